@@ -19,8 +19,8 @@ class BackgroundWorker(Generic[T]):
     def __init__(self, name: str) -> None:
         self._name = name
         self._changed = threading.Condition()
-        self._asked: dict[str, Callable[[], T]] = {}
-        self._doing: str | None = None
+        self._pending: dict[str, Callable[[], T]] = {}
+        self._current_owner: str | None = None
         self._done: dict[str, T] = {}
         self._failed: dict[str, Exception] = {}
         self._thread: threading.Thread | None = None
@@ -29,7 +29,7 @@ class BackgroundWorker(Generic[T]):
     def ask(self, owner: str, work: Callable[[], T]) -> None:
         """Queue a job for the owner, replacing its pending one."""
         with self._changed:
-            self._asked[owner] = work
+            self._pending[owner] = work
             if self._thread is None and not self._closed:
                 self._thread = threading.Thread(target=self._work, name=self._name, daemon=True)
                 start_deep(self._thread)
@@ -50,13 +50,13 @@ class BackgroundWorker(Generic[T]):
         """Wait until the owner has no pending job, at most 2 s; return whether that is so."""
         with self._changed:
             return self._changed.wait_for(
-                lambda: self._closed or (owner not in self._asked and self._doing != owner), END_S
+                lambda: self._closed or (owner not in self._pending and self._current_owner != owner), END_S
             )
 
     def forget(self, owner: str) -> None:
         """Discard the owner's pending job and result."""
         with self._changed:
-            self._asked.pop(owner, None)
+            self._pending.pop(owner, None)
             self._done.pop(owner, None)
             self._failed.pop(owner, None)
 
@@ -64,7 +64,7 @@ class BackgroundWorker(Generic[T]):
         """Stop the thread; waits for the current job, at most 2 s."""
         with self._changed:
             self._closed = True
-            self._asked.clear()
+            self._pending.clear()
             self._changed.notify_all()
         if self._thread is not None:
             self._thread.join(END_S)
@@ -72,13 +72,13 @@ class BackgroundWorker(Generic[T]):
     def _work(self) -> None:
         while True:
             with self._changed:
-                self._doing = None
+                self._current_owner = None
                 self._changed.notify_all()
-                self._changed.wait_for(lambda: self._closed or bool(self._asked))
+                self._changed.wait_for(lambda: self._closed or bool(self._pending))
                 if self._closed:
                     return
-                owner = self._doing = next(iter(self._asked))
-                work = self._asked.pop(owner)
+                owner = self._current_owner = next(iter(self._pending))
+                work = self._pending.pop(owner)
             try:
                 made = work()
             except Exception as error:  # noqa: BLE001  raised in the thread that takes the result

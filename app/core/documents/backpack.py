@@ -28,7 +28,7 @@ MOST = 100
 MOST_BYTES = 4_000_000
 """Maximum file size in bytes."""
 FULL = lazy("the backpack can hold at most {most} stacks; remove something first")
-_APART_S = 0.001
+_MIN_DISTANCE_S = 0.001
 _SPARE = 1_000_000  # tolerance for files of other instances when reading
 
 Json = Mapping[str, object]
@@ -66,8 +66,8 @@ class Backpack:
         self._clock = clock
         self._known = _Found()
         self._stamp: Stamp | None = None
-        self._trouble = ""
-        self._told = ""
+        self._problem = ""
+        self._reported = ""
         make_private(self.path.parent, "backpack*.json")
 
     @property
@@ -77,7 +77,7 @@ class Backpack:
 
     def take_trouble(self) -> str:
         """Return and clear the sentence about a problem of the file, or ""."""
-        trouble, self._trouble = self._trouble, ""
+        trouble, self._problem = self._problem, ""
         return trouble
 
     def look(self) -> None:
@@ -85,15 +85,17 @@ class Backpack:
         if _stamp(self.path) == self._stamp:
             return
         try:
-            self._take(self._read())
+            self._apply(self._read())
         except BackpackError as error:
-            self._tell(str(error))
+            self._report_once(str(error))
 
     def put(self, blocks: Sequence[Json]) -> list[Packed]:
         """Add stacks of blocks, the first on top. Raises BackpackError when it is full."""
         # Newer than all existing stacks, even if the clock was set back.
-        newest = max([self._clock(), *(item.at + len(blocks) * _APART_S for item in self.items[:1])])
-        made = [Packed(uuid4().hex, newest - place * _APART_S, each) for place, each in enumerate(blocks)]
+        newest = max([self._clock(), *(item.at + len(blocks) * _MIN_DISTANCE_S for item in self.items[:1])])
+        made = [
+            Packed(uuid4().hex, newest - place * _MIN_DISTANCE_S, each) for place, each in enumerate(blocks)
+        ]
         self.restore(made)
         return made
 
@@ -125,9 +127,9 @@ class Backpack:
             now = _Found(_sorted(change(found.items)), found.unknown)
             if _ids(now) != _ids(found):
                 self._write(now, grows=len(now.items) > len(found.items))
-            self._take(now)
+            self._apply(now)
 
-    def _take(self, found: _Found) -> None:
+    def _apply(self, found: _Found) -> None:
         if _ids(found) != _ids(self._known):
             self.revision += 1
         self._known = found
@@ -175,7 +177,7 @@ class Backpack:
         except (ValueError, RecursionError):
             return self._set_aside()
         if isinstance(whole, dict) and _is_newer(whole.get("backpack")):
-            return self._beside()
+            return self._use_own_file()
         if not isinstance(whole, dict) or whole.get("backpack") != VERSION:
             return self._set_aside()
         entries = whole.get("items")
@@ -184,7 +186,7 @@ class Backpack:
         made = [(entry, _packed(entry)) for entry in entries]
         unknown = tuple(entry for entry, item in made if item is None)
         if unknown:
-            self._tell(
+            self._report_once(
                 ngettext(
                     "{count} item in the backpack can't be read here; it was saved in '{path}'",
                     "{count} items in the backpack can't be read here; they were saved in '{path}'",
@@ -193,14 +195,14 @@ class Backpack:
             )
         return _Found(_sorted(item for _entry, item in made if item is not None), unknown)
 
-    def _beside(self) -> _Found:
+    def _use_own_file(self) -> _Found:
         # The file of a newer Studio stays unchanged; a file of this version is used beside it.
         newer = self.path
         self.path = newer.with_name(f"backpack.format-{VERSION}.json")
         if self.path == newer:
             return self._set_aside()
         if not self.path.exists():
-            self._tell(
+            self._report_once(
                 _(
                     "the backpack in “{file}” belongs to a newer NEP Studio and is unchanged; blocks you add "
                     "here are saved separately"
@@ -223,17 +225,18 @@ class Backpack:
                     path=self.path, reason=_("it is damaged")
                 )
             ) from error
-        self._tell(
-            _("the backpack is damaged, so a new one was created; the old one is in '{path}'").format(
-                path=place
-            )
+        self._report_once(
+            _(
+                "the backpack could not be read (it is damaged) and begins empty; the old one is kept in"
+                " '{path}'"
+            ).format(path=place)
         )
         return _Found()
 
-    def _tell(self, sentence: str) -> None:
+    def _report_once(self, sentence: str) -> None:
         # Once: a persistent problem is not repeated at each read.
-        if sentence != self._told:
-            self._trouble = self._told = sentence
+        if sentence != self._reported:
+            self._problem = self._reported = sentence
 
 
 def _is_newer(version: object) -> bool:

@@ -52,11 +52,13 @@ def _blocks(workspace: Workspace) -> Iterator[tuple[str, object]]:
     # Blocks that the user placed, with their content.
     for block in parse_workspace(workspace).all_blocks():
         if not block.shadow:
-            yield block.id, _said(block)
+            yield block.id, _content(block)
 
 
-def _said(block: Placed) -> object:
-    inside = {name: [_said(inner) for inner in held if inner.shadow] for name, held in block.inputs.items()}
+def _content(block: Placed) -> object:
+    inside = {
+        name: [_content(inner) for inner in held if inner.shadow] for name, held in block.inputs.items()
+    }
     return (
         block.type,
         dict(block.fields),

@@ -86,7 +86,7 @@ class Document:
         self._topics: tuple[str, ...] = ()
         self._compiled: tuple[Key, Program] | None = None
         self._compile_s: float | None = None
-        self._asked: Key | None = None
+        self._compiling_key: Key | None = None
         self.compiler: BackgroundWorker[Compiled] | None = None
         self.journal_writer: BackgroundWorker[bool] | None = None
         self._definitions: tuple[int, Mapping[str, object]] | None = None
@@ -116,7 +116,7 @@ class Document:
         self._json = told
         self.dirty = True
         self.edits += 1
-        self._keep_used_robots()
+        self._store_used_robots()
         self._write_journal()
 
     def new(self, name: str = "") -> None:
@@ -189,7 +189,7 @@ class Document:
         elif self.path is not None and wanted != self.name:
             self.dirty = True  # in Studio's own folder the name is in the file
         self.name = wanted
-        self._compiled = self._asked = None  # a program contains the name
+        self._compiled = self._compiling_key = None  # a program contains the name
         if self.dirty:
             self._write_journal()
 
@@ -248,7 +248,7 @@ class Document:
         None while it is, or is being written.
         """
         if self.journal_writer is not None:
-            self._written(partial(self.journal_writer.take, self._journal.name))
+            self._apply_journal_result(partial(self.journal_writer.take, self._journal.name))
         return self._journal_error
 
     @property
@@ -280,7 +280,7 @@ class Document:
         if tuple(robots) != self._connected:
             self._connected = tuple(robots)
             self.definitions_revision += 1
-            self._keep_used_robots()
+            self._store_used_robots()
 
     def set_topics(self, topics: Sequence[str]) -> None:
         """Set the topics that the editor offers."""
@@ -324,17 +324,17 @@ class Document:
         done = self.compiler.take(self.key)
         if done is not None:
             self._compiled, self._compile_s = (done.key, done.program), done.seconds
-        if self._asked != key:
-            if self._is_quick():
+        if self._compiling_key != key:
+            if self._is_quick_to_compile():
                 return self.program()
-            self._asked = key
+            self._compiling_key = key
             self.compiler.ask(self.key, partial(_compiled, key, self._compiling(), self._timer))
         return self._compiled[1] if self._compiled is not None else None
 
-    def _is_quick(self) -> bool:
+    def _is_quick_to_compile(self) -> bool:
         if self._compile_s is not None:
             return self._compile_s < QUICK_S
-        return self._asked is None and not self._json.is_longer_than(LONG_CHARACTERS)
+        return self._compiling_key is None and not self._json.is_longer_than(LONG_CHARACTERS)
 
     def _key(self) -> Key:
         return self.revision, self.edits, self.definitions_revision
@@ -362,7 +362,7 @@ class Document:
         self.name = name_of(path, found.name) if path is not None else found.name
         self.path, self.workspace = path, found.workspace
         self.robots, self.others = dict(found.robots), found.others
-        self._compile_s = self._asked = None
+        self._compile_s = self._compiling_key = None
         self.dirty = False
         self.saved_at = self._stamp = None
         self.revision += 1
@@ -370,13 +370,13 @@ class Document:
 
     def _write_journal(self) -> None:
         name, path, robots = self.name, self.path, dict(self.robots)
-        work = partial(_keep, self._journal, name, path, self._json, robots, self.others)
+        work = partial(_write_entry, self._journal, name, path, self._json, robots, self.others)
         if self.journal_writer is not None:
             self.journal_writer.ask(self._journal.name, work)
         else:
-            self._written(work)
+            self._apply_journal_result(work)
 
-    def _written(self, written: Callable[[], bool | None]) -> None:
+    def _apply_journal_result(self, written: Callable[[], bool | None]) -> None:
         # Applies the result of writing the journal; None means not finished.
         try:
             ended = written()
@@ -399,7 +399,7 @@ class Document:
         self._journal.discard()
         self._journal_error = None
 
-    def _keep_used_robots(self) -> None:
+    def _store_used_robots(self) -> None:
         # Stores the descriptions of the used robots, so that the behaviour is complete without them later.
         try:
             text = self._json.text
@@ -418,7 +418,7 @@ class Document:
         return [robot for _description, robot in self._read.values() if robot is not None]
 
 
-def _keep(
+def _write_entry(
     journal: Journal,
     name: str,
     path: Path | None,

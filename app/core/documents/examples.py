@@ -29,7 +29,7 @@ Say = Callable[[str, str], str]
 """Translates an English text in a context."""
 
 
-def translated(example: BehaviourFile, say: Say = translate) -> BehaviourFile:
+def translated(example: BehaviourFile, translate_text: Say = translate) -> BehaviourFile:
     """Return an example of Studio translated; never use it for the user's own file.
 
     Equal English texts get equal translations, so that comparisons still work.
@@ -39,18 +39,18 @@ def translated(example: BehaviourFile, say: Say = translate) -> BehaviourFile:
     def label(english: str) -> str:
         # English where two names would be equal.
         if english not in names:
-            told = say(LABEL, english)
+            told = translate_text(LABEL, english)
             is_taken = told.casefold() in map(str.casefold, names.values())
             names[english] = english if is_taken else told
         return names[english]
 
-    workspace = _translated(example.workspace, say, label)
+    workspace = _translated(example.workspace, translate_text, label)
     others = dict(example.others)
     if isinstance(about := others.get("description"), str):
-        others["description"] = say(ABOUT, about)
+        others["description"] = translate_text(ABOUT, about)
     return replace(
         example,
-        name=say(NAME, example.name),
+        name=translate_text(NAME, example.name),
         workspace=workspace if isinstance(workspace, Mapping) else example.workspace,
         others=others,
     )

@@ -32,7 +32,7 @@ class Documents:
         # a separate worker, so that unsaved work never waits for a long compilation
         self._journal_writer: BackgroundWorker[bool] = BackgroundWorker("studio-journal")
         self.revision = 0
-        self.current = self._made()
+        self.current = self._new_document()
         self._open = [self.current]
 
     def __iter__(self) -> Iterator[Document]:
@@ -53,31 +53,31 @@ class Documents:
         """Start an empty behaviour in a new tab, or in an unchanged one."""
         if self.current.blank:
             return self.current
-        made = self._made()
+        made = self._new_document()
         made.new(self._free_name(_(UNNAMED)))
-        return self._put(made)
+        return self._insert(made)
 
     def open(self, path: Path) -> Document:
         """Open a file in a tab, or show its tab. On DocumentError nothing changes."""
         there = self.with_path(path)
         if there is not None:
-            return self._shown(there)
-        return self._filled(lambda document: document.open(path))
+            return self._make_current(there)
+        return self._open_with(lambda document: document.open(path))
 
     def example(self, path: Path) -> Document:
         """Open an example as a new behaviour in a tab. Raises DocumentError."""
-        return self._named_apart(self._filled(lambda document: document.example(path)))
+        return self._with_unique_name(self._open_with(lambda document: document.example(path)))
 
     def copy(self, path: Path, name: str) -> Document:
         """Open a file as a new behaviour with another name in a tab. Raises DocumentError."""
-        return self._named_apart(self._filled(lambda document: document.copy(path, name)))
+        return self._with_unique_name(self._open_with(lambda document: document.copy(path, name)))
 
     def duplicate(self, document: Document) -> Document:
         """Open a copy of a behaviour in the next tab."""
         self.show(document)
-        made = self._made()
+        made = self._new_document()
         made.duplicate(document, self._free_name(_("{name} copy").format(name=document.name)))
-        return self._put(made)
+        return self._insert(made)
 
     def rename(self, document: Document, name: str) -> None:
         """Rename a behaviour and its file. On DocumentError nothing changes."""
@@ -90,9 +90,9 @@ class Documents:
         """Restore unsaved work: into the tab of its file, else into a new tab."""
         there = self.with_path(unsaved.path) if unsaved.path is not None else None
         if there is None or there.dirty:
-            return self._filled(lambda document: document.recover(unsaved))
+            return self._open_with(lambda document: document.recover(unsaved))
         there.recover(unsaved)
-        return self._shown(there)
+        return self._make_current(there)
 
     def with_path(self, path: Path) -> Document | None:
         """Return the open behaviour of a file, or None."""
@@ -113,7 +113,7 @@ class Documents:
     def show(self, document: Document) -> None:
         """Make an open behaviour the current one."""
         if document in self._open and document is not self.current:
-            self._shown(document)
+            self._make_current(document)
 
     def neighbour(self, step: int) -> Document:
         """Return the behaviour ``step`` tabs further, cyclically."""
@@ -141,7 +141,7 @@ class Documents:
         self._compiler.forget(document.key)
         self._open.remove(document)
         if not self._open:
-            self._open.append(self._made())
+            self._open.append(self._new_document())
         if document is self.current:
             self.current = self._open[min(place, len(self._open) - 1)]
         self.revision += 1
@@ -234,7 +234,7 @@ class Documents:
             if not isinstance(tab, Mapping):
                 continue
             found = unsaved.get(str(tab.get("journal")))
-            document = self._come_back(tab.get("path"), found)
+            document = self._restore_tab(tab.get("path"), found)
             if document is not None:
                 opened[number] = document
             if found is not None:
@@ -264,7 +264,7 @@ class Documents:
             self.current = found[current]
         self.revision += 1
 
-    def _come_back(self, path: object, unsaved: Unsaved | None) -> Document | None:
+    def _restore_tab(self, path: object, unsaved: Unsaved | None) -> Document | None:
         if unsaved is not None:
             return self.recover(unsaved)
         if not isinstance(path, str) or not Path(path).is_file():
@@ -276,31 +276,31 @@ class Documents:
 
     # -- private -----------------------------------------------------------------------------------------
 
-    def _made(self) -> Document:
+    def _new_document(self) -> Document:
         made = self._make()
         made.compiler, made.journal_writer = self._compiler, self._journal_writer
         made.set_connected(self._robots)
         made.set_topics(self._topics)
         return made
 
-    def _filled(self, fill: Callable[[Document], None]) -> Document:
+    def _open_with(self, fill: Callable[[Document], None]) -> Document:
         if self.current.blank:
             fill(self.current)
-            return self._shown(self.current)
-        made = self._made()
+            return self._make_current(self.current)
+        made = self._new_document()
         fill(made)
-        return self._put(made)
+        return self._insert(made)
 
-    def _put(self, made: Document) -> Document:
+    def _insert(self, made: Document) -> Document:
         self._open.insert(self._open.index(self.current) + 1, made)
-        return self._shown(made)
+        return self._make_current(made)
 
-    def _shown(self, document: Document) -> Document:
+    def _make_current(self, document: Document) -> Document:
         self.current = document
         self.revision += 1
         return document
 
-    def _named_apart(self, document: Document) -> Document:
+    def _with_unique_name(self, document: Document) -> Document:
         # A behaviour without a file gets a unique name.
         document.name = self._free_name(document.name, besides=document)
         return document

@@ -21,7 +21,7 @@ class KeptTabs:
         self._settings, self._documents, self._complain = settings, documents, complain
         self.active = False
         """True if this window's tabs are saved; those of a second window are not."""
-        self._last: dict[str, object] = {}
+        self._last_session: dict[str, object] = {}
         self._kept_revision = -1
 
     def come_back(self, left: Sequence[Unsaved]) -> list[Unsaved]:
@@ -31,7 +31,7 @@ class KeptTabs:
         """
         self.active = True
         kept: dict[str, object] = self._settings.get(KEY, {})
-        self._last = kept
+        self._last_session = kept
         taken = self._documents.put_back(kept, left, ended_well=kept.get("ended_well") is True)
         self.keep()
         return [each for each in left if each.journal not in taken]
@@ -40,7 +40,7 @@ class KeptTabs:
         """Restore unsaved work into its tabs, and show the last current one."""
         newest_last = sorted(left, key=lambda each: each.edited_s)
         recovered = {each.journal.name: self._documents.recover(each) for each in newest_last}
-        self._documents.arrange(self._last, recovered)
+        self._documents.arrange(self._last_session, recovered)
         self.keep()
 
     def edited(self, document: Document, *, was_blank: bool) -> None:

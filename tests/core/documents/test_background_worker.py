@@ -34,7 +34,7 @@ def test_only_the_newest_waits(beside) -> None:
         return "slow"
 
     beside.ask("a", slow)
-    until(lambda: not beside._asked)
+    until(lambda: not beside._pending)
     for number in range(5):
         beside.ask("b", lambda number=number: did.append(number) or str(number))
     go.set()
@@ -74,7 +74,7 @@ def test_nothing_asked_makes_no_thread() -> None:
 def test_finishing_waits_for_what_is_asked_and_what_is_done_just_now(beside, monkeypatch) -> None:
     go, did = threading.Event(), []
     beside.ask("a", lambda: (go.wait(60) and did.append("first")) or "first")
-    until(lambda: beside._doing == "a")
+    until(lambda: beside._current_owner == "a")
     beside.ask("a", lambda: did.append("second") or "second")
     assert beside.finish("b"), "nothing of another is waited for"
     monkeypatch.setattr("app.core.documents.background_worker.END_S", 0.01)
