@@ -241,7 +241,7 @@ class Images:
             picture = stream.picture
             if picture is None or picture.whole or picture.message is None or stream.waiting is not None:
                 return
-            if _too_small(picture, size):
+            if _is_too_small(picture, size):
                 stream.waiting = (picture.message, picture.received_s)
                 self._arrived.notify()
 
@@ -304,7 +304,7 @@ class Images:
                 )
             with self.lock:
                 for stream in streams if times == self._times else ():
-                    _give(stream, message, picture, error)
+                    _deliver(stream, message, picture, error)
 
     def _any_waiting(self) -> bool:
         every = (stream for streams in self._streams.values() for stream in streams)
@@ -328,7 +328,7 @@ class Images:
         return work
 
 
-def _give(stream: ImageStream, message: Message, picture: Picture | None, error: str | None) -> None:
+def _deliver(stream: ImageStream, message: Message, picture: Picture | None, error: str | None) -> None:
     before = stream.picture
     if stream.resting:
         return  # it can't be seen; the next one after `wake` is shown
@@ -351,6 +351,6 @@ def _largest(streams: Sequence[ImageStream]) -> Size | None:
     return max(wish[0] for wish in known), max(wish[1] for wish in known)
 
 
-def _too_small(picture: Picture, size: Size | None) -> bool:
+def _is_too_small(picture: Picture, size: Size | None) -> bool:
     rows, columns = picture.bgra.shape[:2]
     return size is None or columns < size[0] or rows < size[1]

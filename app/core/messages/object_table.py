@@ -22,9 +22,9 @@ MOST_COLUMNS = 40
 LOOKED_AT = 50
 """Number of rows from which the columns are taken."""
 MOST_LISTS = 20
-_SEARCHED = 2000
+_MAX_SEARCHED_VALUES = 2000
 """Maximum number of values of a message that are searched for arrays of objects."""
-_FEW = 8
+_MAX_FLATTENED_KEYS = 8
 """Maximum number of keys of an object that gets a column for each of its keys."""
 MISSING = object()
 
@@ -64,14 +64,14 @@ def lists_of_objects(value: object, most: int = MOST_LISTS) -> list[Steps]:
     """Return the paths to arrays of objects in a message, upper levels first; ``()`` is the message."""
     found: list[Steps] = []
     waiting: deque[tuple[Steps, object]] = deque([((), value)])
-    for _each in range(_SEARCHED):
+    for _each in range(_MAX_SEARCHED_VALUES):
         if not waiting or len(found) >= most:
             break
         steps, here = waiting.popleft()
         if is_list_of_objects(here):
             found.append(steps)
         elif isinstance(here, Mapping):
-            room = max(0, _SEARCHED - len(waiting))
+            room = max(0, _MAX_SEARCHED_VALUES - len(waiting))
             waiting.extend(((*steps, str(key)), below) for key, below in islice(here.items(), room))
     return found
 
@@ -119,7 +119,7 @@ def columns_of(rows: Sequence[ObjectRow], most: int = MOST_COLUMNS) -> tuple[Ste
     columns: dict[Steps, None] = {}
     for row in rows[:LOOKED_AT]:
         for key, value in row.value.items():
-            if isinstance(value, Mapping) and 0 < len(value) <= _FEW:
+            if isinstance(value, Mapping) and 0 < len(value) <= _MAX_FLATTENED_KEYS:
                 columns.update(dict.fromkeys((key, below) for below in value))  # type: ignore[misc]
             else:
                 columns[(key,)] = None  # type: ignore[index]

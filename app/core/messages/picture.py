@@ -82,7 +82,7 @@ def decode(
         return None, str(error)
     except (cv2.error, MemoryError) as error:
         return None, _("“{topic}” sends a picture that can't be shown: {problem}").format(
-            topic=message.topic, problem=_short(error)
+            topic=message.topic, problem=_short_message(error)
         )
     if found is None:
         return None, _("“{topic}” has pictures of {shape} {dtype}; they can't be shown").format(
@@ -121,7 +121,7 @@ def _same_bytes(one: memoryview, other: memoryview) -> bool:
     return bytes(one[::step]) == bytes(other[::step]) and bytes(one) == bytes(other)
 
 
-def _short(error: BaseException) -> str:
+def _short_message(error: BaseException) -> str:
     # Last part of OpenCV's long message.
     return (
         str(error).strip().splitlines()[-1].rpartition("error: ")[2][:200]
@@ -160,7 +160,7 @@ def _frame(message: Message, fit: Size | None) -> tuple[NDArray[Any], Size]:
     if layout is not None:
         frame = image_codec.raw_array(message.data, layout, message.extension.get("shape"))
         size = (frame.shape[1], frame.shape[0])
-        frame = _smaller(frame, _factor(size, fit))
+        frame = _reduced(frame, _factor(size, fit))
         if layout.is_red_first:
             frame = frame[:, :, [2, 1, 0, 3][: layout.channels]]
         return frame, size
@@ -169,10 +169,10 @@ def _frame(message: Message, fit: Size | None) -> tuple[NDArray[Any], Size]:
     factor = _factor(size, fit)
     if file.kind == "jpeg":
         return image_codec.read_file(file, factor), size
-    return _smaller(image_codec.read_file(file), factor), size
+    return _reduced(image_codec.read_file(file), factor), size
 
 
-def _smaller(frame: NDArray[Any], factor: int) -> NDArray[Any]:
+def _reduced(frame: NDArray[Any], factor: int) -> NDArray[Any]:
     import cv2  # noqa: PLC0415
 
     if factor == 1:

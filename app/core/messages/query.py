@@ -85,8 +85,10 @@ class JsonQuery:
                     cut = _("Only the first {count} are shown.").format(count=most_found)
                     break
                 found[FoundPath.of(tuple(match.parts))] = _plain(match.obj)
-        except _TooMany:
-            cut = _("Search stopped after {count} values; these were found so far.").format(count=most_steps)
+        except _LimitReached:
+            cut = _("Search stopped after {count} values; these were found so far.").format(
+                count=most_steps
+            )
         except RecursionError:
             cut = _("The message is nested too deeply for a query.")
         except jsonpath.JSONPathError as error:
@@ -111,7 +113,7 @@ def _sentence(error: jsonpath.JSONPathError, text: str) -> str:
     return said.format(rest=escaped(shortened(rest, 20)), reason=reason)
 
 
-class _TooMany(Exception):  # noqa: N818  not an error: it ends the search
+class _LimitReached(Exception):  # noqa: N818  not an error: it ends the search
     """The limit of visited values is reached."""
 
 
@@ -124,7 +126,7 @@ class _Steps:
     def take(self, steps: int = 1) -> None:
         self._left -= steps
         if self._left < 0:
-            raise _TooMany
+            raise _LimitReached
 
 
 def _counted(value: object, count: _Steps) -> object:

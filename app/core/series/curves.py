@@ -88,7 +88,7 @@ class Curves:
 
     def __init__(self, feed: SeriesFeed, topics: Callable[[], Iterable[str]]) -> None:
         # `topics` returns the names of existing topics.
-        self._feed, self._names = feed, topics
+        self._feed, self._existing_topics = feed, topics
         self._topics: dict[str, TopicSeries] = {}
         self._shared: dict[str, _Shared] = {}  # in order of dependency
         self.all: list[Curve] = []
@@ -126,18 +126,18 @@ class Curves:
             raise CurveError(_("a plot has at most {count} curves").format(count=MOST_CURVES))
         made = []
         for source in new:
-            shared = self._enter(source)
+            shared = self._acquire(source)
             made.append(Curve(str(source), source, shared.samples, shared.of))
         self.all += made
-        self._share_room()
+        self._distribute_capacity()
         return made
 
     def remove(self, curve: Curve) -> None:
         """Remove a curve; its topic's watch ends when no other curve needs it."""
         if curve in self.all:
             self.all.remove(curve)
-            self._leave(curve.text)
-            self._share_room()
+            self._release(curve.text)
+            self._distribute_capacity()
 
     def close(self) -> None:
         """Remove all curves."""
@@ -220,9 +220,9 @@ class Curves:
     # ------------------------------------------------------------------------------------------------
 
     def _known_topics(self) -> list[str]:
-        return list(dict.fromkeys([*self._topics, *self._names()]))
+        return list(dict.fromkeys([*self._topics, *self._existing_topics()]))
 
-    def _enter(self, source: Source) -> _Shared:
+    def _acquire(self, source: Source) -> _Shared:
         # Creates it at the first use; counts the users.
         name = str(source)
         shared = self._shared.get(name)
@@ -236,11 +236,11 @@ class Curves:
         if isinstance(source, FieldSource):
             return self._make_field(source)
         if isinstance(source, WindowSource):
-            of = self._enter(source.of)
+            of = self._acquire(source.of)
             calculated: Calculated = WindowCurve(source.kind, of.samples, source.window_s)
             return _Shared(calculated.samples, needs=[str(source.of)], calculated=calculated)
         assert isinstance(source, ExpressionSource)  # noqa: S101  the only other type
-        inputs = [self._enter(each).samples for each in source.inputs]
+        inputs = [self._acquire(each).samples for each in source.inputs]
         calculated = ExpressionCurve(source.calculate, inputs)
         return _Shared(calculated.samples, needs=[str(each) for each in source.inputs], calculated=calculated)
 
@@ -253,14 +253,14 @@ class Curves:
         topic.join(made)
         return _Shared(made.numbers, of=made)
 
-    def _leave(self, name: str) -> None:
+    def _release(self, name: str) -> None:
         shared = self._shared[name]
         shared.users -= 1
         if shared.users > 0:
             return
         del self._shared[name]
         for each in shared.needs:
-            self._leave(each)
+            self._release(each)
         if shared.of is not None:
             topic = self._topics[shared.of.topic]
             topic.fields.remove(shared.of)
@@ -268,7 +268,7 @@ class Curves:
                 del self._topics[topic.topic]
                 self._feed.leave(topic.topic, topic)
 
-    def _share_room(self) -> None:
+    def _distribute_capacity(self) -> None:
         each = max(LEAST_SAMPLES, min(MOST_SAMPLES, MOST_SAMPLES_TOGETHER // max(1, len(self._shared))))
         for shared in self._shared.values():
             shared.samples.limit = each

@@ -134,7 +134,7 @@ class TopicSeries:
         gaps: list[bool] = []
         pending = self._gap or batch.dropped > 0
         for message in batch.messages:
-            jump, publisher = self._missed(message), message.publisher
+            jump, publisher = self._missing_before(message), message.publisher
             if publisher not in seen:
                 seen.add(publisher)
                 first_jumps += jump
@@ -166,7 +166,7 @@ class TopicSeries:
         for field in self.fields:
             field.rewind()
 
-    def _missed(self, message: Message) -> int:
+    def _missing_before(self, message: Message) -> int:
         # Number of messages of its publisher missing immediately before this one.
         seq, publisher = message.seq, message.publisher
         if seq is None:

@@ -113,7 +113,7 @@ def parse(text: str, topics: Sequence[str]) -> Source:
     if not text or len(text) > LONGEST:
         raise CurveError(_("enter a field, such as /odom.speed, or a formula with fields"))
     found = address(text, topics)
-    return found if found is not None else _Reader(text, topics).read()
+    return found if found is not None else _Parser(text, topics).read()
 
 
 def _topic_at(text: str, topics: Sequence[str]) -> str | None:
@@ -126,7 +126,7 @@ def _ends(text: str, place: int) -> bool:
     return place == len(text) or not (text[place].isalnum() or text[place] in "_/")
 
 
-class _Reader:
+class _Parser:
     """Parser of one expression."""
 
     def __init__(self, text: str, topics: Sequence[str]) -> None:
@@ -194,7 +194,7 @@ class _Reader:
             return self._windowed(node, node.func.id)
         inputs: list[Source] = []
         calculate = self._calculation(node, inputs)
-        return ExpressionSource(self._words(node), tuple(inputs), calculate) if inputs else None
+        return ExpressionSource(self._as_typed(node), tuple(inputs), calculate) if inputs else None
 
     def _windowed(self, node: ast.Call, kind: str) -> WindowSource:
         wanted = 2 if kind == "mean" else 1
@@ -233,7 +233,7 @@ class _Reader:
             return self._call(node, node.func.id, inputs)
         if isinstance(node, (ast.Name, ast.Call)):
             return self._input(node, inputs)
-        raise CurveError(_("'{text}' can't be calculated").format(text=self._words(node)[:80]))
+        raise CurveError(_("'{text}' can't be calculated").format(text=self._as_typed(node)[:80]))
 
     def _call(self, node: ast.Call, name: str, inputs: list[Source]) -> Calculation:
         wanted, function = FUNCTIONS[name]
@@ -245,7 +245,7 @@ class _Reader:
     def _input(self, node: ast.Name | ast.Call, inputs: list[Source]) -> Calculation:
         # A field, or a function that needs more than the samples of one time.
         called = node.func if isinstance(node, ast.Call) else node
-        name = called.id if isinstance(called, ast.Name) else self._words(called)
+        name = called.id if isinstance(called, ast.Name) else self._as_typed(called)
         is_field = isinstance(node, ast.Name) and re.fullmatch(r"_\d+", name)
         if not is_field and not (isinstance(node, ast.Call) and name in WINDOWED):
             near = nearest(name, [*FUNCTIONS, *WINDOWED])
@@ -263,7 +263,7 @@ class _Reader:
         place = inputs.index(source)
         return lambda arrays: arrays[place]
 
-    def _words(self, node: ast.expr) -> str:
+    def _as_typed(self, node: ast.expr) -> str:
         written = ast.unparse(node).replace("**", "^")
         return re.sub(r"\b_(\d+)\b", lambda found: str(self._fields[int(found[1])]), written)
 

@@ -142,10 +142,10 @@ class Samples:
         self._times, self._values = np.empty(_FIRST_ROOM), np.empty(_FIRST_ROOM)
         self._gaps = np.zeros(_FIRST_ROOM, dtype=bool)
         self._levels = tuple(_Level(shift) for shift in SHIFTS)
-        self._drawn = _Drawn()
+        self._render_cache = _Drawn()
         self._rewrites: deque[tuple[int, float]] = deque(maxlen=_REWRITES_KEPT)
         self.rewritten = 0
-        self._gap_wanted = False
+        self._gap_pending = False
 
     def __len__(self) -> int:
         return self._count
@@ -186,7 +186,7 @@ class Samples:
 
     def break_line(self) -> None:
         """Mark a gap before the next sample."""
-        self._gap_wanted = self._count > 0
+        self._gap_pending = self._count > 0
 
     def extend(self, times: Floats, values: Floats, gaps: NDArray[np.bool_]) -> None:
         """Append samples in order of arrival; non-finite ones become gaps."""
@@ -194,7 +194,7 @@ class Samples:
         if not good.all():
             gaps = _gaps_carried(gaps, good)
             if not good.any():
-                self._gap_wanted = self._gap_wanted or self._count > 0
+                self._gap_pending = self._gap_pending or self._count > 0
                 return
             trailing = not good[-1]
             times, values, gaps = times[good], values[good], gaps[good]
@@ -207,24 +207,24 @@ class Samples:
             self._append(times, values, gaps)
         else:
             for time_s, value, gap in zip(times.tolist(), values.tolist(), gaps.tolist(), strict=True):
-                self._put(time_s, value, gap=gap)
+                self._add_one(time_s, value, gap=gap)
         if trailing:
             self.break_line()
-        self._forget_old()
+        self._evict_old()
 
     def add(self, time_s: float, value: float, *, gap: bool = False) -> None:
         """Append one sample."""
         self.extend(np.array([time_s]), np.array([value]), np.array([gap]))
 
     def _append(self, times: Floats, values: Floats, gaps: NDArray[np.bool_]) -> None:
-        self._make_room(len(times))
+        self._reserve(len(times))
         new = slice(self._count, self._count + len(times))
         self._times[new], self._values[new], self._gaps[new] = times, values, gaps
-        self._gaps[self._count] = self._count > 0 and (bool(gaps[0]) or self._gap_wanted)
-        self._gap_wanted = False
+        self._gaps[self._count] = self._count > 0 and (bool(gaps[0]) or self._gap_pending)
+        self._gap_pending = False
         self._count += len(times)
 
-    def _put(self, time_s: float, value: float, *, gap: bool) -> None:
+    def _add_one(self, time_s: float, value: float, *, gap: bool) -> None:
         last = self.last_s
         one = np.array([time_s]), np.array([value]), np.array([gap])
         if last is None or time_s >= last:
@@ -238,7 +238,7 @@ class Samples:
 
     def _insert(self, time_s: float, value: float) -> None:
         place = int(np.searchsorted(self.times, time_s, side="right"))
-        self._make_room(1)
+        self._reserve(1)
         for each in (self._times, self._values, self._gaps):
             each[place + 1 : self._count + 1] = each[place : self._count].copy()
         self._times[place], self._values[place] = time_s, value
@@ -254,7 +254,7 @@ class Samples:
             self.undone += self._count - place
             self._count = place
             self._rewrite(place, time_s)
-        self._gap_wanted = self._gap_wanted and self._count > 0
+        self._gap_pending = self._gap_pending and self._count > 0
 
     def clear(self) -> None:
         """Remove all samples."""
@@ -275,7 +275,7 @@ class Samples:
             return -np.inf
         return min(time_s for number, time_s in self._rewrites if number > seen)
 
-    def _make_room(self, more: int) -> None:
+    def _reserve(self, more: int) -> None:
         need = self._count + more
         if need > len(self._times):
             room = max(need, 2 * len(self._times))
@@ -285,13 +285,13 @@ class Samples:
                 new[: self._count] = old[: self._count]
                 setattr(self, name, new)
 
-    def _give_room_back(self) -> None:
+    def _shrink_arrays(self) -> None:
         # After the limit became much smaller, because more curves share the plot's capacity.
         if len(self._times) > 4 * max(self.limit, self._count, _FIRST_ROOM):
             for name in ("_times", "_values", "_gaps"):
                 setattr(self, name, getattr(self, name)[: self._count].copy())
 
-    def _forget_old(self) -> None:
+    def _evict_old(self) -> None:
         if self._count <= self.limit:
             return
         oldest = self._count - self.limit * 3 // 4
@@ -306,7 +306,7 @@ class Samples:
         for level in self._levels:
             level.forget(drop >> level.shift)
         self._count, self.begun = kept, self.begun + drop
-        self._give_room_back()
+        self._shrink_arrays()
 
     # -- queries
     # ------------------------------------------------------------------------------------------------
@@ -355,10 +355,10 @@ class Samples:
         columns = max(1, columns)
         if end - first <= RAW_PER_COLUMN * columns or end_s <= begin_s:
             pixel_s = max(0.0, end_s - begin_s) / columns
-            return Line(*self._whole(first, end, pixel_s), points, is_whole=True)
+            return Line(*self._all_samples(first, end, pixel_s), points, is_whole=True)
         return self._peaks(begin_s, end_s, columns, (first, end))
 
-    def _whole(self, first: int, end: int, pixel_s: float) -> tuple[Floats, Floats]:
+    def _all_samples(self, first: int, end: int, pixel_s: float) -> tuple[Floats, Floats]:
         # NaN at gaps; a sample between two gaps is drawn one pixel wide.
         times, values, gaps = self._times[first:end], self._values[first:end], self._gaps[first:end]
         begins, ends = gaps.copy(), np.append(gaps[1:], end == self._count or self._gaps[end])
@@ -380,7 +380,7 @@ class Samples:
             width = float(np.float32(width))
         begin = float(np.floor(begin_s / width))
         first, end = begin - 1, begin + columns + 1  # one more pixel, so that the line reaches the edge
-        known = self._known(width).part(first, end - 1)
+        known = self._valid_pixels(width).part(first, end - 1)
         if len(known.keys) and known.keys[0] == first:
             pixels = _Pixels.joined((known, self._pixels(width, (known.end, end), None, part[1])))
         else:
@@ -390,7 +390,7 @@ class Samples:
             first += alone
         sure = float(np.floor(self._times[self._count - 1] / width)) - 1  # later pixels may get more samples
         kept = pixels.part(first, max(first, min(sure, end - 1)))
-        self._drawn = _Drawn(width, self.rewritten, self.begun, kept)
+        self._render_cache = _Drawn(width, self.rewritten, self.begun, kept)
         times, values = pixels.times, pixels.values
         broken = 2 * np.flatnonzero(pixels.broken)
         broken = broken[broken > 0]
@@ -398,9 +398,9 @@ class Samples:
             times, values = np.insert(times, broken, times[broken]), np.insert(values, broken, np.nan)
         return Line(times, values, part[1] - part[0], is_whole=False)
 
-    def _known(self, width_s: float) -> _Pixels:
+    def _valid_pixels(self, width_s: float) -> _Pixels:
         # The part of the last rendering that is still valid.
-        drawn = self._drawn
+        drawn = self._render_cache
         if drawn.width_s != width_s:
             return _Pixels()
         pixels = drawn.pixels
