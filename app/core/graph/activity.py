@@ -56,20 +56,20 @@ class CallRates:
     """Call rates of services over a minute. Not thread-safe: use it from the window's thread."""
 
     def __init__(self) -> None:
-        self._looks: deque[tuple[float, Mapping[str, int]]] = deque(maxlen=LOOKS)
+        self._samples: deque[tuple[float, Mapping[str, int]]] = deque(maxlen=LOOKS)
 
     def update(self, facts: GraphFacts, now: float) -> None:
         """Apply call counts; ignored within a second of the last ones."""
-        if not self._looks or now - self._looks[-1][0] >= 1.0:
-            self._looks.append((now, {name: info.calls for name, info in facts.services.items()}))
+        if not self._samples or now - self._samples[-1][0] >= 1.0:
+            self._samples.append((now, {name: info.calls for name, info in facts.services.items()}))
 
     def rates_hz(self) -> dict[str, float]:
         """Return calls per second by service; services with fewer than two samples are omitted."""
-        if len(self._looks) < 2:
+        if len(self._samples) < 2:
             return {}
-        last_at, last = self._looks[-1]
+        last_at, last = self._samples[-1]
         first: dict[str, tuple[float, int]] = {}
-        for at, counts in self._looks:
+        for at, counts in self._samples:
             if last_at - at <= CALLS_OVER_S:
                 for name in counts.keys() - first.keys():
                     first[name] = at, counts[name]

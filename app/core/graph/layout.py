@@ -94,17 +94,17 @@ def arrange(
     hundreds of nodes, so that `LayoutThread` calls it.
     """
     sizes = sizes if sizes is not None else LayoutSizes()
-    ways, left_out = _ways(graph)
+    ways, left_out = _routes_to_draw(graph)
     known = {} if before is None else {**before.kept, **before.places}
     here = {node.key for node in graph.nodes}
     stay = len(here & known.keys())
     is_plain = False
     if not stay or stay < len(here) - stay:
-        places, is_plain = _placed(graph, ways, sizes)
+        places, is_plain = _place_all(graph, ways, sizes)
         known = {}
     else:
-        places = _grown(graph, {key: known[key] for key in here & known.keys()}, sizes)
-    routes = {} if is_plain else _routed(places, ways, sizes)
+        places = _place_new(graph, {key: known[key] for key in here & known.keys()}, sizes)
+    routes = {} if is_plain else _route_lines(places, ways, sizes)
     kept = {key: place for key, place in known.items() if key not in here}
     for key in [*kept][: max(0, len(kept) - MOST_PLACES)]:
         del kept[key]
@@ -116,7 +116,7 @@ def arrange(
 def arrange_plainly(graph: NodeGraph, sizes: LayoutSizes) -> GraphLayout:
     """Lay everything out in rows without the library, when that failed or took too long."""
     places = _in_rows(graph, sizes)
-    ways, left_out = _ways(graph)
+    ways, left_out = _routes_to_draw(graph)
     return GraphLayout(
         places,
         _group_boxes(graph, places, sizes),
@@ -127,7 +127,7 @@ def arrange_plainly(graph: NodeGraph, sizes: LayoutSizes) -> GraphLayout:
     )
 
 
-def _ways(graph: NodeGraph) -> tuple[list[RouteKey], int]:
+def _routes_to_draw(graph: NodeGraph) -> tuple[list[RouteKey], int]:
     # Routes of lines with few ends first; and the number of omitted ones.
     found: list[RouteKey] = []
     left_out = 0
@@ -147,7 +147,7 @@ def _ends_of(line: GraphLine) -> tuple[int, tuple[str, ...]]:
 # -- with the library ----------------------------------------------------------------------------------------
 
 
-def _options(effort: str, gap: float = NODE_GAP) -> dict[str, Any]:
+def _library_options(effort: str, gap: float = NODE_GAP) -> dict[str, Any]:
     return {
         "direction": "leftright",
         "spacing": {
@@ -163,7 +163,9 @@ def _options(effort: str, gap: float = NODE_GAP) -> dict[str, Any]:
     }
 
 
-def _placed(graph: NodeGraph, ways: Sequence[RouteKey], sizes: LayoutSizes) -> tuple[dict[str, Place], bool]:
+def _place_all(
+    graph: NodeGraph, ways: Sequence[RouteKey], sizes: LayoutSizes
+) -> tuple[dict[str, Place], bool]:
     # First the nodes within each group, then the groups. Also returns whether the library failed.
     inside: dict[str, list[str]] = {}
     for node in graph.nodes:
@@ -187,7 +189,7 @@ def _placed(graph: NodeGraph, ways: Sequence[RouteKey], sizes: LayoutSizes) -> t
     except BaseException as error:
         if isinstance(error, KeyboardInterrupt | SystemExit):
             raise
-        _log.exception("nodes could not be placed; they stand in rows")
+        _log.exception("layout library failed; nodes are placed in rows")
         return _in_rows(graph, sizes), True
     places = {}
     for block, (left, top, wide, high) in boxes.items():
@@ -205,7 +207,7 @@ def _place_block(
     index = {key: number for number, key in enumerate(keys)}
     made = graphlay.layout(
         {"nodes": [_request_box(key, sizes.node) for key in keys], "edges": _request_edges(ways, index)},
-        options=_options(effort),
+        options=_library_options(effort),
     )
     return {key: _point(node["center"]) for key, node in zip(keys, made.nodes, strict=True)}
 
@@ -216,7 +218,7 @@ def _block_box(graph: NodeGraph, block: str, places: Mapping[str, Place], sizes:
     box = _around(_box_at(place, sizes.node) for place in places.values())
     if group is None:
         return box
-    left, top, wide, high = _room(box, block, sizes)
+    left, top, wide, high = _with_margins(box, block, sizes)
     return left, top, wide, high + (sizes.foot if group.quiet else 0.0)
 
 
@@ -230,7 +232,7 @@ def _place_boxes(boxes: Mapping[str, Box], between: Mapping[tuple[str, str], int
         for (begin, end), count in between.items()
     ]
     nodes = [_request_box(block, (box[2], box[3])) for block, box in boxes.items()]
-    made = graphlay.layout({"nodes": nodes, "edges": edges}, options=_options("balanced", GROUP_GAP))
+    made = graphlay.layout({"nodes": nodes, "edges": edges}, options=_library_options("balanced", GROUP_GAP))
     middles = {block: _point(node["center"]) for block, node in zip(boxes, made.nodes, strict=True)}
     wide = made.bounds["max"]["x"] - made.bounds["min"]["x"]
     high = made.bounds["max"]["y"] - made.bounds["min"]["y"]
@@ -252,7 +254,7 @@ def _in_shelves(boxes: Mapping[str, Box], middles: Mapping[str, Place]) -> dict[
     return found
 
 
-def _routed(
+def _route_lines(
     places: Mapping[str, Place], ways: Sequence[RouteKey], sizes: LayoutSizes
 ) -> dict[RouteKey, tuple[Place, ...]]:
     # Routes around the boxes; {} when the library fails: then they are straight.
@@ -264,7 +266,7 @@ def _routed(
     ]
     try:
         made = graphlay.reroute(
-            {"nodes": request, "edges": _request_edges(ways, index)}, options=_options("fast")
+            {"nodes": request, "edges": _request_edges(ways, index)}, options=_library_options("fast")
         )
         return {
             way: tuple(_point(each) for each in edge["points"])
@@ -274,7 +276,7 @@ def _routed(
     except BaseException as error:
         if isinstance(error, KeyboardInterrupt | SystemExit):
             raise
-        _log.exception("lines could not be led round nodes; they run straight")
+        _log.exception("line routing failed; lines are straight")
         return {}
 
 
@@ -310,7 +312,7 @@ def _in_rows(graph: NodeGraph, sizes: LayoutSizes) -> dict[str, Place]:
     }
 
 
-def _grown(graph: NodeGraph, places: dict[str, Place], sizes: LayoutSizes) -> dict[str, Place]:
+def _place_new(graph: NodeGraph, places: dict[str, Place], sizes: LayoutSizes) -> dict[str, Place]:
     # Existing nodes keep their places; new ones are placed beside them.
     neighbours = _neighbours(graph)
     for node in graph.nodes:
@@ -358,7 +360,7 @@ def _push_apart(graph: NodeGraph, places: dict[str, Place], grown: str, sizes: L
         if node.key in places:
             members.setdefault(node.group or node.key, []).append(node.key)
     boxes = {
-        key: _around(_room(_box_at(places[each], sizes.node), key, sizes) for each in keys)
+        key: _around(_with_margins(_box_at(places[each], sizes.node), key, sizes) for each in keys)
         for key, keys in members.items()
     }
     moving = [grown] if grown in boxes else []
@@ -396,14 +398,14 @@ def _group_boxes(graph: NodeGraph, places: Mapping[str, Place], sizes: LayoutSiz
     for group in graph.groups:
         if group.is_closed or group.key not in inside:
             continue
-        left, top, wide, high = _around(_room(box, group.key, sizes) for box in inside[group.key])
+        left, top, wide, high = _around(_with_margins(box, group.key, sizes) for box in inside[group.key])
         if group.quiet:
             high += sizes.foot
         made[group.key] = (left, top, wide, high)
     return made
 
 
-def _room(box: Box, group: str, sizes: LayoutSizes) -> Box:
+def _with_margins(box: Box, group: str, sizes: LayoutSizes) -> Box:
     # With the margins of its group; unchanged without a group.
     if not group:
         return box

@@ -44,13 +44,13 @@ class LayoutProcess:
             self.kill()
             return None
         finally:
-            self._leave()
+            self._clean_up()
         if self._process.returncode or not told:
             return None
         made = pickle.loads(told)  # noqa: S301 - written by our own child
         return made if isinstance(made, GraphLayout) else None
 
-    def _leave(self) -> None:
+    def _clean_up(self) -> None:
         # Closes the pipes and reaps the process.
         for pipe in (self._process.stdin, self._process.stdout):
             if pipe is not None:

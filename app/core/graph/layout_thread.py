@@ -25,7 +25,7 @@ class LayoutThread:
         # `arranged` replaces the layout function, for graphs of any size.
         self._arrange = arranged if arranged is not None else self._arrange_anywhere
         self._process: LayoutProcess | None = None
-        self._news = threading.Condition()
+        self._changed = threading.Condition()
         self._waiting: tuple[NodeGraph, GraphLayout | None, LayoutSizes] | None = None
         self._made: tuple[NodeGraph, GraphLayout] | None = None
         self._is_busy = self._is_closing = False
@@ -34,31 +34,31 @@ class LayoutThread:
     @property
     def is_busy(self) -> bool:
         """True if a graph is being laid out or pending."""
-        with self._news:
+        with self._changed:
             return self._is_busy or self._waiting is not None
 
     def ask(self, graph: NodeGraph, before: GraphLayout | None, sizes: LayoutSizes) -> None:
         """Lay out this graph, replacing a pending one. No effect after `close`."""
-        with self._news:
+        with self._changed:
             if self._is_closing:
                 return
             self._waiting = graph, before, sizes
             if self._thread is None:
                 self._thread = threading.Thread(target=self._run, name="graph-layout", daemon=True)
                 self._thread.start()
-            self._news.notify()
+            self._changed.notify()
 
     def take(self) -> tuple[NodeGraph, GraphLayout] | None:
         """Return the newest finished graph with its layout once; None when there is none."""
-        with self._news:
+        with self._changed:
             made, self._made = self._made, None
             return made
 
     def close(self) -> None:
         """Stop; returns when the thread has ended, or after `END_S` if the library hangs."""
-        with self._news:
+        with self._changed:
             self._is_closing, self._waiting = True, None
-            self._news.notify()
+            self._changed.notify()
             if self._process is not None:
                 self._process.kill()
         if self._thread is not None:
@@ -66,16 +66,16 @@ class LayoutThread:
 
     def _run(self) -> None:
         while True:
-            with self._news:
-                self._news.wait_for(lambda: self._waiting is not None or self._is_closing)
+            with self._changed:
+                self._changed.wait_for(lambda: self._waiting is not None or self._is_closing)
                 if self._is_closing or self._waiting is None:
                     return
                 graph, before, sizes = self._waiting
                 self._waiting, self._is_busy = None, True
             made: GraphLayout | None = None
-            with log_errors("give nodes their places"):
+            with log_errors("lay out the graph"):
                 made = self._arrange(graph, before, sizes)
-            with self._news:
+            with self._changed:
                 self._is_busy = False
                 if made is not None:
                     self._made = graph, made
@@ -85,7 +85,7 @@ class LayoutThread:
     ) -> GraphLayout:
         if not is_large(graph):
             return arrange(graph, before, sizes)
-        with self._news:
+        with self._changed:
             if self._is_closing:
                 return GraphLayout()
             try:
@@ -95,6 +95,6 @@ class LayoutThread:
         try:
             made = process.arrange(graph, before, sizes)
         finally:
-            with self._news:
+            with self._changed:
                 self._process = None
         return made if made is not None else arrange_plainly(graph, sizes)

@@ -157,17 +157,17 @@ def node_graph(facts: GraphFacts, choices: GraphChoices) -> NodeGraph:
     groups = _groups(facts, choices, boxes)
     closed = {group.key for group in groups if group.is_closed}
     drawn = [node for node in boxes.values() if node.group not in closed and not _is_hidden(node, choices)]
-    drawn += [_box_of(group) for group in groups if group.is_closed]
+    drawn += [_collapsed_box(group) for group in groups if group.is_closed]
     shown = {node.key for node in drawn}
-    place = {
+    box_by_entry = {
         entry: (node.group if node.group in closed else node.key)
         for entry, node in boxes.items()
         if node.group in closed or node.key in shown
     }
-    lines = [*_topic_lines(facts, choices, place)]
+    lines = [*_topic_lines(facts, choices, box_by_entry)]
     services: list[GraphLine] = []
     if choices.shows_services:
-        services = [*_service_lines(facts, choices, place)]
+        services = [*_service_lines(facts, choices, box_by_entry)]
     return NodeGraph(
         tuple(drawn),
         tuple(sorted([*lines, *services], key=lambda line: (line.kind, line.topics))),
@@ -203,7 +203,7 @@ def _boxes(facts: GraphFacts, choices: GraphChoices) -> dict[str, DrawnNode]:
             _kind_of(entry, facts),
             entry,
             entry.key,
-            _joined_by(entry),
+            _bridged_network(entry),
             any(key_of(entry.network, topic) in pictures for topic in entry.publishes),
             entry.gone_s is not None,
             entry.key in choices.quiet and entry.gone_s is None,
@@ -236,7 +236,7 @@ def _name_of(entry: NodeEntry) -> str:
     return entry.name.removeprefix(PROGRAM) or entry.name
 
 
-def _joined_by(entry: NodeEntry) -> str:
+def _bridged_network(entry: NodeEntry) -> str:
     # "" when its name does not contain it.
     _before, found, back_end = entry.name.rpartition(BRIDGE_TO)
     if not entry.is_bridge or not found:
@@ -325,7 +325,7 @@ def _address_in(endpoint: str) -> str:
     return "" if host.startswith(("127.", "0.")) or host in {"localhost", "::1", "*", "::"} else host
 
 
-def _box_of(group: GraphGroup) -> DrawnNode:
+def _collapsed_box(group: GraphGroup) -> DrawnNode:
     return DrawnNode(group.key, group.name, group.key, "group", members=group.members, quiet=group.quiet)
 
 

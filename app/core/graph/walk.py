@@ -32,7 +32,7 @@ def step(
     Right goes from a node to an outgoing line and on to its target; left goes against the arrows. Up and down
     go to the next line of that node, or the next node above or below.
     """
-    if chosen is None or not _is_there(graph, layout, chosen):
+    if chosen is None or not _exists(graph, layout, chosen):
         first = min(layout.places, key=lambda key: (layout.places[key], key), default=None)
         return GraphChoice("node", first) if first is not None else None
     if chosen.kind == "node":
@@ -40,7 +40,7 @@ def step(
     return _from_line(graph, layout, chosen, arrow)
 
 
-def _is_there(graph: NodeGraph, layout: GraphLayout, chosen: GraphChoice) -> bool:
+def _exists(graph: NodeGraph, layout: GraphLayout, chosen: GraphChoice) -> bool:
     if chosen.kind == "node":
         return chosen.key in layout.places
     return graph.line_of(chosen.key) is not None

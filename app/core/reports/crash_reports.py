@@ -65,7 +65,7 @@ class CrashReports:
         """Store a report and evict old ones; return its file, or None when it can't be written."""
         now = self._clock()
         try:
-            path = self._free(f"crash {time.strftime(_STAMP, time.localtime(now))} {crash.part}")
+            path = self._unused_path(f"crash {time.strftime(_STAMP, time.localtime(now))} {crash.part}")
             write_atomically(path, _text(crash, now).encode("utf-8", "replace"), durable=False, private=True)
         except OSError as error:
             _log.warning("a crash report can't be kept: %s", error, extra=IN_CONSOLE)
@@ -75,7 +75,7 @@ class CrashReports:
                 old.path.unlink(missing_ok=True)
         return path
 
-    def _free(self, stem: str) -> Path:
+    def _unused_path(self, stem: str) -> Path:
         # An unused name, considering both offered and new reports.
         taken = {each.path.name.replace(".new.txt", ".txt") for each in self.all()}
         names = (stem, *(f"{stem} {number}" for number in range(2, len(taken) + 3)))
@@ -110,12 +110,12 @@ class CrashLog(logging.Handler):
 
     def __init__(self, reports: CrashReports) -> None:
         super().__init__(logging.WARNING)
-        self._reports, self._once = reports, RepeatFilter()
+        self._reports, self._repeat_filter = reports, RepeatFilter()
 
     def emit(self, record: logging.LogRecord) -> None:
         """Store a report if the record has a crash (`app.core.reports.crash.crash_extra`)."""
         crash = getattr(record, "crash", None)
-        if isinstance(crash, Crash) and self._once.filter(record) is not None:
+        if isinstance(crash, Crash) and self._repeat_filter.filter(record) is not None:
             self._reports.add(crash)
 
 

@@ -167,7 +167,7 @@ class ReportWriter:
         except ReportError as error:
             self.problem = str(error)
         except Exception as error:  # noqa: BLE001  shown to the user
-            _log.exception("can't make a report")
+            _log.exception("can't create a report")
             self.problem = _("can't write the report: {error}").format(error=error_words(error))
 
 

@@ -76,10 +76,10 @@ class StudioRun:
         try:
             self._write(asked=False)
             self._lock.acquire()
-            self._listen()
+            self._enable_faulthandler()
         except OSError as error:
-            self._take_away()
-            _log.warning("if Studio crashes, the next start will not know: %s", error, extra=IN_CONSOLE)
+            self._delete_files()
+            _log.warning("a crash of this run will not be detected: %s", error, extra=IN_CONSOLE)
 
     def expect_end(self) -> None:
         """Record that Studio was asked to end, so that its end does not count as a crash."""
@@ -89,7 +89,7 @@ class StudioRun:
 
     def end(self) -> None:
         """Delete the marker: Studio ends normally."""
-        self._take_away()
+        self._delete_files()
 
     def __enter__(self) -> Self:
         self.begin()
@@ -113,7 +113,7 @@ class StudioRun:
             marks = [mark for mark in self._folder.glob("*.json") if mark != self._mark]
         except OSError:
             return []
-        found = [self._look(mark) for mark in marks]
+        found = [self._check(mark) for mark in marks]
         return [crash for crash in found if crash is not None]
 
     # -- this run -------------------------------------------------------------------------------------------
@@ -128,14 +128,14 @@ class StudioRun:
         }
         write_atomically(self._mark, json.dumps(entry).encode(), durable=False, private=True)
 
-    def _listen(self) -> None:
+    def _enable_faulthandler(self) -> None:
         private_folder(self._log)
         path = self._log / _trace_name(self._mark)
         number = os.open(path, os.O_WRONLY | os.O_CREAT | os.O_TRUNC | os.O_APPEND, 0o600)
         self._trace = os.fdopen(number, "a", encoding="utf-8")
         faulthandler.enable(self._trace)
 
-    def _take_away(self) -> None:
+    def _delete_files(self) -> None:
         if self._trace is not None:
             faulthandler.disable()
             self._trace.close()
@@ -146,7 +146,7 @@ class StudioRun:
     # -- earlier runs
     # -----------------------------------------------------------------------------------------
 
-    def _look(self, mark: Path) -> Crash | None:
+    def _check(self, mark: Path) -> Crash | None:
         lock = FileLock(mark)
         if not lock.acquire():
             return None  # its process is running
@@ -154,7 +154,7 @@ class StudioRun:
         try:
             entry = json.loads(read_whole(mark))
             began_s, pid = float(entry["began_s"]), int(entry["pid"])
-            if _runs(pid, began_s):  # on a file system without locks
+            if _is_running(pid, began_s):  # on a file system without locks
                 return None
             mark.unlink()  # only one instance succeeds, which then reports it
             judged = entry, began_s
@@ -166,9 +166,9 @@ class StudioRun:
             lock.release()  # before it is deleted: Windows can't delete an open file
         trace = self._trace_of(mark)
         _remove(mark, self._log)
-        return self._judged(*judged, trace) if judged is not None else None
+        return self._crash_of(*judged, trace) if judged is not None else None
 
-    def _judged(self, entry: Mapping[str, object], began_s: float, trace: str) -> Crash | None:
+    def _crash_of(self, entry: Mapping[str, object], began_s: float, trace: str) -> Crash | None:
         how = fatal_line(trace)
         if not how:
             if entry.get("asked") is True or psutil.boot_time() > began_s + CLOCK_S:
@@ -203,7 +203,7 @@ def _remove(mark: Path, log: Path) -> None:
             path.unlink(missing_ok=True)
 
 
-def _runs(pid: int, began_s: float) -> bool:
+def _is_running(pid: int, began_s: float) -> bool:
     # Checks the start time too, because process ids are reused.
     try:
         process = psutil.Process(pid)

@@ -32,10 +32,10 @@ class SelfTest:
         # Starts the watchdog: from now on the process ends in time, whatever its threads do.
         self.place = place
         self.report = Report(place.path(REPORT), {**facts, "bound_s": bounds.ALL_S})
-        self._news = threading.Condition()
+        self._changed = threading.Condition()
         self._all_until = time.monotonic() + bounds.ALL_S
         self._step_until = self._all_until
-        self._what = ""
+        self._awaited = ""
         self._crash: TextIO = place.path(CRASH).open("w", encoding="utf-8")
         faulthandler.enable(self._crash)
         # This second watchdog needs neither Python code nor the GIL; it writes the stack of all threads.
@@ -122,18 +122,16 @@ class SelfTest:
     # -- watchdog -----------------------------------------------------------------------------------------
 
     def _wait_until(self, until: float, what: str) -> None:
-        with self._news:
-            self._step_until, self._what = until, what
-            self._news.notify_all()
+        with self._changed:
+            self._step_until, self._awaited = until, what
+            self._changed.notify_all()
 
     def _watch(self) -> None:
-        with self._news:
+        with self._changed:
             while (left := min(self._step_until, self._all_until + bounds.GRACE_S) - time.monotonic()) > 0:
-                self._news.wait(left)
-            what = self._what
-        self.fail(
-            _("Studio did not respond in time and was stopped. It was waiting for: {what}").format(what=what)
-        )
+                self._changed.wait(left)
+            what = self._awaited
+        self.fail(_("Studio did not respond in time and was stopped. It was waiting for: {what}").format(what=what))
         self.report.end()
         with suppress(OSError, ValueError):  # closed at the very end
             faulthandler.dump_traceback(self._crash, all_threads=True)

@@ -79,17 +79,17 @@ def write_atomically(
             if durable:
                 os.fsync(file.fileno())
         if not private:  # mkstemp creates private files
-            _keep_mode(path, Path(name))
+            _copy_mode(path, Path(name))
         replace_file(Path(name), path)
     except BaseException:
         Path(name).unlink(missing_ok=True)
         raise
     if durable:
         _sync_folder(path.parent)
-        _sweep(path)
+        _remove_stale_parts(path)
 
 
-def _sweep(path: Path) -> None:
+def _remove_stale_parts(path: Path) -> None:
     # Removes parts left by killed writers; writes in progress are younger.
     before = time.time() - LEFT_AFTER_S
     for part in path.parent.glob(f".{glob.escape(path.name)}.*.part"):
@@ -127,7 +127,7 @@ def _close_to_others(path: Path) -> None:
             path.chmod(mode & ~_OTHERS)
 
 
-def _keep_mode(old: Path, new: Path) -> None:
+def _copy_mode(old: Path, new: Path) -> None:
     # A behaviour stays shared as the replaced file was.
     try:
         mode = old.stat().st_mode & 0o777

@@ -12,7 +12,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import IO
 
-LOOK_S = 0.01
+POLL_S = 0.01
 
 if sys.platform == "win32":
     import ctypes
@@ -48,7 +48,7 @@ HELD = frozenset({errno.EACCES, errno.EAGAIN, errno.EWOULDBLOCK, errno.EDEADLK})
 """Error numbers of a held lock; all others mean that the file system has no locks."""
 
 
-def _wait_for(file: IO[bytes], until: float) -> bool:
+def _acquire(file: IO[bytes], until: float) -> bool:
     # Returns whether the lock was acquired. Without lock support False at once.
     pause = threading.Event()
     while True:
@@ -59,10 +59,10 @@ def _wait_for(file: IO[bytes], until: float) -> bool:
                 return False
         else:
             return True
-        pause.wait(LOOK_S)
+        pause.wait(POLL_S)
 
 
-def _opened(path: Path) -> IO[bytes]:
+def _open_lock_file(path: Path) -> IO[bytes]:
     # The lock file of `path`. Raises OSError.
     # Private; never blocks on a pipe of that name.
     flags = os.O_WRONLY | os.O_CREAT | os.O_APPEND | getattr(os, "O_NONBLOCK", 0)
@@ -86,7 +86,7 @@ class FileLock:
             return True
         try:
             self._path.parent.mkdir(parents=True, exist_ok=True)
-            file = _opened(self._path)
+            file = _open_lock_file(self._path)
         except OSError:
             return True
         try:
@@ -115,12 +115,12 @@ def locked(path: Path, within_s: float = 1.0) -> Iterator[bool]:
     until = time.monotonic() + within_s
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
-        file = _opened(path)
+        file = _open_lock_file(path)
     except OSError:
         yield False
         return
     with file:
-        held = _wait_for(file, until)
+        held = _acquire(file, until)
         try:
             yield held
         finally:

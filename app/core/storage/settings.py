@@ -139,7 +139,7 @@ class Settings:
         json.dumps(value)
         self._values[key] = self._unwritten[key] = value
         with locked(self.path):
-            self._values = self._of_others()
+            self._values = self._merged_values()
             self._write()
 
     def all(self) -> dict[str, object]:
@@ -169,14 +169,14 @@ class Settings:
     def add_recent(self, path: Path, name: str | None = None) -> None:
         """Put ``path`` first among the recent files. Raises SettingsError."""
         path = path.resolve()
-        self._values = self._of_others()
+        self._values = self._merged_values()
         kept = [file for file in self.recent_known if file.path != path]
         self.set_recent([RecentFile(path, name or path.stem, self._clock()), *kept])
 
     def rename_recent(self, old: Path, new: Path) -> None:
         """Rename a recent file in place. Raises SettingsError."""
         old, new = old.resolve(), new.resolve()
-        self._values = self._of_others()
+        self._values = self._merged_values()
         kept = [file for file in self.recent_known if file.path != new]
         named = [replace(file, path=new, name=new.stem) if file.path == old else file for file in kept]
         self.set_recent(named)
@@ -207,13 +207,13 @@ class Settings:
             return self._set_aside()
         if _format_of(values) <= FORMAT:
             return values
-        return self._set_aside() if self.path == self._own_path() else self._beside(values)
+        return self._set_aside() if self.path == self._own_path() else self._use_own_file(values)
 
     def _own_path(self) -> Path:
         # Used while a newer Studio has its settings in the usual place.
         return self.path.with_name(_OWN_NAME)
 
-    def _beside(self, newer: dict[str, object]) -> dict[str, object]:
+    def _use_own_file(self, newer: dict[str, object]) -> dict[str, object]:
         # The file of a newer Studio stays unchanged; a file of this version is used beside it.
         found = self.path.name
         self.path = self._own_path()
@@ -225,7 +225,7 @@ class Settings:
         ).format(file=found, format=_format_of(newer))
         return {name: value for name, value in newer.items() if name != "format"}
 
-    def _of_others(self) -> dict[str, object]:
+    def _merged_values(self) -> dict[str, object]:
         # Current file content with unwritten values; the known values if it can't be read.
         try:
             values = json.loads(read_whole(self.path))
@@ -234,7 +234,7 @@ class Settings:
         if not isinstance(values, dict):
             return self._values
         if _format_of(values) > FORMAT:  # a newer Studio also runs on this computer
-            self._beside(values)
+            self._use_own_file(values)
             return self._values
         return {**values, **self._unwritten}
 

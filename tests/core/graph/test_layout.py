@@ -136,7 +136,7 @@ def test_when_the_library_fails_nodes_stand_in_rows_and_lines_run_straight(
     assert found.places.keys() == set("abcdefx")
     assert overlapping(found) == []
     assert all(len(points) == 2 for points in found.routes.values())
-    assert "could not be placed" in caplog.text
+    assert "layout library failed" in caplog.text
     monkeypatch.undo()
     placed = arrange(LAB)
     monkeypatch.setattr(layout_module.graphlay, "reroute", fails)

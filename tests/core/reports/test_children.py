@@ -146,6 +146,6 @@ def test_a_master_that_crashed_is_reported_when_the_next_one_is_started(crashes)
         assert process is not None
         process.send_signal(signal.SIGSEGV if number_of_crashes == 0 else signal.SIGTERM)
         process.wait(WAIT_S)
-    start._look_back()
+    start._log_crash()
     (crash,) = crashes()
     assert (crash.part, crash.how) == ("master", "the master's process ended by signal 11 (SIGSEGV)")
