@@ -48,11 +48,14 @@ _log = logging.getLogger("studio")
 def window_parser() -> argparse.ArgumentParser:
     """Return the argument parser of ``python -m app``."""
     parser = argparse.ArgumentParser(
-        prog="nep-studio", description=_("NEP Studio. `nep-studio run FILE` runs a behaviour without a window.")
+        prog="nep-studio",
+        description=_("NEP Studio. `nep-studio run FILE` runs a behaviour without a window."),
     )
     parser.add_argument("files", nargs="*", type=Path, metavar="FILE", help=_("behaviours to open"))
     parser.add_argument(
-        "--new-window", action="store_true", help=_("open a separate window even if Studio is already running")
+        "--new-window",
+        action="store_true",
+        help=_("open a separate window even if Studio is already running"),
     )
     parser.add_argument(
         "--demo", action="store_true", help=_("start with the virtual robot and the first example")
@@ -61,7 +64,10 @@ def window_parser() -> argparse.ArgumentParser:
     parser.add_argument("--version", action="version", version=f"NEP Studio {__version__}")
     parser.add_argument("--theme", choices=("light", "dark", "system"), help=_("colour theme"))
     parser.add_argument(
-        "--self-drive", metavar="DIR", type=Path, help=_("run the main job without a person; screenshots go to DIR")
+        "--self-drive",
+        metavar="DIR",
+        type=Path,
+        help=_("run the main job without a person; screenshots go to DIR"),
     )
     parser.add_argument(
         "--selftest",
@@ -87,7 +93,11 @@ def run_parser() -> argparse.ArgumentParser:
     )
     parser.add_argument("file", type=Path, metavar="FILE", help=_("the behaviour"))
     parser.add_argument(
-        "--robot-wait", type=float, metavar="S", default=10.0, help=_("how long to wait for its robots, in seconds")
+        "--robot-wait",
+        type=float,
+        metavar="S",
+        default=10.0,
+        help=_("how long to wait for its robots, in seconds"),
     )
     parser.add_argument("--master", metavar="HOST:PORT", help=_("address of the master"))
     parser.add_argument(

@@ -86,9 +86,7 @@ class JsonQuery:
                     break
                 found[FoundPath.of(tuple(match.parts))] = _plain(match.obj)
         except _LimitReached:
-            cut = _("Search stopped after {count} values; these were found so far.").format(
-                count=most_steps
-            )
+            cut = _("Search stopped after {count} values; these were found so far.").format(count=most_steps)
         except RecursionError:
             cut = _("The message is nested too deeply for a query.")
         except jsonpath.JSONPathError as error:

@@ -105,7 +105,9 @@ class Tries:
         if robot.dialect == "native" and made.state == "sent":
             if now - made.started_s > FIRST_ANSWER_S:
                 self._mark_unresponsive(
-                    link, made, _("{robot} is not responding. Check that it is switched on.").format(robot=link.name)
+                    link,
+                    made,
+                    _("{robot} is not responding. Check that it is switched on.").format(robot=link.name),
                 )
             return
         silence = max(SHORTEST_SILENCE_S, BEATS_MISSED * robot.beat_s) if robot.beat_s else None

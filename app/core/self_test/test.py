@@ -131,7 +131,9 @@ class SelfTest:
             while (left := min(self._step_until, self._all_until + bounds.GRACE_S) - time.monotonic()) > 0:
                 self._changed.wait(left)
             what = self._awaited
-        self.fail(_("Studio did not respond in time and was stopped. It was waiting for: {what}").format(what=what))
+        self.fail(
+            _("Studio did not respond in time and was stopped. It was waiting for: {what}").format(what=what)
+        )
         self.report.end()
         with suppress(OSError, ValueError):  # closed at the very end
             faulthandler.dump_traceback(self._crash, all_threads=True)

@@ -163,7 +163,7 @@ class PublisherTracker:
             if last is not None:
                 self.lost += seq - last - 1
             source.last = seq
-        elif source.late_to == last and source.late_from <= seq:  # it was only late
+        elif 0 < source.late_to == last and source.late_from <= seq:  # it was only late
             source.late_from = seq + 1
             self.lost -= 1
         elif is_alone:

@@ -539,7 +539,7 @@ class NativeSubscriber(SocketSubscriber[NativeReadable]):
             if not self.is_closed:
                 self._fill_locked()
                 self._wake_waiters_locked()
-                self._readable.reconnect()
+                self._readable.reconnect_remote()
                 self._after_use_locked()
 
     def reconcile(self, remotes: Iterable[RemotePublisher]) -> None:

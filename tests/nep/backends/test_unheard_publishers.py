@@ -61,6 +61,12 @@ def test_no_message_is_lost_if_the_first_one_arrives() -> None:
     assert (sources.received, sources.lost) == (1, 0)
 
 
+def test_a_message_without_a_valid_number_does_not_make_losses_negative() -> None:
+    sources = new_publisher()
+    sources.arrived(5, 0, is_alone=False)
+    assert sources.lost == 0
+
+
 def test_losses_grow_with_each_renewal_while_the_publisher_is_not_reached() -> None:
     sources = new_publisher()
     sources.expect_up_to(5, 100)
