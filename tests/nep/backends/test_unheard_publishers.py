@@ -63,7 +63,7 @@ def test_no_message_is_lost_if_the_first_one_arrives() -> None:
 
 def test_a_message_without_a_valid_number_does_not_make_losses_negative() -> None:
     sources = new_publisher()
-    sources.arrived(5, 0, is_alone=False)
+    sources.count_message(5, 0, is_alone=False)
     assert sources.lost == 0
 
 

@@ -126,7 +126,7 @@ export class Sources {
     if (last === undefined || seq > last) {
       if (last !== undefined) this.lost += Number(seq - last - 1n);
       source.last = seq;
-    } else if (source.lateTo === last && source.lateFrom <= seq) {
+    } else if (source.lateTo !== 0n && source.lateTo === last && source.lateFrom <= seq) {
       source.lateFrom = seq + 1n; // it was only late
       this.lost--;
     } else if (isAlone) {
