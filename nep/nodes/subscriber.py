@@ -29,7 +29,9 @@ _logger = logging.getLogger("nep")
 
 
 class Subscriber:
-    """Receive messages of one topic, in order. Created by `Node.new_sub`.
+    """Subscriber to one topic or pattern. Created by `Node.new_sub`.
+
+    It returns the messages of each publisher in the order of their publication.
 
     Iterating (`for` or `async for`) yields `Message` objects until the subscriber is closed. Usable as a
     context manager.

@@ -205,7 +205,14 @@ class Surveyor:
 
 
 class Respondent(Server):
-    """Respondent of a survey, with a callback or with `listen_json` and `send_json`. See `Server`."""
+    """Respondent of a survey, with a callback or with `listen_json` and `send_json`. Thread-safe.
+
+    Callbacks run as those of `Server`; an exception is logged and counted in
+    `Surveyor.failures`.
+
+        node.new_respondent("battery", lambda _question: {"percent": 87})
+        node.spin()
+    """
 
     @property
     def survey(self) -> str:
