@@ -29,15 +29,15 @@ class Clocks:
         """Return True if the node shares the master's clock."""
         return bool(self._computer) and member.node.computer == self._computer
 
-    def note(self, member: RegisteredNode, told: tuple[int, ...] | None, now: float) -> None:
+    def note(self, member: RegisteredNode, clock: tuple[int, ...] | None, now: float) -> None:
         """Store a node's reported clock offset: None if it has none, empty if unknown yet.
 
         Implausible values count as unknown.
         """
-        if told is not None and self.is_here(member):
+        if clock is not None and self.is_here(member):
             member.clock = _MASTER_CLOCK
-        elif told is not None and len(told) == 2 and is_clock(*told):
-            member.clock = NodeClock(*told, now)
+        elif clock is not None and len(clock) == 2 and is_clock(*clock):
+            member.clock = NodeClock(*clock, now)
         else:
             member.clock = None
 

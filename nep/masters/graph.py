@@ -206,14 +206,14 @@ class Graph:
         """Return a snapshot of the graph."""
         return self._viewer.view(self.epoch)
 
-    def renew_fast(self, said: RawRenewal, now: float, sender: str) -> dict[int, int] | None:
+    def renew_fast(self, renewal: RawRenewal, now: float, sender: str) -> dict[int, int] | None:
         """Handle a usual renewal of `sender` and return the newest message by publisher id.
 
         Return None if it must be handled by `apply`; it may have been handled in part.
         """
-        if said.revision < self._registry.publishers_revision:
+        if renewal.revision < self._registry.publishers_revision:
             return None
-        member = self._renew_member(said, now, sender)
+        member = self._renew_member(renewal, now, sender)
         if member is None:
             return None
         self._leases.renew(member, now)
@@ -291,9 +291,9 @@ class Graph:
     def _check_limits(self, request: Join | AddPublisher | AddSubscriber, count: int) -> None:
         registry = self._registry
         member = registry.members.get(request.node.id)
-        own = 0 if member is None else len(member.publishers) + len(member.subscribers)
-        mine = count if isinstance(request, Join) else own + 1
-        if mine > max(own, RECORDS_MAX):
+        held = 0 if member is None else len(member.publishers) + len(member.subscribers)
+        needed = count if isinstance(request, Join) else held + 1
+        if needed > max(held, RECORDS_MAX):
             raise WireError(
                 _("a node has {RECORDS_MAX} publishers and subscribers at most").format(
                     RECORDS_MAX=RECORDS_MAX
@@ -301,8 +301,8 @@ class Graph:
                 code="limit",
             )
         self._check_pattern_limits(request)
-        all_ = len(registry.publisher_owners) + len(registry.subscriber_owners)
-        if mine > max(own, GUARANTEED_RECORDS) and all_ + mine - own > ALL_RECORDS_MAX:
+        total = len(registry.publisher_owners) + len(registry.subscriber_owners)
+        if needed > max(held, GUARANTEED_RECORDS) and total + needed - held > ALL_RECORDS_MAX:
             raise WireError(
                 _("the graph has {ALL_RECORDS_MAX} publishers and subscribers, which is the most").format(
                     ALL_RECORDS_MAX=ALL_RECORDS_MAX
@@ -316,11 +316,11 @@ class Graph:
             return
         member = self._registry.members.get(request.node.id)
         known = () if member is None else member.subscribers.values()
-        own = {each.record.id for each in known if each.record.pattern}
-        mine = new if isinstance(request, Join) else own | new
-        all_ = len(self._registry.patterns) - len(own) + len(mine)
-        most = max(len(self._registry.patterns), ALL_PATTERNS_MAX)
-        if len(mine) > max(len(own), PATTERNS_MAX) or all_ > most:
+        held = {each.record.id for each in known if each.record.pattern}
+        needed = new if isinstance(request, Join) else held | new
+        total = len(self._registry.patterns) - len(held) + len(needed)
+        limit = max(len(self._registry.patterns), ALL_PATTERNS_MAX)
+        if len(needed) > max(len(held), PATTERNS_MAX) or total > limit:
             raise WireError(
                 _(
                     "a node has {PATTERNS_MAX} subscribers with wildcards at most, and all nodes together "
@@ -421,14 +421,14 @@ class Graph:
         found = [remote for topic in sorted(topics) for remote in self._registry.publishers_of(topic)]
         return Found(self.epoch, self.revision, tuple(found))
 
-    def _renew_member(self, said: RawRenewal, now: float, sender: str) -> RegisteredNode | None:
+    def _renew_member(self, renewal: RawRenewal, now: float, sender: str) -> RegisteredNode | None:
         # None: the node must join again.
-        member = self._member_at(said.node_id, sender)
-        if member is None or said.epoch != self.epoch:
+        member = self._member_at(renewal.node_id, sender)
+        if member is None or renewal.epoch != self.epoch:
             return None
-        if not self._registry.renew(member, said.publishers, said.subscribers, now, said.cpu_ratio):
+        if not self._registry.renew(member, renewal.publishers, renewal.subscribers, now, renewal.cpu_ratio):
             return None
-        self.clocks.note(member, said.clock, now)
+        self.clocks.note(member, renewal.clock, now)
         return member
 
     def _member_at(self, node_id: str, sender: str) -> RegisteredNode | None:

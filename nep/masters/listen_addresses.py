@@ -19,12 +19,12 @@ __all__ = ["ListenAddresses", "check_hosts"]
 _logger = logging.getLogger("nep.master")
 
 
-def check_hosts(hosts: Iterable[str], here: Iterable[OwnAddress]) -> tuple[str, ...]:
+def check_hosts(hosts: Iterable[str], addresses: Iterable[OwnAddress]) -> tuple[str, ...]:
     """Validate and deduplicate addresses.
 
     Raises `NepError` unless they are this computer's (`own_addresses`).
     """
-    known = {own.host for own in here}
+    known = {own.host for own in addresses}
     checked = tuple(dict.fromkeys(hosts))
     for host in checked:
         try:
@@ -49,20 +49,20 @@ class ListenAddresses:
     Args:
         router: Socket of the master.
         port: Port of all addresses.
-        here: Returns the addresses of this computer.
+        list_addresses: Returns the addresses of this computer.
     """
 
     def __init__(
         self,
         router: zmq.Socket[bytes],
         port: int,
-        here: Callable[[], tuple[OwnAddress, ...]] = own_addresses,
+        list_addresses: Callable[[], tuple[OwnAddress, ...]] = own_addresses,
     ) -> None:
         self.hosts: tuple[str, ...] = ()
         """Requested addresses."""
         self._router = router
         self._port = port
-        self._here = here
+        self._list_addresses = list_addresses
         self._bound: set[str] = set()
 
     @property
@@ -76,11 +76,11 @@ class ListenAddresses:
         Raises `NepError` for addresses that are not this computer's, and `AddressInUseError` for a port in
         use; nothing is changed then.
         """
-        here = self._here()
-        chosen = check_hosts(hosts, here)
+        addresses = self._list_addresses()
+        chosen = check_hosts(hosts, addresses)
         new: list[str] = []
         try:
-            for host in self._available_hosts(chosen, here) - self._bound:
+            for host in self._available_hosts(chosen, addresses) - self._bound:
                 self._bind(host)
                 new.append(host)
         except NepError:
@@ -88,32 +88,34 @@ class ListenAddresses:
                 self._unbind(host)
             raise
         self.hosts = chosen
-        for host in self._bound - self._available_hosts(chosen, here):
+        for host in self._bound - self._available_hosts(chosen, addresses):
             self._unbind(host)
 
     def refresh(self) -> tuple[Alert, ...]:
         """Update the bindings to this computer's current addresses. Return alerts for lost addresses."""
         if not self.hosts:
             return ()
-        here = self._here()
-        available = self._available_hosts(self.hosts, here)
+        addresses = self._list_addresses()
+        available = self._available_hosts(self.hosts, addresses)
         for host in self._bound - available:
             self._unbind(host)
         for host in available - self._bound:
             with contextlib.suppress(AddressInUseError):  # retried at the next call
                 self._bind(host)
         return tuple(
-            self._lost_alert(host, here) for host in self.hosts if host != ANY and host not in self._bound
+            self._lost_alert(host, addresses)
+            for host in self.hosts
+            if host != ANY and host not in self._bound
         )
 
-    def _available_hosts(self, hosts: tuple[str, ...], here: tuple[OwnAddress, ...]) -> set[str]:
-        present = {own.host for own in here}
+    def _available_hosts(self, hosts: tuple[str, ...], addresses: tuple[OwnAddress, ...]) -> set[str]:
+        present = {own.host for own in addresses}
         if ANY in hosts:
             return present
         return {host for host in hosts if host in present or ipaddress.IPv4Address(host).is_loopback}
 
-    def _lost_alert(self, host: str, here: tuple[OwnAddress, ...]) -> Alert:
-        now = ", ".join(own.host for own in here)
+    def _lost_alert(self, host: str, addresses: tuple[OwnAddress, ...]) -> Alert:
+        now = ", ".join(own.host for own in addresses)
         return Alert(
             f"listen:{host}",
             _(

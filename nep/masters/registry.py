@@ -236,8 +236,10 @@ class Registry:
                 if other.publishers[known].record.endpoints
             }
             owners = {owner.node.id: owner for owner in map(self.publisher_owners.get, member.heard) if owner}
-            own = member.node.computer
-            member.far = tuple(each for each in owners.values() if not own or each.node.computer != own)
+            computer = member.node.computer
+            member.far = tuple(
+                each for each in owners.values() if not computer or each.node.computer != computer
+            )
         return member.heard
 
     def remote_nodes_of(self, member: RegisteredNode) -> tuple[RegisteredNode, ...]:

@@ -222,8 +222,8 @@ class MasterServer:
 
     def _is_needed(self) -> bool:
         # A node of another process than the owner's and this one is registered.
-        own = {os.getpid(), None if self._owner is None else self._owner.pid}
-        return any(node.pid not in own for node in self._graph.nodes)
+        own_pids = {os.getpid(), None if self._owner is None else self._owner.pid}
+        return any(node.pid not in own_pids for node in self._graph.nodes)
 
     def _serve_submissions(self) -> None:
         while self._submitted:

@@ -81,15 +81,15 @@ def leaves(payload: object, most: int = 200) -> Iterator[str]:
     yield from _leaves(payload, "", remaining, _MAX_DEPTH)
 
 
-def _leaves(value: object, so_far: str, remaining: list[int], depth: int) -> Iterator[str]:
+def _leaves(value: object, path: str, remaining: list[int], depth: int) -> Iterator[str]:
     if remaining[0] <= 0:
         return
     if depth and isinstance(value, Mapping) and value:
         for key, each in value.items():
-            yield from _leaves(each, so_far + _format_step(str(key)), remaining, depth - 1)
+            yield from _leaves(each, path + _format_step(str(key)), remaining, depth - 1)
     elif depth and isinstance(value, Sequence) and not isinstance(value, (str, bytes)) and value:
         for number, each in enumerate(value[:10]):
-            yield from _leaves(each, f"{so_far}[{number}]", remaining, depth - 1)
+            yield from _leaves(each, f"{path}[{number}]", remaining, depth - 1)
     else:
         remaining[0] -= 1
-        yield so_far.removeprefix(".") or "."
+        yield path.removeprefix(".") or "."

@@ -21,8 +21,8 @@ class History(Generic[T]):
     With `most` 0 it stays empty. Not thread-safe: guarded by the publisher's lock.
     """
 
-    def __init__(self, most: int, max_bytes: int = HISTORY_BYTES) -> None:
-        self._most = most
+    def __init__(self, max_messages: int, max_bytes: int = HISTORY_BYTES) -> None:
+        self._max_messages = max_messages
         self._max_bytes = max_bytes
         self._messages: deque[tuple[T, int]] = deque()
         self.size_bytes = 0
@@ -30,11 +30,11 @@ class History(Generic[T]):
 
     def add(self, message: T, size_bytes: int) -> None:
         """Append a message; evict the oldest beyond the limits."""
-        if not self._most:
+        if not self._max_messages:
             return
         self._messages.append((message, size_bytes))
         self.size_bytes += size_bytes
-        while len(self._messages) > self._most or (
+        while len(self._messages) > self._max_messages or (
             self.size_bytes > self._max_bytes and len(self._messages) > 1
         ):
             self.size_bytes -= self._messages.popleft()[1]

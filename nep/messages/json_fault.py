@@ -136,17 +136,17 @@ def _explain(text: str, error: json.JSONDecodeError) -> JsonFault:
 
 
 def _unexpected(text: str, position: int, message: str) -> JsonFault:
-    here, end = text[position : position + 1], len(text[:position].rstrip())
+    sign, end = text[position : position + 1], len(text[:position].rstrip())
     last = text[end - 1 : end]
-    if here in {"}", "]"} and last == ",":
+    if sign in {"}", "]"} and last == ",":
         return _trailing_comma(text, end - 1)
     if message.startswith("Expecting ':'"):
         return _at(text, end, _("a colon is missing after the name"), JsonFix(end, end, ":"))
-    if not here:
+    if not sign:
         return _unclosed(text, end)
     if message.startswith("Expecting ','"):
         return _missing_comma(text, position, end)
-    if here in {"}", "]", ","} and last == ":":
+    if sign in {"}", "]", ","} and last == ":":
         return _at(text, end, _("a value is missing after the colon"))
     return _missing_value(text, position, is_name=message.startswith("Expecting property name"))
 
@@ -156,10 +156,10 @@ def _trailing_comma(text: str, position: int) -> JsonFault:
 
 
 def _missing_comma(text: str, position: int, end: int) -> JsonFault:
-    here = text[position]
-    if here in {"}", "]"}:
-        return _at(text, position, _("{sign} does not match the opening bracket").format(sign=here))
-    if position == end and (here.isalnum() or here in "._"):
+    sign = text[position]
+    if sign in {"}", "]"}:
+        return _at(text, position, _("{sign} does not match the opening bracket").format(sign=sign))
+    if position == end and (sign.isalnum() or sign in "._"):
         return _at(text, position, _("JSON has no such number"))
     return _at(text, end, _("a comma is missing between two values"), JsonFix(end, end, ","))
 

@@ -362,11 +362,11 @@ def _fill_dataclass(shape: ValueShape, declared: type, known: dict[object, Value
     shape.read, shape.write = read, write
 
 
-def _check_constructor(declared: type, given: Collection[str]) -> None:
+def _check_constructor(declared: type, names: Collection[str]) -> None:
     # Raises `ValueError` if the constructor needs more than the fields.
     for each in inspect.signature(declared).parameters.values():
         is_open = each.kind in {each.VAR_POSITIONAL, each.VAR_KEYWORD} or each.default is not each.empty
-        if not is_open and (each.name not in given or each.kind is each.POSITIONAL_ONLY):
+        if not is_open and (each.name not in names or each.kind is each.POSITIONAL_ONLY):
             raise ValueError(
                 _("{where} is needed to make one, and is no field that is sent; give it a default").format(
                     where=f"{declared.__name__}.{each.name}"
@@ -374,9 +374,9 @@ def _check_constructor(declared: type, given: Collection[str]) -> None:
             )
 
 
-def _construct(declared: type, given: Mapping[str, object]) -> object:
+def _construct(declared: type, arguments: Mapping[str, object]) -> object:
     try:
-        return declared(**given)
+        return declared(**arguments)
     except Exception as error:
         raise ShapeMismatch(  # `__post_init__` may raise anything
             _("is refused by '{name}': {error}").format(

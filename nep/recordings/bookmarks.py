@@ -117,8 +117,8 @@ class Bookmarks:
             self._is_damaged = True
             return []
 
-    def _save(self, made: list[Bookmark]) -> None:
-        plain = {"bookmarks": [{"at_ns": each.at_ns, "name": each.name} for each in made]}
+    def _save(self, bookmarks: list[Bookmark]) -> None:
+        plain = {"bookmarks": [{"at_ns": each.at_ns, "name": each.name} for each in bookmarks]}
         unfinished = self.path.with_name(f"{self.path.name}.part")
         try:
             text = orjson.dumps(plain, option=orjson.OPT_INDENT_2)
@@ -137,7 +137,7 @@ class Bookmarks:
             with suppress(OSError):
                 unfinished.unlink(missing_ok=True)
             raise disk_error(self.path, error) from error
-        self._saved = made
+        self._saved = bookmarks
         self._sort()
 
 

@@ -323,17 +323,17 @@ def _selection(order: Mapping[str, Any]) -> TopicSelection:
 
 
 def _texts(order: Mapping[str, Any], key: str) -> tuple[str, ...]:
-    given = order.get(key, [])
-    if not isinstance(given, list) or not all(isinstance(each, str) for each in given):
+    value = order.get(key, [])
+    if not isinstance(value, list) or not all(isinstance(each, str) for each in value):
         raise TypeError(key)
-    return tuple(given)
+    return tuple(value)
 
 
 def _text(order: Mapping[str, Any], key: str, default: str | None = None) -> str:
-    given = order.get(key, default)
-    if not isinstance(given, str):
+    value = order.get(key, default)
+    if not isinstance(value, str):
         raise TypeError(key)
-    return given
+    return value
 
 
 def _lines(stream: IO[bytes]) -> Iterator[bytes]:
@@ -359,7 +359,7 @@ def main(arguments: list[str] | None = None) -> None:
     parser = argparse.ArgumentParser(prog="nep.recordings.child")
     parser.add_argument("--master", default=None)
     parser.add_argument("--transport", default="zeromq")
-    given = parser.parse_args(arguments)
+    options = parser.parse_args(arguments)
     out = sys.stdout.buffer
 
     def tell(event: Mapping[str, object]) -> None:
@@ -369,7 +369,7 @@ def main(arguments: list[str] | None = None) -> None:
         except OSError:  # the parent process has ended, and the input ends, too
             return
 
-    node = Node(f"nep-recorder-{os.getpid()}", given.transport, master=given.master, wait_s=None)
+    node = Node(f"nep-recorder-{os.getpid()}", options.transport, master=options.master, wait_s=None)
     service = RecorderService(node, tell)
     _stop_on_signals()
     service.tell("ready")

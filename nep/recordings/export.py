@@ -104,7 +104,7 @@ def export(
     if kind == "mcap":
         return [_mcap(recording, folder, replace(part, topics=topics), counted)]
     make: Callable[[_Source, Path, float], int]
-    made, taken = [], set[str]()
+    exported, used_names = [], set[str]()
     try:
         folder.mkdir(parents=True, exist_ok=True)
         if kind == "mp4":
@@ -113,7 +113,7 @@ def export(
         else:
             make, suffix = {"csv": _csv, "parquet": _parquet, "pictures": _pictures}[kind], _SUFFIXES[kind]
         for topic in topics:
-            path = folder / _file_name(topic, taken, suffix)
+            path = folder / _file_name(topic, used_names, suffix)
             if path.exists():
                 raise RecordingError(str(path), _("there is such a file already; choose another name"))
             unfinished = path.with_name(f"{path.name}.part")
@@ -124,10 +124,10 @@ def export(
             except BaseException:
                 _remove(unfinished)
                 raise
-            made.append(Exported(topic, path, count, source.unreadable))
+            exported.append(Exported(topic, path, count, source.unreadable))
     except OSError as error:
         raise disk_error(folder, error) from error
-    return made
+    return exported
 
 
 def takes(kind: str, codec: str) -> bool:
@@ -154,8 +154,8 @@ def _suitable_topics(
         }.get(kind, _("no topic has values for a table"))
         raise RecordingError(str(recording.path), reason)
     if kind != "mcap" and len(topics) > MAX_FILES:
-        said = _("it has {count} such topics; choose {most} of them at most")
-        raise RecordingError(str(recording.path), said.format(count=len(topics), most=MAX_FILES))
+        sentence = _("it has {count} such topics; choose {most} of them at most")
+        raise RecordingError(str(recording.path), sentence.format(count=len(topics), most=MAX_FILES))
     counts = _counts(recording, topics, part)
     if kind != "mcap":
         topics = [name for name in topics if counts.get(name)]
@@ -175,11 +175,11 @@ def _counts(recording: Recording, topics: list[str], part: Part) -> dict[str, in
     start_ns = recording.start_ns if part.start_ns is None else part.start_ns
     end_ns = recording.end_ns + 1 if part.end_ns is None else part.end_ns
     counted = recording.densities(start_ns, end_ns, 1, topics)
-    made = {}
+    counts = {}
     for name in topics:
         some = next(recording.read(start_ns, end_ns, (name,)), None) if start_ns < end_ns else None
-        made[name] = max(1, sum(counted.get(name, ()))) if some is not None else 0
-    return made
+        counts[name] = max(1, sum(counted.get(name, ()))) if some is not None else 0
+    return counts
 
 
 def _remove(path: Path) -> None:
@@ -192,13 +192,13 @@ def _remove(path: Path) -> None:
             path.unlink(missing_ok=True)
 
 
-def _file_name(topic: str, taken: set[str], suffix: str) -> str:
+def _file_name(topic: str, used_names: set[str], suffix: str) -> str:
     # Valid on every operating system, and unique.
     plain = re.sub(r"[^\w.-]+", "_", topic).strip("._") or "topic"
     name, number = plain[:100], 2
-    while name.lower() in taken:
+    while name.lower() in used_names:
         name, number = f"{plain[:100]}-{number}", number + 1
-    taken.add(name.lower())
+    used_names.add(name.lower())
     return name + suffix
 
 
@@ -263,25 +263,25 @@ def _encodable(text: str) -> str:
 
 def flattened(payload: object) -> dict[str, object]:
     """Return scalar values by path, such as "pose.x" and "joints[3]", or "value" for a scalar payload."""
-    made: dict[str, object] = {}
-    _flatten(payload, "", made, _MAX_DEPTH)
-    return made
+    columns: dict[str, object] = {}
+    _flatten(payload, "", columns, _MAX_DEPTH)
+    return columns
 
 
-def _flatten(value: object, path: str, made: dict[str, object], depth: int) -> None:
+def _flatten(value: object, path: str, columns: dict[str, object], depth: int) -> None:
     if isinstance(value, Mapping) and value and depth > 0:
         for key, each in value.items():
-            _flatten(each, f"{path}.{key}" if path else str(key), made, depth - 1)
+            _flatten(each, f"{path}.{key}" if path else str(key), columns, depth - 1)
     elif isinstance(value, list | tuple) and 0 < len(value) <= _MAX_LIST_COLUMNS and depth > 0:
         for number, each in enumerate(value):
-            _flatten(each, f"{path}[{number}]", made, depth - 1)
+            _flatten(each, f"{path}[{number}]", columns, depth - 1)
     elif value is None or isinstance(value, bool | int | float | str):
-        made[path or "value"] = value
+        columns[path or "value"] = value
     else:
         try:
-            made[path or "value"] = json.dumps(value, default=str, ensure_ascii=False)
+            columns[path or "value"] = json.dumps(value, default=str, ensure_ascii=False)
         except TypeError:  # keys of msgpack may be bytes
-            made[path or "value"] = str(value)
+            columns[path or "value"] = str(value)
 
 
 def _columns(source: _Source) -> dict[str, set[type]]:
@@ -418,11 +418,11 @@ def _pictures(source: _Source, path: Path, _fps: float) -> int:
     path.mkdir()
     count = 0
     for each in source.messages():
-        made = _picture_file(each.message)
-        if made is None:
+        picture = _picture_file(each.message)
+        if picture is None:
             source.unreadable += 1
             continue
-        suffix, data = made
+        suffix, data = picture
         count += 1
         (path / f"{count:06d}.{suffix}").write_bytes(data)
     return count

@@ -377,7 +377,7 @@ class FileReader:
         Payloads are not read. Short times are counted exactly from the indexes; for long ones the messages of
         a chunk are spread evenly over its time, at most half a second in nep's own recordings.
         """
-        made: dict[int, list[int]] = {}
+        result: dict[int, list[int]] = {}
         first = bisect_left(self._latest_ends, max(0, start_ns))
         last = bisect_left(self._starts, max(0, min(end_ns, 2**64 - 1)))
         is_exact = last - first <= _MAX_EXACT_CHUNKS
@@ -387,14 +387,14 @@ class FileReader:
             for channel, count in self._counts(number).items():
                 if channel not in channels:
                     continue
-                counts = made.setdefault(channel, [0] * buckets)
+                counts = result.setdefault(channel, [0] * buckets)
                 if not is_exact:
                     _spread(counts, (start_ns, end_ns), (chunk.start_ns, chunk.end_ns), count)
                     continue
                 for log_ns, _offset in self._entries(number, channel):
                     if start_ns <= log_ns < end_ns:
                         counts[(log_ns - start_ns) * buckets // span] += 1
-        return dict(made)
+        return dict(result)
 
     def pieces_of(self, channels: Collection[int]) -> Sequence[int]:
         """Return the chunks with messages of these channels. See `RawFile.pieces_of`."""
@@ -454,16 +454,16 @@ class FileReader:
                 self._budget.spend(max(info.length, info.uncompressed_bytes))
             self._make_room(info.uncompressed_bytes)
             try:
-                made = _LoadedChunk(read_chunk(self._file, info))
+                chunk = _LoadedChunk(read_chunk(self._file, info))
             except (ValueError, OSError) as error:
                 self._damaged[number] = self._damage_of(info)
                 if isinstance(error, ValueError):  # an I/O error may be temporary
                     self._unreadable.add(number)
                 return None
             self._damaged.pop(number, None)
-            self._cache[number] = made
-            self._cached_bytes += len(made.data)
-            return made
+            self._cache[number] = chunk
+            self._cached_bytes += len(chunk.data)
+            return chunk
 
     def _damage_of(self, info: ChunkInfo) -> Damage:
         counts = info.counts
@@ -519,9 +519,9 @@ def _spread(counts: list[int], whole: tuple[int, int], chunk: tuple[int, int], c
     shown = range(max(0, first), min(last, buckets - 1) + 1)
     before = until(shown.start - 1)
     for at in shown:
-        so_far = until(at)
-        counts[at] += so_far - before
-        before = so_far
+        total = until(at)
+        counts[at] += total - before
+        before = total
 
 
 def _log_ns(raw: RawMessage) -> int:

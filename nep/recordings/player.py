@@ -272,10 +272,10 @@ class Playback:
         now = self._clock()
         started, from_ns = self._anchor
         target = from_ns + int((now - started) * self._speed * 1e9)
-        most = self._position_ns + int(_MAX_LAG_S * self._speed * 1e9)
-        if target > most:
-            self._anchor = (now, most)
-            return most
+        limit = self._position_ns + int(_MAX_LAG_S * self._speed * 1e9)
+        if target > limit:
+            self._anchor = (now, limit)
+            return limit
         return max(target, self._position_ns)
 
     def _due(self, until_ns: int) -> list[RecordedMessage]:

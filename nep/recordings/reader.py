@@ -109,15 +109,15 @@ class Recording:
                 self._channels_of.setdefault(each.topic, []).append(number)
 
     def _topics(self) -> dict[str, RecordedTopic]:
-        made: dict[str, RecordedTopic] = {}
+        topics: dict[str, RecordedTopic] = {}
         for number, definition in self.facts.channels.items():
             if number in self._roles:
                 continue
             count, decoder = self.facts.counts.get(number, 0), self._decoders[number]
-            known = made.get(definition.topic)
+            known = topics.get(definition.topic)
             if known is not None and (known.message_count or not count):
                 publishers = tuple(dict.fromkeys((*known.publishers, decoder.publisher)))
-                made[known.name] = RecordedTopic(
+                topics[known.name] = RecordedTopic(
                     known.name,
                     known.msg_type,
                     known.codec,
@@ -127,7 +127,7 @@ class Recording:
                     known.schema_encoding,
                 )
                 continue
-            made[definition.topic] = RecordedTopic(
+            topics[definition.topic] = RecordedTopic(
                 definition.topic,
                 decoder.msg_type,
                 decoder.codec,
@@ -136,7 +136,7 @@ class Recording:
                 definition.message_encoding,
                 definition.schema_encoding,
             )
-        return dict(sorted(made.items()))
+        return dict(sorted(topics.items()))
 
     # ---- properties
 
@@ -168,29 +168,29 @@ class Recording:
     @property
     def words(self) -> Mapping[str, str]:
         """Metadata of the recorder: "note", "end", "started_ns", "ended_ns", as far as known."""
-        made: dict[str, str] = {}
+        metadata: dict[str, str] = {}
         for name, values in self.facts.metadata:
             if name == "nep.recording":
-                made.update(values)
-        return made
+                metadata.update(values)
+        return metadata
 
     def figures(self) -> dict[str, TopicFigures]:
         """Return the recorder's counts by topic; empty for recordings of other programs.
 
         They are in the metadata of a complete recording; otherwise its entries, once a second, are read.
         """
-        made: dict[str, TopicFigures] = {}
+        totals: dict[str, TopicFigures] = {}
         for name, values in self.facts.metadata:
             if name == "nep.figures":
                 for topic, text in values.items():
                     known = read_figures(text)
                     if known is not None:
-                        made[topic] = known
-        if made:
-            return made
+                        totals[topic] = known
+        if totals:
+            return totals
         for _log_ns, each in self.figures_over_time():
-            made.update(each)
-        return made
+            totals.update(each)
+        return totals
 
     def figure_pieces(self) -> Sequence[int]:
         """Return the pieces of the file with counts, in order of time, without reading them."""
@@ -206,8 +206,8 @@ class Recording:
         for log_ns, value in self.said("figures", pieces):
             topics = value.get("topics") if isinstance(value, dict) else None
             if isinstance(topics, dict):
-                made = {str(topic): read_figures(each) for topic, each in topics.items()}
-                yield log_ns, {topic: each for topic, each in made.items() if each is not None}
+                parsed = {str(topic): read_figures(each) for topic, each in topics.items()}
+                yield log_ns, {topic: each for topic, each in parsed.items() if each is not None}
 
     def said(self, role: Role, pieces: Collection[int] | None = None) -> Iterator[tuple[int, object]]:
         """Iterate over (time, value) of a role of the recorder's own entries: "alerts", "notes", "runs" etc.
@@ -276,11 +276,11 @@ class Recording:
 
     def newest_times(self, at_ns: int, topics: Collection[str] | None = None) -> dict[str, int]:
         """Return the time of the newest message up to `at_ns` by topic, from indexes only."""
-        made: dict[str, int] = {}
+        times: dict[str, int] = {}
         for channel, log_ns in self.file.newest_times(at_ns, self._channels(topics)).items():
             topic = self.facts.channels[channel].topic
-            made[topic] = max(log_ns, made.get(topic, 0))
-        return made
+            times[topic] = max(log_ns, times.get(topic, 0))
+        return times
 
     def before(self, at_ns: int, topic: str) -> RecordedMessage | None:
         """Return the last message of a topic before `at_ns`, or None."""
@@ -298,14 +298,14 @@ class Recording:
         Payloads are not read. Short times are counted exactly from the indexes; for long ones the messages of
         a chunk are spread evenly over its time, at most half a second in nep's own recordings.
         """
-        made: dict[str, list[int]] = {}
+        result: dict[str, list[int]] = {}
         if buckets < 1 or end_ns <= start_ns:
-            return made
+            return result
         for channel, counts in self.file.densities(start_ns, end_ns, buckets, self._channels(topics)).items():
             topic = self.facts.channels[channel].topic
-            known = made.get(topic)
-            made[topic] = list(counts) if known is None else list(map(sum, zip(known, counts, strict=True)))
-        return made
+            known = result.get(topic)
+            result[topic] = list(counts) if known is None else list(map(sum, zip(known, counts, strict=True)))
+        return result
 
     def close(self) -> None:
         """Close the file; concurrent reads raise `ClosedError`. Idempotent."""
@@ -326,5 +326,5 @@ class _Decoders(dict[int, ChannelDecoder]):
         self._definitions = definitions
 
     def __missing__(self, number: int) -> ChannelDecoder:
-        made = self[number] = ChannelDecoder(self._definitions[number])
-        return made
+        decoder = self[number] = ChannelDecoder(self._definitions[number])
+        return decoder

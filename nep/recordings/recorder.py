@@ -58,11 +58,11 @@ class TopicSelection:
     @property
     def subscriptions(self) -> tuple[str, ...]:
         """Minimal set of topics and patterns that covers the selection."""
-        made: list[str] = []
+        chosen: list[str] = []
         for each in map(widened, self.topics or (_ALL,)):
-            if not any(glob_matches(other, each) for other in made):
-                made = [*(other for other in made if not glob_matches(each, other)), each]
-        return tuple(made)
+            if not any(glob_matches(other, each) for other in chosen):
+                chosen = [*(other for other in chosen if not glob_matches(each, other)), each]
+        return tuple(chosen)
 
     def has(self, topic: str) -> bool:
         """Return True if a topic is selected."""
@@ -134,9 +134,9 @@ class Recorder:
 
     def _record(self, number: int, messages: Sequence[Message]) -> None:
         # With overlapping subscriptions the first one counts.
-        mine = [each for each in messages if self._owner(each.topic) == number]
-        if mine:
-            self._writer.post(mine)
+        own_messages = [each for each in messages if self._owner(each.topic) == number]
+        if own_messages:
+            self._writer.post(own_messages)
 
     def _owner(self, topic: str) -> int:
         # -1 if the topic is not selected.

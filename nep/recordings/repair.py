@@ -101,12 +101,12 @@ class _Counts:
 
 def repaired_path(path: Path) -> Path:
     """Return an unused file name beside a damaged recording."""
-    made = path.with_name(f"{path.stem}.repaired.mcap")
+    candidate = path.with_name(f"{path.stem}.repaired.mcap")
     number = 2
-    while made.exists():
-        made = path.with_name(f"{path.stem}.repaired-{number}.mcap")
+    while candidate.exists():
+        candidate = path.with_name(f"{path.stem}.repaired-{number}.mcap")
         number += 1
-    return made
+    return candidate
 
 
 def repair(
@@ -244,8 +244,8 @@ class _Repair:
             return False
         if place.opcode == Opcode.CHUNK:
             return self._copy_chunk_at(place)
-        most = MAX_CHUNK_BYTES if place.opcode == Opcode.MESSAGE else MAX_RECORD_BYTES
-        if place.opcode in _PARSED_OPCODES and place.length > most:
+        limit = MAX_CHUNK_BYTES if place.opcode == Opcode.MESSAGE else MAX_RECORD_BYTES
+        if place.opcode in _PARSED_OPCODES and place.length > limit:
             return False
         if place.opcode == Opcode.MESSAGE_INDEX:
             self._count_lost(place)
@@ -275,17 +275,17 @@ class _Repair:
 
     def _copy_metadata(self, content: bytes) -> None:
         try:
-            made = read_record("Metadata", content)
+            record = read_record("Metadata", content)
         except ValueError:
             return
-        if made.name == "nep.recording":
-            self._counts.words.update(made.metadata)
-        elif made.name == "nep.figures":
-            for topic, text in made.metadata.items():
+        if record.name == "nep.recording":
+            self._counts.words.update(record.metadata)
+        elif record.name == "nep.figures":
+            for topic, text in record.metadata.items():
                 with suppress(orjson.JSONDecodeError):
                     self._counts.figures[topic] = orjson.loads(text)
         else:
-            self._counts.metadata.append((made.name, made.metadata))
+            self._counts.metadata.append((record.name, record.metadata))
 
     # ---- chunks
 
@@ -396,8 +396,8 @@ class _Repair:
         self._counts.damaged_places += 1
         self._counts.is_unknown = True
         if found is None:
-            kept = self._copy_truncated_chunk(offset)
-            self._discard_bytes(self._size - offset - kept)
+            copied = self._copy_truncated_chunk(offset)
+            self._discard_bytes(self._size - offset - copied)
             return self._size
         self._discard_bytes(found - offset)
         return found

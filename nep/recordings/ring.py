@@ -171,17 +171,17 @@ class _Segments:
         # `release(` must follow.
         with self._lock:
             since = self._newest_ns_locked() - int(seconds * 1e9)
-            taken = []
+            segments = []
             for segment in self._all:
                 chunks = [each for each in segment.writer.chunks or () if each.end_ns >= since]
                 if chunks:
                     segment.users += 1
-                    taken.append((segment, chunks))
-            return taken
+                    segments.append((segment, chunks))
+            return segments
 
-    def release(self, taken: Sequence[tuple[_Segment, list[ChunkInfo]]]) -> None:
+    def release(self, segments: Sequence[tuple[_Segment, list[ChunkInfo]]]) -> None:
         with self._lock:
-            for segment, _chunks in taken:
+            for segment, _chunks in segments:
                 segment.users -= 1
                 if segment.is_unwanted and not segment.users:
                     _remove(segment.path)
@@ -279,11 +279,11 @@ class FlightRecorder:
         target = Path(path)
         if not self._writer.flush():
             raise RecordingError(str(target), self._writer.problem or _("the disk does not answer"))
-        taken = self._segments.take(seconds)
-        if not taken:
+        segments = self._segments.take(seconds)
+        if not segments:
             raise RecordingError(str(target), _("no message has come yet"))
         try:
-            return self._copy_segments(target, taken, note)
+            return self._copy_segments(target, segments, note)
         except FileExistsError:
             raise RecordingError(
                 str(target), _("there is such a file already; choose another name")
@@ -291,16 +291,16 @@ class FlightRecorder:
         except OSError as error:
             raise disk_error(target, error) from error
         finally:
-            self._segments.release(taken)
+            self._segments.release(segments)
 
     def _copy_segments(
-        self, target: Path, taken: Sequence[tuple[_Segment, list[ChunkInfo]]], note: str
+        self, target: Path, segments: Sequence[tuple[_Segment, list[ChunkInfo]]], note: str
     ) -> KeptRecording:
         writer = FileWriter(target, self._segments.table)
         try:
             figures = _FiguresInChunks(self._segments.table)
             damaged = 0
-            for segment, chunks in taken:
+            for segment, chunks in segments:
                 with segment.path.open("rb") as file:
                     for chunk in chunks:
                         damaged += not _copy(file, chunk, writer, figures)
@@ -308,9 +308,9 @@ class FlightRecorder:
                 raise ValueError("nothing is left")
             words = {"note": note, "started_ns": str(writer.start_ns or 0), "ended_ns": str(writer.end_ns)}
             writer.add_metadata("nep.recording", {**words, "end": "", "kept": "1", "damaged": str(damaged)})
-            told = figures.figures(writer.counts)
-            if told:
-                plain = {topic: orjson.dumps(each.to_plain()).decode() for topic, each in told.items()}
+            totals = figures.figures(writer.counts)
+            if totals:
+                plain = {topic: orjson.dumps(each.to_plain()).decode() for topic, each in totals.items()}
                 writer.add_metadata("nep.figures", plain)
             writer.finish()
         except (OSError, ValueError) as error:
@@ -319,7 +319,7 @@ class FlightRecorder:
             if isinstance(error, ValueError):
                 raise RecordingError(str(target), _("what was to be kept is damaged on the disk")) from error
             raise
-        count = sum(each.received - each.unkept for each in told.values())
+        count = sum(each.received - each.unkept for each in totals.values())
         return KeptRecording(target, count, (writer.end_ns - (writer.start_ns or writer.end_ns)) / 1e9)
 
     def close(self) -> None:
@@ -387,14 +387,14 @@ class _FiguresInChunks:
                     self._last[topic] = figures
 
     def figures(self, counts: dict[int, int]) -> dict[str, TopicFigures]:
-        kept: dict[str, int] = {}
+        counts_by_topic: dict[str, int] = {}
         for channel, count in counts.items():
             if not self._role(channel):
                 topic = self._table.definitions[channel].topic
-                kept[topic] = kept.get(topic, 0) + count
-        return {topic: self._difference(topic, count) for topic, count in kept.items()}
+                counts_by_topic[topic] = counts_by_topic.get(topic, 0) + count
+        return {topic: self._difference(topic, count) for topic, count in counts_by_topic.items()}
 
     def _difference(self, topic: str, count: int) -> TopicFigures:
         nothing = TopicFigures()
-        made = self._last.get(topic, nothing).since(self._first.get(topic, nothing))
-        return replace(made, received=count + made.unkept)
+        difference = self._last.get(topic, nothing).since(self._first.get(topic, nothing))
+        return replace(difference, received=count + difference.unkept)

@@ -451,8 +451,8 @@ class RecordingWriter:
         definition = definition_of(message, encoding)
         if len(table.definitions) < MAX_PUBLISHER_CHANNELS or table.has(definition):
             return table.number(definition), encoding
-        apart = encoding_of(message, log_ns, is_self_contained=True)
-        return table.number(definition_of(message, apart)), apart
+        encoding = encoding_of(message, log_ns, is_self_contained=True)
+        return table.number(definition_of(message, encoding)), encoding
 
     def _write_own(self, role: Role, text: bytes) -> None:
         self._own_sequence += 1

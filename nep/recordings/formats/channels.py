@@ -335,8 +335,8 @@ class ChannelDecoder:
                 if number == self._data_field and isinstance(value, memoryview):
                     payload = value
                 elif number == EXTRA and isinstance(value, memoryview):
-                    made = unpack(value)
-                    extra = made if isinstance(made, dict) else {}
+                    decoded = unpack(value)
+                    extra = decoded if isinstance(decoded, dict) else {}
                 else:
                     values[number] = value
         except ValueError:
@@ -345,15 +345,15 @@ class ChannelDecoder:
             extra = {"extension": self._foreign_extension(values)}
         return payload, extra
 
-    def _foreign_extension(self, told: Mapping[int, int | memoryview]) -> Mapping[str, object]:
-        name = told.get(3 if self._data_field == 2 else 4)
+    def _foreign_extension(self, fields: Mapping[int, int | memoryview]) -> Mapping[str, object]:
+        name = fields.get(3 if self._data_field == 2 else 4)
         encoding = str(name, "utf-8", "replace") if isinstance(name, memoryview) else ""
         if self._data_field == 2:
             return {"encoding": encoding}
         layout = raw_layout(encoding)
         channels = 1 if layout is None else layout.channels
         return {
-            "shape": [_int_or_none(told.get(3)) or 0, _int_or_none(told.get(2)) or 0, channels],
+            "shape": [_int_or_none(fields.get(3)) or 0, _int_or_none(fields.get(2)) or 0, channels],
             "encoding": encoding,
         }
 

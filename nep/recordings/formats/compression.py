@@ -51,8 +51,8 @@ def compressed(data: bytes, compression: str) -> bytes:
     if compression == "zstd":
         return zstandard.ZstdCompressor(level=_ZSTD_LEVEL).compress(data)
     if compression == "lz4":
-        made: bytes = lz4_frame.compress(data)
-        return made
+        result: bytes = lz4_frame.compress(data)
+        return result
     return data
 
 
@@ -65,21 +65,21 @@ def decompressed(data: memoryview, head: ChunkHead) -> bytes | memoryview:
     size = head.uncompressed_bytes
     if size > max_chunk_bytes(head.data_bytes):
         raise ValueError("too large")
-    made: bytes | memoryview
+    result: bytes | memoryview
     try:
         if not head.compression:
-            made = data
+            result = data
         elif head.compression == "zstd" and zstandard.frame_content_size(data) == size:
-            made = zstandard.ZstdDecompressor(max_window_size=_MAX_WINDOW_BYTES).decompress(data)
+            result = zstandard.ZstdDecompressor(max_window_size=_MAX_WINDOW_BYTES).decompress(data)
         else:
-            made = _joined(_pieces(data, head.compression, size + 1))
+            result = _joined(_pieces(data, head.compression, size + 1))
     except (zstandard.ZstdError, RuntimeError, EOFError, MemoryError) as error:
         raise ValueError(str(error)) from error
-    if len(made) != size:
+    if len(result) != size:
         raise ValueError("size")
-    if head.crc and zlib.crc32(made) != head.crc:
+    if head.crc and zlib.crc32(result) != head.crc:
         raise ValueError("crc")
-    return made
+    return result
 
 
 def decompressed_part(data: memoryview, head: ChunkHead) -> bytes | memoryview:
@@ -119,7 +119,7 @@ def _pieces(
         while most_bytes > 0 and not lz4.eof and (at < len(data) or not lz4.needs_input):
             part = data[at : at + step_bytes] if lz4.needs_input else b""
             at += len(part)
-            made: bytes = lz4.decompress(part, max_length=min(step_bytes, most_bytes))
-            most_bytes -= len(made)
-            if made:
-                yield made
+            decoded: bytes = lz4.decompress(part, max_length=min(step_bytes, most_bytes))
+            most_bytes -= len(decoded)
+            if decoded:
+                yield decoded

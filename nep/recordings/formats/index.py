@@ -264,8 +264,8 @@ def _read_metadata(file: BinaryIO, place: Place, index: FileIndex) -> None:
     if not 0 < place.length <= MAX_RECORD_BYTES or index.metadata_bytes > _MAX_METADATA_BYTES:
         return
     with suppress(ValueError):
-        made = read_record("Metadata", _content(file, place))
-        index.metadata.append((made.name, made.metadata))
+        record = read_record("Metadata", _content(file, place))
+        index.metadata.append((record.name, record.metadata))
 
 
 # ---- from the summary
@@ -332,9 +332,9 @@ class _Summary:
                     self._file, Place(at.offset, Opcode.METADATA, max(0, at.length - HEAD_BYTES)), index
                 )
         elif opcode == Opcode.ATTACHMENT_INDEX and place.length <= _MAX_HEADER_BYTES:
-            told = read_record("AttachmentIndex", _content(self._file, place))
-            if self._is_new(told.offset) and len(index.attachments) < _MAX_ATTACHMENTS:
-                index.attachments.append(AttachedFile(told.name, told.media_type, told.data_size))
+            record = read_record("AttachmentIndex", _content(self._file, place))
+            if self._is_new(record.offset) and len(index.attachments) < _MAX_ATTACHMENTS:
+                index.attachments.append(AttachedFile(record.name, record.media_type, record.data_size))
 
     def _is_new(self, offset: int) -> bool:
         # False for a second entry with the same offset.
@@ -579,7 +579,7 @@ def read_entries(file: BinaryIO, info: ChunkInfo, channel: int) -> Sequence[tupl
     if opcode != Opcode.MESSAGE_INDEX or length > info.index_bytes:
         return None
     try:
-        told, entries = read_message_index(file.read(length))
+        number, entries = read_message_index(file.read(length))
     except ValueError:
         return None
-    return list(entries) if told == channel else None
+    return list(entries) if number == channel else None

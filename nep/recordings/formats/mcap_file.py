@@ -87,20 +87,23 @@ class ChannelTable:
 
     def records(self, number: int) -> tuple[mcap_records.Schema | None, mcap_records.Channel]:
         """Return schema and channel record of a channel."""
-        made = self.definitions[number]
-        key = (made.schema_name, made.schema_encoding, made.schema_data)
+        definition = self.definitions[number]
+        key = (definition.schema_name, definition.schema_encoding, definition.schema_data)
         schema_number = self._schemas.get(key, 0)
         channel = mcap_records.Channel(
             id=number,
-            topic=made.topic,
-            message_encoding=made.message_encoding,
+            topic=definition.topic,
+            message_encoding=definition.message_encoding,
             schema_id=schema_number,
-            metadata=dict(made.metadata),
+            metadata=dict(definition.metadata),
         )
         if not schema_number:
             return None, channel
         return mcap_records.Schema(
-            id=schema_number, data=made.schema_data, encoding=made.schema_encoding, name=made.schema_name
+            id=schema_number,
+            data=definition.schema_data,
+            encoding=definition.schema_encoding,
+            name=definition.schema_name,
         ), channel
 
 
@@ -220,10 +223,10 @@ class FileWriter:
             return 0
         data = b"".join(chunk.parts)
         crc, size = zlib.crc32(data), len(data)
-        made, compression = compressed(data, self._compression), self._compression
-        if len(made) >= size:
-            made, compression = data, ""
-        head = pack_chunk(made, compression, size, crc, (chunk.start_ns, chunk.end_ns))
+        payload, compression = compressed(data, self._compression), self._compression
+        if len(payload) >= size:
+            payload, compression = data, ""
+        head = pack_chunk(payload, compression, size, crc, (chunk.start_ns, chunk.end_ns))
         indexes = {number: pack_message_index(number, entries) for number, entries in chunk.indexes.items()}
         counts = self.pending_counts
         self.define(counts)
@@ -231,14 +234,14 @@ class FileWriter:
             chunk.start_ns,
             chunk.end_ns,
             self._at,
-            len(head) + len(made),
+            len(head) + len(payload),
             b"",
             0,
             compression,
-            len(made),
+            len(payload),
             size,
         )
-        self._write_chunk(info, [head, made], indexes, counts)
+        self._write_chunk(info, [head, payload], indexes, counts)
         self._chunk = _Chunk()
         return sum(counts.values())
 
@@ -278,15 +281,15 @@ class FileWriter:
         new = [number for number in channels if number not in self._written_channels]
         if not new:
             return
-        made: list[bytes | memoryview] = []
+        parts: list[bytes | memoryview] = []
         schemas: set[int] = set()
         for number in new:
             schema, channel = self.table.records(number)
             if schema is not None and schema.id not in self._written_schemas and schema.id not in schemas:
                 schemas.add(schema.id)
-                made.append(packed(schema))
-            made.append(packed(channel))
-        self._write(b"".join(made))
+                parts.append(packed(schema))
+            parts.append(packed(channel))
+        self._write(b"".join(parts))
         self._written_channels.update(new)
         self._written_schemas |= schemas
 
@@ -340,21 +343,21 @@ class FileWriter:
         data_end = packed(mcap_records.DataEnd(data_section_crc=0))
         start = self._at + len(data_end)
         groups = self._groups()
-        made, offsets = b"", b""
+        summary, offsets = b"", b""
         for opcode, group in groups:
             if group:
                 offsets += packed(
                     mcap_records.SummaryOffset(
-                        group_opcode=opcode, group_start=start + len(made), group_length=len(group)
+                        group_opcode=opcode, group_start=start + len(summary), group_length=len(group)
                     )
                 )
-                made += group
+                summary += group
         footer = mcap_records.Footer(
-            summary_start=start, summary_offset_start=start + len(made), summary_crc=0
+            summary_start=start, summary_offset_start=start + len(summary), summary_crc=0
         )
         head = packed(footer)[:-4]
-        crc = zlib.crc32(made + offsets + head)
-        return data_end + made + offsets + head + crc.to_bytes(4, "little") + MAGIC
+        crc = zlib.crc32(summary + offsets + head)
+        return data_end + summary + offsets + head + crc.to_bytes(4, "little") + MAGIC
 
     def _summary_order(self, number: int) -> tuple[bool, int]:
         # Wrapped channels last: viewers read all messages of a topic as those of its first channel.

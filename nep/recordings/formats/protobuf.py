@@ -29,12 +29,12 @@ _NS = 1_000_000_000
 
 
 def _varint(number: int) -> bytes:
-    made = bytearray()
+    encoded = bytearray()
     while number > 0x7F:
-        made.append(number & 0x7F | 0x80)
+        encoded.append(number & 0x7F | 0x80)
         number >>= 7
-    made.append(number)
-    return bytes(made)
+    encoded.append(number)
+    return bytes(encoded)
 
 
 def bytes_field(number: int, size_bytes: int) -> bytes:
@@ -128,21 +128,21 @@ SCHEMAS: Mapping[str, _Fields] = {
 
 
 def _message_type(name: str, fields_of_it: _Fields) -> bytes:
-    made = _whole(1, name.encode())
+    encoded = _whole(1, name.encode())
     for field_name, (number, kind) in fields_of_it.items():
         one = _whole(1, field_name.encode())
         one += b"\x18" + _varint(number) + b"\x20\x01\x28" + _varint(kind)  # number, optional, type
         if kind == _MESSAGE:
             one += _whole(6, f".{_STAMP}".encode())
-        made += _whole(2, one)
-    return made
+        encoded += _whole(2, one)
+    return encoded
 
 
 def _file(name: str, package: str, depends_on: str, message: bytes) -> bytes:
-    made = _whole(1, name.encode()) + _whole(2, package.encode())
+    encoded = _whole(1, name.encode()) + _whole(2, package.encode())
     if depends_on:
-        made += _whole(3, depends_on.encode())
-    return made + _whole(4, message) + _whole(12, b"proto3")
+        encoded += _whole(3, depends_on.encode())
+    return encoded + _whole(4, message) + _whole(12, b"proto3")
 
 
 @cache
@@ -151,8 +151,8 @@ def descriptor_set(schema: str) -> bytes:
     package, name = schema.split(".")
     message = _message_type(name, SCHEMAS[schema])
     needs = "google/protobuf/timestamp.proto" if "timestamp" in SCHEMAS[schema] else ""
-    made = b""
+    encoded = b""
     if needs:
         stamp = _message_type("Timestamp", {"seconds": (1, _INT64), "nanos": (2, _INT32)})
-        made += _whole(1, _file(needs, "google.protobuf", "", stamp))
-    return made + _whole(1, _file(f"{package}/{name}.proto", package, needs, message))
+        encoded += _whole(1, _file(needs, "google.protobuf", "", stamp))
+    return encoded + _whole(1, _file(f"{package}/{name}.proto", package, needs, message))

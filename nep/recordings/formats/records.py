@@ -151,7 +151,7 @@ def messages_in(chunk: bytes | memoryview, offset: int = 0) -> Iterator[RawMessa
     Stops without an error at the end or at invalid bytes, because the last record may be truncated.
     """
     whole = memoryview(chunk)
-    size, others = whole.nbytes, 0
+    size, other_count = whole.nbytes, 0
     while offset + HEAD_BYTES <= size:
         opcode, length = RECORD_HEAD.unpack_from(whole, offset)
         end = offset + HEAD_BYTES + length
@@ -165,8 +165,8 @@ def messages_in(chunk: bytes | memoryview, offset: int = 0) -> Iterator[RawMessa
                 offset, channel, sequence, log_ns, publish_ns, whole[offset + MESSAGE_HEAD.size : end]
             )
         else:
-            others += 1
-            if not opcode or others > _MAX_OTHERS:
+            other_count += 1
+            if not opcode or other_count > _MAX_OTHERS:
                 return
             yield opcode, whole[offset + HEAD_BYTES : end]
         offset = end

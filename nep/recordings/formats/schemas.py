@@ -40,8 +40,8 @@ def schema_of(msg_type: str) -> bytes:
 @cache
 def json_schema(declared: type) -> bytes:
     """Return the JSON Schema of a dataclass or TypedDict."""
-    made = _of(declared, 0) or {"type": "object"}
-    return orjson.dumps({"title": getattr(declared, "MSG_TYPE", declared.__name__), **made})
+    schema = _of(declared, 0) or {"type": "object"}
+    return orjson.dumps({"title": getattr(declared, "MSG_TYPE", declared.__name__), **schema})
 
 
 def _of(hint: Any, depth: int) -> dict[str, object] | None:  # noqa: ANN401 - any annotation
@@ -57,9 +57,9 @@ def _of(hint: Any, depth: int) -> dict[str, object] | None:  # noqa: ANN401 - an
         return None if items is None or items["type"] == "array" else {"type": "array", "items": items}
     if not (dataclasses.is_dataclass(hint) or hasattr(hint, "__required_keys__")) or depth >= _DEEPEST:
         return None
-    made = {
-        name: its
+    properties = {
+        name: field_schema
         for name, each in typing.get_type_hints(hint).items()
-        if not name.startswith("_") and (its := _of(each, depth + 1)) is not None
+        if not name.startswith("_") and (field_schema := _of(each, depth + 1)) is not None
     }
-    return {"type": "object", "properties": made}
+    return {"type": "object", "properties": properties}
