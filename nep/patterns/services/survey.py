@@ -210,7 +210,7 @@ class Respondent(Server):
     Callbacks run as those of `Server`; an exception is logged and counted in
     `Surveyor.failures`.
 
-        node.new_respondent("battery", lambda _question: {"percent": 87})
+        node.new_respondent("battery", lambda question: {"percent": 87})
         node.spin()
     """
 
