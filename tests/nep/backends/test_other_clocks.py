@@ -220,7 +220,7 @@ def test_who_does_not_say_where_it_is_is_judged_by_its_address(
     endpoints = (endpoint,) if endpoint else ()
     where = computer_id() if told is None else told
     far = RemotePublisher(PublisherRecord(7, "t", "json", "json", endpoints), "n", "far", where)
-    assert (PublisherTracker().listed(far).clock.difference is SAME_CLOCK) is is_here
+    assert (PublisherTracker().add_listed(far).clock.difference is SAME_CLOCK) is is_here
 
 
 def test_a_computer_is_known_by_what_it_does_not_tell(monkeypatch: pytest.MonkeyPatch) -> None:
