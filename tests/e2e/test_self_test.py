@@ -123,7 +123,7 @@ def test_without_the_editor_all_else_is_tried_at_the_same_time(both: tuple[Tried
     went_well(tried, *ALWAYS, "processes")
     assert tried.report["editor_ready_ms"] is None
     assert not tried.report["web"]
-    assert not [line for line in tried.program.lines if "Traceback" in line or "a fault of Studio" in line]
+    assert not [line for line in tried.program.lines if "Traceback" in line or "uncaught exception" in line]
     assert picture(tried).shape == (900, 1440, 3)
 
 

@@ -23,12 +23,12 @@ class DeferredSteps(QObject):
         self._window, self._steps = window, deque(steps)
         self.began = False
         """True if the window was painted, or the time limit passed."""
-        self._turn = QTimer(self)
-        self._turn.timeout.connect(self._take)
-        self._late = QTimer(self)
-        self._late.setSingleShot(True)
-        self._late.timeout.connect(self._begin)
-        self._late.start(AT_THE_LATEST_MS)
+        self._idle_timer = QTimer(self)
+        self._idle_timer.timeout.connect(self._run_step)
+        self._deadline = QTimer(self)
+        self._deadline.setSingleShot(True)
+        self._deadline.timeout.connect(self._begin)
+        self._deadline.start(AT_THE_LATEST_MS)
         window.installEventFilter(self)
 
     def put_first(self, steps: Sequence[Callable[[], object]]) -> None:
@@ -43,19 +43,19 @@ class DeferredSteps(QObject):
     def _begin(self) -> None:
         if not self.began:
             self.began = True
-            self._late.stop()
+            self._deadline.stop()
             self._window.removeEventFilter(self)
-            self._turn.start(0)
+            self._idle_timer.start(0)
 
-    def _take(self) -> None:
+    def _run_step(self) -> None:
         if not self._steps:
-            self._turn.stop()
+            self._idle_timer.stop()
             return
         step = self._steps.popleft()
         try:
             step()
         except Exception:  # noqa: BLE001  it fails again, and is reported, where it is used
-            _log.exception("a step after the first paint failed")
+            _log.exception("a deferred step failed")
 
     @property
     def done(self) -> bool:

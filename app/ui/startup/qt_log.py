@@ -77,22 +77,22 @@ class Log(logging.Handler):
 
     def __init__(self) -> None:
         super().__init__(logging.WARNING)
-        self._once = RepeatFilter()
-        self._kept: deque[tuple[str, str, str]] = deque(maxlen=KEPT)
+        self._repeat_filter = RepeatFilter()
+        self._records: deque[tuple[str, str, str]] = deque(maxlen=KEPT)
 
     def emit(self, record: logging.LogRecord) -> None:
         """Store a record; repetitions are stored with their count."""
         if getattr(record, "in_console", False):
             return
-        told = self._once.filter(record)
+        told = self._repeat_filter.filter(record)
         if told is not None:
             level = "error" if told.levelno >= logging.ERROR else "warn"
-            self._kept.append((level, told.name.partition(".")[0], told.getMessage()))
+            self._records.append((level, told.name.partition(".")[0], told.getMessage()))
 
     def take(self, add: Callable[[str, str, str], object]) -> None:
         """Pass stored records to ``add`` (level, origin, text), oldest first."""
-        while self._kept:
-            add(*self._kept.popleft())
+        while self._records:
+            add(*self._records.popleft())
 
 
 class TerminalHandler(logging.StreamHandler[terminal.Terminal]):
@@ -103,13 +103,13 @@ class TerminalHandler(logging.StreamHandler[terminal.Terminal]):
 
     def __init__(self, stream: TextIO | None) -> None:
         super().__init__(terminal.Terminal(stream))
-        self._once = RepeatFilter()
+        self._repeat_filter = RepeatFilter()
         self.setLevel(logging.WARNING)
         self.setFormatter(terminal.LineFormatter("%(name)s: %(message)s"))
 
     def emit(self, record: logging.LogRecord) -> None:
         """Write a record; repetitions are written with their count."""
-        told = self._once.filter(record)
+        told = self._repeat_filter.filter(record)
         if told is not None:
             super().emit(told)
             if told.levelno >= logging.CRITICAL:  # Qt ends the program afterwards

@@ -70,7 +70,9 @@ def begin_trial(environ: Mapping[str, str], platform: str) -> SandboxTrial | Non
 def fit_sandbox(environ: MutableMapping[str, str], trial: SandboxTrial | None) -> None:
     """Restrict Chromium to its filter if the test failed. Call it before the web engine starts."""
     if trial is not None and not trial.allowed():
-        _log.info("no name spaces are allowed here: the block editor's browser has its filter alone")
+        _log.info(
+            "user namespaces are not permitted: the block editor's browser uses the system call filter only"
+        )
         environ[FLAGS] = f"{environ.get(FLAGS, '')} {FILTER_ALONE}".strip()
 
 

@@ -36,7 +36,7 @@ else:
 
 CONNECT_MS = 300
 ANSWER_MS = 3000
-START_S, LOOK_S = 20.0, 0.05
+START_S, POLL_S = 20.0, 0.05
 LONGEST = 1_000_000
 LONGEST_PATH = 100  # the path of a Unix socket has at most 108 bytes
 OK = b"ok\n"
@@ -121,7 +121,7 @@ def hand_over(name: str, asked: StartRequest) -> bool:
         return False  # on Unix before Qt's network module is loaded, which takes time
     line = QtNetwork.QLocalSocket()
     line.connectToServer(name)
-    if not line.waitForConnected(CONNECT_MS) or _is_others(line):
+    if not line.waitForConnected(CONNECT_MS) or _belongs_to_other_user(line):
         return False
     files = [str(path.absolute()) for path in asked.files]
     line.write(json.dumps({"files": files, "demo": asked.demo}).encode() + b"\n")
@@ -151,11 +151,11 @@ def found(name: str, asked: StartRequest, turn: FileLock, within_s: float = STAR
                 return True
             return False
         waited = True
-        pause.wait(LOOK_S)
+        pause.wait(POLL_S)
     return True
 
 
-def _is_others(line: QtNetwork.QLocalSocket) -> bool:
+def _belongs_to_other_user(line: QtNetwork.QLocalSocket) -> bool:
     if os.name != "posix":
         return False
     user = peer_of(int(line.socketDescriptor()))
@@ -171,10 +171,10 @@ class SingleInstanceServer(QObject):
         # `do` is called for each request.
         super().__init__(parent)
         self._do = do
-        self._heard: dict[QtNetwork.QLocalSocket, bytes] = {}
+        self._received: dict[QtNetwork.QLocalSocket, bytes] = {}
         self._server = QtNetwork.QLocalServer(self)
         self._server.setSocketOptions(QtNetwork.QLocalServer.SocketOption.UserAccessOption)
-        self._server.newConnection.connect(self._come)
+        self._server.newConnection.connect(self._accept)
         self.open = self._listen(name)
         """True if later starts can find it; otherwise each opens its own window."""
 
@@ -192,26 +192,26 @@ class SingleInstanceServer(QObject):
         QtNetwork.QLocalServer.removeServer(name)  # left behind by a killed instance
         return self._server.listen(name)
 
-    def _come(self) -> None:
+    def _accept(self) -> None:
         while (socket := self._server.nextPendingConnection()) is not None:
-            if _is_others(socket):
+            if _belongs_to_other_user(socket):
                 socket.abort()
                 socket.deleteLater()
                 continue
-            self._heard[socket] = b""
+            self._received[socket] = b""
             socket.readyRead.connect(lambda socket=socket: self._read(socket))
-            socket.disconnected.connect(lambda socket=socket: self._gone(socket))
+            socket.disconnected.connect(lambda socket=socket: self._on_disconnected(socket))
             self._read(socket)
 
     def _read(self, socket: QtNetwork.QLocalSocket) -> None:
-        if socket not in self._heard:
+        if socket not in self._received:
             return
-        self._heard[socket] += socket.readAll().data()
-        data = self._heard[socket]
+        self._received[socket] += socket.readAll().data()
+        data = self._received[socket]
         if len(data) > LONGEST:
             socket.abort()
         elif data.endswith(b"\n"):
-            self._heard[socket] = b""
+            self._received[socket] = b""
             asked = parse(data)
             if asked is None:
                 socket.abort()
@@ -220,8 +220,8 @@ class SingleInstanceServer(QObject):
             socket.flush()
             self._do(asked)
 
-    def _gone(self, socket: QtNetwork.QLocalSocket) -> None:
-        self._heard.pop(socket, None)
+    def _on_disconnected(self, socket: QtNetwork.QLocalSocket) -> None:
+        self._received.pop(socket, None)
         if isValid(socket):  # not one that is deleted with the window
             socket.deleteLater()
 

@@ -45,7 +45,7 @@ def names() -> frozenset[str]:
 def _source(name: str) -> str:
     shape = _shapes().get(name)
     if shape is None:
-        _log.warning("no icon '%s'%s; another one stands in", name[:80], _near(name))
+        _log.warning("unknown icon '%s'%s; using a placeholder", name[:80], _near(name))
         shape = _shapes()[UNKNOWN]
     return f"{HEAD}{shape}</svg>"
 

@@ -24,8 +24,8 @@ MODES: tuple[Mode, ...] = get_args(Mode)
 MONO_KINDS = frozenset({"code", "mono"})
 DISPLAY_SPACING_EM = -0.02
 TEXT_PERCENT = (100, 200)
-STRONGER = frozenset({"border", "borderStrong", "okBorder", "warnBorder", "errorBorder"})
-DEPRIVED_OF_TINT = ("okTint", "warnTint", "errorTint", "infoTint", "accentTint", "changedTint")
+HC_STRONGER = frozenset({"border", "borderStrong", "okBorder", "warnBorder", "errorBorder"})
+HC_FLATTENED = ("okTint", "warnTint", "errorTint", "infoTint", "accentTint", "changedTint")
 PALETTE_ROLES: Mapping[QPalette.ColorRole, str] = {
     QPalette.ColorRole.Window: "window",
     QPalette.ColorRole.WindowText: "text",
@@ -178,9 +178,9 @@ class Theme(QObject):
     def hex(self, role: str) -> str:
         """Return a role's colour as in the tokens. Raises KeyError for an unknown role."""
         if self.high_contrast:
-            if role in STRONGER:
+            if role in HC_STRONGER:
                 role = "controlBorder"
-            elif role in DEPRIVED_OF_TINT:
+            elif role in HC_FLATTENED:
                 role = "panel"
         return self._tokens.colours[self._scheme][role]
 

@@ -291,7 +291,7 @@ def test_a_window_that_goes_while_a_later_start_talks_to_it_raises_nothing(
     line = QLocalSocket()
     line.connectToServer(name)
     assert line.waitForConnected(WAIT_MS)
-    qtbot.waitUntil(lambda: bool(meeting._heard), timeout=WAIT_MS)
+    qtbot.waitUntil(lambda: bool(meeting._received), timeout=WAIT_MS)
     with qtbot.waitSignal(window.destroyed, timeout=WAIT_MS):
         window.deleteLater()
     qtbot.waitUntil(lambda: line.state() == QLocalSocket.LocalSocketState.UnconnectedState, timeout=WAIT_MS)

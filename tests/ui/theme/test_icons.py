@@ -75,7 +75,7 @@ def test_an_icon_is_painted_at_the_screens_ratio(theme: Theme, ratio: float) -> 
 def test_an_unknown_icon_is_told_and_another_one_stands_in(qapp, caplog, name: str) -> None:
     engine = icons.IconEngine(name, lambda _mode, _state: QColor("#102030"))
     assert inks(engine.scaledPixmap(QSize(24, 24), QIcon.Mode.Normal, QIcon.State.Off, 2.0).toImage())
-    assert caplog.records[0].getMessage().startswith(f"no icon '{name[:80]}'")
+    assert caplog.records[0].getMessage().startswith(f"unknown icon '{name[:80]}'")
     assert ("did you mean 'play'?" in caplog.text) == (name == "plya")
 
 
