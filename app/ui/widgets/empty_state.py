@@ -97,9 +97,9 @@ class EmptyState(QWidget):
         if icon is not None:
             self._tile.icon = icon
             self._tile.update()
-        self._fit()
+        self._update_visibility()
 
-    def _fit(self) -> None:
+    def _update_visibility(self) -> None:
         # In a low place the tile is hidden first, then the smaller text before the buttons.
         width = self.width() - 32
         text = self._text.heightForWidth(min(width, TEXT_WIDTH))
@@ -116,7 +116,7 @@ class EmptyState(QWidget):
 
     def resizeEvent(self, event: QResizeEvent) -> None:
         super().resizeEvent(event)
-        self._fit()
+        self._update_visibility()
 
     def set_actions(self, actions: Sequence[EmptyAction]) -> None:
         """Set the buttons."""
@@ -133,7 +133,7 @@ class EmptyState(QWidget):
             self._row.addWidget(button)
             self._buttons.append(button)
         self._row.addStretch(1)
-        self._fit()
+        self._update_visibility()
 
     def minimumSizeHint(self) -> QSize:
         return QSize(120, 120)

@@ -58,13 +58,13 @@ class Flow(QLayout):
 
     def sizeHint(self) -> QSize:
         shown = [*self._shown()]
-        wide = sum(self._wanted(item) for item in shown) + self._gap * max(0, len(shown) - 1)
+        wide = sum(self._preferred_width(item) for item in shown) + self._gap * max(0, len(shown) - 1)
         high = max((item.sizeHint().height() for item in shown), default=0)
         return self._outside(QSize(wide, high))
 
     def minimumSize(self) -> QSize:
         shown = [*self._shown()]
-        wide = max((self._least(item) for item in shown), default=0)
+        wide = max((self._minimum_width(item) for item in shown), default=0)
         high = max((item.minimumSize().height() for item in shown), default=0)
         return self._outside(QSize(wide, high))
 
@@ -82,22 +82,22 @@ class Flow(QLayout):
         edge = self.contentsMargins()
         return size + QSize(edge.left() + edge.right(), edge.top() + edge.bottom())
 
-    def _wanted(self, item: QLayoutItem) -> int:
+    def _preferred_width(self, item: QLayoutItem) -> int:
         widget = item.widget()
         if isinstance(widget, QLabel) and widget.wordWrap():  # Qt's own hint is for several lines
             return widget.fontMetrics().horizontalAdvance(widget.text()) + 2
         return item.sizeHint().width()
 
-    def _least(self, item: QLayoutItem) -> int:
-        bends = self._bends(item) or item.hasHeightForWidth()
+    def _minimum_width(self, item: QLayoutItem) -> int:
+        bends = self._is_elastic(item) or item.hasHeightForWidth()
         return item.minimumSize().width() if bends else item.minimumSize().expandedTo(item.sizeHint()).width()
 
-    def _most(self, item: QLayoutItem, room: int) -> int:
+    def _maximum_width(self, item: QLayoutItem, room: int) -> int:
         widget = item.widget()
         greedy = widget is not None and self._elastic.get(widget, False)
-        return room if greedy else self._wanted(item)
+        return room if greedy else self._preferred_width(item)
 
-    def _bends(self, item: QLayoutItem) -> bool:
+    def _is_elastic(self, item: QLayoutItem) -> bool:
         widget = item.widget()
         return widget in self._elastic
 
@@ -122,13 +122,16 @@ class Flow(QLayout):
 
     def _one_row(self, items: list[QLayoutItem], room: int) -> list[tuple[QLayoutItem, int, int]]:
         # (item, left, width); empty when it does not fit.
-        widths = [item.minimumSize().width() if self._bends(item) else self._wanted(item) for item in items]
+        widths = [
+            item.minimumSize().width() if self._is_elastic(item) else self._preferred_width(item)
+            for item in items
+        ]
         spare = room - sum(widths) - self._gap * (len(items) - 1)
         if spare < 0:
             return []
         for place, item in enumerate(items):
-            if self._bends(item):
-                more = max(0, min(spare, self._most(item, room) - widths[place]))
+            if self._is_elastic(item):
+                more = max(0, min(spare, self._maximum_width(item, room) - widths[place]))
                 widths[place] += more
                 spare -= more
         pushed = self._items[self._push :] if self._push >= 0 else []
@@ -145,9 +148,9 @@ class Flow(QLayout):
         rows: list[list[tuple[QLayoutItem, int, int]]] = []
         left = room + 1
         for item in items:
-            wide = min(room, self._most(item, room))
+            wide = min(room, self._maximum_width(item, room))
             rest = room - left
-            if wide > rest >= self._least(item):
+            if wide > rest >= self._minimum_width(item):
                 wide = rest
             if wide > rest:
                 rows.append([])

@@ -97,7 +97,7 @@ class Chip(QWidget):
         self.setAccessibleName(text)
         paint.show_when(self, bool(text))
         if self._bare:
-            self._tell_whole()
+            self._update_tooltip()
         self.updateGeometry()
         self.update()
 
@@ -140,9 +140,9 @@ class Chip(QWidget):
 
     def resizeEvent(self, event: QResizeEvent) -> None:
         super().resizeEvent(event)
-        self._tell_whole()
+        self._update_tooltip()
 
-    def _tell_whole(self) -> None:
+    def _update_tooltip(self) -> None:
         paint.tell_whole(self, self._text)
         if self._bare:
             self.setProperty("shortened", True)

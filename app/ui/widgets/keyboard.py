@@ -15,7 +15,7 @@ from PySide6.QtGui import QKeyEvent
 from PySide6.QtWidgets import QApplication, QWidget
 from shiboken6 import isValid
 
-_LEADS = "keyboardLeads"
+_LEADS_PROPERTY = "keyboardLeads"
 
 
 def is_plain(event: QKeyEvent) -> bool:
@@ -36,26 +36,26 @@ def is_pressed_key(key: int) -> bool:
 def keyboard_leads() -> bool:
     """Return whether the focus was moved by the keyboard: only then it gets a ring."""
     application = QApplication.instance()
-    return bool(application is not None and application.property(_LEADS))
+    return bool(application is not None and application.property(_LEADS_PROPERTY))
 
 
 def set_keyboard_leads(leads: bool) -> None:
     """Record whether the last input was a key that moves the focus, or a mouse button."""
     application = QApplication.instance()
     if application is not None:
-        application.setProperty(_LEADS, leads)
+        application.setProperty(_LEADS_PROPERTY, leads)
 
 
 def following(widget: QWidget, *, forward: bool = True) -> QWidget:
     """Return the next (or previous) widget in the window's focus chain; itself when it is alone."""
     found = widget.nextInFocusChain() if forward else widget.previousInFocusChain()
-    return widget if found is None else _own_again(found)
+    return widget if found is None else _with_own_parent(found)
 
 
 def proxy_of(widget: QWidget) -> QWidget | None:
     """Return the focus proxy of a widget, or None."""
     found = widget.focusProxy()
-    return None if found is None else _own_again(found)
+    return None if found is None else _with_own_parent(found)
 
 
 def tab_stops(widget: QWidget, begin: QWidget, *, forward: bool = True) -> Iterator[QWidget]:
@@ -84,7 +84,7 @@ def stops_of(widget: QWidget) -> list[QWidget]:
     ]
 
 
-def _own_again(found: QWidget) -> QWidget:
+def _with_own_parent(found: QWidget) -> QWidget:
     # Restores the ownership in PySide; a no-op for Qt.
     if not isValid(found):
         return found

@@ -153,9 +153,9 @@ class Menu(QMenu):
         held = QGuiApplication.queryKeyboardModifiers() & Qt.KeyboardModifier.AltModifier
         self._by_keys = bool(held) or keyboard_leads()
         cut(self, self._theme.radius("panel"))
-        self._leave_stop()
+        self._move_off_stop()
 
-    def _leave_stop(self) -> None:
+    def _move_off_stop(self) -> None:
         # Moves aside where it would cover a Stop, since Qt may move it in a small window.
         owner = self.parentWidget()
         while isinstance(owner, QMenu):
@@ -187,7 +187,7 @@ class Menu(QMenu):
         rect = QRectF(self.rect())
         box(painter, rect, theme.radius("panel"), theme.colour("raised"), theme.colour("borderStrong"))
         shown = [action for action in self.actions() if action.isVisible()]
-        above, below = self._scrolled(shown)
+        above, below = self._hidden_ends(shown)
         inside = rect.adjusted(1, 1 + above * SCROLLER, -1, -1 - below * SCROLLER)
         for hidden, icon, top in (
             (above, "chevron-up", 1),
@@ -205,7 +205,7 @@ class Menu(QMenu):
                 self._paint_action(painter, place, action, letters.get(action, -1))
         painter.end()
 
-    def _scrolled(self, shown: list[QAction]) -> tuple[bool, bool]:
+    def _hidden_ends(self, shown: list[QAction]) -> tuple[bool, bool]:
         # A low screen hides entries, to which the mouse at the edge scrolls.
         if not shown:
             return False, False

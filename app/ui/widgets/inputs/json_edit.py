@@ -85,7 +85,7 @@ class JsonLinesEdit(QPlainTextEdit):
         self.colours = _JsonColours(self.document(), theme)
         self._numbers = _JsonLines(self)
         EditMenu(theme, self)
-        self.blockCountChanged.connect(self._make_room)
+        self.blockCountChanged.connect(self._update_margins)
         self.updateRequest.connect(self._scrolled)
         theme.changed.connect(self._restyle)
         self._restyle()
@@ -95,20 +95,20 @@ class JsonLinesEdit(QPlainTextEdit):
         font.setPixelSize(round(self._theme.scaled(13)))
         self.setFont(font)
         self.colours.rehighlight()
-        self._make_room()
+        self._update_margins()
         self.mark(self.wrong_line)
 
-    def _room(self) -> int:
+    def _margin_width(self) -> int:
         digits = max(2, len(str(self.blockCount())))
         return round(paint.width_of(self.font(), "0" * digits)) + 30
 
-    def _make_room(self) -> None:
-        self.setViewportMargins(self._room(), 0, 0, 0)
+    def _update_margins(self) -> None:
+        self.setViewportMargins(self._margin_width(), 0, 0, 0)
         self._place_numbers()
 
     def _place_numbers(self) -> None:
         inside = self.contentsRect()
-        self._numbers.setGeometry(QRect(inside.left(), inside.top(), self._room(), inside.height()))
+        self._numbers.setGeometry(QRect(inside.left(), inside.top(), self._margin_width(), inside.height()))
 
     def _scrolled(self, rect: QRect, dy: int) -> None:
         if dy:

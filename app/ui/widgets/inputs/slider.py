@@ -143,7 +143,7 @@ class SliderWithUnit(QWidget):
         self.track.valueChanged.connect(self._from_track)
         self.track.reset.connect(lambda: self._choose(self._default))
         self.field.number.connect(self._choose)
-        self.field.problem.connect(self._complain)
+        self.field.problem.connect(self._show_problem)
 
     def _name(self, name: str) -> None:
         self.setAccessibleName(name)
@@ -172,6 +172,6 @@ class SliderWithUnit(QWidget):
             self.set_value(value)
             self.changed.emit(value)
 
-    def _complain(self, sentence: str) -> None:
+    def _show_problem(self, sentence: str) -> None:
         self._sentence.setText(sentence)
         self._sentence.setVisible(bool(sentence))

@@ -71,7 +71,7 @@ def match(query: str, words: str) -> tuple[float, tuple[Span, ...]] | None:
             return None
         score += found[0]
         spans.extend(found[1])
-    return score / max(1, len(pieces)) - PER_LETTER * len(words), _joined(spans)
+    return score / max(1, len(pieces)) - PER_LETTER * len(words), _merged(spans)
 
 
 def _piece(piece: str, text: str) -> tuple[float, list[Span]] | None:
@@ -118,7 +118,7 @@ def _word_beginning(letter: str, text: str, start: int) -> int:
     return place
 
 
-def _joined(spans: Iterable[Span]) -> tuple[Span, ...]:
+def _merged(spans: Iterable[Span]) -> tuple[Span, ...]:
     # Merges adjacent spans.
     made: list[Span] = []
     for begin, end in sorted(spans):
@@ -149,7 +149,7 @@ class Finder:
             if len(pairs) > MANY:
                 whole = [pair for pair in pairs if all(piece in pair[0] for piece in pieces)]
                 count += len(whole) - min(len(whole), MANY)
-                few = [entry for _lower, entry in heapq.nsmallest(MANY, whole, key=_soonest(pieces))]
+                few = [entry for _lower, entry in heapq.nsmallest(MANY, whole, key=_by_position(pieces))]
             found = [each for each in (_fitting(query, entry) for entry in few) if each is not None]
             count += len(found)
             if found:
@@ -182,7 +182,7 @@ def is_initials(query: str, words: str) -> bool:
     return all(letter in left for letter in wanted)
 
 
-def _soonest(pieces: Sequence[str]) -> Callable[[tuple[str, Entry]], tuple[int, int]]:
+def _by_position(pieces: Sequence[str]) -> Callable[[tuple[str, Entry]], tuple[int, int]]:
     # Cheap preliminary order: position of the first piece, then text length.
     first = pieces[0] if pieces else ""
     return lambda pair: (pair[0].find(first), len(pair[0]))
