@@ -142,7 +142,7 @@ class BlocklyHost(QWidget):
         if isinstance(tokens.get("reducedMotion"), bool):
             self.set_reduced_motion(bool(tokens["reducedMotion"]))
         if self._web is not None:
-            self._dress(self._web)
+            self._apply_theme(self._web)
         self._tell("theme", self._theme)
 
     def set_reduced_motion(self, reduced: bool) -> None:
@@ -212,7 +212,7 @@ class BlocklyHost(QWidget):
         self.setFocusProxy(self._web.view)
         self._web.view.installEventFilter(self)
         self._web.page.renderProcessTerminated.connect(self._died)
-        self._dress(self._web)
+        self._apply_theme(self._web)
         application = QCoreApplication.instance()
         if application is not None:
             application.aboutToQuit.connect(self._close_page)
@@ -224,7 +224,7 @@ class BlocklyHost(QWidget):
         if web is not None:
             web.close()
 
-    def _dress(self, web: BlocklyWeb) -> None:
+    def _apply_theme(self, web: BlocklyWeb) -> None:
         # Styles outside the page: background before the first painting, text size.
         web.page.setBackgroundColor(self._background())
         tokens = cast("Mapping[str, object]", self._theme["tokens"])
@@ -285,7 +285,7 @@ class BlocklyHost(QWidget):
         is_crash = status != QWebEnginePage.RenderProcessTerminationStatus.NormalTerminationStatus
         how = f"the web process of the block editor ended (code {code}, {status.name})"
         _log.warning(
-            "the web process of the block editor ended (code %d); it is started again",
+            "the web process of the block editor ended (code %d); restarting it",
             code,
             extra=crash_extra("editor", how) if is_crash else None,
         )

@@ -308,7 +308,7 @@ class BlocklyView(BlocklyHost):
 
         No effect when the page has the focus, because it has handled the key.
         """
-        if self.web is not None and not self._has_keys():
+        if self.web is not None and not self._has_focus():
             self.setFocus()
             self._tell("edit", what)
 
@@ -327,7 +327,7 @@ class BlocklyView(BlocklyHost):
 
         page.runJavaScript(TYPES, act)
 
-    def _has_keys(self) -> bool:
+    def _has_focus(self) -> bool:
         focus = QApplication.focusWidget()
         return focus is not None and self.isAncestorOf(focus)
 

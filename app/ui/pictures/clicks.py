@@ -38,10 +38,10 @@ class ClickablePicture(ZoomablePicture):
         super().__init__(theme)
         self._takes_clicks = False
         self._pressed: tuple[QPointF, PicturePoint] | None = None
-        self._waiting: PicturePoint | None = None
-        self._sure = QTimer(self)
-        self._sure.setSingleShot(True)
-        self._sure.timeout.connect(self._tell)
+        self._pending_click: PicturePoint | None = None
+        self._double_click_timer = QTimer(self)
+        self._double_click_timer.setSingleShot(True)
+        self._double_click_timer.timeout.connect(self._emit_click)
         self.pointed: tuple[int, int] | None = None
         """Pixel of the keyboard cursor."""
         self.marked: PicturePoint | None = None
@@ -76,18 +76,18 @@ class ClickablePicture(ZoomablePicture):
 
     def forget_click(self) -> None:
         """Discard a pending click and the keyboard cursor."""
-        self._pressed = self._waiting = None
-        self._sure.stop()
-        self._point_nowhere()
+        self._pressed = self._pending_click = None
+        self._double_click_timer.stop()
+        self._clear_cursor()
 
     def clear(self) -> None:
         super().clear()
         self.forget_click()
         self.marked = None
 
-    def _tell(self) -> None:
-        point, self._waiting = self._waiting, None
-        self._sure.stop()
+    def _emit_click(self) -> None:
+        point, self._pending_click = self._pending_click, None
+        self._double_click_timer.stop()
         if point is not None:
             self.clicked.emit(point)
 
@@ -100,7 +100,7 @@ class ClickablePicture(ZoomablePicture):
     # -- mouse --------------------------------------------------------------------------------------------
 
     def mousePressEvent(self, event: QMouseEvent) -> None:
-        self._tell()  # this press is not the second of a double click
+        self._emit_click()  # this press is not the second of a double click
         super().mousePressEvent(event)
         point = self._point_at(event)
         alone = event.buttons() == event.button()
@@ -114,7 +114,7 @@ class ClickablePicture(ZoomablePicture):
         return PicturePoint(*pixel, picture.width, picture.height, picture.stamp_ns, button)
 
     def mouseMoveEvent(self, event: QMouseEvent) -> None:
-        self._point_nowhere()
+        self._clear_cursor()
         if self._pressed is not None:
             moved = event.position() - self._pressed[0]
             if moved.manhattanLength() >= QApplication.startDragDistance():
@@ -130,8 +130,8 @@ class ClickablePicture(ZoomablePicture):
         self._show_cursor()
         pressed, self._pressed = self._pressed, None
         if pressed is not None:
-            self._waiting = pressed[1]
-            self._sure.start(QApplication.doubleClickInterval())
+            self._pending_click = pressed[1]
+            self._double_click_timer.start(QApplication.doubleClickInterval())
 
     def mouseDoubleClickEvent(self, event: QMouseEvent) -> None:
         self.forget_click()
@@ -145,15 +145,15 @@ class ClickablePicture(ZoomablePicture):
         if not self._takes_clicks or picture is None:
             super().keyPressEvent(event)
         elif way is not None:
-            self._point(-way[0], -way[1], FAR if name.startswith("Shift+") else 1)
+            self._move_cursor(-way[0], -way[1], FAR if name.startswith("Shift+") else 1)
         elif name in {"Return", "Enter"} and self.pointed is not None and not event.isAutoRepeat():
-            self._tell()
-            x, y = _inside(self.pointed, picture)
+            self._emit_click()
+            x, y = _clamped(self.pointed, picture)
             self.clicked.emit(PicturePoint(x, y, picture.width, picture.height, picture.stamp_ns, "left"))
         else:
             super().keyPressEvent(event)
 
-    def _point(self, across: int, down: int, count: int) -> None:
+    def _move_cursor(self, across: int, down: int, count: int) -> None:
         # In displayed directions; starts at the centre of the visible part.
         if self.pointed is None:
             wanted = QRectF(self.rect()).center()
@@ -169,10 +169,10 @@ class ClickablePicture(ZoomablePicture):
         if pixel is None:
             return
         self.pointed = pixel
-        self._bring_into_sight()
+        self._scroll_to_cursor()
         self.update()
 
-    def _bring_into_sight(self) -> None:
+    def _scroll_to_cursor(self) -> None:
         # Scrolls a zoomed image so that the pixel is visible.
         if self.pointed is None or self.place.zoom is None:
             return
@@ -187,11 +187,11 @@ class ClickablePicture(ZoomablePicture):
         picture = self.picture
         if picture is None:
             return QPointF()
-        x, y = _inside(pixel, picture)
+        x, y = _clamped(pixel, picture)
         share = QPointF((x + 0.5) / picture.width, (y + 0.5) / picture.height)
         return self.place.to_view(self.area()).map(share)
 
-    def _point_nowhere(self) -> None:
+    def _clear_cursor(self) -> None:
         if self.pointed is not None:
             self.pointed = self.mouse = None
             self.update()
@@ -223,6 +223,6 @@ class ClickablePicture(ZoomablePicture):
         painter.end()
 
 
-def _inside(pixel: tuple[int, int], picture: Picture) -> tuple[int, int]:
+def _clamped(pixel: tuple[int, int], picture: Picture) -> tuple[int, int]:
     # A later image can be smaller.
     return min(pixel[0], picture.width - 1), min(pixel[1], picture.height - 1)

@@ -97,7 +97,7 @@ class PicturePlace:
             share_x + (view.width() / 2 - at.x()) / max(1e-9, seen.width()),
             share_y + (view.height() / 2 - at.y()) / max(1e-9, seen.height()),
         )
-        self._settle(view, picture)
+        self._normalize_centre(view, picture)
 
     def move(self, dx: float, dy: float, view: QSizeF, picture: QSizeF) -> None:
         """Move the image by some pixels; one that fits stays."""
@@ -108,7 +108,7 @@ class PicturePlace:
             (view.width() / 2 - area.x() - dx) / max(1e-9, area.width()),
             (view.height() / 2 - area.y() - dy) / max(1e-9, area.height()),
         )
-        self._settle(view, picture)
+        self._normalize_centre(view, picture)
 
     def set_zoom(self, zoom: float | None) -> None:
         """Set the zoom in logical pixels per image pixel, or fit."""
@@ -134,7 +134,7 @@ class PicturePlace:
         else:
             self.flipped_down, self.centre = not self.flipped_down, (x, 1 - y)
 
-    def _settle(self, view: QSizeF, picture: QSizeF) -> None:
+    def _normalize_centre(self, view: QSizeF, picture: QSizeF) -> None:
         # Normalizes the centre, so that the next step begins where the image is displayed.
         area = self.area(view, picture)
         self.centre = (

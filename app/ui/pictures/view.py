@@ -102,7 +102,7 @@ class PictureView(QWidget):
         self._rates = RateWords(clock)
         self._silent = False  # the last image is shown, and no new one arrives
         self.mouse: QPointF | None = None  # mouse position while it is relevant
-        self._aged_s = -FIGURES_STAY_S  # when the age was updated
+        self._age_updated_s = -FIGURES_STAY_S  # when the age was updated
         self.setAttribute(Qt.WidgetAttribute.WA_OpaquePaintEvent)
         self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Expanding)
         self.setMinimumSize(80, 60)
@@ -156,8 +156,8 @@ class PictureView(QWidget):
         picture, shown, silent_s = stream.picture, self._picture, stream.silent_s
         self._rate = self._rates.of(stream)
         now = self._clock()
-        if picture is not None and (now - self._aged_s >= FIGURES_STAY_S or not self._age):
-            self._age, self._aged_s = _age_words(stream.stamped_s), now
+        if picture is not None and (now - self._age_updated_s >= FIGURES_STAY_S or not self._age):
+            self._age, self._age_updated_s = _age_words(stream.stamped_s), now
         self._silent = not stream.held and silent_s is not None and silent_s > SILENT_AFTER_S
         if stream.held:
             self._state = _("Frozen {age} ago").format(age=age_words(stream.age_s))
@@ -181,12 +181,12 @@ class PictureView(QWidget):
             self._boxes = boxes  # boxes on a frozen image are frozen too
             shown = self._picture
             self._drawn = drawn(shown.width, shown.height) if drawn is not None and shown is not None else ()
-        stream.want(self._wish())
+        stream.want(self._wanted_size())
         if (self._boxes, self._drawn, self._silent, self._state) != before:
             self.update()
-        self._tell_words(words)
+        self._update_label(words)
 
-    def _tell_words(self, before: str) -> None:
+    def _update_label(self, before: str) -> None:
         words = self.words
         if words != before:
             self.setAccessibleDescription(words)
@@ -194,7 +194,7 @@ class PictureView(QWidget):
                 top = self._label_top()
                 self.update(0, top, self.width(), self.height() - top)
 
-    def _wish(self) -> tuple[int, int] | None:
+    def _wanted_size(self) -> tuple[int, int] | None:
         # Size of the image in screen pixels; None when each image pixel is needed.
         if self.mouse is not None:
             return None

@@ -71,7 +71,7 @@ class RobotDrawing:
         painter.scale(stage.scale, stage.scale)
         figures = _figures(stage, state, others)
         _paint_reach(painter, figures[0].spot, state)
-        drawn: list[tuple[Spot, Thing | Figure]] = [*_placed(stage, state)]
+        drawn: list[tuple[Spot, Thing | Figure]] = [*_placed_things(stage, state)]
         drawn += [(figure.spot, figure) for figure in reversed(figures)]
         for spot, one in sorted(drawn, key=lambda pair: pair[0].v):
             if isinstance(one, Thing):
@@ -104,7 +104,7 @@ class RobotDrawing:
             part = _part_at(figure.own(unit), figure.state)
             if part is not None:
                 return figure.named(part)
-        for spot, thing in reversed(_placed(stage, state)):
+        for spot, thing in reversed(_placed_things(stage, state)):
             if thing_area(thing, spot).adjusted(-3, -3, 3, 3).contains(unit):
                 return thing.name or thing.kind
         return next((each.named("body") for each in figures if each.area.contains(unit)), None)
@@ -143,7 +143,7 @@ class RobotDrawing:
                 if part == figure.named(name):
                     unit = QPointF(figure.spot.u, figure.spot.v) + place * figure.spot.scale
                     return stage.origin + unit * stage.scale
-        for spot, thing in _placed(stage, state):
+        for spot, thing in _placed_things(stage, state):
             if part in {thing.name, thing.kind}:
                 return stage.origin + thing_area(thing, spot).center() * stage.scale
         return None
@@ -151,7 +151,7 @@ class RobotDrawing:
     def _mark(self, p: QPainter, stage: Stage, state: RobotState, others: Others, marks: Marks) -> None:
         # A line around the hovered part, a stronger one around the selected part.
         areas = {figure.named("body"): figure.area for figure in _figures(stage, state, others)}
-        for spot, thing in _placed(stage, state):
+        for spot, thing in _placed_things(stage, state):
             areas[thing.name or thing.kind] = thing_area(thing, spot)
         for part, width in ((marks.hovered, 1.4), (marks.chosen, 2.4)):
             area = areas.get(part or "")
@@ -180,7 +180,7 @@ class RobotDrawing:
         painter.drawPixmap(area.topLeft(), self._room)
 
 
-def _placed(stage: Stage, state: RobotState) -> list[tuple[Spot, Thing]]:
+def _placed_things(stage: Stage, state: RobotState) -> list[tuple[Spot, Thing]]:
     # Farthest first; people in front of the robot as marks on the floor.
     placed = []
     for thing in state.objects:
@@ -254,11 +254,11 @@ def _part_at(own: QPointF, state: RobotState) -> str | None:
     if state.figure == TURTLE:
         return None
     for limb in limbs(state):
-        if _near(own, limb.hand, 11.0):
+        if _is_near(own, limb.hand, 11.0):
             return f"{limb.side}_hand"
-    return "head" if _near(own, HEAD, 36.0) else None
+    return "head" if _is_near(own, HEAD, 36.0) else None
 
 
-def _near(point: QPointF, centre: QPointF, radius: float) -> bool:
+def _is_near(point: QPointF, centre: QPointF, radius: float) -> bool:
     away = point - centre
     return QPointF.dotProduct(away, away) <= radius * radius

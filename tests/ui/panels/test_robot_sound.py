@@ -71,10 +71,10 @@ def test_the_bubble_of_a_sound_is_painted(panel, window) -> None:
 def test_who_is_heard_after_the_bubble_has_gone_is_named_below(panel, window) -> None:
     panel.refresh()
     before = panel.view.grab().toImage()
-    window.session.voices._now = Utterance("Ginger", "And I say", "en", 0.5)
+    window.session.voices._current = Utterance("Ginger", "And I say", "en", 0.5)
     panel.refresh()
     assert panel.view.heard == "Ginger: And I say"
     assert panel.view.grab().toImage() != before
-    window.session.voices._now = None
+    window.session.voices._current = None
     panel.refresh()
     assert panel.view.heard == ""
