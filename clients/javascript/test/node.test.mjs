@@ -126,7 +126,7 @@ test("without a master, calls time out and a warning is emitted", async (t) => {
   assert.throws(() => new Node("a\nb"), nep.BadNameError);
 });
 
-test("a direct subscriber hears a publisher whose port another program's socket had before", async (t) => {
+test("a direct subscriber hears a publisher whose port another program's socket had before", { timeout: 30_000 }, async (t) => {
   const pull = new Pull();
   await pull.bind("tcp://127.0.0.1:*");
   const endpoint = pull.lastEndpoint;
