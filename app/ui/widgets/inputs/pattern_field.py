@@ -24,7 +24,7 @@ class PatternField(TokenField):
         if (tuple(wanted), tuple(unwanted)) == self.patterns():
             return
         for each in list(self._tokens):
-            self._remove_token(each)
+            self._drop(each)
         self.edit.clear()
         self._add(wanted, unwanted)
 
@@ -52,18 +52,6 @@ class PatternField(TokenField):
         self.changed.emit()
         self.settled.emit()
 
-    def _remove_last(self) -> None:
-        if self._tokens:
-            self._remove(self._tokens[-1])
-
-    def _remove(self, token: PatternToken) -> None:
-        self.edit.setFocus(Qt.FocusReason.OtherFocusReason)
-        self._remove_token(token)
-        self.changed.emit()
-        self.settled.emit()
-
-    # ---- private
-
     def _add(self, wanted: Sequence[str], unwanted: Sequence[str]) -> None:
         there = {(each.entry, each.is_left_out) for each in self._tokens}
         for is_left_out, patterns in ((False, wanted), (True, unwanted)):
@@ -71,39 +59,3 @@ class PatternField(TokenField):
                 if (pattern, is_left_out) not in there:
                     self._add_token(Token(self._theme, pattern, is_left_out=is_left_out))
         self._arrange()
-
-    def _remove_token(self, token: PatternToken) -> None:
-        self._tokens.remove(token)
-        token.hide()
-        self._flow.removeWidget(token)
-        token.deleteLater()
-        self._arrange()
-
-    def _arrange(self) -> None:
-        # Tokens, then the edit; also in the tab order.
-        self._flow.removeWidget(self.edit)
-        before: QWidget | None = None
-        for token in self._tokens:
-            self._flow.removeWidget(token)
-            self._flow.addWidget(token)
-            token.show()
-            if before is not None:
-                QWidget.setTabOrder(before, token)
-            before = token
-        self._flow.add_elastic(self.edit, greedy=True)
-        if before is not None:
-            QWidget.setTabOrder(before, self.edit)
-        self.edit.setPlaceholderText("" if self._tokens else self._example)
-        self.updateGeometry()
-
-    def mousePressEvent(self, event: QMouseEvent) -> None:
-        self.edit.setFocus(Qt.FocusReason.MouseFocusReason)
-        event.accept()
-
-    def paintEvent(self, _event: QPaintEvent) -> None:
-        theme, painter = self._theme, QPainter(self)
-        has_focus = self.edit.hasFocus()
-        edge = "error" if self._is_wrong else "accent" if has_focus else "controlBorder"
-        fill, width = theme.colour("sunken" if theme.dark else "panel"), 2.0 if has_focus else 1.0
-        paint.box(painter, QRectF(self.rect()), theme.radius("control"), fill, theme.colour(edge), width)
-        painter.end()
