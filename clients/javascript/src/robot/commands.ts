@@ -85,7 +85,7 @@ export class CommandDesk implements Dialect {
     else if (op === "invoke") this.invoke(id, command, { program, publisher, epoch });
     else {
       const shown = quotable(op ?? null);
-      this.fail(id, shown, `there is no “${shown}”; a command is invoke, cancel, stop or alive`);
+      this.fail(id, shown, `unknown operation “${shown}”; use invoke, cancel, stop or alive`);
     }
   }
 
@@ -96,7 +96,7 @@ export class CommandDesk implements Dialect {
   private cancel(id: string, name: string, publisher: bigint | undefined): void {
     let error = this.tasks.cancel(({ spec }) => spec.id === id && spec.publisher === publisher);
     if (error === NOTHING_RUNS && this.openIds.has(id))
-      error = `only who asked for “${name || id}” can cancel it; a stop is for everybody`;
+      error = `only the program that started “${name || id}” can cancel it; anyone can stop`;
     if (error !== undefined) this.answerer(id, "cancel", name)({ state: "failed", error });
   }
 
@@ -196,7 +196,7 @@ function outputOf({ name, output }: RobotAction, returned: unknown): Members {
     const problems = output && Object.keys(members).length > 0 ? problemsOf(output, members) : [];
     if (problems.length > 0) throw new Failed(problems.join("; "));
   } catch (error) {
-    throw new Failed(`${name} was done, but its result is wrong: ${errorText(error)}`);
+    throw new Failed(`${name} finished, but its result is invalid: ${errorText(error)}`);
   }
   return members;
 }

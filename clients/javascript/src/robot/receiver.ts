@@ -68,12 +68,12 @@ export class MessageQueue {
     const size = message.data.length;
     if (size > this.maxMessageBytes) {
       const limit = this.maxMessageBytes / 1000;
-      const error = `the message has ${(size / 1000).toFixed(0)} kB; at most ${limit} kB are read`;
+      const error = `the message has ${(size / 1000).toFixed(0)} kB; the limit is ${limit} kB`;
       this.rejected.add(this.topic, error);
       return error;
     }
     if (this.backlog.length >= MAX_BACKLOG || this.backlogBytes + size > MAX_BACKLOG_BYTES) {
-      this.rejected.add(this.topic, "messages come faster than they are handled");
+      this.rejected.add(this.topic, "messages arrive faster than they are handled");
       return undefined;
     }
     this.backlog.push({ message, use });

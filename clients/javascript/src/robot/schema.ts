@@ -124,9 +124,9 @@ export function given(members: Members): Members {
 function checkUnit(name: string, unit: string | undefined): void {
   if (unit === undefined) return;
   const sign = UNIT_WORDS[unit.toLowerCase()];
-  if (sign !== undefined) throw new NepError(`${name}: there is no unit "${unit}"; write "${sign}".`);
+  if (sign !== undefined) throw new NepError(`${name}: unknown unit "${unit}"; write "${sign}".`);
   if (!/^[!-~µ²³]{1,16}$/u.test(unit))
-    throw new NepError(`${name}: there is no unit "${unit}"; write it as UCUM does.`);
+    throw new NepError(`${name}: unknown unit "${unit}"; use UCUM, such as "m", "deg" or "m/s".`);
 }
 
 // ---- checking values
@@ -135,7 +135,7 @@ function checkUnit(name: string, unit: string | undefined): void {
 export function problemsOf(parameters: Readonly<Record<string, Parameter>>, input: unknown): string[] {
   if (!isMembers(input)) return ["the input must be an object with named values"];
   const unknown = Object.keys(input).filter((name) => !Object.hasOwn(parameters, name));
-  const problems = unknown.slice(0, 5).map((name) => `there is no “${quotedName(name)}”`);
+  const problems = unknown.slice(0, 5).map((name) => `unknown name “${quotedName(name)}”`);
   if (unknown.length > 5) problems.push(`${unknown.length - 5} more names are unknown`);
   for (const [name, parameter] of Object.entries(parameters)) {
     const place = parameter.title ?? name.replaceAll("_", " ");

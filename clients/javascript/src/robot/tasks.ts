@@ -13,9 +13,9 @@ const MAX_QUEUED = 50;
 const MAX_RUNNING = 50;
 const MAX_PENDING_STOPS = 2000;
 const THE_STOP = "the stop itself";
-const STOPPED_BEFORE: Answer = { state: "canceled", error: "the robot was stopped before this began" };
+const STOPPED_BEFORE: Answer = { state: "canceled", error: "the robot was stopped before this started" };
 
-export const NOTHING_RUNS = "nothing with this id runs";
+export const NOTHING_RUNS = "no running task has this id";
 
 /** What the tasks of a robot need from it. */
 export interface TasksHost {
@@ -99,7 +99,7 @@ export class Tasks {
         this.clearTimer?.();
         resolve();
       };
-      this.stop(end, "the driver ends");
+      this.stop(end, "the driver is ending");
     });
   }
 
@@ -113,7 +113,7 @@ export class Tasks {
     const found = [...this.running, ...this.queue].filter(isWanted);
     if (found.length === 0) return NOTHING_RUNS;
     const stubborn = found.find((task) => this.running.includes(task) && !task.spec.isCancellable);
-    if (stubborn) return `${stubborn.spec.action} can't be cancelled; it ends by itself`;
+    if (stubborn) return `${stubborn.spec.action} can't be cancelled; it ends on its own`;
     this.act(() => {
       this.drop(found.filter((task) => this.queue.includes(task)), { state: "canceled" });
       for (const task of found) if (this.running.includes(task)) this.end(task, { state: "canceled" });
@@ -156,7 +156,7 @@ export class Tasks {
     const ended = clashing.filter(isEnded);
     const waitsFor = names(clashing.filter((each) => !isEnded(each)));
     task.spec.answer({ state: "accepted", waitsFor, replaces: names(ended) });
-    const replaced: Answer = { state: "canceled", error: `${title} took its place` };
+    const replaced: Answer = { state: "canceled", error: `replaced by ${title}` };
     this.drop(ended.filter((each) => this.queue.includes(each)), replaced);
     for (const each of ended) if (this.running.includes(each)) this.end(each, replaced);
     this.queue.push(task);
@@ -169,8 +169,8 @@ export class Tasks {
     if (this.isStopLate || stopped.some((each) => each.isAnswered)) return this.stillMoving(this.notEnded());
     if (this.isStopping || stopped.length > 0) return `${this.host.name} is stopping`;
     if (busyWith) return `${this.host.name} is busy with ${busyWith.spec.title}`;
-    if (this.running.length >= MAX_RUNNING) return `${MAX_RUNNING} other actions run already`;
-    if (this.queue.length >= MAX_QUEUED) return `${MAX_QUEUED} other actions are waiting already`;
+    if (this.running.length >= MAX_RUNNING) return `${MAX_RUNNING} other actions are already running`;
+    if (this.queue.length >= MAX_QUEUED) return `${MAX_QUEUED} other actions are already waiting`;
     return undefined;
   }
 
@@ -184,7 +184,7 @@ export class Tasks {
   }
 
   private stillMoving(actions: readonly string[]): string {
-    return this.mayMove(`${actions.join(", ")} ${actions.length === 1 ? "has" : "have"} not ended`);
+    return this.mayMove(`${actions.join(", ")} ${actions.length === 1 ? "is" : "are"} still running`);
   }
 
   private mayMove(why: string): string {
@@ -231,8 +231,8 @@ export class Tasks {
     const isAbort = call.canceled && error instanceof Error && error.name === "AbortError";
     if (error instanceof Canceled || isAbort) return { state: "canceled" };
     if (error instanceof Failed) return { state: "failed", error: errorText(error) };
-    this.host.warn(`${this.host.name}: ${task.spec.action} broke off. ${(error as Error)?.stack ?? errorText(error)}`);
-    return { state: "failed", error: `${task.spec.action} broke off: ${errorText(error)}` };
+    this.host.warn(`${this.host.name}: ${task.spec.action} failed. ${(error as Error)?.stack ?? errorText(error)}`);
+    return { state: "failed", error: `${task.spec.action} failed: ${errorText(error)}` };
   }
 
   private ended(task: Task, done: Answer): void {
@@ -258,8 +258,8 @@ export class Tasks {
     try {
       await stop();
     } catch (problem) {
-      if (!(problem instanceof Failed)) this.host.warn(`${this.host.name}: its stop broke off. ${errorText(problem)}`);
-      const why = problem instanceof Failed ? errorText(problem) : `its stop broke off: ${errorText(problem)}`;
+      if (!(problem instanceof Failed)) this.host.warn(`${this.host.name}: its stop failed. ${errorText(problem)}`);
+      const why = problem instanceof Failed ? errorText(problem) : `its stop failed: ${errorText(problem)}`;
       error = this.mayMove(why);
     }
     this.act(() => this.stopEnded(run, error));
@@ -353,7 +353,7 @@ export class Tasks {
   private watchPrograms(): void {
     const acting = [...this.running, ...this.queue].map((each) => each.spec.program);
     if (this.watchdog.bites(this.host.clock.now(), acting))
-      this.stop(this.takeUnasked, `no sign of life from its program for ${this.watchdog.patienceS} s`);
+      this.stop(this.takeUnasked, `its program has been silent for ${this.watchdog.patienceS} s`);
   }
 
   private tellBeat(): void {
