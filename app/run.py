@@ -39,7 +39,7 @@ from nep.text import escaped
 
 OK, FAILED, UNUSABLE, ROBOT_MISSING, MAY_NOT_MOVE, INTERRUPTED = 0, 1, 2, 3, 4, 130
 ROBOT_WAIT_S = 10.0
-SLICE_S = 0.1
+WAIT_STEP_S = 0.1
 ALL_ROBOTS_WAIT_S = 3.0
 """Time that a behaviour with publish blocks waits for the descriptions of all robots on the network."""
 LATE_S = 1.0
@@ -241,7 +241,7 @@ def _run(
     late = _LateRobots(reach.node, runner) if program.publishes else None
     try:
         runner.start(program, [robot.source for robot in found.robots], reach.master, owners=owners)
-        while not runner.wait(SLICE_S) and not interrupted.is_set():
+        while not runner.wait(WAIT_STEP_S) and not interrupted.is_set():
             if late is not None:
                 late.poll()
         was_interrupted = interrupted.is_set()

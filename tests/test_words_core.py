@@ -22,7 +22,7 @@ from app.core.network.decode_checks import Checked
 from app.core.network.remote_access import RemoteAccess, RemoteAccessChanged
 from app.core.network.topics import Topic, Topics
 from app.core.robots.fleet import Fleet
-from app.core.robots.health import AWAY_S, Health
+from app.core.robots.health import RESTART_TIMEOUT_S, Health
 from app.core.robots.health_facts import facts_of
 from app.core.robots.motion.permission import MayNotMoveError, Question
 from app.core.robots.reported_count import ReportedCount
@@ -174,7 +174,7 @@ def test_alerts_of_health() -> None:
     fleet = cast("Fleet", SimpleNamespace(links=links, claims={}))
     health = Health(Topics(), fleet, alerts, lambda: now[0])
     health.check({"Pepper"}, {"Turtle"})
-    now[0] = AWAY_S + 1
+    now[0] = RESTART_TIMEOUT_S + 1
     health.check({"Pepper"}, {"Turtle"})
     for unchecked in (0, 7):
         health.look({f"/{unchecked}": Checked(3, 2, unchecked, "Xx", last_good=False)})

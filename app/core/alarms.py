@@ -40,7 +40,7 @@ from nep.protocol.graph_view import GraphView
 FILE = "alarms.json"
 SHOW = "panel:alarms"
 """Window command that shows the alarms panel."""
-LATE_S = 10.0
+MAX_AGE_S = 10.0
 """Maximum age of a message that waits for a master. Older ones are discarded, because they may no longer be
 valid."""
 SOUND: Notes = ((880.0, 0.16), (0.0, 0.06), (880.0, 0.16), (0.0, 0.06), (660.0, 0.3))
@@ -353,7 +353,7 @@ class SessionAlarms:
         asked = self._clock()
 
         def job(node: Node) -> None:
-            if self._clock() - asked > LATE_S:
+            if self._clock() - asked > MAX_AGE_S:
                 done(False, _("there was no master"))
             else:
                 self._commands.carry(node, action, done)

@@ -32,12 +32,12 @@ WRITER = "NEP Studio %s writes from here on"
 FORMAT = "%(asctime)s %(levelname)s %(threadName)s %(name)s: %(message)s"
 
 ALERT = "studio"
-WELL_S = 5.0
+RECOVERY_S = 5.0
 """Time without a failure after which a fault is over, so that intermittent faults don't make the banner
 flicker."""
-OVER_S = 60.0
+EXPIRY_S = 60.0
 """Time after which a fault of a step that isn't repeated (a single event) is over; it stays in the log."""
-MOST = 100
+MAX_FAULTS = 100
 
 _log = logging.getLogger("studio")
 
@@ -234,7 +234,7 @@ class FaultAlerts:
         over = [
             what
             for what, fault in self._faults.items()
-            if now - fault.last_s >= (WELL_S if fault.is_well else OVER_S)
+            if now - fault.last_s >= (RECOVERY_S if fault.is_well else EXPIRY_S)
         ]
         for what in over:
             del self._faults[what]
@@ -245,7 +245,7 @@ class FaultAlerts:
 
     def _failed(self, what: str, said: str) -> None:
         is_new = what not in self._faults
-        while is_new and len(self._faults) >= MOST:
+        while is_new and len(self._faults) >= MAX_FAULTS:
             del self._faults[next(iter(self._faults))]
         self._faults[what] = _Fault(said, self._clock())
         if not self._alerts.has(ALERT):

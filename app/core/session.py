@@ -77,7 +77,7 @@ if TYPE_CHECKING:
 else:
     replay_module = lazy_module("app.core.recording.replay.replay")
 
-CHECK_S = 1.0
+CHECK_INTERVAL_S = 1.0
 NO_WATCH = lazy("can't monitor the robots: {error}")
 LOGS = {LOG_TOPIC: LOG_TYPE, LAST_ERRORS_TOPIC: LAST_ERRORS_TYPE}
 """Topics of the Console."""
@@ -316,7 +316,7 @@ class Session:
             self.runs.tick()
             self.recordings.events.follow_run(self.runs.state)
         if now >= self._next_check:
-            self._next_check = now + CHECK_S
+            self._next_check = now + CHECK_INTERVAL_S
             self._check(now)
         self.tick_ms = (self._clock() - now) * 1000
 

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 import nep
-from app.core.alarms import FILE, LATE_S
+from app.core.alarms import FILE, MAX_AGE_S
 from app.core.session import Session
 from app.core.storage.settings import Settings
 from nep.programs.alarms import AlarmAction, AlarmCondition, AlarmRule
@@ -209,7 +209,7 @@ def test_what_waited_too_long_for_a_master_is_not_sent(tmp_path: Path) -> None:
     session.source.submit = lambda _what, job: jobs.append(job)  # type: ignore[method-assign]
     told: list[tuple[bool, str]] = []
     session.alarms._command(None, AlarmAction("send", "/cmd", 1), lambda *said: told.append(said))  # type: ignore[arg-type]
-    now[0] += LATE_S + 1
+    now[0] += MAX_AGE_S + 1
     jobs[0](None)
     assert told == [(False, "there was no master")]
     session.close()

@@ -9,7 +9,7 @@ from typing import Generic, TypeVar
 from app.core.storage.deep_json import start_deep
 
 T = TypeVar("T")
-END_S = 2.0
+JOIN_TIMEOUT_S = 2.0
 """Maximum time that the window waits for a job, for example on a disk that hangs."""
 
 
@@ -50,7 +50,8 @@ class BackgroundWorker(Generic[T]):
         """Wait until the owner has no pending job, at most 2 s; return whether that is so."""
         with self._changed:
             return self._changed.wait_for(
-                lambda: self._closed or (owner not in self._pending and self._current_owner != owner), END_S
+                lambda: self._closed or (owner not in self._pending and self._current_owner != owner),
+                JOIN_TIMEOUT_S,
             )
 
     def forget(self, owner: str) -> None:
@@ -67,7 +68,7 @@ class BackgroundWorker(Generic[T]):
             self._pending.clear()
             self._changed.notify_all()
         if self._thread is not None:
-            self._thread.join(END_S)
+            self._thread.join(JOIN_TIMEOUT_S)
 
     def _work(self) -> None:
         while True:

@@ -23,9 +23,9 @@ from nep.i18n import _, lazy, ngettext, number
 from nep.system.replace_file import replace_file
 
 VERSION = 1
-MOST = 100
+MAX_STACKS = 100
 """Maximum number of stacks."""
-MOST_BYTES = 4_000_000
+MAX_BYTES = 4_000_000
 """Maximum file size in bytes."""
 FULL = lazy("the backpack can hold at most {most} stacks; remove something first")
 _MIN_DISTANCE_S = 0.001
@@ -136,19 +136,21 @@ class Backpack:
         self._stamp = _stamp(self.path)
 
     def _write(self, found: _Found, *, grows: bool) -> None:
-        if grows and len(found.items) > MOST:
+        if grows and len(found.items) > MAX_STACKS:
             raise BackpackError(
-                _("the backpack can hold at most {most} stacks; remove something first").format(most=MOST)
+                _("the backpack can hold at most {most} stacks; remove something first").format(
+                    most=MAX_STACKS
+                )
             )
         whole = {
             "backpack": VERSION,
             "items": [*(item.to_json() for item in found.items), *found.unknown],
         }
         data = deep_json.dumps(whole, ascii=True).encode()
-        if grows and len(data) > MOST_BYTES:
+        if grows and len(data) > MAX_BYTES:
             raise BackpackError(
                 _("the backpack can hold at most {most} MB; remove something first").format(
-                    most=number(MOST_BYTES / 1e6, ".0f")
+                    most=number(MAX_BYTES / 1e6, ".0f")
                 )
             )
         try:
@@ -163,7 +165,7 @@ class Backpack:
     def _read(self) -> _Found:
         # Raises BackpackError when it can't be read now; a damaged file is renamed.
         try:
-            data = read_whole(self.path, MOST_BYTES + _SPARE)
+            data = read_whole(self.path, MAX_BYTES + _SPARE)
         except (FileNotFoundError, NotADirectoryError):
             return _Found()
         except OSError as error:

@@ -37,7 +37,7 @@ from nep.i18n import _, lazy
 
 UNNAMED = lazy("New behaviour")
 
-QUICK_S = 0.02
+INLINE_COMPILE_S = 0.02
 """Compile time below which a behaviour is compiled immediately, in the window's thread."""
 Key = tuple[int, int, int]
 
@@ -333,7 +333,7 @@ class Document:
 
     def _is_quick_to_compile(self) -> bool:
         if self._compile_s is not None:
-            return self._compile_s < QUICK_S
+            return self._compile_s < INLINE_COMPILE_S
         return self._compiling_key is None and not self._json.is_longer_than(LONG_CHARACTERS)
 
     def _key(self) -> Key:

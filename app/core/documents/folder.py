@@ -11,7 +11,7 @@ from pathlib import Path
 from app.core.documents.file_format import SUFFIX
 from nep.i18n import _
 
-MOST_ENTRIES = 5000
+MAX_ENTRIES = 5000
 REFUSED = re.compile(r'[/\\:*?"<>|\x00-\x1f]')
 RESERVED = re.compile(r"(con|prn|aux|nul|com\d|lpt\d)(\..*)?", re.IGNORECASE)
 """Names that one of the systems rejects: a file should be usable on all of them."""
@@ -42,7 +42,7 @@ def entries_of(folder: Path, endings: tuple[str, ...] = (SUFFIX,)) -> tuple[Fold
             is_folder = stat.S_ISDIR(facts.st_mode)
             if is_folder or each.name.lower().endswith(endings):
                 made.append(FolderEntry(Path(each.path), is_folder, facts.st_mtime, facts.st_size))
-            if len(made) == MOST_ENTRIES:
+            if len(made) == MAX_ENTRIES:
                 break
     return tuple(made)
 

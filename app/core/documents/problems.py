@@ -11,7 +11,7 @@ from app.robots.description.description import Robot
 from nep.i18n import _, ngettext
 
 CONNECT = "connect:"
-MOST_MENDS = 2  # a line has no space for more
+MAX_FIXES = 2  # a line has no space for more
 
 
 @dataclass(frozen=True)
@@ -84,9 +84,9 @@ def robot_mends(
     alike = [other for other in able if other.model == robot.model] or able
     mends = [
         Mend(_("Use {robot}").format(robot=other.name), f"robot.use:{name}:{other.name}")
-        for other in alike[:MOST_MENDS]
+        for other in alike[:MAX_FIXES]
     ]
-    if robot.model in virtual_models and len(mends) < MOST_MENDS:
+    if robot.model in virtual_models and len(mends) < MAX_FIXES:
         mends.append(Mend(_("Start a virtual {robot}").format(robot=name), f"robot.virtual:{name}"))
     return tuple(mends) or (_show_robots(name),)
 

@@ -25,9 +25,9 @@ Box = tuple[float, float, float, float]
 RouteKey = tuple[tuple[str, tuple[str, ...], tuple[str, ...]], str, str]
 """Key of a line, source node, target node."""
 
-MOST_ROUTES = 6000
+MAX_ROUTES = 6000
 """Maximum number of drawn routes; of more, those of lines with the most ends are omitted and counted."""
-MOST_PLACES = 4000
+MAX_PLACES = 4000
 """Maximum number of places kept of nodes that left, for their return."""
 LAYER_GAP, NODE_GAP, GROUP_GAP, DUMMY_GAP = 150.0, 36.0, 40.0, 10.0
 ALONE_COLUMNS = 4
@@ -106,7 +106,7 @@ def arrange(
         places = _place_new(graph, {key: known[key] for key in here & known.keys()}, sizes)
     routes = {} if is_plain else _route_lines(places, ways, sizes)
     kept = {key: place for key, place in known.items() if key not in here}
-    for key in [*kept][: max(0, len(kept) - MOST_PLACES)]:
+    for key in [*kept][: max(0, len(kept) - MAX_PLACES)]:
         del kept[key]
     straight = {way: _straight(places[way[1]], places[way[2]], sizes) for way in ways}
     groups = _group_boxes(graph, places, sizes)
@@ -133,7 +133,7 @@ def _routes_to_draw(graph: NodeGraph) -> tuple[list[RouteKey], int]:
     left_out = 0
     for line in sorted(graph.lines, key=_ends_of):
         ways = [(line.key, source, target) for source, target in line.pairs()]
-        if len(found) + len(ways) <= MOST_ROUTES:
+        if len(found) + len(ways) <= MAX_ROUTES:
             found += ways
         else:
             left_out += len(ways)
@@ -381,7 +381,7 @@ def _push_apart(graph: NodeGraph, places: dict[str, Place], grown: str, sizes: L
 def _neighbours(graph: NodeGraph) -> dict[str, set[str]]:
     found: dict[str, set[str]] = {}
     for line in graph.lines:
-        if len(line.sources) * len(line.targets) > MOST_ROUTES:
+        if len(line.sources) * len(line.targets) > MAX_ROUTES:
             continue
         for source, target in line.pairs():
             found.setdefault(source, set()).add(target)

@@ -18,7 +18,7 @@ from app.core.own_process import module_command
 from nep.masters.process import NO_CONSOLE
 
 TIMEOUT_S = 60.0
-MOST_HERE, MOST_LINES_HERE = 40, 60
+MAX_HERE, MAX_LINES_HERE = 40, 60
 """Maximum size of graphs laid out in this process, which takes some milliseconds, far less than starting a
 process."""
 
@@ -66,7 +66,7 @@ class LayoutProcess:
 def is_large(graph: NodeGraph) -> bool:
     """Return whether a graph should be laid out by another process."""
     lines = sum(len(line.sources) * len(line.targets) for line in graph.lines)
-    return len(graph.nodes) > MOST_HERE or lines > MOST_LINES_HERE
+    return len(graph.nodes) > MAX_HERE or lines > MAX_LINES_HERE
 
 
 def main() -> None:

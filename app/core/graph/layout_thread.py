@@ -10,7 +10,7 @@ from app.core.graph.layout import GraphLayout, LayoutSizes, arrange, arrange_pla
 from app.core.graph.layout_process import LayoutProcess, is_large
 from app.core.graph.node_graph import NodeGraph
 
-END_S = 5.0
+JOIN_TIMEOUT_S = 5.0
 
 Arrange = Callable[[NodeGraph, "GraphLayout | None", LayoutSizes], GraphLayout]
 
@@ -55,14 +55,14 @@ class LayoutThread:
             return made
 
     def close(self) -> None:
-        """Stop; returns when the thread has ended, or after `END_S` if the library hangs."""
+        """Stop; returns when the thread has ended, or after `JOIN_TIMEOUT_S` if the library hangs."""
         with self._changed:
             self._is_closing, self._waiting = True, None
             self._changed.notify()
             if self._process is not None:
                 self._process.kill()
         if self._thread is not None:
-            self._thread.join(END_S)
+            self._thread.join(JOIN_TIMEOUT_S)
 
     def _run(self) -> None:
         while True:

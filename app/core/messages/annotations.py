@@ -12,10 +12,10 @@ from itertools import islice
 from nep.i18n import _
 from nep.text import shortened
 
-MOST_SHAPES = 2000
-MOST_POINTS = 20_000
+MAX_SHAPES = 2000
+MAX_POINTS = 20_000
 LONGEST_TEXT = 200
-MOST_PIXELS = 1e6
+MAX_PIXELS = 1e6
 """Limit of coordinates and sizes: larger ones are not drawn, as no painter supports them."""
 FACE_FRAME = (640, 480)
 """Image size that RIZE's face detection uses."""
@@ -58,7 +58,7 @@ def drawn_by(payload: object, width: int, height: int) -> tuple[Drawn, ...]:
     if not isinstance(payload, Mapping) or width <= 0 or height <= 0:
         return ()
     frame = _Frame(width, height)
-    return tuple(islice(_all(payload, frame), MOST_SHAPES))
+    return tuple(islice(_all(payload, frame), MAX_SHAPES))
 
 
 class _Frame:
@@ -66,7 +66,7 @@ class _Frame:
 
     def __init__(self, width: float, height: float) -> None:
         self.width, self.height = width, height
-        self.left = MOST_POINTS
+        self.left = MAX_POINTS
 
     def point(self, value: object) -> Point | None:
         if not isinstance(value, Mapping):
@@ -177,4 +177,4 @@ def _number(value: object) -> float | None:
     # None for numbers that a painter doesn't support.
     if isinstance(value, bool) or not isinstance(value, (int, float)):
         return None
-    return float(value) if abs(value) <= MOST_PIXELS else None  # also excludes NaN
+    return float(value) if abs(value) <= MAX_PIXELS else None  # also excludes NaN

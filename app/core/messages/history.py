@@ -9,8 +9,8 @@ from copy import copy
 from app.core.network.mailbox import Batch
 from nep.messages.message import UNDECODED, Message
 
-MOST_BYTES = 32_000_000
-MOST_MESSAGES = 2000
+MAX_BYTES = 32_000_000
+MAX_MESSAGES = 2000
 
 
 class MessageHistory:
@@ -20,7 +20,7 @@ class MessageHistory:
     reuses.
     """
 
-    def __init__(self, most_bytes: int = MOST_BYTES, most_messages: int = MOST_MESSAGES) -> None:
+    def __init__(self, most_bytes: int = MAX_BYTES, most_messages: int = MAX_MESSAGES) -> None:
         self._most_bytes, self._most_messages = most_bytes, max(1, most_messages)
         self._kept: deque[Message] = deque()
         self.size_bytes = 0

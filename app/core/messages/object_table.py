@@ -21,7 +21,7 @@ MOST_ROWS = 2000
 MOST_COLUMNS = 40
 LOOKED_AT = 50
 """Number of rows from which the columns are taken."""
-MOST_LISTS = 20
+MAX_LISTS = 20
 _MAX_SEARCHED_VALUES = 2000
 """Maximum number of values of a message that are searched for arrays of objects."""
 _MAX_FLATTENED_KEYS = 8
@@ -60,7 +60,7 @@ def is_list_of_objects(value: object) -> bool:
     return all(isinstance(each, Mapping) for each in first) and any(first)
 
 
-def lists_of_objects(value: object, most: int = MOST_LISTS) -> list[Steps]:
+def lists_of_objects(value: object, most: int = MAX_LISTS) -> list[Steps]:
     """Return the paths to arrays of objects in a message, upper levels first; ``()`` is the message."""
     found: list[Steps] = []
     waiting: deque[tuple[Steps, object]] = deque([((), value)])

@@ -24,9 +24,9 @@ else:
 
 LONGEST = 500
 """Maximum length of a query."""
-MOST_STEPS = 50_000
+MAX_STEPS = 50_000
 """Maximum number of visited values."""
-MOST_FOUND = 2_000
+MAX_RESULTS = 2_000
 Steps = tuple[str | int, ...]
 
 
@@ -70,7 +70,7 @@ class JsonQuery:
             raise QueryError(_("the query is not valid")) from error
 
     def answer(
-        self, value: object, most_steps: int = MOST_STEPS, most_found: int = MOST_FOUND
+        self, value: object, most_steps: int = MAX_STEPS, most_found: int = MAX_RESULTS
     ) -> QueryAnswer:
         """Return the values found in a decoded message, with limits of visited and returned values."""
         count = _Steps(most_steps)

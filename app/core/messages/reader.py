@@ -13,7 +13,7 @@ from nep.messages.message import Message
 LARGE_BYTES = 1_000_000
 """Size above which JSON is indexed instead of decoded; larger messages are never read in the window's thread.
 """
-EVERY_S = 1.0
+READ_INTERVAL_S = 1.0
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -59,7 +59,7 @@ class Reader(NewestOnly[Message, Reading]):
         Large messages take a while, and people don't read faster. ``now`` is monotonic seconds. Return
         whether it will be read.
         """
-        if self.busy or (self._asked_at is not None and now - self._asked_at < EVERY_S):
+        if self.busy or (self._asked_at is not None and now - self._asked_at < READ_INTERVAL_S):
             return False
         self._asked_at = now
         self.ask(message)

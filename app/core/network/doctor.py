@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 else:
     doctor = lazy_module("nep.programs.doctor")
 
-JOIN_S = 4.0
+JOIN_TIMEOUT_S = 4.0
 
 
 class Doctor:
@@ -92,7 +92,7 @@ class Doctor:
     def close(self) -> None:
         """Wait for a run in progress."""
         if self._thread is not None:
-            self._thread.join(JOIN_S)
+            self._thread.join(JOIN_TIMEOUT_S)
 
     def _run(self) -> None:
         while True:  # repeats when another topic was set meanwhile

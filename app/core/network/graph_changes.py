@@ -13,7 +13,7 @@ MASTER = "master"
 PROGRAM = "program "
 NEP = "/nep/"
 FEW = 2
-MOST_LINES = 8
+MAX_LINES = 8
 """Number of changes above which one line with the count is written: a bridge can add a thousand topics."""
 NAMED = 3
 
@@ -51,7 +51,7 @@ def arrivals(before: GraphView, after: GraphView) -> list[str]:
 
 
 def _summarized(lines: Sequence[tuple[str, str]], many: str) -> list[str]:
-    if len(lines) <= MOST_LINES:
+    if len(lines) <= MAX_LINES:
         return [line for _name, line in lines]
     named = ", ".join(name for name, _line in lines[:NAMED])
     return [many.format(count=len(lines), names=named, more=len(lines) - NAMED)]

@@ -23,14 +23,14 @@ if TYPE_CHECKING:
 else:
     doctor = lazy_module("nep.programs.doctor")
 
-LEARNING_S = 1.5
+DISCOVERY_S = 1.5
 """Time during which a newly started master may not know all nodes yet (it collects them for one second)."""
 AGAIN_S, AGAIN_AT_MOST_S = 2.0, 30.0
 """Pause before another attempt to start a master, and its maximum; the pause doubles with each failure."""
-START_S = 50.0
+START_TIMEOUT_S = 50.0
 """Time limit for a started master to answer while its process is alive. The first start after an
 installation, from a slow disk and with a virus scanner, takes longer than the usual ten seconds."""
-END_WAIT_S = 2.0
+END_TIMEOUT_S = 2.0
 
 _log = logging.getLogger("studio.master")
 
@@ -59,7 +59,7 @@ class MasterChange:
             return False
         if self._new_epoch[0] != view.epoch:
             self._new_epoch = (view.epoch, now)
-        return now - self._new_epoch[1] < LEARNING_S
+        return now - self._new_epoch[1] < DISCOVERY_S
 
 
 class MasterStart:
@@ -99,7 +99,7 @@ class MasterStart:
     def close(self) -> None:
         """Wait for a start in progress."""
         if self._thread is not None:
-            self._thread.join(timeout=END_WAIT_S)
+            self._thread.join(timeout=END_TIMEOUT_S)
 
     def _start(self) -> None:
         why = self._start_or_reason()
@@ -122,7 +122,7 @@ class MasterStart:
         self._log_crash()
         try:
             self._process = start_process(
-                self._address, owner_pid=os.getpid(), command=module_command("nep"), timeout_s=START_S
+                self._address, owner_pid=os.getpid(), command=module_command("nep"), timeout_s=START_TIMEOUT_S
             )
         except (NepError, OSError) as error:
             return str(error)

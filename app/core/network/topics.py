@@ -18,7 +18,7 @@ RATES_KEPT = 60
 AT_ONCE = 1500
 START_S = 5.0
 """Time that a publisher has for its first message after a subscription, such as a camera that starts then."""
-FIGURES_LATE_S = 6.0
+STATISTICS_LATE_S = 6.0
 """Minimum silence of topics whose counts only the nodes report: nodes of large graphs report every 5 s."""
 
 
@@ -405,7 +405,7 @@ def _silence(topic: Topic, now: float, told_at: float) -> float | None:
     until = now if topic.watched else told_at
     since = topic.moved_at if topic.moved_at >= topic.heard_since else topic.heard_since + START_S
     silent_s = max(0.0, until - since)
-    return silent_s if topic.watched or silent_s >= FIGURES_LATE_S else 0.0
+    return silent_s if topic.watched or silent_s >= STATISTICS_LATE_S else 0.0
 
 
 def total_rate_hz(topics: Iterable[TopicInfo]) -> float | None:

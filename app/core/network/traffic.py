@@ -11,7 +11,7 @@ from nep.protocol.graph_view import GraphView
 
 WINDOW_S = 30.0
 
-SUM_EVERY_S = 0.5
+SUM_INTERVAL_S = 0.5
 """Interval at which the statistics of more than `AT_ONCE` topics are summed."""
 
 
@@ -49,7 +49,7 @@ class Traffic:
         self._losses = RecentLosses()
         self._recent: deque[tuple[float, int, int]] = deque()
         self._pending_view: GraphView | None = None
-        self._summed_at = -SUM_EVERY_S
+        self._summed_at = -SUM_INTERVAL_S
         self.messages_per_s: float | None = None
         self.lost_30s = 0
         self.shown_30s = 0
@@ -70,7 +70,7 @@ class Traffic:
         self._sum_if_due(now)
 
     def _sum_if_due(self, now: float) -> None:
-        if self._pending_view is not None and now - self._summed_at >= SUM_EVERY_S:
+        if self._pending_view is not None and now - self._summed_at >= SUM_INTERVAL_S:
             self._sum(self._pending_view, now)
 
     def _sum(self, view: GraphView, now: float) -> None:

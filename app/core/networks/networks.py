@@ -22,7 +22,7 @@ KEPT = "networks"
 """Setting with the shown networks: addresses by kind."""
 LOOK_COMMAND = "network.look"
 """Window command for choosing the networks."""
-COUNT_S = 1.0
+COUNT_INTERVAL_S = 1.0
 
 NetworkState = Literal["off", "looking", "there", "lost"]
 
@@ -117,7 +117,7 @@ class OtherNetwork:
         """Update the ages; once a second, measure rates that publishers don't report."""
         self.topics.age(now, now_ns)
         self.nodes.age(now)
-        if self._counted_at is None or now - self._counted_at >= COUNT_S:
+        if self._counted_at is None or now - self._counted_at >= COUNT_INTERVAL_S:
             passed_s = 0.0 if self._counted_at is None else now - self._counted_at
             self._arrived, self._counted_at = self.topics.count(passed_s, self._arrived), now
 

@@ -26,15 +26,15 @@ from nep.patterns.parameters.owned import place_of
 from nep.patterns.parameters.remote import RemoteParameters
 from nep.text import bounded_str
 
-ANSWER_S = 3.0
+ANSWER_TIMEOUT_S = 3.0
 """Timeout of the call that sets a parameter."""
 READ_BYTES = 4 * 2**20
 """Maximum message size that is decoded in the window."""
 EDITED_LETTERS = 20_000
-MOST = 1000
+MAX_PARAMETERS = 1000
+"""Number of parameters that a node may declare; more are not shown."""
 _MAX_DESCRIPTION_LENGTH = 2_000
-"""Maximum length of a shown description (`MOST` is the number of parameters that a node may declare; more are
-not shown)."""
+"""Maximum length of a shown description."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -83,7 +83,7 @@ class ParameterSetter:
 
 def _set(node: Node, node_id: str, name: str, value: object) -> bool:
     try:
-        with RemoteParameters(node.new_client(place_of(node_id), timeout_s=ANSWER_S)) as theirs:
+        with RemoteParameters(node.new_client(place_of(node_id), timeout_s=ANSWER_TIMEOUT_S)) as theirs:
             theirs.set(name, value)
     except NepError:
         raise
@@ -165,7 +165,7 @@ class NodeParameters:
         try:
             if message.size_bytes > READ_BYTES:
                 raise NepError(_("they are too large to show here; use nep param list"))
-            told = parameters_in(message.payload)
+            parameters = parameters_in(message.payload)
         except NepError as error:  # also a `DecodeError`
             self.problem = str(error)
             return
@@ -174,11 +174,11 @@ class NodeParameters:
             self.changed.update(
                 {
                     each.name: now
-                    for each in told
+                    for each in parameters
                     if each.name not in before or not _same(before[each.name], each.value)
                 }
             )
-        self.all, self.heard, self.problem = told, True, ""
+        self.all, self.heard, self.problem = parameters, True, ""
 
     def _poll_result(self, node: NodeEntry) -> None:
         try:
@@ -231,8 +231,8 @@ def parameters_in(state: object) -> tuple[ShownParameter, ...]:
     listed = state.get("parameters") if isinstance(state, Mapping) else None
     if not isinstance(listed, list):
         raise NepError(_("this is not a list of parameters"))
-    told = [_parameter(each) for each in listed[:MOST] if isinstance(each, Mapping)]
-    return tuple({each.name: each for each in told}.values())
+    parameters = [_parameter(each) for each in listed[:MAX_PARAMETERS] if isinstance(each, Mapping)]
+    return tuple({each.name: each for each in parameters}.values())
 
 
 def _parameter(told: Mapping[str, object]) -> ShownParameter:
@@ -244,7 +244,7 @@ def _parameter(told: Mapping[str, object]) -> ShownParameter:
         bounded_str(told.get("description") or "", _MAX_DESCRIPTION_LENGTH),
         _number(told.get("min")),
         _number(told.get("max")),
-        tuple(choices[:MOST]) if isinstance(choices, list) else (),
+        tuple(choices[:MAX_PARAMETERS]) if isinstance(choices, list) else (),
         told.get("read_only") is True,
         text_of(told.get("value")),
     )
@@ -273,13 +273,13 @@ def value_of(text: str, kind: str) -> object:
     """Parse the text of a parameter of this kind. Raises `ValueError` with a sentence."""
     if kind == "str":
         return text
-    said = text.strip()
+    stripped = text.strip()
     if kind == "int":
-        return _whole(said)
+        return _whole(stripped)
     if kind == "float":
-        return _decimal(said)
+        return _decimal(stripped)
     try:
-        value: object = orjson.loads(said)
+        value: object = orjson.loads(stripped)
     except orjson.JSONDecodeError:
         value = None
     if kind == "bool" and not isinstance(value, bool):

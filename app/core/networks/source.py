@@ -17,14 +17,14 @@ from nep.nodes.node import Node
 from nep.nodes.subscriber import Subscriber
 from nep.protocol.graph_view import GraphView
 
-ASK_S = 1.0
-LOOK_S = 2.0
+REQUEST_TIMEOUT_S = 1.0
+POLL_S = 2.0
 
 
 class OtherSource(LiveSource):
     """`LiveSource` of another network; its sinks get topics by their keys among all networks (`key_of`)."""
 
-    poll_s = ASK_S
+    poll_s = REQUEST_TIMEOUT_S
 
     def __init__(
         self,
@@ -43,7 +43,7 @@ class OtherSource(LiveSource):
     def join(self) -> Node:
         """Join the network. Raises `NepError` while it doesn't answer."""
         with _converted_errors():
-            return nep.node(NODE_NAME, self._kind.name, master=self.address, wait_s=LOOK_S)
+            return nep.node(NODE_NAME, self._kind.name, master=self.address, wait_s=POLL_S)
 
     def look(self, node: Node) -> GraphView:
         """Return the graph with the codecs by which topics are read.
@@ -52,7 +52,7 @@ class OtherSource(LiveSource):
         time give different graphs the same number.
         """
         with _converted_errors():
-            view = node.graph(timeout_s=LOOK_S)
+            view = node.graph(timeout_s=POLL_S)
         topics = {
             name: info if (codec := self._kind.codec(info)) == info.codec else replace(info, codec=codec)
             for name, info in view.topics.items()

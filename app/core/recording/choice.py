@@ -22,8 +22,8 @@ LEAST_S, MOST_S, USUAL_S = 5, 3_600, 60
 LEAST_GB, MOST_GB, USUAL_GB = 0.1, 1_000.0, 2.0
 LEAST_MIN, MOST_MIN = 0.1, 10_080.0
 """Limits of the recording's duration in minutes; its size limits are those of the flight recorder."""
-MOST_NAMES = 1_000
-MOST_LETTERS = 80
+MAX_NAMES = 1_000
+MAX_NAME_LENGTH = 80
 """Maximum length of a file name, which with its suffix all file systems accept."""
 NOT = lazy("not")
 _INVALID_CHARACTERS = re.compile(r'[\x00-\x1f\x7f<>:"/\\|?*\ud800-\udfff]+')
@@ -105,9 +105,7 @@ def plain_choice(choice: RecordingChoice) -> dict[str, object]:
 
 
 def _names(told: object) -> tuple[str, ...]:
-    return (
-        tuple(each for each in told if isinstance(each, str))[:MOST_NAMES] if isinstance(told, list) else ()
-    )
+    return tuple(each for each in told if isinstance(each, str))[:MAX_NAMES] if isinstance(told, list) else ()
 
 
 @dataclass(frozen=True, slots=True)
@@ -185,7 +183,7 @@ def read_patterns(text: str) -> tuple[tuple[str, ...], tuple[str, ...]]:
 def file_stem(name: str) -> str:
     """Return a name that is valid as a file name on every system; "" when nothing of it is left."""
     plain = _INVALID_CHARACTERS.sub(" ", name)
-    plain = " ".join(plain.split())[:MOST_LETTERS].strip(" .")
+    plain = " ".join(plain.split())[:MAX_NAME_LENGTH].strip(" .")
     return f"_{plain}" if _RESERVED_NAMES.fullmatch(plain) else plain
 
 

@@ -29,9 +29,9 @@ LOW_DISK_BYTES = 1_000_000_000
 """Free disk space below which the user is warned; at 200 MB the recorder stops by itself."""
 AGAIN_S, AGAIN_AT_MOST_S = 2.0, 30.0
 """Pause before a flight recorder whose process ended is restarted, and its maximum; doubled each time."""
-END_WAIT_S = 2.0
-MOST_ORDERS = 1000
-MOST_KEEPING = 100
+END_TIMEOUT_S = 2.0
+MAX_QUEUED_COMMANDS = 1000
+MAX_PENDING_SAVES = 100
 _TAIL_BYTES = 2000
 
 
@@ -112,7 +112,7 @@ class RecorderProcess:
     def __init__(self, number: int, address: str, post_event: Callable[[object], object]) -> None:
         # Starts in a thread; posts `RecorderSaid` events, and finally a `RecorderGone`.
         self._number, self._address, self._post_event = number, address, post_event
-        self._orders: queue.Queue[bytes | None] = queue.Queue(MOST_ORDERS)
+        self._orders: queue.Queue[bytes | None] = queue.Queue(MAX_QUEUED_COMMANDS)
         self._has_ended = threading.Event()
         threading.Thread(target=self._run, name="recorder-process", daemon=True).start()
 
@@ -164,7 +164,7 @@ class RecorderProcess:
             code = process.wait()
             with suppress(queue.Full):
                 self._orders.put_nowait(None)  # ends the thread that waits for commands
-            writer.join(END_WAIT_S)
+            writer.join(END_TIMEOUT_S)
         return "" if code == 0 else _tail(log) or _("it ended with exit code {code}").format(code=code)
 
     def _write(self, process: subprocess.Popen[bytes]) -> None:
@@ -289,7 +289,7 @@ class RecorderClient:
 
     def keep(self, path: Path, seconds: float, note: str = "") -> bool:
         """Save the last seconds to a file; return False without a flight recorder, or with too many saves."""
-        if self._ring is None or self._process is None or len(self.state.keeping) >= MOST_KEEPING:
+        if self._ring is None or self._process is None or len(self.state.keeping) >= MAX_PENDING_SAVES:
             return False
         self._set(replace(self.state, keeping=(*self.state.keeping, path)))
         self._send(op="keep", path=str(path), seconds=seconds, note=note)
@@ -300,7 +300,7 @@ class RecorderClient:
         if self._ring is not None and self._process is None and self._clock() >= self._retry_at:
             self._begin_ring(self._ring)
 
-    def close(self, wait_s: float = END_WAIT_S) -> None:
+    def close(self, wait_s: float = END_TIMEOUT_S) -> None:
         """Close the process, which finishes its work even beyond the time waited here."""
         line, self._process = self._process, None
         if line is not None:

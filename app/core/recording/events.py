@@ -13,9 +13,9 @@ from nep.i18n import _
 from nep.programs.alarms import AlarmEvent
 from nep.programs.alarms.sentences import what_words
 
-MOST_PRESENT = 200
+MAX_PRESENT = 200
 """Maximum number of present alarms that are repeated; further ones are sent once."""
-MOST_LETTERS = 200
+MAX_TEXT_LENGTH = 200
 _ACTIVE_STATES = frozenset({"running", "paused"})
 
 
@@ -105,11 +105,16 @@ class RecordedEvents:
 
     def _new(self, id: str, name: str) -> dict[str, object]:
         since_ns = self._clock_ns()
-        return {"id": f"{id}-{since_ns}", "name": name[:MOST_LETTERS], "since_ns": since_ns, "until_ns": None}
+        return {
+            "id": f"{id}-{since_ns}",
+            "name": name[:MAX_TEXT_LENGTH],
+            "since_ns": since_ns,
+            "until_ns": None,
+        }
 
     def _add(self, role: str, told: Mapping[str, object], key: str = "") -> None:
         self._say(role, dict(told))
-        if len(self._present) < MOST_PRESENT:
+        if len(self._present) < MAX_PRESENT:
             self._present[key or str(told["id"])] = (role, told)
 
 
@@ -120,7 +125,7 @@ def _is_same(before: RunState, run: RunState) -> bool:
 
 def _result(run: RunState) -> dict[str, object]:
     if run.errors:
-        return {"result": "failed", "words": next(iter(run.errors.values()))[:MOST_LETTERS]}
+        return {"result": "failed", "words": next(iter(run.errors.values()))[:MAX_TEXT_LENGTH]}
     if run.finished:
         return {"result": "ended", "words": ""}
     report = run.report

@@ -19,7 +19,7 @@ _BUDGET = (1_000_000_000, 20.0)
 _MAX_TOPICS = 10_000
 SAMPLES = 4
 """Number of messages of a topic that are read to estimate its size."""
-MOST_SAMPLED = 200
+MAX_SAMPLED = 200
 """Maximum number of topics whose size is estimated; that of others is unknown."""
 
 
@@ -117,7 +117,7 @@ def _message_bytes(recording: Recording) -> dict[str, float]:
         for topic, each in figures.items()
         if each.received and topic in recording.topics
     }
-    others = [topic for topic in recording.topics if topic not in made][:MOST_SAMPLED]
+    others = [topic for topic in recording.topics if topic not in made][:MAX_SAMPLED]
     seen: dict[str, dict[int, int]] = {topic: {} for topic in others}
     span = recording.end_ns - recording.start_ns
     for place in range(SAMPLES if others else 0):

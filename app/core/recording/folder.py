@@ -19,12 +19,12 @@ from nep.i18n import _
 from nep.recordings.reader import Recording
 
 SUFFIX = ".mcap"
-MOST_FILES = 2_000
+MAX_FILES = 2_000
 AT_ONCE = 50
 """Number of files that are read before a partial result is shown ..."""
-MOST_S = 2.0
+MAX_SCAN_S = 2.0
 """... and time limit: a file may take some seconds."""
-MOST_TOPICS = 200
+MAX_TOPICS = 200
 CACHE_BYTES = 8_000_000
 """Cache size for a recording that is open only briefly."""
 SCAN_BUDGET = (256_000_000, 3.0)
@@ -122,9 +122,9 @@ class RecordingFolder:
         except OSError as error:
             return FolderLook(problem=(error.strerror or str(error)).lower())
         there.sort(key=lambda each: (-each[1].st_mtime_ns, each[0].name))
-        listed, left_out = there[:MOST_FILES], max(0, len(there) - MOST_FILES)
+        listed, left_out = there[:MAX_FILES], max(0, len(there) - MAX_FILES)
         self._known = {path: self._known[path] for path, _about in listed if path in self._known}
-        files, opened, until = [], 0, time.monotonic() + MOST_S
+        files, opened, until = [], 0, time.monotonic() + MAX_SCAN_S
         for path, about in listed:
             mark = (about.st_mtime_ns, about.st_size)
             known = self._known.get(path)
@@ -154,7 +154,7 @@ def read_facts(plain: RecordingFacts, opener: RecordingOpener) -> RecordingFacts
                 started_ns=recording.start_ns,
                 duration_s=recording.duration_s,
                 message_count=recording.message_count,
-                topics=tuple(recording.topics)[:MOST_TOPICS],
+                topics=tuple(recording.topics)[:MAX_TOPICS],
                 note=words.get("note", ""),
                 is_complete=recording.is_complete,
                 is_repaired=words.get("repaired") == "1",

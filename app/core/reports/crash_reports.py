@@ -20,8 +20,8 @@ from nep.i18n import _, lazy
 from nep.system.replace_file import replace_file
 from nep.version import __version__
 
-MOST = 10
-MOST_LETTERS = 100_000
+MAX_REPORTS = 10
+MAX_REPORT_CHARS = 100_000
 ALERT = "crash"
 OFFER = "help.report"
 _STAMP = "%Y-%m-%d %H.%M.%S"
@@ -70,7 +70,7 @@ class CrashReports:
         except OSError as error:
             _log.warning("a crash report can't be kept: %s", error, extra=IN_CONSOLE)
             return None
-        for old in self.all()[MOST:]:
+        for old in self.all()[MAX_REPORTS:]:
             with suppress(OSError):  # another instance was faster
                 old.path.unlink(missing_ok=True)
         return path
@@ -163,7 +163,7 @@ def _text(crash: Crash, now_s: float) -> str:
         f"how: {crash.how}",
         f"noticed: {noticed}{by}",
         "",
-        crash.text[-MOST_LETTERS:],
+        crash.text[-MAX_REPORT_CHARS:],
     )
     return without_home("\n".join(lines).rstrip() + "\n")
 

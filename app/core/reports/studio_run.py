@@ -36,8 +36,8 @@ else:
     psutil = lazy_module("psutil")
 
 LOG_LINES = 80
-MOST_TRACE = 1_000_000
-CLOCK_S = 2.0
+MAX_TRACE_BYTES = 1_000_000
+CLOCK_TOLERANCE_S = 2.0
 """Tolerance between the system's start time of a process and the clock."""
 WITHOUT_A_WORD = (
     "it ended without a word: the system ended it (for lack of memory, say), or a person did, or the "
@@ -171,7 +171,7 @@ class StudioRun:
     def _crash_of(self, entry: Mapping[str, object], began_s: float, trace: str) -> Crash | None:
         how = fatal_line(trace)
         if not how:
-            if entry.get("asked") is True or psutil.boot_time() > began_s + CLOCK_S:
+            if entry.get("asked") is True or psutil.boot_time() > began_s + CLOCK_TOLERANCE_S:
                 return None
             how = WITHOUT_A_WORD
         began = time.strftime("%Y-%m-%d %H:%M:%S", time.localtime(began_s))
@@ -181,7 +181,7 @@ class StudioRun:
 
     def _trace_of(self, mark: Path) -> str:
         try:
-            return read_whole(self._log / _trace_name(mark), MOST_TRACE).decode("utf-8", "replace")
+            return read_whole(self._log / _trace_name(mark), MAX_TRACE_BYTES).decode("utf-8", "replace")
         except OSError:
             return ""
 
@@ -207,7 +207,7 @@ def _is_running(pid: int, began_s: float) -> bool:
     # Checks the start time too, because process ids are reused.
     try:
         process = psutil.Process(pid)
-        is_old = process.create_time() <= began_s + CLOCK_S
+        is_old = process.create_time() <= began_s + CLOCK_TOLERANCE_S
         return is_old and process.status() != psutil.STATUS_ZOMBIE
     except psutil.Error:
         return False

@@ -10,7 +10,7 @@ from nep.version import __version__
 
 KEY = "studio_versions"
 """Setting with the versions, newest last, each with the time of its first start (epoch seconds)."""
-MOST = 10
+MAX_VERSIONS = 10
 PLAIN = re.compile(r"[0-9A-Za-z][0-9A-Za-z.+-]{0,39}")
 """Valid version; anything else in a file is ignored."""
 EARLIER = "earlier"
@@ -41,7 +41,7 @@ def known(values: Mapping[str, object]) -> list[tuple[str, float]]:
             and version
         ):
             found.append((version, float(since)))
-    return found[-MOST:]
+    return found[-MAX_VERSIONS:]
 
 
 def with_this_version(
@@ -54,7 +54,7 @@ def with_this_version(
     before = known(values) or ([] if is_first else [(EARLIER, 0.0)])
     if before and before[-1][0] == version:
         return None
-    return [{"version": each, "since_s": s} for each, s in [*before, (version, now_s)][-MOST:]]
+    return [{"version": each, "since_s": s} for each, s in [*before, (version, now_s)][-MAX_VERSIONS:]]
 
 
 def used_here(values: Mapping[str, object]) -> str:

@@ -23,9 +23,9 @@ from nep.i18n import _, listed, ngettext
 from nep.messages.message import Message
 from nep.protocol.graph_view import GraphView
 
-MOST_ROBOTS = 200
-MOST_CLAIMANTS = 8
-MOST_OWNERS = 4
+MAX_ROBOTS = 200
+MAX_CLAIMANTS = 8
+MAX_OWNERS = 4
 """Maximum number of earlier programs of one robot whose descriptions are kept, in case they return."""
 READING_SHARE = 0.2
 """Maximum share of the window's time for parsing descriptions in the long run."""
@@ -82,7 +82,7 @@ class Announcements:
         self._waiting: set[str] = set()
         self._topics: dict[str, _Announced] = {}
         self.left_out: tuple[str, ...] = ()
-        """Description topics of robots beyond `MOST_ROBOTS`."""
+        """Description topics of robots beyond `MAX_ROBOTS`."""
 
     def is_announced(self, topic: str) -> bool:
         """Return whether a robot is announced on this topic."""
@@ -118,7 +118,7 @@ class Announcements:
                     ),
                     _("{first} was first and is used; {others} is ignored. Close one of them.").format(
                         first=known.owner.words,
-                        others=listed([twin.words for twin in known.twins[:MOST_CLAIMANTS]]),
+                        others=listed([twin.words for twin in known.twins[:MAX_CLAIMANTS]]),
                     ),
                 )
             elif known.wrong is not None:
@@ -128,7 +128,7 @@ class Announcements:
                 "{count} more robot is on the network; Studio shows at most {most}.",
                 "{count} more robots are on the network; Studio shows at most {most}.",
                 len(self.left_out),
-            ).format(count=len(self.left_out), most=MOST_ROBOTS)
+            ).format(count=len(self.left_out), most=MAX_ROBOTS)
             found["robots"] = Claim(title, _("Find out which program announces them, and close it."))
         return found
 
@@ -156,7 +156,7 @@ class Announcements:
             if known.owner is None or known.owner.node_id not in nodes:
                 known.owner, known.robot, known.parsed = identity_of(view, nodes[0]), None, None
                 known.wrong = None
-                known.owners = tuple(dict.fromkeys((nodes[0], *known.owners)))[:MOST_OWNERS]
+                known.owners = tuple(dict.fromkeys((nodes[0], *known.owners)))[:MAX_OWNERS]
             others = (node for node in nodes if node != known.owner.node_id)
             known.twins = tuple(identity_of(view, node) for node in others)
             ids = {publisher.id for publisher in view.topics[topic].publishers}
@@ -177,7 +177,7 @@ class Announcements:
                 if message.publisher is not None:
                     known.told.pop(message.publisher, None)  # so that the newest is last
                     known.told[message.publisher] = message
-            while len(known.told) > MOST_CLAIMANTS:
+            while len(known.told) > MAX_CLAIMANTS:
                 self._evict_one(known)
             self._waiting.add(topic)
         return self._parse_waiting()
@@ -187,7 +187,7 @@ class Announcements:
     def _add_topic(self, topic: str, place: int, left_out: list[str]) -> _Announced | None:
         # None when there are too many. Vanished topics are evicted first, then those of nodes that announce
         # more robots than this one.
-        if len(self._topics) >= MOST_ROBOTS:
+        if len(self._topics) >= MAX_ROBOTS:
             strangers = [name for name in self._topics if not self._is_proven(name)]
             gone = next((name for name in strangers if self._topics[name].watch is None), None)
             last = max(strangers, key=lambda name: self._topics[name].place, default=None)
@@ -294,7 +294,7 @@ class RizeNames:
     def tell(self, name: str) -> None:
         """Add a name from a ready message on ``rize_event``."""
         self._told.setdefault(name)
-        if len(self._told) > MOST_ROBOTS:
+        if len(self._told) > MAX_ROBOTS:
             del self._told[next(iter(self._told))]
 
     def present(self, view: GraphView, native: Collection[str] = ()) -> set[str]:

@@ -8,8 +8,8 @@ from app.blocks.model.robot_text import TextParts, type_of
 from app.blocks.model.workspace import saved_blocks
 from app.robots.description.description import Event, Robot
 
-MOST = 12
-SHORTEST, LONGEST = 1, 60
+MAX_WORDS = 12
+MIN_LENGTH, MAX_LENGTH = 1, 60
 
 
 def awaited_values(
@@ -17,7 +17,7 @@ def awaited_values(
 ) -> tuple[str, ...]:
     """Return the values of an event's datum ``name`` that blocks wait for, then the suggested default.
 
-    Unique, at most `MOST`. ``workspaces`` are saved workspaces, that of the current behaviour first.
+    Unique, at most `MAX_WORDS`. ``workspaces`` are saved workspaces, that of the current behaviour first.
     """
     hat = type_of(robot.model, "when", event.name)
     argument = TextParts(event.text, event.filters).arguments.get(name, "")
@@ -32,7 +32,7 @@ def awaited_values(
     parameter = next((each for each in event.fields if each.name == name), None)
     if parameter is not None and isinstance(parameter.default, str):
         found[parameter.default] = None
-    return tuple(word for word in found if SHORTEST <= len(word) <= LONGEST)[:MOST]
+    return tuple(word for word in found if MIN_LENGTH <= len(word) <= MAX_LENGTH)[:MAX_WORDS]
 
 
 def _compared(block: Mapping[str, object], sensors: set[str]) -> list[str]:

@@ -24,7 +24,7 @@ from app.core.robots.robot_link import (
     topics_of,
 )
 from app.core.robots.robot_messages import RobotMessages
-from app.core.robots.stop.lines import MOST_TOPICS, StopTarget
+from app.core.robots.stop.lines import MAX_TOPICS, StopTarget
 from app.core.robots.stop.moved_robots import MovedRobots
 from app.core.robots.stop.reach import targets_of, unlisted_targets
 from app.core.robots.stop.report import STOPPING_SHOWN_AFTER_S, StopReport
@@ -447,7 +447,7 @@ class Fleet:
         if before.topics != robot.topics or before.dialect != robot.dialect:
             if before.dialect == robot.dialect:
                 known = dict.fromkeys((*link.topics_before, before.topics))
-                link.topics_before = tuple(known)[:MOST_TOPICS]
+                link.topics_before = tuple(known)[:MAX_TOPICS]
             self._leave_topics(link)
         if link.watch is None:
             link.watch = self._watches.open([robot.topics.answer])

@@ -15,8 +15,8 @@ from nep.i18n import _, lazy, listed, ngettext
 from nep.protocol.graph_view import Alert, GraphView
 
 SILENT_S = 3.0
-CURE_S = 1.0
-AWAY_S = 5.0
+RECOVERY_S = 1.0
+RESTART_TIMEOUT_S = 5.0
 """Time within which a restarted driver is back."""
 PORTS = "ports"
 ASK_DOCTOR = lazy("Open the connection doctor")
@@ -83,7 +83,7 @@ class Health:
         processes this Studio started and that still run.
         """
         now = self._clock()
-        for topic in [t for t, bad in self._bad.items() if bad.is_well and now - bad.since >= CURE_S]:
+        for topic in [t for t, bad in self._bad.items() if bad.is_well and now - bad.since >= RECOVERY_S]:
             self.forget(topic)
         self._check_claims()
         self._forget_robots()
@@ -232,7 +232,7 @@ class Health:
     def _check_presence(self, link: RobotLink, now: float, *, runs_here: bool) -> None:
         # A real robot that left, or a virtual one that hangs.
         since = self._gone_since.setdefault(link.name, now)
-        if now - since < AWAY_S or (link.virtual and not runs_here):
+        if now - since < RESTART_TIMEOUT_S or (link.virtual and not runs_here):
             self._alerts.resolve(f"robot:{link.name}")
             return
         self._alerts.put(

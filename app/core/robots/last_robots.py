@@ -11,7 +11,7 @@ from app.core.storage.settings import Settings
 from app.errors import SettingsError
 
 KEPT, COME_BACK = "virtual_robots", "virtual_robots_come_back"
-MOST = 8
+MAX_ROBOTS = 8
 
 
 class StartsRobots(Protocol):
@@ -44,7 +44,7 @@ class LastRobots:
         if not self.come_back:
             return
         kept: Mapping[str, object] = self._settings.get(KEPT, {})
-        for name, model in list(kept.items())[:MOST]:
+        for name, model in list(kept.items())[:MAX_ROBOTS]:
             if name and isinstance(model, str) and model in VIRTUAL_ROBOTS:
                 launcher.start_virtual_robot(name, model)
 

@@ -23,19 +23,19 @@ from nep.i18n import _
 from nep.masters.process import NO_CONSOLE
 from nep.system.addresses import is_loopback
 
-END_WAIT_S = 2.0
+END_TIMEOUT_S = 2.0
 VIRTUAL_ROBOTS = {"pepper": "app.robots.simulated", "diffdrive": "app.robots.turtle"}
 """Module of each model of virtual robot."""
 TAIL_BYTES, TAIL_LETTERS = 100_000, 2000
-KNOWN_WITHIN_S = 3.0
+FIRST_GRAPH_TIMEOUT_S = 3.0
 """Time that a start waits for the first graph, which may contain a robot of that name."""
-COMING_S = 30.0
+STARTING_S = 30.0
 """Time during which a started robot counts as starting: slow computers need that long."""
-WISH_KEPT_S = 4.0
+REQUEST_KEPT_S = 4.0
 """Time that a request is kept although the robot is listed: its end is noticed only within 3.3 s."""
 
 RUNS_MODULE = ("-m", "--module")
-MOST_KNOWN = 1000
+MAX_KNOWN = 1000
 
 _log = logging.getLogger("studio.launcher")
 
@@ -168,8 +168,8 @@ class Launcher:
         """
         now = self._clock()
         self.wanted[name] = model
-        self._starting[name] = now + COMING_S
-        self._requests[name] = _StartRequest(model, now + KNOWN_WITHIN_S, now + WISH_KEPT_S)
+        self._starting[name] = now + STARTING_S
+        self._requests[name] = _StartRequest(model, now + FIRST_GRAPH_TIMEOUT_S, now + REQUEST_KEPT_S)
         self.follow()
 
     def follow(self) -> None:
@@ -225,7 +225,7 @@ class Launcher:
             held[0].kill()
             held[0].wait()
             held[1].close()
-        self._starting[name] = self._clock() + COMING_S
+        self._starting[name] = self._clock() + STARTING_S
         self._start_robot(name, model)
 
     def stop_virtual_robot(self, name: str) -> None:
@@ -276,7 +276,7 @@ class Launcher:
 def _terminate(process: Process) -> None:
     process.terminate()
     try:
-        process.wait(timeout=END_WAIT_S)
+        process.wait(timeout=END_TIMEOUT_S)
     except subprocess.TimeoutExpired:
         process.kill()
         process.wait()
@@ -314,7 +314,7 @@ class VirtualProcesses:
         if identity.pid == os.getpid():
             return True
         if identity not in self._known:
-            if len(self._known) >= MOST_KNOWN:
+            if len(self._known) >= MAX_KNOWN:
                 self._known.clear()
             self._known[identity] = self._is_own_process(identity.pid)
         return self._known[identity]

@@ -18,7 +18,7 @@ FIRST_ANSWER_S = 3.0
 GRACE_S = 0.5
 """Delay after the time limit of an action, which the robot enforces itself, before Studio ends it."""
 BEATS_MISSED = 4
-SHORTEST_SILENCE_S = 2.0
+MIN_SILENCE_S = 2.0
 
 
 class Tries:
@@ -110,7 +110,7 @@ class Tries:
                     _("{robot} is not responding. Check that it is switched on.").format(robot=link.name),
                 )
             return
-        silence = max(SHORTEST_SILENCE_S, BEATS_MISSED * robot.beat_s) if robot.beat_s else None
+        silence = max(MIN_SILENCE_S, BEATS_MISSED * robot.beat_s) if robot.beat_s else None
         if silence is not None and now - link.heard_s > silence:
             said = _(
                 "{robot} stopped responding. Check that it is switched on; press Stop to make it stand still."

@@ -20,10 +20,10 @@ SOUND = "robots_heard"
 """Setting: whether robots are audible."""
 ENDED = 0.9
 """Share of a text after which it counts as finished: a voice may take longer than the speech bubble."""
-MOST_WAITING = 4
+MAX_WAITING = 4
 PATIENCE_S, PATIENCE_PER_LETTER_S = 10.0, 0.2
 """Timeout of a voice (base, and per letter), after which its engine counts as hung."""
-MOST_NOTES, LONGEST_S = 32, 10.0
+MAX_NOTES, LONGEST_S = 32, 10.0
 LOWEST_HZ, HIGHEST_HZ = 20.0, 20_000.0
 
 Notes: TypeAlias = Sequence[tuple[float, float]]
@@ -191,7 +191,7 @@ class RobotVoices:
             self.speaker.play((), 0.0)
 
     def _queue(self, said: Utterance) -> None:
-        if len(self._waiting) >= MOST_WAITING:
+        if len(self._waiting) >= MAX_WAITING:
             lost = self._waiting.popleft()
             words = _("“{words}” was only shown: others were speaking").format(words=lost.words)
             self._tell("info", lost.robot, words)
@@ -240,7 +240,7 @@ def _notes(value: object) -> Notes:
         return ()
     notes: list[tuple[float, float]] = []
     left_s = LONGEST_S
-    for each in value[:MOST_NOTES]:
+    for each in value[:MAX_NOTES]:
         if not (isinstance(each, list) and len(each) == 2):
             return ()
         hz, seconds = each

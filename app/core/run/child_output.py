@@ -13,7 +13,7 @@ MARK = b'{"is"'
 """First bytes of each protocol line; everything else is counted, not parsed."""
 LINES_PER_S = 1_000
 BYTES_PER_S = 20_000_000
-REST_S = 0.02
+PAUSE_S = 0.02
 LONGEST_TEXT = 2_000
 
 
@@ -77,7 +77,7 @@ class Output:
         self._lines += lines
         self._bytes += read
         if self._lines > LINES_PER_S or self._bytes > BYTES_PER_S:
-            self._stopped.wait(REST_S)
+            self._stopped.wait(PAUSE_S)
 
 
 class Gate:

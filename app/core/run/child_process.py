@@ -22,9 +22,9 @@ if TYPE_CHECKING:
 else:
     psutil = lazy_module("psutil")
 
-MOST_BYTES = 1_000_000_000
+MAX_BYTES = 1_000_000_000
 """Maximum memory of a program and its children."""
-FAMILY_S = 1.0
+CHILD_CHECK_INTERVAL_S = 1.0
 """Interval of checks for new child processes; the program's own memory is checked each time."""
 
 
@@ -36,13 +36,13 @@ class ChildProcess:
         command: Sequence[str],
         cwd: Path | None,
         *,
-        most_bytes: int = MOST_BYTES,
+        most_bytes: int = MAX_BYTES,
         clock: Callable[[], float] = time.monotonic,
     ) -> None:
         # Raises RunnerError if the process can't be started.
         self._most_bytes, self._clock = most_bytes, clock
         self._family: list[psutil.Process] = []
-        self._next_family_s = clock() + FAMILY_S
+        self._next_family_s = clock() + CHILD_CHECK_INTERVAL_S
         self.too_large = False
         """True if it was killed because of its memory use."""
         try:
@@ -71,7 +71,7 @@ class ChildProcess:
         if self._process is None:
             return
         if self._clock() >= self._next_family_s:
-            self._next_family_s = self._clock() + FAMILY_S
+            self._next_family_s = self._clock() + CHILD_CHECK_INTERVAL_S
             self._family = _descendants(self._process)
         if sum(map(_used, (self._process, *self._family))) > self._most_bytes:
             self.too_large = True

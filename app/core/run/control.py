@@ -41,7 +41,7 @@ from app.core.run.wanted import OpenBehaviours, Wanted
 from app.errors import AppError
 from nep.i18n import _
 
-PRESSED_TWICE_S = 0.5
+DOUBLE_CLICK_S = 0.5
 """Time within which two presses of Run count as a double click."""
 CLOSE_WAIT_S = STOP_TIMEOUT_S + 1
 
@@ -183,7 +183,7 @@ class Runs:
         run = self._run
         if run.state == "paused":
             self.go_on()
-        elif run.state != "running" or self._clock() - run.started_s >= PRESSED_TWICE_S:
+        elif run.state != "running" or self._clock() - run.started_s >= DOUBLE_CLICK_S:
             self._request(Wanted(self._documents.current))
 
     def restart(self) -> None:
@@ -199,7 +199,7 @@ class Runs:
             return
         wanted, run = Wanted(self._documents.current, stack=stack), self._run
         again = self.active and self._current_request == wanted
-        if not again or self._clock() - run.started_s >= PRESSED_TWICE_S:
+        if not again or self._clock() - run.started_s >= DOUBLE_CLICK_S:
             self._request(wanted)
 
     def _show_variable(self, stack: Stack, id: str) -> None:

@@ -19,7 +19,7 @@ from app.blocks.runtime.variables import VariableValue
 from app.core.faults import IN_CONSOLE
 from app.core.reports.crash import crash_extra, end_words, is_crash, split_trace
 from app.core.run.child_output import Gate, Output, text_of, texts
-from app.core.run.child_process import MOST_BYTES, ChildProcess, home
+from app.core.run.child_process import MAX_BYTES, ChildProcess, home
 from app.core.run.child_process import child_command as child_command
 from app.errors import RunnerError
 from app.robots.identity import program_of
@@ -33,15 +33,15 @@ State = Literal["ready", "running", "paused", "stopping", "ended"]
 
 STOP_GRACE_S = 0.04
 """Time that a stopped program gets to end before it is killed; stopping takes well below 100 ms in all."""
-END_S = 2.0
+END_TIMEOUT_S = 2.0
 """Time that a process gets to end after its program has ended."""
 MEMORY_CHECK_INTERVAL_S = 0.1
 """Interval of the memory checks."""
-PIPE_S = 0.5
+PIPE_TIMEOUT_S = 0.5
 """Time that its pipes may stay open after its end: its child processes may hold them."""
 EVENTS_PER_S = 300
-MOST_BLOCKS = 100
-MOST_CHOICES, LONGEST_CHOICE = 12, 200
+MAX_BLOCKS = 100
+MAX_CHOICES, MAX_CHOICE_LENGTH = 12, 200
 WORTH_TELLING = 10_000
 LONGEST_ERROR = 100_000
 ERRORS_KEPT = 200
@@ -89,7 +89,7 @@ class Runner:
         on_event: Callable[[RunnerEvent], object],
         *,
         command: Sequence[str] | None = None,
-        most_bytes: int = MOST_BYTES,
+        most_bytes: int = MAX_BYTES,
         clock: Callable[[], float] = time.monotonic,
     ) -> None:
         # `command` starts the child; the default is this Python or this frozen Studio.
@@ -210,7 +210,7 @@ class Runner:
         self._commands.put(None)
         if not child.wait(STOP_GRACE_S):
             child.kill()
-            child.wait(END_S)
+            child.wait(END_TIMEOUT_S)
 
     def wait(self, timeout_s: float | None = None) -> bool:
         """Wait until the program has ended and its last event was delivered; return whether it has."""
@@ -221,7 +221,7 @@ class Runner:
         self.stop()
         for thread in self._threads:
             if thread is not threading.current_thread():
-                thread.join(timeout=END_S)
+                thread.join(timeout=END_TIMEOUT_S)
 
     # ---- private
 
@@ -281,13 +281,13 @@ class Runner:
         while not child.ended and not self._output_over.wait(MEMORY_CHECK_INTERVAL_S):
             child.look()
         self._commands.put(None)  # closes its input, which ends a child that still waits for commands
-        hung = not child.wait(END_S)
+        hung = not child.wait(END_TIMEOUT_S)
         if hung:
             child.kill()
-            child.wait(END_S)
+            child.wait(END_TIMEOUT_S)
         child.end_family()  # remaining children would hold its pipes open
-        reader.join(timeout=PIPE_S)
-        errors.join(timeout=PIPE_S)  # its last output
+        reader.join(timeout=PIPE_TIMEOUT_S)
+        errors.join(timeout=PIPE_TIMEOUT_S)  # its last output
         was_stopped = self.state == "stopping"
         self.state = "ended"
         last = self._last
@@ -341,7 +341,7 @@ class Runner:
         kind = said.get("is")
         block = said.get("block")
         first = (block,) if isinstance(block, str) else ()
-        blocks = (*first, *(each for each in texts(said.get("blocks"))[:MOST_BLOCKS] if each not in first))
+        blocks = (*first, *(each for each in texts(said.get("blocks"))[:MAX_BLOCKS] if each not in first))
         if kind == "ready":
             return RunnerEvent("ready", self.run)
         if kind in ("running", "paused"):
@@ -358,7 +358,7 @@ class Runner:
         if kind in ("print", "ask"):
             question = said.get("question")
             asked = question if isinstance(question, int) else 0
-            choices = tuple(each[:LONGEST_CHOICE] for each in texts(said.get("choices"))[:MOST_CHOICES])
+            choices = tuple(each[:MAX_CHOICE_LENGTH] for each in texts(said.get("choices"))[:MAX_CHOICES])
             return RunnerEvent(kind, self.run, text=text_of(said, "text"), question=asked, choices=choices)
         if kind == "variables":
             told = said.get("values")

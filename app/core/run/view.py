@@ -9,7 +9,7 @@ from dataclasses import dataclass, field, replace
 from app.core.robots.stop.report import STOPPING_SHOWN_AFTER_S, RobotStop, StopReport, StopStatus
 from nep.i18n import _, lazy, listed, ngettext, number
 
-MOST_NAMED = 4
+MAX_NAMED = 4
 WIDEST_NAMES = 24
 """Maximum length of robot names on the button; longer ones are only in the sentence beside it."""
 APPLIES_LATER = lazy("Your changes apply at the next Run")
@@ -396,7 +396,7 @@ def unanswered_words(report: StopReport, doubts: Sequence[str] = ()) -> tuple[st
             "{why}. Switch {robots} off by hand if it still moves.",
             "{why}. Switch {robots} off by hand if they still move.",
             len(report.silent),
-        ).format(why="; ".join(doubts[:MOST_NAMED]), robots=them)
+        ).format(why="; ".join(doubts[:MAX_NAMED]), robots=them)
     if still:
         slowest = max(robot.elapsed_ms or 0 for robot in report.robots if robot.name in still)
         detail = _("{robots} stopped ({elapsed} ms). {next_step}").format(
@@ -415,16 +415,16 @@ def _wrong_words(report: StopReport) -> str:
     told = [robot.wrong for robot in report.unproven if robot.refused]
     untold = [robot.wrong for robot in report.unproven if robot.error and not robot.refused]
     silent = [robot.who for robot in report.unproven if not robot.error]
-    if len(silent) > MOST_NAMED:
-        silent = [*silent[:MOST_NAMED], _("{count} more").format(count=len(silent) - MOST_NAMED)]
+    if len(silent) > MAX_NAMED:
+        silent = [*silent[:MAX_NAMED], _("{count} more").format(count=len(silent) - MAX_NAMED)]
     wrong = [*told, *untold]
     if silent:
         words = ngettext("{robots} did not respond", "{robots} did not respond", len(silent))
         wrong.append(words.format(robots=listed(silent)))
-    left = len(wrong) - MOST_NAMED
+    left = len(wrong) - MAX_NAMED
     if left > 0:
         words = ngettext("{count} more may still move", "{count} more may still move", left)
-        wrong = [*wrong[:MOST_NAMED], words.format(count=left)]
+        wrong = [*wrong[:MAX_NAMED], words.format(count=left)]
     return "; ".join(wrong)
 
 

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from app.core.series.formula import Calculation, Windowed
 from app.core.series.samples import Floats, Samples
 
-WAITS_S = 0.5
+MAX_WAIT_S = 0.5
 """Time (by the messages' time stamps) that the newest sample of one input waits for the others."""
 HOLDS_S, HOLDS = 1.0, 8.0
 """Validity of another input's sample: until its next one, at most this long, or eight usual intervals."""
@@ -105,7 +105,7 @@ class ExpressionCurve(Calculated):
         if last_s is None:
             return 0
         theirs = [-np.inf if each.last_s is None else each.last_s for each in self._inputs[1:]]
-        until_s = max(min(theirs, default=last_s), last_s - WAITS_S)
+        until_s = max(min(theirs, default=last_s), last_s - MAX_WAIT_S)
         return int(np.searchsorted(base.times, until_s, side="right"))
 
     def _calculated(self, base: Samples, first: int, end: int) -> tuple[Floats, Floats, NDArray[np.bool_]]:

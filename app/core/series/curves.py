@@ -23,15 +23,15 @@ from app.core.series.formula import (
     WindowSource,
     parse,
 )
-from app.core.series.samples import MOST_SAMPLES, Samples
+from app.core.series.samples import MAX_SAMPLES, Samples
 from app.core.series.states import States
 from app.errors import CurveError
 from nep.i18n import _
 
 MOST_CURVES = 64
-MOST_SAMPLES_TOGETHER = 8 * MOST_SAMPLES
+MAX_SAMPLES_TOGETHER = 8 * MAX_SAMPLES
 """Maximum number of samples of all curves of a plot (about 150 MB); more curves keep fewer samples each."""
-LEAST_SAMPLES = 8192
+MIN_SAMPLES = 8192
 
 
 @dataclass(eq=False, slots=True)
@@ -269,6 +269,6 @@ class Curves:
                 self._feed.leave(topic.topic, topic)
 
     def _distribute_capacity(self) -> None:
-        each = max(LEAST_SAMPLES, min(MOST_SAMPLES, MOST_SAMPLES_TOGETHER // max(1, len(self._shared))))
+        each = max(MIN_SAMPLES, min(MAX_SAMPLES, MAX_SAMPLES_TOGETHER // max(1, len(self._shared))))
         for shared in self._shared.values():
             shared.samples.limit = each

@@ -20,7 +20,7 @@ from nep.i18n import _
 
 EVERY: Final = "*"
 """Step for every element of an array; as a key it would be quoted in brackets."""
-MOST_STEPS, MOST_EVERY, MOST_FIELDS = 32, 65, 2000
+MAX_STEPS, MAX_EVERY, MAX_FIELDS = 32, 65, 2000
 LONGEST = 400
 ALONE = "value"
 _STEP = re.compile(
@@ -74,7 +74,7 @@ class FieldPath:
         while at < len(text):
             found = _STEP.match(text, at)
             bare = found is not None and found["name"] is not None and bool(steps) and text[at] != "."
-            if found is None or bare or len(steps) >= MOST_STEPS or len(text) > LONGEST:
+            if found is None or bare or len(steps) >= MAX_STEPS or len(text) > LONGEST:
                 raise CurveError(_("'{path}' is not a field path").format(path=text[:80]))
             steps.append(_step_of(found))
             at = found.end()
@@ -117,12 +117,12 @@ class FieldPath:
             return [self]
         place = self.steps.index(ALL)
         above = FieldPath(self.steps[:place]).value_in(payload) if place else payload
-        count = min(len(above), MOST_EVERY) if is_list(above) else 0  # type: ignore[arg-type]
+        count = min(len(above), MAX_EVERY) if is_list(above) else 0  # type: ignore[arg-type]
         found: list[FieldPath] = []
         for number in range(count):
             one = FieldPath((*self.steps[:place], number, *self.steps[place + 1 :]))
             found += one.expanded(payload)
-        return found[:MOST_EVERY]
+        return found[:MAX_EVERY]
 
 
 def _step_of(found: re.Match[str]) -> Step:
@@ -157,7 +157,7 @@ class FieldFound:
     count: int = 1
 
 
-def fields_of(payload: object, most: int = MOST_FIELDS) -> Iterator[FieldFound]:
+def fields_of(payload: object, most: int = MAX_FIELDS) -> Iterator[FieldFound]:
     """Yield the plottable values of a message, upper levels first.
 
     Of an array the first elements and ``[*]``.
@@ -173,7 +173,7 @@ def fields_of(payload: object, most: int = MOST_FIELDS) -> Iterator[FieldFound]:
             told += 1
             count = len(here) if kind == "list" else 1  # type: ignore[arg-type]
             yield FieldFound(FieldPath((*steps, ALL) if kind == "list" else steps), kind, here, count)
-        if len(steps) >= MOST_STEPS or len(waiting) > most:
+        if len(steps) >= MAX_STEPS or len(waiting) > most:
             continue
         if isinstance(here, Mapping):
             named = ((key, below) for key, below in here.items() if isinstance(key, str))

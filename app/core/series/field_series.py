@@ -25,7 +25,7 @@ SILENCE_S, SILENCES = 1.0, 8.0
 SILENCES_IN_A_ROW = 3
 """Number of consecutive silences after which they are the usual interval; otherwise each message would be a
 gap."""
-MOST_PUBLISHERS = 64
+MAX_PUBLISHERS = 64
 UNREAD = object()
 """Placeholder for an unreadable message."""
 
@@ -172,7 +172,7 @@ class TopicSeries:
         if seq is None:
             return 0
         before = self._seqs.get(publisher)
-        if before is None and len(self._seqs) >= MOST_PUBLISHERS:
+        if before is None and len(self._seqs) >= MAX_PUBLISHERS:
             self._seqs.clear()
         self._seqs[publisher] = seq
         # a latched message is repeated; a restarted publisher has lost nothing

@@ -26,7 +26,7 @@ from nep.errors import nearest
 from nep.i18n import _
 from nep.system.syntax import parse_expression
 
-LONGEST, MOST_NODES = 400, 120
+LONGEST, MAX_NODES = 400, 120
 LONGEST_WINDOW_S = 600.0
 Windowed = Literal["difference", "derivative", "integral", "mean"]
 WINDOWED: tuple[Windowed, ...] = ("difference", "derivative", "integral", "mean")
@@ -139,7 +139,7 @@ class _Parser:
             tree = parse_expression(python)
         except (SyntaxError, ValueError, MemoryError, RecursionError):
             raise CurveError(_("'{text}' can't be parsed").format(text=self._text[:80])) from None
-        if sum(1 for _node in ast.walk(tree)) > MOST_NODES:
+        if sum(1 for _node in ast.walk(tree)) > MAX_NODES:
             raise CurveError(_("this is too complex for one curve; use several curves"))
         source = self._source(tree.body)
         if source is None:

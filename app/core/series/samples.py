@@ -17,9 +17,9 @@ from numpy.typing import NDArray
 
 Floats = NDArray[np.float64]
 Indexes = NDArray[np.intp]
-MOST_SAMPLES = 1 << 20
+MAX_SAMPLES = 1 << 20
 """About a million samples: a quarter of an hour at 1 kHz, 20 MB."""
-LATE_S = 1.0
+MAX_LATENESS_S = 1.0
 """Maximum lateness of a sample that is inserted; beyond it the clock was set back."""
 SHIFTS = (4, 7, 10)
 RAW_PER_COLUMN = 4
@@ -135,7 +135,7 @@ class Samples:
     removed because a clock was set back. An absolute index includes evicted samples.
     """
 
-    def __init__(self, limit: int = MOST_SAMPLES) -> None:
+    def __init__(self, limit: int = MAX_SAMPLES) -> None:
         self.limit = limit
         self.begun = self.undone = 0
         self._count = 0
@@ -229,7 +229,7 @@ class Samples:
         one = np.array([time_s]), np.array([value]), np.array([gap])
         if last is None or time_s >= last:
             self._append(*one)
-        elif last - time_s > LATE_S:
+        elif last - time_s > MAX_LATENESS_S:
             self.truncate(time_s)
             self.break_line()
             self._append(*one)

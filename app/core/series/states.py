@@ -7,9 +7,9 @@ from collections.abc import Collection, Iterator
 from dataclasses import dataclass
 from itertools import pairwise
 
-from app.core.series.samples import LATE_S
+from app.core.series.samples import MAX_LATENESS_S
 
-MOST_RUNS = 10_000
+MAX_RUNS = 10_000
 LONGEST_STATE = 200
 
 
@@ -23,9 +23,9 @@ class StateRun:
 
 
 class States:
-    """Runs of one field. Beyond `MOST_RUNS` changes the oldest are evicted and counted."""
+    """Runs of one field. Beyond `MAX_RUNS` changes the oldest are evicted and counted."""
 
-    def __init__(self, limit: int = MOST_RUNS) -> None:
+    def __init__(self, limit: int = MAX_RUNS) -> None:
         self._limit = limit
         self._begins: list[float] = []
         self._words: list[str | None] = []
@@ -41,7 +41,7 @@ class States:
         Slightly late values are ignored; a very late one means that the clock was set back.
         """
         if self.last_s is not None and time_s < self.last_s:
-            if self.last_s - time_s <= LATE_S:
+            if self.last_s - time_s <= MAX_LATENESS_S:
                 return
             self._truncate(time_s)
             gap = True

@@ -15,7 +15,7 @@ from app.core.storage import deep_json
 Json = dict[str, object]
 COPIED = '{"nepStudio":'
 """Prefix of copied blocks (`clipboard.ts`)."""
-MOST_COPIED = 5_000_000
+MAX_COPIED_CHARS = 5_000_000
 
 
 class BlocklyBridge(QObject):
@@ -139,7 +139,7 @@ class BlocklyBridge(QObject):
         "" for anything else, which the page must not read.
         """
         text = QGuiApplication.clipboard().text()
-        return text if text.startswith(COPIED) and len(text) <= MOST_COPIED else ""
+        return text if text.startswith(COPIED) and len(text) <= MAX_COPIED_CHARS else ""
 
     @Slot(str)
     def command(self, name: str) -> None:

@@ -13,12 +13,12 @@ from app.ui.theme.theme import Theme
 from app.ui.widgets import paint
 from nep.i18n import number
 
-LEAST_PEN, MOST_PEN = 1.0, 64.0
-LEAST_LETTERS, MOST_LETTERS = 8.0, 96.0
+MIN_PEN, MAX_PEN = 1.0, 64.0
+MIN_LETTERS, MAX_LETTERS = 8.0, 96.0
 FACE_LETTERS = 12.0
 BAR = QSizeF(12, 140)
 BAR_EDGE = 10
-LEAST_BAR = 40
+MIN_BAR = 40
 
 
 def paint_drawn(
@@ -66,7 +66,7 @@ def _paint_one(
 def _paint_words(painter: QPainter, theme: Theme, at: QPointF, high: float, drawn: Drawn) -> None:
     # The lower left corner is `at`; upright whatever the image's rotation.
     font, words = theme.font("small"), drawn.words
-    font.setPixelSize(round(min(max(high, LEAST_LETTERS), MOST_LETTERS)))
+    font.setPixelSize(round(min(max(high, MIN_LETTERS), MAX_LETTERS)))
     metrics = QFontMetricsF(font)
     room = QRectF(at.x(), at.y() - metrics.height(), metrics.horizontalAdvance(words) + 4, metrics.height())
     if drawn.fill is not None:
@@ -78,7 +78,7 @@ def _paint_words(painter: QPainter, theme: Theme, at: QPointF, high: float, draw
 def _pen(colour: Colour | None, width: float) -> QPen:
     if colour is None:
         return QPen(Qt.PenStyle.NoPen)
-    pen = QPen(_colour(colour), min(max(width, LEAST_PEN), MOST_PEN))
+    pen = QPen(_colour(colour), min(max(width, MIN_PEN), MAX_PEN))
     pen.setJoinStyle(Qt.PenJoinStyle.RoundJoin)
     return pen
 
@@ -101,7 +101,7 @@ def paint_colour_bar(painter: QPainter, theme: Theme, view: QRectF, scale: Colou
     font = theme.font("small")
     line = paint.height_of(font)
     high = min(BAR.height(), view.height() - 2 * BAR_EDGE - 2 * line - 40)
-    if high < LEAST_BAR:
+    if high < MIN_BAR:
         return
     ends = (end_words(scale.high), end_words(scale.low / 2 + scale.high / 2), end_words(scale.low))
     wide = max(paint.width_of(font, words) for words in ends)

@@ -11,8 +11,8 @@ from PySide6.QtGui import QColor, QFont, QFontMetricsF, QPainter, QPainterPath, 
 from app.ui.robot_drawing.room import Spot
 from app.ui.robot_drawing.state import RobotState
 
-LEAST_WIDTH, SHORT_WIDTH, LONG_WIDTH = 140.0, 190.0, 320.0
-SHORT_LINES, MOST_LINES, MOST_NARROW = 4, 6, 8
+MIN_WIDTH, SHORT_WIDTH, LONG_WIDTH = 140.0, 190.0, 320.0
+SHORT_LINES, MAX_LINES, MAX_NARROW = 4, 6, 8
 LARGE, SMALL = 14, 12
 INSIDE, EDGE = 14.0, 8.0
 READ_AHEAD = 2
@@ -92,12 +92,12 @@ def paint_bubble(
     if len(lines) > SHORT_LINES:
         face.setPixelSize(SMALL)
         beside = max(room_right, room_left)  # narrower and higher, rather than over the face
-        width = min(max(LEAST_WIDTH, beside), LONG_WIDTH, bounds.width() - 2 * EDGE)
+        width = min(max(MIN_WIDTH, beside), LONG_WIDTH, bounds.width() - 2 * EDGE)
         lines = wrapped(words, QFontMetricsF(face), width - 2 * INSIDE)
     metrics = QFontMetricsF(face)
     line_height = metrics.height() + 1
     fits = int((bounds.height() - 2 * EDGE - 30) / line_height)
-    text = scrolled(lines, min(MOST_NARROW if width < SHORT_WIDTH else MOST_LINES, fits), state.spoken)
+    text = scrolled(lines, min(MAX_NARROW if width < SHORT_WIDTH else MAX_LINES, fits), state.spoken)
     width = max(metrics.horizontalAdvance(line) for line in lines) + 2 * INSIDE
     height = text.shown * line_height + 18
     side = -1.0 if room_left > room_right and room_right < width else 1.0

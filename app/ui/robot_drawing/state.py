@@ -10,7 +10,7 @@ from nep.text import bounded_str
 
 EYES = "#35B0FA"
 SHOULDERS = "#3AB5FF"
-MOST_HEARD = 200  # letters
+MAX_HEARD_CHARS = 200  # letters
 
 
 @dataclass(frozen=True, slots=True)
@@ -89,7 +89,7 @@ class RobotState:
             speech=speech if isinstance(speech, str) and speech.strip() else None,
             spoken=min(1.0, max(0.0, _number(data.get("spoken")))),
             sound=_sound(data.get("sound")),
-            heard=bounded_str(data.get("heard") or "")[:MOST_HEARD],
+            heard=bounded_str(data.get("heard") or "")[:MAX_HEARD_CHARS],
             eyes=_colour(data.get("eyes"), EYES),
             shoulders=_colour(data.get("shoulders"), SHOULDERS),
             emotion=bounded_str(data.get("emotion") or "neutral"),

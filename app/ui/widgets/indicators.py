@@ -29,7 +29,7 @@ from nep.i18n import _, lazy
 CHIP_HEIGHT, CHIP_PADDING, CHIP_GAP = 22, 8, 5
 ICON = 18
 # minimum width of an item when space is scarce, px at 100 %; its tooltip has the whole text
-LEAST_ITEM = 64
+MIN_ITEM = 64
 SPARK = QSize(56, 16)
 SPARK_STROKE = 1.25
 BAR_HEIGHT = 6
@@ -266,7 +266,7 @@ class StatusItem(QWidget):
 
     def minimumSizeHint(self) -> QSize:
         wanted = self.sizeHint()
-        return QSize(min(wanted.width(), round(self._theme.scaled(LEAST_ITEM))), wanted.height())
+        return QSize(min(wanted.width(), round(self._theme.scaled(MIN_ITEM))), wanted.height())
 
     def resizeEvent(self, event: QResizeEvent) -> None:
         super().resizeEvent(event)

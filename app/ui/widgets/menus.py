@@ -37,7 +37,7 @@ CUT_ON = frozenset({"xcb"})
 MARK, LARGEST_MARK, TEXT_LEFT = 15, 22, 33
 SCROLLER = 22  # px, as in the style sheet
 GUESSED = QAction.MenuRole.TextHeuristicRole
-LEAST_WIDTH = 160  # px; a narrower menu is unreadable, and is better placed over Stop
+MIN_WIDTH = 160  # px; a narrower menu is unreadable, and is better placed over Stop
 
 
 def make_round(widget: QWidget) -> None:
@@ -72,7 +72,7 @@ def beside(menu: QRect, stop: QRect, screen: QRect) -> QRect:
     low.moveTop(stop.bottom() + 1)
     narrow.setLeft(screen.left())
     narrow.setRight(stop.left() - 1)
-    if narrow.width() < LEAST_WIDTH:
+    if narrow.width() < MIN_WIDTH:
         narrow = menu
     return next((place for place in (left, low) if screen.contains(place)), narrow)
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from app.core.run.acting.arming import LEAST_S, MOST_NAMES, MOST_S, Arming, Target
+from app.core.run.acting.arming import MAX_NAMES, MAX_S, MIN_S, Arming, Target
 
 TOPIC = Target("topic", "/cmd_vel")
 
@@ -52,11 +52,11 @@ def test_what_was_asked_in_one_turn_is_not_done_in_the_next() -> None:
 
 def test_names_and_minutes_are_bounded_and_names_can_be_taken_away() -> None:
     arming, _now = made()
-    for seconds, left in ((-1, LEAST_S), (1e9, MOST_S), (300, 300)):
+    for seconds, left in ((-1, MIN_S), (1e9, MAX_S), (300, 300)):
         arming.arm(seconds)
         assert arming.left_s == left
-    names = [Target("topic", f"/t{number}") for number in range(MOST_NAMES + 1)]
-    assert [arming.allow(each) for each in names] == [True] * MOST_NAMES + [False]
+    names = [Target("topic", f"/t{number}") for number in range(MAX_NAMES + 1)]
+    assert [arming.allow(each) for each in names] == [True] * MAX_NAMES + [False]
     arming.forbid(names[0])
     assert not arming.allows(names[0])
     assert arming.allow(names[-1])

@@ -9,7 +9,7 @@ import pytest
 import nep
 from app.core.run.acting import sending
 from app.core.run.acting.arming import Arming, Target
-from app.core.run.acting.sending import LATE_S, MOST_AT_ONCE, Outbox, Repeated, SendOrder
+from app.core.run.acting.sending import MAX_AGE_S, MAX_CONCURRENT, Outbox, Repeated, SendOrder
 from nep.errors import NepError
 from nep.nodes.node import Node
 from tests.nep.programs import eventually
@@ -84,7 +84,7 @@ def test_what_waited_for_a_master_is_not_sent_when_it_is_late_or_no_longer_armed
     bench.arming.disarm()
     bench.arm("/cmd_vel")
     first(bench.node)
-    bench.now += LATE_S + 1
+    bench.now += MAX_AGE_S + 1
     second(bench.node)
     said = [each.sentence for each in bench.outbox.take()]
     assert said == ["not sent: no longer armed", "not sent: there was no master"]
@@ -151,10 +151,10 @@ def test_one_that_raises_ends_and_the_others_go_on(bench) -> None:
 
 
 def test_many_at_once_are_refused_and_rates_are_bounded(bench) -> None:
-    names = [f"/t{number}" for number in range(MOST_AT_ONCE + 1)]
+    names = [f"/t{number}" for number in range(MAX_CONCURRENT + 1)]
     bench.arm(*names)
     begun = [bench.outbox.begin(order(name, id=name), 1e-9) for name in names]
-    assert begun == [True] * MOST_AT_ONCE + [False]
+    assert begun == [True] * MAX_CONCURRENT + [False]
     assert {each.rate_hz for each in bench.outbox.all_repeated} == {0.1}
 
 

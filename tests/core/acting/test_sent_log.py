@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from app.core.run.acting.sent_log import KEPT_BYTES, MOST_KEPT, SentLog, SentRecord
+from app.core.run.acting.sent_log import KEPT_BYTES, MAX_ENTRIES, SentLog, SentRecord
 
 
 def entry(at_s: float, words: str = "Still, heard by 1", text: str = "{}", source: str = "{}") -> SentRecord:
@@ -32,19 +32,19 @@ def test_switching_is_never_counted_together_nor_as_sent() -> None:
 
 def test_it_keeps_the_last_and_still_knows_how_many_there_were() -> None:
     log = SentLog()
-    for number in range(MOST_KEPT + 50):
+    for number in range(MAX_ENTRIES + 50):
         log.put(entry(float(number), f"{number}"), 1)
-    assert len(log.records) == MOST_KEPT
+    assert len(log.records) == MAX_ENTRIES
     assert log.records[0].words == "50"
     assert log.get(50) is None
     assert log.get(51) is log.records[0]
     revision = log.revision
     log.clear()
     assert list(log.records) == []
-    assert (log.total, log.since_s) == (MOST_KEPT + 50, 0.0)
+    assert (log.total, log.since_s) == (MAX_ENTRIES + 50, 0.0)
     assert log.revision > revision
     log.put(entry(1.0), 1)
-    assert log.records[0].number == MOST_KEPT + 51, "a number is never used again"
+    assert log.records[0].number == MAX_ENTRIES + 51, "a number is never used again"
 
 
 def test_a_large_message_is_listed_but_not_kept() -> None:

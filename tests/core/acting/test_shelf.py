@@ -8,8 +8,8 @@ import pytest
 
 from app.core.run.acting.sending import MOST_HZ
 from app.core.run.acting.shelf import (
+    MAX_REQUESTS,
     MOST_MESSAGES,
-    MOST_REQUESTS,
     KeptMessage,
     NewerShelfError,
     Shelf,
@@ -59,9 +59,9 @@ def test_it_is_bounded() -> None:
     assert kept == [True] * MOST_MESSAGES + [False]
     assert shelf.copy("0") is None
     assert shelf.put(KeptMessage("0", "other", "/t"))
-    for number in range(MOST_REQUESTS + 5):
+    for number in range(MAX_REQUESTS + 5):
         shelf.remember(f"/s{number}", "{}")
-    assert len(shelf.requests) == MOST_REQUESTS
+    assert len(shelf.requests) == MAX_REQUESTS
     assert "/s0" not in shelf.requests
 
 

@@ -77,9 +77,9 @@ def test_finishing_waits_for_what_is_asked_and_what_is_done_just_now(beside, mon
     until(lambda: beside._current_owner == "a")
     beside.ask("a", lambda: did.append("second") or "second")
     assert beside.finish("b"), "nothing of another is waited for"
-    monkeypatch.setattr("app.core.documents.background_worker.END_S", 0.01)
+    monkeypatch.setattr("app.core.documents.background_worker.JOIN_TIMEOUT_S", 0.01)
     assert not beside.finish("a"), "and not for ever"
-    monkeypatch.setattr("app.core.documents.background_worker.END_S", 60.0)
+    monkeypatch.setattr("app.core.documents.background_worker.JOIN_TIMEOUT_S", 60.0)
     go.set()
     assert beside.finish("a")
     assert did == ["first", "second"]

@@ -103,8 +103,8 @@ def test_what_is_not_understood_in_it_is_counted_and_stays(tmp_path: Path) -> No
 
 
 def test_it_has_bounds_that_lose_nothing(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(module, "MOST", 3)
-    monkeypatch.setattr(module, "MOST_BYTES", 2000)
+    monkeypatch.setattr(module, "MAX_STACKS", 3)
+    monkeypatch.setattr(module, "MAX_BYTES", 2000)
     backpack = Backpack(tmp_path)
     backpack.put([WAIT, WAIT])
     with pytest.raises(BackpackError, match="remove something first"):
@@ -115,7 +115,7 @@ def test_it_has_bounds_that_lose_nothing(tmp_path: Path, monkeypatch: pytest.Mon
     again = Backpack(tmp_path)
     again.look()
     assert types(again) == ["control_wait"] * 2
-    monkeypatch.setattr(module, "MOST", 1)
+    monkeypatch.setattr(module, "MAX_STACKS", 1)
     backpack.remove([backpack.items[0].id])  # less than it holds is always possible
     assert len(backpack.items) == 1
 

@@ -100,7 +100,7 @@ def test_what_is_discarded_while_it_is_written_does_not_come_back(
     end: Callable[[Document], object],
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    monkeypatch.setattr("app.core.documents.background_worker.END_S", 60.0)
+    monkeypatch.setattr("app.core.documents.background_worker.JOIN_TIMEOUT_S", 60.0)
     document = on_a_slow_disk
     document.path = tmp_path / "mine.nepb"
     document.edited(STARTED)
@@ -115,7 +115,7 @@ def test_what_is_discarded_while_it_is_written_does_not_come_back(
 def test_a_disk_that_hangs_is_told_when_the_window_closes(
     on_a_slow_disk: Document, slow: SlowJournal, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("app.core.documents.background_worker.END_S", 0.01)
+    monkeypatch.setattr("app.core.documents.background_worker.JOIN_TIMEOUT_S", 0.01)
     on_a_slow_disk.edited(STARTED)
     assert slow.began.wait(60)
     assert not on_a_slow_disk.keep_again()

@@ -7,7 +7,7 @@ import graphlay
 import pytest
 
 from app.core.graph import layout as layout_module
-from app.core.graph.layout import MOST_ROUTES, GraphLayout, LayoutSizes, arrange
+from app.core.graph.layout import MAX_ROUTES, GraphLayout, LayoutSizes, arrange
 from app.core.graph.layout_thread import LayoutThread
 from app.core.graph.node_graph import DrawnNode, GraphGroup, GraphLine, NodeGraph
 from tests.nep.programs import eventually
@@ -119,7 +119,7 @@ def test_too_many_lines_are_left_out_and_counted() -> None:
     one = GraphLine("topic", ("n0",), ("n1",), ("/one",))
     found = arrange(NodeGraph(nodes, (all_to_all, one), (), 120))
     assert found.left_out == 120 * 119
-    assert found.left_out > MOST_ROUTES
+    assert found.left_out > MAX_ROUTES
     assert [key[1:] for key in found.routes] == [("n0", "n1")]
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from app.core.messages.annotations import MOST_POINTS, MOST_SHAPES, drawn_by, is_annotation
+from app.core.messages.annotations import MAX_POINTS, MAX_SHAPES, drawn_by, is_annotation
 
 RED = {"r": 1, "g": 0, "b": 0, "a": 1}
 CLEAR = {"r": 1, "g": 1, "b": 1, "a": 0}
@@ -92,8 +92,8 @@ def test_what_is_no_drawing_draws_nothing(payload) -> None:
 
 
 def test_no_message_draws_without_end() -> None:
-    many = [{"position": {"x": 1, "y": 1}, "diameter": 2, "outline_color": RED}] * (MOST_SHAPES + 50)
-    assert len(drawn_by({"circles": many}, 320, 240)) == MOST_SHAPES
-    (line,) = drawn_by(points(3, MOST_POINTS + 50), 320, 240)
-    assert len(line.points) == MOST_POINTS
+    many = [{"position": {"x": 1, "y": 1}, "diameter": 2, "outline_color": RED}] * (MAX_SHAPES + 50)
+    assert len(drawn_by({"circles": many}, 320, 240)) == MAX_SHAPES
+    (line,) = drawn_by(points(3, MAX_POINTS + 50), 320, 240)
+    assert len(line.points) == MAX_POINTS
     assert drawn_by({"circles": many[:1]}, 0, 240) == ()

@@ -7,9 +7,9 @@ import csv
 import pytest
 
 from app.core.messages.object_table import (
+    MAX_LISTS,
     MISSING,
     MOST_COLUMNS,
-    MOST_LISTS,
     column_name,
     columns_of,
     is_list_of_objects,
@@ -35,7 +35,7 @@ def test_lists_of_objects_are_found_wherever_they_are_upper_ones_first() -> None
     assert lists_of_objects(SEEN) == [("doors",), ("seen", "people")]
     assert lists_of_objects(PEOPLE) == [()]
     assert lists_of_objects({str(number): [{"a": 1}] for number in range(100)}) == [
-        (str(number),) for number in range(MOST_LISTS)
+        (str(number),) for number in range(MAX_LISTS)
     ]
 
 

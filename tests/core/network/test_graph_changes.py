@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from app.core.network.graph_changes import MOST_LINES, arrivals
+from app.core.network.graph_changes import MAX_LINES, arrivals
 from nep.protocol.graph_view import GraphView, NodeInfo, PublisherInfo, TopicInfo
 
 
@@ -63,5 +63,5 @@ def test_many_at_once_are_one_line_with_their_number() -> None:
 
 
 def test_a_few_at_once_are_named_each() -> None:
-    few = [f"/t{number}" for number in range(MOST_LINES)]
-    assert len(arrivals(graph(one=[]), graph(one=few))) == MOST_LINES
+    few = [f"/t{number}" for number in range(MAX_LINES)]
+    assert len(arrivals(graph(one=[]), graph(one=few))) == MAX_LINES

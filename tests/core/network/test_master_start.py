@@ -11,7 +11,7 @@ import psutil
 import pytest
 
 import nep
-from app.core.network.master import AGAIN_AT_MOST_S, LEARNING_S, MasterChange, MasterStart
+from app.core.network.master import AGAIN_AT_MOST_S, DISCOVERY_S, MasterChange, MasterStart
 from nep.protocol.graph_view import GraphView
 from tests.nep.programs import eventually
 
@@ -113,11 +113,11 @@ def test_the_first_master_and_the_same_one_are_believed_at_once() -> None:
 def test_another_master_is_believed_when_it_had_time_to_learn() -> None:
     learning = MasterChange()
     assert learning.still(view(1), view(2), 10.0)
-    assert learning.still(view(1), view(2), 10.0 + LEARNING_S - 0.1)
-    assert not learning.still(view(1), view(2), 10.0 + LEARNING_S)
+    assert learning.still(view(1), view(2), 10.0 + DISCOVERY_S - 0.1)
+    assert not learning.still(view(1), view(2), 10.0 + DISCOVERY_S)
 
 
 def test_a_third_one_begins_to_learn_anew() -> None:
     learning = MasterChange()
     learning.still(view(1), view(2), 10.0)
-    assert learning.still(view(1), view(3), 10.0 + LEARNING_S)
+    assert learning.still(view(1), view(3), 10.0 + DISCOVERY_S)

@@ -6,7 +6,7 @@ from dataclasses import replace
 from itertools import count
 
 from app.core.network.mailbox import Batch
-from app.core.network.topics import FIGURES_LATE_S, GONE_SHOWN_S, START_S, Topics, total_rate_hz
+from app.core.network.topics import GONE_SHOWN_S, START_S, STATISTICS_LATE_S, Topics, total_rate_hz
 from nep.messages.clocks import ClockDifference, PublisherClock
 from nep.messages.message import Message, kind_of
 from nep.protocol.graph_view import GraphView, NodeInfo, PublisherInfo, SubscriberInfo, TopicInfo
@@ -234,8 +234,8 @@ def test_what_others_hear_is_judged_by_what_the_master_told_last() -> None:
     topics.update(view(heard()), 0)
     topics.update(view(heard(last_stamp_ns=2_000_000_000), revision=5), 10)
     assert silence(topics, 60) == 0.0, "the master has gone; nobody knows"
-    topics.update(view(heard(last_stamp_ns=2_000_000_000), revision=5), 10 + FIGURES_LATE_S)
-    assert silence(topics, 60) == FIGURES_LATE_S
+    topics.update(view(heard(last_stamp_ns=2_000_000_000), revision=5), 10 + STATISTICS_LATE_S)
+    assert silence(topics, 60) == STATISTICS_LATE_S
 
 
 def test_a_topic_that_never_sent_is_not_silent() -> None:

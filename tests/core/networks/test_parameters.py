@@ -122,7 +122,7 @@ def test_a_number_that_no_wire_carries_is_refused_and_the_window_lives_on(
 def test_a_node_that_ends_while_it_is_asked_is_told_in_words(
     session: Session, robot: nep.Node, shown: NodeParameters, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("app.core.networks.parameters.ANSWER_S", 0.3)
+    monkeypatch.setattr("app.core.networks.parameters.ANSWER_TIMEOUT_S", 0.3)
     halted = threading.Event()
     robot.parameters.on_change(lambda _new: halted.wait(20.0) and None)
     shown.set("speed", "1")

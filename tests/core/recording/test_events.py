@@ -122,7 +122,7 @@ def test_what_goes_on_is_told_again_and_what_is_over_is_not(told):
 
 
 def test_of_very_many_alarms_each_is_told_once_and_no_more_are_kept_than_fit(told, monkeypatch):
-    monkeypatch.setattr(events_module, "MOST_PRESENT", 3)
+    monkeypatch.setattr(events_module, "MAX_PRESENT", 3)
     for number in range(5):
         told.events.take_alarm(event("on", f"/{number}"))
     assert len(told.said) == 5

@@ -65,7 +65,7 @@ def test_what_is_being_written_is_not_opened_and_many_come_bit_by_bit(folder, tm
         found = look(folder, tmp_path / "b.mcap")
         counts.append((sum(each.is_read for each in found.files), found.is_whole))
     assert counts == [(1, False), (2, True), (2, True)]
-    monkeypatch.setattr(folder_module, "MOST_FILES", 2)
+    monkeypatch.setattr(folder_module, "MAX_FILES", 2)
     found = look(folder)
     assert (len(found.files), found.left_out) == (2, 1)
 

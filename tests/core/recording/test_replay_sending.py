@@ -7,11 +7,11 @@ from pathlib import Path
 import pytest
 
 import nep
-from app.core.recording.replay.sending import LATE_S, ReplayOutbox, ReplayRoute, sent_words
+from app.core.recording.replay.sending import MAX_DELAY_S, ReplayOutbox, ReplayRoute, sent_words
 from app.core.recording.replay.source import ReplaySource
 from app.core.robots.motion.gate import MotionGate
 from app.core.robots.motion.permission import MotionPermission
-from app.core.run.acting.arming import MOST_NAMES, Arming, Target
+from app.core.run.acting.arming import MAX_NAMES, Arming, Target
 from app.core.session import Session
 from app.robots.description.description import parse
 from nep.errors import ClosedError
@@ -101,7 +101,7 @@ def test_all_of_a_topic_is_sent_from_its_first_message_on_and_panels_get_what_th
     sender.do(Playback.play)
     sender.pass_time(2.0)
     assert sender.taken() == some(whole, "/a", "/camera")
-    assert max(sender.late) < LATE_S
+    assert max(sender.late) < MAX_DELAY_S
     assert set(sender.source.take().drained.batches) == {"/b"}
     sender.do(lambda playback: playback.seek(whole[0][0]))
     sender.do(Playback.play)
@@ -146,8 +146,8 @@ def test_who_is_late_sends_no_burst_and_the_speed_is_the_replays(played):
     sender.taken(), sender.late.clear()
     sender.clock.now += 20.0  # a computer that slept
     sender.source.turn()
-    assert max(sender.late) > LATE_S
-    assert 0 < sum(late <= LATE_S for late in sender.late) <= round(LATE_S / 0.01) + 1
+    assert max(sender.late) > MAX_DELAY_S
+    assert 0 < sum(late <= MAX_DELAY_S for late in sender.late) <= round(MAX_DELAY_S / 0.01) + 1
     quick = played("/a", "/b")
     quick.do(lambda playback: setattr(playback, "speed", 10.0))
     quick.do(Playback.play)
@@ -231,7 +231,7 @@ def test_the_outbox_sends_what_is_allowed_in_its_turn_and_counts_what_it_leaves_
     outbox.offer(messages, [0.0] * 3)
     assert (sent.count, sent.skipped) == (0, 0)  # its publisher is not there yet: nothing has begun
     jobs.pop()(node)
-    outbox.offer(messages, [0.0, 0.0, LATE_S + 0.01])
+    outbox.offer(messages, [0.0, 0.0, MAX_DELAY_S + 0.01])
     assert (sent.count, sent.skipped, sent.heard) == (1, 1, 2)
     assert sent_words(sent) == "1 sent, 1 late message skipped"
     assert node.made[0].made == ("/test", "json", True)
@@ -335,7 +335,7 @@ def test_what_moves_robots_is_asked_for_again_also_under_another_name(session: S
     acting.forbid(Target("topic", "/a"))
     session.tick()
     assert [sent.route.name for sent in sending.outbox.going] == ["/arm/command"]
-    for place in range(MOST_NAMES + 5):
+    for place in range(MAX_NAMES + 5):
         sending.choose("/a", None), sending.choose("/a", f"/x{place}")
     assert len(sending.routes) == 3
     assert sending.arm() == ""

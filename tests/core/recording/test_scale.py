@@ -6,7 +6,7 @@ import random
 
 import pytest
 
-from app.core.recording.replay.scale import LEAST_SPAN_NS, TimeScale, clock_words, span_words
+from app.core.recording.replay.scale import MIN_SPAN_NS, TimeScale, clock_words, span_words
 
 S = 1_000_000_000
 WHOLE = TimeScale.whole(100 * S, 860 * S)
@@ -44,7 +44,7 @@ def test_whatever_a_person_does_the_part_stays_within_the_recording(seed):
             )
         )
         assert scale.first_ns <= scale.begin_ns < scale.end_ns <= scale.last_ns
-        assert scale.span_ns >= LEAST_SPAN_NS
+        assert scale.span_ns >= MIN_SPAN_NS
         assert 1 <= len(list(scale.marks(8))) <= 10
 
 
@@ -64,5 +64,5 @@ def test_marks_are_full_steps_from_the_beginning():
 
 def test_a_recording_of_one_moment_has_a_length_to_show():
     scale = TimeScale.whole(5 * S, 5 * S)
-    assert scale.span_ns == LEAST_SPAN_NS
+    assert scale.span_ns == MIN_SPAN_NS
     assert scale.time(0.5) <= scale.last_ns

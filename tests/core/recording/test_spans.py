@@ -95,7 +95,7 @@ def test_whatever_stands_there_spans_lie_within_the_recording(found, role, value
 
 
 def test_no_more_are_kept_than_fit_and_the_others_are_counted(found, monkeypatch):
-    monkeypatch.setattr(spans_module, "MOST_SPANS", 4)
+    monkeypatch.setattr(spans_module, "MAX_SPANS", 4)
     said = [(1, "runs", run(id=f"run-{number}")) for number in range(7)]
     made = found(*said, *said)
     assert (len(made.runs), made.left_out) == (4, 3)

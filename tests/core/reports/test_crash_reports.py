@@ -11,7 +11,7 @@ import pytest
 
 from app.core.alerts import Alerts
 from app.core.reports.crash import PARTS, Crash, crash_extra
-from app.core.reports.crash_reports import ALERT, MOST, CrashLog, CrashReports, offer, texts
+from app.core.reports.crash_reports import ALERT, MAX_REPORTS, CrashLog, CrashReports, offer, texts
 from nep.version import __version__
 from tests.pseudo import untranslated
 
@@ -58,10 +58,10 @@ def test_the_home_folder_has_no_name_in_it(reports: CrashReports) -> None:
 
 
 def test_ten_are_kept_the_newest(reports: CrashReports, clock: Clock) -> None:
-    for number in range(MOST + 4):
+    for number in range(MAX_REPORTS + 4):
         clock.now += 60
         reports.add(Crash("editor", f"number {number}"))
-    assert len(reports.all()) == MOST
+    assert len(reports.all()) == MAX_REPORTS
     told = [text.decode() for _name, text in texts(reports.all())]
     assert "number 13" in told[0]
     assert "number 4" in told[-1]
@@ -94,7 +94,7 @@ def test_what_is_no_report_is_left_alone(reports: CrashReports, tmp_path: Path) 
     for name in ("crash of mine.txt", "crash 2026-13-99 99.99.99 studio.txt", "note.txt"):
         (folder / name).write_text("mine")
     assert reports.all() == []
-    for _number in range(MOST + 1):
+    for _number in range(MAX_REPORTS + 1):
         reports.add(Crash("studio", "how"))
     assert (folder / "note.txt").exists()
     assert (folder / "crash of mine.txt").exists()

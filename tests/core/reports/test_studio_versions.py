@@ -10,7 +10,7 @@ import pytest
 
 from app.core.reports.crash_reports import CrashReports
 from app.core.reports.problem_report import ReportParts, make_report
-from app.core.reports.studio_versions import KEY, MOST, known, used_here, with_this_version
+from app.core.reports.studio_versions import KEY, MAX_VERSIONS, known, used_here, with_this_version
 from app.core.storage.settings import Settings
 from nep.version import __version__
 from tests.core.reports.test_problem_report import opened
@@ -37,9 +37,11 @@ def test_versions_that_did_not_keep_this_are_told_as_earlier_ones() -> None:
 
 def test_of_many_the_newest_are_kept() -> None:
     values: dict[str, object] = {}
-    for number in range(MOST + 5):
+    for number in range(MAX_VERSIONS + 5):
         values[KEY] = with_this_version(values, float(number), is_first=True, version=f"1.{number}")
-    assert [version for version, _since in known(values)] == [f"1.{number}" for number in range(5, MOST + 5)]
+    assert [version for version, _since in known(values)] == [
+        f"1.{number}" for number in range(5, MAX_VERSIONS + 5)
+    ]
 
 
 @pytest.mark.parametrize(

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from app.core.robots.awaited import MOST, awaited_values
+from app.core.robots.awaited import MAX_WORDS, awaited_values
 from app.robots.description.description import parse, td_for
 from app.robots.simulated import ROBOT
 
@@ -51,4 +51,4 @@ def test_what_is_no_word_is_left_out(word: object) -> None:
 
 
 def test_no_more_are_offered_than_a_menu_can_show() -> None:
-    assert len(words(behaviour(*(hat(f"word {number}") for number in range(100))))) == MOST
+    assert len(words(behaviour(*(hat(f"word {number}") for number in range(100))))) == MAX_WORDS

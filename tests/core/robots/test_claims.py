@@ -12,7 +12,7 @@ import pytest
 import nep
 from app.core.network.mailbox import Batch
 from app.core.network.watches import Watches
-from app.core.robots.announcements import MOST_ROBOTS, Announcements
+from app.core.robots.announcements import MAX_ROBOTS, Announcements
 from app.core.robots.robot_link import Invocation, RobotLink
 from app.core.session import Session
 from app.robots.description.description import Robot
@@ -311,7 +311,7 @@ def test_a_flood_of_robots_is_bounded_and_told() -> None:
     opened: list[str] = []
     announcements = Announcements(Watches(opened.append, opened.remove), Senders())
     announcements.update(_view({f"/r{number}/description": number + 1 for number in range(1000)}))
-    assert len(opened) == MOST_ROBOTS
+    assert len(opened) == MAX_ROBOTS
     assert announcements.claims["robots"].title.startswith("800 more robots")
     announcements.update(_view({"/new/description": 5000}))
     assert opened == ["/new/description"]

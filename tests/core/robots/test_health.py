@@ -12,7 +12,7 @@ from app.core.network.decode_checks import Checked
 from app.core.network.mailbox import Batch
 from app.core.network.topics import Topics
 from app.core.robots.fleet import Fleet
-from app.core.robots.health import AWAY_S, CURE_S, Health
+from app.core.robots.health import RECOVERY_S, RESTART_TIMEOUT_S, Health
 from app.core.robots.reported_count import GROWING_S, ReportedCount
 from nep.messages.message import Message
 from nep.protocol.graph_view import Alert, GraphView, PublisherInfo, SubscriberInfo, TopicInfo
@@ -65,7 +65,7 @@ def test_good_messages_for_a_second_cure_it_and_the_next_count_begins_anew(case:
     case.look(0, 1, last_good=True)
     case.health.check()
     assert case.alert() is not None
-    case.now += CURE_S
+    case.now += RECOVERY_S
     case.health.check()
     assert case.alert() is None
     case.look(1)
@@ -78,7 +78,7 @@ def test_a_topic_that_mixes_good_and_bad_is_one_alert_that_stays(case: Case) -> 
     seen = []
     for _ in range(20):
         case.look(1, 4, last_good=True)
-        case.now += CURE_S / 2
+        case.now += RECOVERY_S / 2
         case.health.check()
         alert = case.alert()
         seen.append(alert.since_s if alert is not None else None)
@@ -134,7 +134,7 @@ def test_a_real_robot_that_has_gone_is_told_after_a_while_and_cured_when_it_is_b
     case.links.append(robot(virtual=False))
     case.health.check()
     assert case.alert() is None, "its driver may be starting again"
-    case.now += AWAY_S
+    case.now += RESTART_TIMEOUT_S
     case.health.check()
     alert = case.alert()
     assert alert is not None
@@ -154,7 +154,7 @@ def test_a_real_robot_that_has_gone_is_told_after_a_while_and_cured_when_it_is_b
 def test_a_virtual_robot_is_told_of_only_while_its_process_runs_here(case: Case) -> None:
     case.links.append(robot(virtual=True))
     case.health.check()
-    case.now += AWAY_S
+    case.now += RESTART_TIMEOUT_S
     case.health.check()
     assert case.alert() is None, "it was ended, or belongs to somebody else"
     case.health.check(started={"Rover"})

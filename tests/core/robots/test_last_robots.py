@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from app.core.robots.last_robots import KEPT, MOST, LastRobots
+from app.core.robots.last_robots import KEPT, MAX_ROBOTS, LastRobots
 from app.core.storage.settings import Settings
 
 
@@ -68,4 +68,4 @@ def test_damaged_settings_start_nobody(tmp_path: Path, kept: object) -> None:
 
 def test_settings_full_of_robots_start_only_a_few(tmp_path: Path) -> None:
     Settings(tmp_path).set(KEPT, {f"Pepper {number}": "pepper" for number in range(500)})
-    assert len(next_start(tmp_path)) == MOST
+    assert len(next_start(tmp_path)) == MAX_ROBOTS

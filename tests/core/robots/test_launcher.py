@@ -11,7 +11,7 @@ import pytest
 import nep
 from app.core.network.watches import Watches
 from app.core.robots.fleet import Fleet
-from app.core.robots.launcher import COMING_S, KNOWN_WITHIN_S, WISH_KEPT_S, Launcher
+from app.core.robots.launcher import FIRST_GRAPH_TIMEOUT_S, REQUEST_KEPT_S, STARTING_S, Launcher
 from app.core.session import Session
 from app.core.storage.settings import Settings
 from app.robots import simulated
@@ -63,7 +63,7 @@ def test_one_that_is_not_there_is_started_at_once(world: World) -> None:
 def test_one_that_was_there_and_has_ended_is_started_when_that_is_noticed(world: World) -> None:
     world.there = True
     world.launcher.start_virtual_robot()
-    world.after(WISH_KEPT_S - 1)
+    world.after(REQUEST_KEPT_S - 1)
     assert not world.started
     world.there = False
     world.after(0.03)
@@ -75,7 +75,7 @@ def test_one_that_was_there_and_has_ended_is_started_when_that_is_noticed(world:
 def test_the_wish_is_forgotten_when_the_one_that_is_there_stays(world: World) -> None:
     world.there = True
     world.launcher.start_virtual_robot()
-    world.after(WISH_KEPT_S)
+    world.after(REQUEST_KEPT_S)
     world.there = False
     world.after(0.03)
     assert not world.started
@@ -84,7 +84,7 @@ def test_the_wish_is_forgotten_when_the_one_that_is_there_stays(world: World) ->
 def test_it_waits_until_it_is_known_who_is_there(world: World) -> None:
     world.there = None
     world.launcher.start_virtual_robot()
-    world.after(KNOWN_WITHIN_S - 0.1)
+    world.after(FIRST_GRAPH_TIMEOUT_S - 0.1)
     assert not world.started
     world.there = True
     world.after(1.0)
@@ -103,7 +103,7 @@ def test_it_does_not_wait_where_no_master_was_before(world: World) -> None:
 def test_it_does_not_wait_any_longer_than_some_seconds(world: World) -> None:
     world.there = None
     world.launcher.start_virtual_robot()
-    world.after(KNOWN_WITHIN_S)
+    world.after(FIRST_GRAPH_TIMEOUT_S)
     assert len(world.started) == 1
 
 
@@ -177,5 +177,5 @@ def test_a_robot_is_coming_until_it_is_there_or_has_failed(world: World) -> None
     launcher.check()
     assert launcher.coming == (), "it ended by itself"
     launcher.start_virtual_robot("Turtle", "diffdrive")
-    world.after(COMING_S)
+    world.after(STARTING_S)
     assert launcher.coming == (), "it never came"

@@ -161,7 +161,7 @@ def test_run_prints_what_the_robot_said(master: Master, arm: Driver, tmp_path: P
 def patient(session: Session, monkeypatch: pytest.MonkeyPatch) -> Session:
     """Waits for the answers to a stop as long as a test needs."""
     monkeypatch.setattr("app.core.robots.stop.stopper.STOP_TIMEOUT_S", 120.0)
-    monkeypatch.setattr("app.core.robots.stop.stopper.LONGEST_STOP_S", 120.0)
+    monkeypatch.setattr("app.core.robots.stop.stopper.MAX_STOP_S", 120.0)
     return session
 
 

@@ -15,7 +15,7 @@ from app.core.network.topics import Topics
 from app.core.network.watches import Watches
 from app.core.robots.announcements import RizeNames
 from app.core.robots.fleet import Fleet
-from app.core.robots.health import AWAY_S, Health
+from app.core.robots.health import RESTART_TIMEOUT_S, Health
 from app.core.robots.robot_link import MAX_AWAY, RobotLink
 from app.core.robots.stop.report import RobotStop, StopReport
 from app.robots.description.description import RobotTopics, topic_of
@@ -181,7 +181,7 @@ def test_alerts_of_forgotten_robots_are_resolved(strangers: Strangers) -> None:
     strangers.come("Rover")
     strangers.leave()
     health.check()
-    strangers.clock.move_to(strangers.clock.now() + AWAY_S)
+    strangers.clock.move_to(strangers.clock.now() + RESTART_TIMEOUT_S)
     health.check()
     assert alerts.has("robot:Rover")
     strangers.pass_by(300)

@@ -7,8 +7,8 @@ from pathlib import Path
 
 import pytest
 
-from app.core.robots.announcements import MOST_ROBOTS
-from app.core.session import CHECK_S
+from app.core.robots.announcements import MAX_ROBOTS
+from app.core.session import CHECK_INTERVAL_S
 from nep.messages.message import Message
 from tests.core.robots.stop_model.lab import SimulatedLab
 from tests.core.robots.stop_model.network import LEASE_S
@@ -65,7 +65,7 @@ def test_robot_lost_while_moving_is_named_until_it_answers_or_a_person_confirms(
     lab.settle()
     assert link.running
     silence(pepper, how)
-    lab.advance(LEASE_S + CHECK_S)
+    lab.advance(LEASE_S + CHECK_INTERVAL_S)
     if how == "replaced":
         lab.start_robot("Pepper")
         lab.wait_for_link("Pepper")
@@ -111,7 +111,7 @@ def test_stop_names_what_moved_a_robot(lab: SimulatedLab, by: str) -> None:
     lab.wait_for_link("Pepper")
     session.fleet.moved.note(["Pepper"], by)
     pepper.node.close()
-    lab.advance(2 * CHECK_S)
+    lab.advance(2 * CHECK_INTERVAL_S)
     motion = session.fleet.moved.motion("Pepper")
     assert motion is not None
     assert session.alerts.has("moving:Pepper")
@@ -210,7 +210,7 @@ def test_stopper_does_not_decode_the_answer_of_a_stranger(lab: SimulatedLab, sen
 def test_invented_robots_do_not_keep_a_stop_from_a_real_one(
     lab: SimulatedLab, order: str, announcing: str
 ) -> None:
-    invented = [f"A{number}" for number in range(MOST_ROBOTS + 20)]
+    invented = [f"A{number}" for number in range(MAX_ROBOTS + 20)]
     strangers = [
         Stranger(lab.network) for _each in (invented if announcing == "many nodes" else invented[:1])
     ]

@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from app.core.robots.stop.report import StopReport
-from app.core.robots.voices import LONGEST_S, MOST_WAITING, SOUND, Heard, Notes, RobotVoices, Speaker
+from app.core.robots.voices import LONGEST_S, MAX_WAITING, SOUND, Heard, Notes, RobotVoices, Speaker
 from app.core.storage.settings import Settings
 from app.robots.description.description import parse, td_for
 from app.robots.simulated import ROBOT as PEPPER
@@ -109,16 +109,16 @@ def test_two_robots_speak_one_after_the_other_and_the_caption_says_who(case) -> 
 
 def test_too_many_that_wait_are_bounded_and_told(case) -> None:
     case.tell("Pepper", "A long story")
-    for count in range(MOST_WAITING + 1):
+    for count in range(MAX_WAITING + 1):
         case.tell("Ginger", f"word {count}", 0.95)
     lines = [line.text for line in case.session.console.records if line.origin == "Ginger"]
     assert lines == ["“word 0” was only shown: others were speaking"]
     heard = []
-    for _turn in range(MOST_WAITING + 2):
+    for _turn in range(MAX_WAITING + 2):
         case.speaker.busy = False
         case.session.tick()
         heard = case.said
-    assert heard == ["A long story", *(f"word {count}" for count in range(1, MOST_WAITING + 1))]
+    assert heard == ["A long story", *(f"word {count}" for count in range(1, MAX_WAITING + 1))]
 
 
 def test_a_voice_that_never_ends_is_not_waited_for(case) -> None:

@@ -9,7 +9,7 @@ from collections.abc import Callable, Iterable
 
 import pytest
 
-from app.core.run.child_output import BYTES_PER_S, CHUNK, LINES_PER_S, LONGEST_LINE, REST_S, Gate, Output
+from app.core.run.child_output import BYTES_PER_S, CHUNK, LINES_PER_S, LONGEST_LINE, PAUSE_S, Gate, Output
 
 LINE = b'{"is": "print", "text": "x"}\n'
 
@@ -86,7 +86,7 @@ def test_after_too_much_in_a_second_it_leaves_the_processor_to_others() -> None:
     assert rested([LINE] * LINES_PER_S, lambda: 5.0).count == 0
     tired = rested([LINE] * (LINES_PER_S + 3), lambda: 5.0)
     assert tired.count >= 3
-    assert tired.seconds == pytest.approx(tired.count * REST_S)
+    assert tired.seconds == pytest.approx(tired.count * PAUSE_S)
     assert rested([b"y" * CHUNK] * (BYTES_PER_S // CHUNK), lambda: 5.0).count == 0
     assert rested([b"y" * CHUNK] * (BYTES_PER_S // CHUNK + 3), lambda: 5.0).count >= 2
 

@@ -10,7 +10,7 @@ import time
 import psutil
 import pytest
 
-from app.core.run.child_process import MOST_BYTES
+from app.core.run.child_process import MAX_BYTES
 from app.core.run.runner import EVENTS_PER_S, Runner
 from tests.core.run.test_runner import LONG_S, STOP_WITHIN_S, Heard, heard, program, stopping_s
 
@@ -74,7 +74,7 @@ def test_what_it_starts_counts_with_it(started, heard) -> None:
 
 
 def test_a_behaviours_program_has_a_gigabyte() -> None:
-    assert Runner(lambda _event: None)._most_bytes == MOST_BYTES == 1_000_000_000
+    assert Runner(lambda _event: None)._most_bytes == MAX_BYTES == 1_000_000_000
 
 
 # ---- floods ----------------------------------------------------------------------------------------

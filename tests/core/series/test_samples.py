@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from app.core.series.samples import LATE_S, RAW_PER_COLUMN, SHIFTS, Figures, Samples
+from app.core.series.samples import MAX_LATENESS_S, RAW_PER_COLUMN, SHIFTS, Figures, Samples
 
 Row = tuple[float, float, bool]
 ODD = [math.nan, math.inf, -math.inf, float(2**64 - 1), 1.7e308, -1.7e308, 0.0, -0.0, 5e-324]
@@ -30,7 +30,7 @@ class Naive:
             return
         last = self.rows[-1][0] if self.rows else None
         if last is not None and time_s < last:
-            if last - time_s <= LATE_S:
+            if last - time_s <= MAX_LATENESS_S:
                 place = next(n for n, row in enumerate(self.rows) if row[0] > time_s)
                 after = self.rows[place]
                 self.rows.insert(place, (time_s, value, after[2]))
@@ -57,7 +57,7 @@ def filled(rows: list[Row]) -> Samples:
 
 
 numbers = st.one_of(st.floats(-1e6, 1e6), st.sampled_from(ODD))
-steps = st.one_of(st.floats(0, 2), st.sampled_from([0.0, -0.2, -5.0, 100.0, -LATE_S]))
+steps = st.one_of(st.floats(0, 2), st.sampled_from([0.0, -0.2, -5.0, 100.0, -MAX_LATENESS_S]))
 batches = st.lists(st.lists(st.tuples(steps, numbers, st.booleans()), max_size=12), max_size=12)
 
 
@@ -239,9 +239,9 @@ def test_what_was_drawn_before_is_drawn_as_if_for_the_first_time(seed, limit, co
         samples.extend(times, random.normal(size=count), random.random(count) < 0.001)
         now_s = float(times[-1])
         if random.random() < 0.3:
-            samples.add(now_s - random.uniform(0, LATE_S), 50.0 * random.normal())  # late
+            samples.add(now_s - random.uniform(0, MAX_LATENESS_S), 50.0 * random.normal())  # late
         if random.random() < 0.15:
-            now_s -= 2 * LATE_S + random.exponential(5)
+            now_s -= 2 * MAX_LATENESS_S + random.exponential(5)
             samples.add(now_s, 1.0)  # a clock was set back
         span_s = float(random.choice([10.0, 10.0, 3.0, 1e-40]))
         fresh = Samples()

@@ -25,7 +25,7 @@ from app.ui.panels.robots.controls.picture_file import MOST_FILE_BYTES, encoded,
 from app.ui.panels.robots.form import ActionForm
 from app.ui.theme.theme import Theme
 from app.ui.widgets import SliderWithUnit
-from app.ui.widgets.inputs.fields import LEAST_HEIGHT, LongText
+from app.ui.widgets.inputs.fields import MIN_HEIGHT, LongText
 from app.ui.widgets.menus import Menu
 from tests.nep.bad_pictures import BOMBS, chunk, exif, segment
 from tests.ui import fakes
@@ -157,7 +157,7 @@ def test_a_long_text_grows_with_its_lines_to_five(qtbot, theme) -> None:
     form = form_of(qtbot, theme, Parameter("t", "text", "text", max_length=500, required=True))
     field = child(form, LongText)
     one = field.height()
-    assert one >= LEAST_HEIGHT
+    assert one >= MIN_HEIGHT
     field.set_text("a\nb\nc")
     three = field.height()
     field.set_text("\n".join("abcdefgh"))

@@ -9,7 +9,7 @@ import pytest
 from PySide6.QtCore import QPointF, QRectF
 from PySide6.QtGui import QColor, QImage, QPainter, QTransform
 
-from app.core.messages.annotations import MOST_PIXELS, drawn_by
+from app.core.messages.annotations import MAX_PIXELS, drawn_by
 from app.core.messages.picture_look import ColourScale
 from app.ui.panels.image.overlays import MOST_OVERLAYS
 from app.ui.panels.image.panel import PANEL, ImagePanel
@@ -173,9 +173,9 @@ def test_lines_areas_points_and_texts_are_where_they_are_said_to_be(qapp) -> Non
 
 
 def test_far_away_and_huge_nothing_breaks(qapp) -> None:
-    far = {"x": MOST_PIXELS, "y": -MOST_PIXELS}
-    huge = {"position": far, "diameter": MOST_PIXELS, "thickness": MOST_PIXELS, "outline_color": RED}
-    text = {"position": {"x": 5, "y": 5}, "text": "x" * 10_000, "font_size": MOST_PIXELS}
+    far = {"x": MAX_PIXELS, "y": -MAX_PIXELS}
+    huge = {"position": far, "diameter": MAX_PIXELS, "thickness": MAX_PIXELS, "outline_color": RED}
+    text = {"position": {"x": 5, "y": 5}, "text": "x" * 10_000, "font_size": MAX_PIXELS}
     image = painted({"circles": [huge], "points": [{"type": 3, "points": [far, far], "outline_color": RED}],
                      "texts": [text]})  # fmt: skip
     assert image.width() == 320

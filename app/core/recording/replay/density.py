@@ -12,7 +12,7 @@ from nep.errors import NepError, RecordingError
 from nep.recordings.formats.figures import TopicFigures
 from nep.recordings.reader import Recording
 
-MOST_MARKS = 2_000
+MAX_MARKS = 2_000
 """Maximum number of marks of one topic; later losses are added to the last one."""
 
 
@@ -113,7 +113,7 @@ def losses_of(recording: Recording) -> dict[str, tuple[LossMark, ...]]:
             marks = found.setdefault(topic, [])
             if grown <= 0:
                 _take_back(marks, -grown)
-            elif len(marks) < MOST_MARKS:
+            elif len(marks) < MAX_MARKS:
                 marks.append(LossMark(at_ns, grown))
             else:
                 marks[-1] = LossMark(marks[-1].at_ns, marks[-1].count + grown)

@@ -7,7 +7,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from math import ceil
 
-LEAST_SPAN_NS = 1_000_000
+MIN_SPAN_NS = 1_000_000
 STEPS_S = (
     0.001, 0.002, 0.005, 0.01, 0.02, 0.05, 0.1, 0.2, 0.5, 1.0, 2.0, 5.0, 10.0, 15.0, 30.0, 60.0, 120.0, 300.0,
     600.0, 900.0, 1800.0, 3600.0, 7200.0, 21_600.0, 43_200.0, 86_400.0,
@@ -26,7 +26,7 @@ class TimeScale:
     @classmethod
     def whole(cls, first_ns: int, last_ns: int) -> TimeScale:
         """Return the scale of a whole recording, at least one millisecond."""
-        last_ns = max(last_ns, first_ns + LEAST_SPAN_NS)
+        last_ns = max(last_ns, first_ns + MIN_SPAN_NS)
         return cls(first_ns, last_ns, first_ns, last_ns)
 
     @property
@@ -51,7 +51,7 @@ class TimeScale:
     def zoomed(self, factor: float, at_ns: int) -> TimeScale:
         """Return a scale zoomed out (factor above 1) or in, with ``at_ns`` at the same position."""
         whole = self.last_ns - self.first_ns
-        span = max(LEAST_SPAN_NS, min(whole, round(self.span_ns * factor)))
+        span = max(MIN_SPAN_NS, min(whole, round(self.span_ns * factor)))
         return self._placed(at_ns - round(self.share(at_ns) * span), span)
 
     def moved(self, by_ns: int) -> TimeScale:

@@ -17,7 +17,7 @@ from app.core.network.source import Job
 from app.core.recording.replay.opening import OpenedRecording
 from app.core.robots.motion.gate import MotionGate
 from app.core.run.acting.acting import SessionActing
-from app.core.run.acting.arming import MOST_NAMES, Arming, Target
+from app.core.run.acting.arming import MAX_NAMES, Arming, Target
 from nep.errors import BadTopicError, NepError
 from nep.i18n import _, ngettext
 from nep.messages.message import Message
@@ -28,9 +28,9 @@ from nep.protocol.wire import check_topic
 from nep.recordings.player import latched_topics, moving_topics, published_type
 from nep.recordings.reader import Recording
 
-LATE_S = 0.1
+MAX_DELAY_S = 0.1
 """Delay beyond which a message is dropped."""
-MOST_TYPES = 10
+MAX_TYPES = 10
 """Maximum number of types of a topic in one recording; messages of further ones are dropped."""
 Submit = Callable[[str, Job], None]
 
@@ -120,7 +120,7 @@ class ReplayOutbox:
         publisher = sent.publishers.get(kind)
         if publisher is None:
             self._create_publisher(sent, kind)
-        if publisher is None or late_s > LATE_S or self._is_refused(sent, publisher):
+        if publisher is None or late_s > MAX_DELAY_S or self._is_refused(sent, publisher):
             sent.skipped += 1
             return
         data, extension = bytes(message.data), dict(message.extension) or None
@@ -147,7 +147,7 @@ class ReplayOutbox:
     # ---- in the network thread
 
     def _create_publisher(self, sent: SentTopic, msg_type: str) -> None:
-        if msg_type in sent.asked or len(sent.asked) >= MOST_TYPES:
+        if msg_type in sent.asked or len(sent.asked) >= MAX_TYPES:
             return
         sent.asked.add(msg_type)
 
@@ -233,7 +233,7 @@ class ReplaySending:
             self.routes.pop(recorded, None)
             return ""
         wanted = name.strip() or recorded
-        if recorded not in self.routes and len(self.routes) >= MOST_NAMES:
+        if recorded not in self.routes and len(self.routes) >= MAX_NAMES:
             return _("No more topics can be sent. Remove one first.")
         try:
             check_topic(wanted)

@@ -26,15 +26,15 @@ from nep.recordings.player import Due, Playback, PlayerStatus
 from nep.recordings.reader import Recording
 
 RATE_S = 2.0
-FIGURES_EVERY_S = 0.5
+STATISTICS_INTERVAL_S = 0.5
 TOPICS_AT_ONCE = 100
 FIGURES_SHARE = 10.0
 """Minimum interval of reading statistics, as a multiple of its duration."""
 HISTORY_S = (5.0, 20.0, 60.0, 180.0)
 """Ranges before the playhead that are read for topics with history, nearest first ..."""
-HISTORY_MOST_S = 0.25
+HISTORY_TIMEOUT_S = 0.25
 """... and the time limit."""
-MOST_HISTORY = 8192
+MAX_HISTORY_MESSAGES = 8192
 OWN_BYTES = 65_536
 """Maximum size of copied messages: a small one would keep the whole megabyte that it was read with."""
 
@@ -355,17 +355,17 @@ class ReplaySource:
         self, recording: Recording, span: tuple[int, int], found: dict[str, deque[Message]], began: float
     ) -> bool:
         # Prepends the messages of a range; returns False when the limits are reached.
-        topics = [topic for topic, each in found.items() if len(each) < MOST_HISTORY]
+        topics = [topic for topic, each in found.items() if len(each) < MAX_HISTORY_MESSAGES]
         came: dict[str, deque[Message]] = {
-            topic: deque(maxlen=MOST_HISTORY - len(found[topic])) for topic in topics
+            topic: deque(maxlen=MAX_HISTORY_MESSAGES - len(found[topic])) for topic in topics
         }
         for number, each in enumerate(recording.read(span[0], span[1], topics)):
             came[each.message.topic].append(_own_copy(each.message))
-            if number % 64 == 0 and (self._changes or self._clock() - began > HISTORY_MOST_S):
+            if number % 64 == 0 and (self._changes or self._clock() - began > HISTORY_TIMEOUT_S):
                 return False  # an incomplete range would be a gap, so it is discarded
         for topic, messages in came.items():
             found[topic].extendleft(reversed(messages))
-        return bool(topics) and self._clock() - began <= HISTORY_MOST_S
+        return bool(topics) and self._clock() - began <= HISTORY_TIMEOUT_S
 
     # -- statistics
     # ---------------------------------------------------------------------------------------------
@@ -376,7 +376,7 @@ class ReplaySource:
             return
         names, at_ns = list(self.opened.recording.topics), playback.status().position_ns
         self._figures = [(at_ns, names[k : k + TOPICS_AT_ONCE]) for k in range(0, len(names), TOPICS_AT_ONCE)]
-        self._next_figures = self._clock() + max(FIGURES_EVERY_S, FIGURES_SHARE * self._figures_s)
+        self._next_figures = self._clock() + max(STATISTICS_INTERVAL_S, FIGURES_SHARE * self._figures_s)
         self._figures_s = 0.0
 
     def _read_next_figures(self) -> None:

@@ -12,9 +12,9 @@ from dataclasses import dataclass, replace
 
 from nep.recordings.reader import Recording
 
-MOST_SPANS = 2_000
+MAX_SPANS = 2_000
 """Maximum number of spans in each lane; further ones are only counted."""
-_MOST_LETTERS = 200
+_MAX_NAME_LENGTH = 200
 RESULTS = ("ended", "stopped", "failed")
 
 
@@ -67,8 +67,8 @@ class _Lane:
     def put(self, id: str, span: RecordedSpan) -> None:
         # The start is the earliest of all records.
         known = self._by_id.get(id)
-        if known is None and len(self._by_id) >= MOST_SPANS:
-            if len(self._left_out) < MOST_SPANS:
+        if known is None and len(self._by_id) >= MAX_SPANS:
+            if len(self._left_out) < MAX_SPANS:
                 self._left_out.add(id)
             return
         start_ns = self._within(span.start_ns if known is None else min(known.start_ns, span.start_ns))
@@ -119,7 +119,7 @@ def _read_alerts(recording: Recording, lane: _Lane) -> None:
         listed = told.get("alerts") if isinstance(told, Mapping) else None
         there = {
             _text(each, "id"): each
-            for each in (listed if isinstance(listed, list) else ())[:MOST_SPANS]
+            for each in (listed if isinstance(listed, list) else ())[:MAX_SPANS]
             if isinstance(each, Mapping) and _text(each, "id")
         }
         for gone in [id for id in present if id not in there]:
@@ -136,4 +136,4 @@ def _read_alerts(recording: Recording, lane: _Lane) -> None:
 
 def _text(told: Mapping[str, object], key: str) -> str:
     value = told.get(key)
-    return value[:_MOST_LETTERS] if isinstance(value, str) else ""
+    return value[:_MAX_NAME_LENGTH] if isinstance(value, str) else ""

@@ -20,7 +20,7 @@ from nep.i18n import _, listed, ngettext, pgettext
 from nep.programs.robots.moving import RIZE_COMMANDS
 
 ALWAYS = "robots.may_move"
-MOST_NAMED = 4
+MAX_NAMED = 4
 
 
 class MayNotMoveError(AppError):
@@ -176,9 +176,7 @@ def risky(robot: Robot, actions: Iterable[str]) -> tuple[str, ...]:
     found = [action.title for name in actions if (action := robot.action(name)) is not None and action.risk]
     titles = [f"“{title}”" for title in dict.fromkeys(found)]
     return (
-        (*titles[:MOST_NAMED], pgettext("after a list", "more"))
-        if len(titles) > MOST_NAMED
-        else tuple(titles)
+        (*titles[:MAX_NAMED], pgettext("after a list", "more")) if len(titles) > MAX_NAMED else tuple(titles)
     )
 
 

@@ -12,7 +12,7 @@ from nep.i18n import _
 from nep.messages.message import Message
 from nep.protocol.graph_view import GraphView
 
-MOST_TOPICS = 32
+MAX_TOPICS = 32
 """Maximum number of command topics of one robot: the present ones, then those of earlier descriptions."""
 
 
@@ -84,7 +84,7 @@ class StopTarget:
     @property
     def ways(self) -> tuple[RobotTopics, ...]:
         """Topics for the Stop: those of its description, then those of earlier ones."""
-        return tuple(dict.fromkeys((self.robot.topics, *self.topics)))[:MOST_TOPICS]
+        return tuple(dict.fromkeys((self.robot.topics, *self.topics)))[:MAX_TOPICS]
 
 
 @dataclass

@@ -37,12 +37,12 @@ from nep.protocol.graph_view import GraphView
 _log = logging.getLogger("studio")
 RIZE = "rize"
 NO_NETWORK = lazy("there is no connection to the network yet")
-LATE_S = 120.0
+LATE_REPLY_S = 120.0
 """Time during which late replies are accepted."""
 LATE_KEPT = 64
-MOST_SERVING = 32
+MAX_SERVING = 32
 """Maximum number of programs of one robot whose replies are awaited."""
-MOST_LISTENING = 4
+MAX_LISTENING = 4
 """Maximum number of named programs that only subscribe to a robot's commands."""
 POLL_S = 0.02
 """Interval of checks for a connection."""
@@ -55,10 +55,10 @@ _UNKNOWN_PROGRAM = "nobody"
 STOP_TIMEOUT_S = 1.0
 """Timeout of a Stop, unless the robot's description requires a longer one."""
 MARGIN_S = 0.5
-LONGEST_STOP_S = 10.0
+MAX_STOP_S = 10.0
 
 
-def patience_s(robots: Iterable[Robot], longest_s: float = LONGEST_STOP_S) -> float:
+def patience_s(robots: Iterable[Robot], longest_s: float = MAX_STOP_S) -> float:
     """Return the timeout for these robots, which is longer than that of their drivers."""
     needed_s = max((robot.safe_stop.within_s + MARGIN_S for robot in robots), default=0.0)
     return min(longest_s, max(STOP_TIMEOUT_S, needed_s))
@@ -71,7 +71,7 @@ class RobotStopper:
         self,
         node: StopNode,
         clock: Callable[[], float] = time.monotonic,
-        longest_s: float = LONGEST_STOP_S,
+        longest_s: float = MAX_STOP_S,
     ) -> None:
         # `longest_s` limits the wait for replies. Robots are added by `set_robots`.
         self._longest_s = longest_s
@@ -151,11 +151,13 @@ class RobotStopper:
     def deliver(self) -> None:
         """Send pending Stops to robots that have connected since. Call it at each tick.
 
-        Stops stay pending for `LATE_S`.
+        Stops stay pending for `LATE_REPLY_S`.
         """
         with self._changed:
             now = self._clock()
-            waiting = [each for each in self._asked.values() if each.is_over and now - each.sent_s <= LATE_S]
+            waiting = [
+                each for each in self._asked.values() if each.is_over and now - each.sent_s <= LATE_REPLY_S
+            ]
         for each in waiting:
             self._deliver(each)
 
@@ -435,12 +437,12 @@ class RobotStopper:
         answering = {node for way in target.ways for node in publishing(view, way.answer)}
         heard = dict.fromkeys(node for way in target.ways for node in hearing(view, way.command))
         others = [node for node in heard if node not in (own, self._node.id)]
-        for node in [node for node in others if node in answering][:MOST_SERVING]:
+        for node in [node for node in others if node in answering][:MAX_SERVING]:
             asked.programs[node] = identity_of(view, node).node or node
             found[node] = None
         listening = [node for node in others if node not in answering]
-        programs = [identity_of(view, node).node or node for node in listening[:MOST_LISTENING]]
-        if len(listening) > MOST_LISTENING:
+        programs = [identity_of(view, node).node or node for node in listening[:MAX_LISTENING]]
+        if len(listening) > MAX_LISTENING:
             programs = [
                 ngettext("{count} program", "{count} programs", len(listening)).format(count=len(listening))
             ]
@@ -483,7 +485,7 @@ class RobotStopper:
             asked.unknown.put(message)
             return []
         if node not in asked.serving:
-            if node in asked.foreign or len(asked.foreign) < MOST_SERVING:
+            if node in asked.foreign or len(asked.foreign) < MAX_SERVING:
                 asked.foreign.setdefault(node, HeldMessages(publishers=1)).put(message)
             return []
         name = asked.line.name
@@ -527,7 +529,7 @@ class RobotStopper:
         over = [id for id, each in self._asked.items() if each.is_over]
         for place, id in enumerate(over):
             each = self._asked[id]
-            if each.is_proven or place < len(over) - LATE_KEPT or now - each.sent_s > LATE_S:
+            if each.is_proven or place < len(over) - LATE_KEPT or now - each.sent_s > LATE_REPLY_S:
                 del self._asked[id]
 
 

@@ -25,7 +25,7 @@ from app.core.run.acting.json_text import read_json
 from app.core.run.acting.sending import Outbox, SendOrder, SendResult
 from app.core.run.acting.sent_log import Asker, SentLog, SentRecord
 from app.core.run.acting.shelf import (
-    MOST_BYTES,
+    MAX_BYTES,
     KeptMessage,
     NewerShelfError,
     Shelf,
@@ -431,7 +431,7 @@ class SessionActing:
             said = ngettext("{count} message can't be read", "{count} messages can't be read", unread)
             return shelf, said.format(count=unread) if unread else ""
 
-        kept = read_kept(path, parse, NewerShelfError, MOST_BYTES)
+        kept = read_kept(path, parse, NewerShelfError, MAX_BYTES)
         self._is_newer = kept.is_newer
         if kept.problem:
             title = _("Saved messages could not be read.")

@@ -8,8 +8,8 @@ from collections.abc import Callable
 from typing import Literal, NamedTuple
 
 ARMED_S = 300.0
-LEAST_S, MOST_S = 60.0, 3600.0
-MOST_NAMES = 20
+MIN_S, MAX_S = 60.0, 3600.0
+MAX_NAMES = 20
 
 
 class Target(NamedTuple):
@@ -58,22 +58,22 @@ class Arming:
         return self.is_on and target in self._targets
 
     def arm(self, seconds: float = ARMED_S) -> None:
-        """Switch on, or extend to ``seconds`` from now (`LEAST_S` to `MOST_S`)."""
+        """Switch on, or extend to ``seconds`` from now (`MIN_S` to `MAX_S`)."""
         with self._lock:
             if not self.is_on:
                 self._targets, self._confirmed = (), frozenset()
                 self.turn += 1
             self._is_on = True
-            self._until_s = self._clock() + min(MOST_S, max(LEAST_S, seconds))
+            self._until_s = self._clock() + min(MAX_S, max(MIN_S, seconds))
             self.revision += 1
 
     def allow(self, target: Target, *, is_confirmed: bool = False) -> bool:
-        """Permit a target; return False while off and for more than `MOST_NAMES` targets.
+        """Permit a target; return False while off and for more than `MAX_NAMES` targets.
 
         ``is_confirmed``: the user knows that this moves a robot.
         """
         with self._lock:
-            if not self.is_on or (target not in self._targets and len(self._targets) >= MOST_NAMES):
+            if not self.is_on or (target not in self._targets and len(self._targets) >= MAX_NAMES):
                 return False
             if target not in self._targets:
                 self._targets = (*self._targets, target)

@@ -26,7 +26,7 @@ HISTORY_KEPT = 200
 ANSWERS_KEPT = 20
 """Number of newest calls whose replies are kept; of older ones only the fact and time."""
 ANSWER_LETTERS = 1_000_000
-MOST_CLIENTS = 20
+MAX_CLIENTS = 20
 
 State = Literal["waiting", "answered", "failed", "canceled"]
 
@@ -223,7 +223,7 @@ class ServiceCalls:
     def _client(self, node: Node, service: str) -> Client:
         known = self._clients.get(service)
         if known is None or known.is_closed:
-            if len(self._clients) >= MOST_CLIENTS:
+            if len(self._clients) >= MAX_CLIENTS:
                 self._clients.pop(next(iter(self._clients))).close()
             known = self._clients[service] = node.new_client(service)
         return known

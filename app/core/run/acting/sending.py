@@ -24,11 +24,11 @@ from nep.nodes.node import Node
 from nep.nodes.publisher import Publisher
 
 LEAST_HZ, MOST_HZ = 0.1, 50.0
-LATE_S = 10.0
+MAX_AGE_S = 10.0
 """Maximum age of a message that waits for a master; older ones are discarded."""
-MOST_AT_ONCE = 10
+MAX_CONCURRENT = 10
 """Maximum number of messages sent repeatedly at the same time."""
-MOST_KEPT = 20
+MAX_PUBLISHERS = 20
 RESULTS_KEPT = 200
 
 
@@ -163,11 +163,11 @@ class Outbox:
         self._submit("", self._guarded(order, asked_s, send_it))
 
     def begin(self, order: SendOrder, rate_hz: float) -> bool:
-        """Send a message repeatedly; return False when `MOST_AT_ONCE` is reached."""
+        """Send a message repeatedly; return False when `MAX_CONCURRENT` is reached."""
         rate_hz = min(MOST_HZ, max(LEAST_HZ, rate_hz))
         turn, asked_s, token = self._arming.turn, self._clock(), object()
         with self._changed:
-            if len(self._repeated.keys() | self._starting.keys() | {order.id}) > MOST_AT_ONCE:
+            if len(self._repeated.keys() | self._starting.keys() | {order.id}) > MAX_CONCURRENT:
                 return False
             self._starting[order.id] = token
 
@@ -230,7 +230,7 @@ class Outbox:
     def _guarded(self, order: SendOrder, asked_s: float, job: Job) -> Job:
         def run(node: Node) -> None:
             try:
-                if self._clock() - asked_s > LATE_S:
+                if self._clock() - asked_s > MAX_AGE_S:
                     raise NepError(_("not sent: there was no master"))
                 job(node)
             except NepError as error:
@@ -260,7 +260,7 @@ class Outbox:
         known = self._publishers.get(key)
         if known is None or known.is_closed:
             unused = [each for each in self._publishers if each not in used]
-            if len(self._publishers) >= MOST_KEPT and unused:
+            if len(self._publishers) >= MAX_PUBLISHERS and unused:
                 self._close(unused[0])
             known = self._publishers[key] = node.new_pub(order.topic, order.msg_type)
         return known

@@ -9,7 +9,7 @@ from typing import Literal
 
 from app.core.run.acting.arming import Target
 
-MOST_KEPT = 200
+MAX_ENTRIES = 200
 KEPT_BYTES = 16 * 1024
 """Size limit of stored messages; larger ones are listed but can't be copied or repeated."""
 
@@ -48,10 +48,10 @@ class SentRecord:
 
 
 class SentLog:
-    """Newest `MOST_KEPT` entries, oldest first, and the total. Not thread-safe: window's thread only."""
+    """Newest `MAX_ENTRIES` entries, oldest first, and the total. Not thread-safe: window's thread only."""
 
     def __init__(self) -> None:
-        self._records: deque[SentRecord] = deque(maxlen=MOST_KEPT)
+        self._records: deque[SentRecord] = deque(maxlen=MAX_ENTRIES)
         self._last = 0
         self.total = 0
         """Number of messages and calls sent."""

@@ -16,11 +16,11 @@ from nep.i18n import _
 
 FORMAT = 1
 MOST_MESSAGES = 200
-MOST_REQUESTS = 100
-MOST_VALUES = 50
+MAX_REQUESTS = 100
+MAX_VALUES = 50
 NAME_LETTERS = 80
 VALUE_LETTERS = 2000
-MOST_BYTES = 64 * 2**20
+MAX_BYTES = 64 * 2**20
 """Maximum file size; larger files are not read."""
 
 
@@ -60,7 +60,7 @@ class KeptMessage:
     def with_value(self, name: str, value: str) -> KeptMessage:
         """Return a copy with another value of a placeholder."""
         others = {**dict(self.values), name: value[:VALUE_LETTERS]}
-        return replace(self, values=tuple(others.items())[-MOST_VALUES:])
+        return replace(self, values=tuple(others.items())[-MAX_VALUES:])
 
 
 class Shelf:
@@ -70,7 +70,7 @@ class Shelf:
         self, messages: Iterable[KeptMessage] = (), requests: Mapping[str, str] | None = None
     ) -> None:
         self._messages = list(messages)[:MOST_MESSAGES]
-        self._requests = dict(list((requests or {}).items())[-MOST_REQUESTS:])
+        self._requests = dict(list((requests or {}).items())[-MAX_REQUESTS:])
         self._removed: tuple[KeptMessage, int] | None = None
         self.revision = 0
 
@@ -146,7 +146,7 @@ class Shelf:
         if self._requests.get(service) != request and len(request) <= MOST_LETTERS:
             self._requests.pop(service, None)
             self._requests[service] = request
-            while len(self._requests) > MOST_REQUESTS:
+            while len(self._requests) > MAX_REQUESTS:
                 self._requests.pop(next(iter(self._requests)))
             self.revision += 1
 
@@ -220,4 +220,4 @@ def _message(told: object) -> KeptMessage | None:
     hertz = 1.0
     if isinstance(rate_hz, (int, float)) and not isinstance(rate_hz, bool) and math.isfinite(rate_hz):
         hertz = float(min(MOST_HZ, max(LEAST_HZ, rate_hz)))
-    return KeptMessage(id, name[:NAME_LETTERS], topic, kind, text, typed[:MOST_VALUES], hertz)
+    return KeptMessage(id, name[:NAME_LETTERS], topic, kind, text, typed[:MAX_VALUES], hertz)

@@ -15,8 +15,8 @@ from app.ui.widgets.menus import EditMenu
 from nep.i18n import _
 from nep.i18n import number as number_text
 
-MOST_LINES = 5
-LEAST_HEIGHT = 34
+MAX_LINES = 5
+MIN_HEIGHT = 34
 SHEET_PADDING = 9  # padding from the style sheet above and below, and a pixel for rounding
 
 
@@ -243,10 +243,10 @@ class LongText(QWidget):
     def _lines(self) -> int:
         lines = 0
         block = self.edit.document().firstBlock()
-        while block.isValid() and lines < MOST_LINES:
+        while block.isValid() and lines < MAX_LINES:
             lines += max(1, block.layout().lineCount())
             block = block.next()
-        return min(MOST_LINES, max(1, lines))
+        return min(MAX_LINES, max(1, lines))
 
     def _line_height(self) -> float:
         return paint.height_of(self.edit.font())
@@ -254,9 +254,9 @@ class LongText(QWidget):
     def _grow(self) -> None:
         lines = self._lines()
         text = round(lines * self._line_height()) + SHEET_PADDING
-        high = max(round(self._theme.scaled(LEAST_HEIGHT)), text + 8)
+        high = max(round(self._theme.scaled(MIN_HEIGHT)), text + 8)
         self.edit.setFixedHeight(text)
-        shown = Qt.ScrollBarPolicy.ScrollBarAsNeeded if lines == MOST_LINES else None
+        shown = Qt.ScrollBarPolicy.ScrollBarAsNeeded if lines == MAX_LINES else None
         self.edit.setVerticalScrollBarPolicy(shown or Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
         if high != self.height():
             self.setFixedHeight(high)

@@ -13,7 +13,7 @@ from app.ui.widgets import paint
 from app.ui.widgets.inputs.fields import NumberEdit
 from app.ui.widgets.labels import label
 
-MOST_STEPS = 100_000
+MAX_STEPS = 100_000
 FIELD_WIDTH = 104
 PAGE_STEPS = 10
 
@@ -120,7 +120,7 @@ class SliderWithUnit(QWidget):
         super().__init__()
         if not (maximum > minimum and step > 0):
             raise ValueError(f"no range from {minimum} to {maximum} by {step}")
-        steps = min(MOST_STEPS, max(1, round((maximum - minimum) / step)))
+        steps = min(MAX_STEPS, max(1, round((maximum - minimum) / step)))
         self._minimum, self._step = minimum, (maximum - minimum) / steps
         self._default = default if default is not None else value if value is not None else minimum
         self._value = minimum

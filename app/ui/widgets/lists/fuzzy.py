@@ -13,7 +13,7 @@ from dataclasses import dataclass
 from operator import attrgetter
 
 WHOLE, WORD, INITIALS, INSIDE, SPREAD = 100.0, 80.0, 70.0, 55.0, 40.0
-LEAST_SPREAD = 0.8  # minimum share of letters that begin a word or follow the previous letter
+MIN_SPREAD = 0.8  # minimum share of letters that begin a word or follow the previous letter
 PER_LETTER = 0.05
 MANY = 400  # maximum number of entries of a kind that are matched letter by letter
 LATER = 5.0  # penalty of entries that are unavailable now
@@ -106,7 +106,7 @@ def _spread(piece: str, text: str) -> tuple[float, list[Span]] | None:
         places.append(place)
         at = place + 1
     share = good / len(piece)
-    if share < LEAST_SPREAD:
+    if share < MIN_SPREAD:
         return None
     return SPREAD * share - min(15.0, (places[-1] - places[0]) / 10), [(place, place + 1) for place in places]
 
