@@ -138,7 +138,8 @@ def _request(request: Request, address: str, timeout_s: float) -> Reply:
 def _send(socket: zmq.Socket[bytes], endpoint: str, body: bytes) -> None:
     try:
         socket.send(body, zmq.DONTWAIT)
-    except zmq.Again:  # libzmq disconnected: the peer was not a master's socket
+    except zmq.Again:  # libzmq gave up the connection: the peer was not a master's socket
+        socket.disconnect(endpoint)  # else connecting again has no effect
         socket.connect(endpoint)
 
 

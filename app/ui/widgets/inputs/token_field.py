@@ -1,4 +1,4 @@
-"""A field whose finished entries are tokens, each of which a press removes; what is typed comes last."""
+"""Field with finished entries as removable tokens, followed by the text being typed."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ MOST_LETTERS = 400
 
 
 class Token(PaintedButton):
-    """One finished entry, with "not" before it if it is left out; a press, or Delete, removes it."""
+    """Finished entry, with "not" if it is excluded; a click or Delete removes it."""
 
     def __init__(self, theme: Theme, entry: str, *, is_left_out: bool = False) -> None:
         super().__init__(theme)
@@ -68,14 +68,13 @@ class Token(PaintedButton):
 
 
 class _Typed(QLineEdit):
-    """What is being typed; Enter makes a token of it, Backspace before its first letter takes one away."""
+    """Text being typed; Enter finishes it, Backspace at its start removes the last token."""
 
     ended = Signal()
     back = Signal()
     focused = Signal()
 
     def sizeHint(self) -> QSize:
-        """As much as its words need: it stands behind the last token as long as there is room."""
         words = self.text() or self.placeholderText()
         wide = self.fontMetrics().horizontalAdvance(words) + 2 * PAD
         return QSize(max(LEAST, wide), super().sizeHint().height())
@@ -113,7 +112,7 @@ class TokenField(QWidget):
     settled = Signal()
 
     def __init__(self, theme: Theme, name: str, example: str, add: str = "") -> None:
-        """``example`` stands in the empty field, ``add`` behind its tokens."""
+        """``example`` is the placeholder of the empty field, ``add`` the one after tokens."""
         super().__init__()
         self._add_words = add
         self._theme, self._example, self._is_wrong = theme, example, False
@@ -141,17 +140,17 @@ class TokenField(QWidget):
         return tuple(self._tokens)
 
     def set_wrong(self, is_wrong: bool) -> None:
-        """Give it the edge of a wrong value, or take it away."""
+        """Show or remove the edge of an invalid value."""
         self._is_wrong = is_wrong
         self.update()
 
-    # ---- what a person does
+    # ---- input
 
     def _edited(self, text: str) -> None:
         """Handle typed text."""
 
     def _end_typing(self) -> None:
-        """Finish what is typed: Enter was pressed, or the focus left."""
+        """Finish the text: Enter was pressed or the focus left."""
 
     def _remove_last(self) -> None:
         if self._tokens:
@@ -177,7 +176,6 @@ class TokenField(QWidget):
         self._arrange()
 
     def _arrange(self) -> None:
-        """The tokens, then what is typed; Tab goes the same way."""
         self._flow.removeWidget(self.edit)
         before: QWidget | None = None
         for token in self._tokens:
