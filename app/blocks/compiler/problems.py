@@ -102,7 +102,7 @@ class ProblemCollector:
     def no_input(self, placed: Placed, block: Block) -> None:
         """Report an input of a function outside of it, or a removed one."""
         name = reading(placed, self._catalogue.blocks, self._workspace.variables)
-        sentence = _("“{name}” only works inside its own function. It is kept and skipped.").format(name=name)
+        sentence = _("“{name}” only works inside its own function. It is kept but skipped.").format(name=name)
         self._add("warning", placed, block, name, sentence)
 
     def undefined(self, placed: Placed, block: Block) -> None:

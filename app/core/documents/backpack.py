@@ -228,10 +228,9 @@ class Backpack:
                 )
             ) from error
         self._report_once(
-            _(
-                "the backpack could not be read (it is damaged) and begins empty; the old one is kept in"
-                " '{path}'"
-            ).format(path=place)
+            _("the backpack is damaged, so a new one was created; the old one is in '{path}'").format(
+                path=place
+            )
         )
         return _Found()
 

@@ -74,7 +74,7 @@ def pictures_folder() -> str:
 BEHAVIOURS = (lazy("Behaviours"), f"*{SUFFIX}")
 RECORDINGS = (lazy("Recordings"), "*.mcap")
 LAYOUTS = (lazy("Layouts"), "*.nep-layout")
-PICTURES = (lazy("Pictures"), " ".join(f"*{ending}" for ending in PICTURE_ENDINGS))
+PICTURES = (lazy("Images"), " ".join(f"*{ending}" for ending in PICTURE_ENDINGS))
 """Name filters of dialogs: label and patterns."""
 
 
