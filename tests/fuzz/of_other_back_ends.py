@@ -140,7 +140,7 @@ def definitions_of_ros(data: bytes) -> None:
 
 
 def _is_small(made: definition.Definition) -> bool:
-    return sum(each.kind.least for each in made.fields) < 10_000
+    return sum(each.kind.min_bytes for each in made.fields) < 10_000
 
 
 def bodies() -> Iterator[bytes]:
