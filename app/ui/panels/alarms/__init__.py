@@ -1,7 +1,7 @@
-"""Alarms: rules as sentences whose words are chosen, how each is now, and what happened.
+"""Alarms panel: rules as editable sentences, their states and their history.
 
-`phrases` makes the sentences and takes what is typed, `slots` are their words and `row` an alarm; `columns`
-say how alarms are and have the table of what happened.
+`phrases` builds the sentences and parses typed values, `slots` are the editable words, `row` is the widget of
+one alarm, and `columns` has the texts of states and the history table.
 """
 
 from app.ui.panels.alarms.panel import PANEL as PANEL

@@ -1,4 +1,4 @@
-"""How alarms are told: the chip and the note of each, and the table of what happened."""
+"""Texts of alarm states and the columns of the history table."""
 
 from __future__ import annotations
 
@@ -25,12 +25,12 @@ TROUBLES = {
 
 
 def moment(seconds: float) -> dt.datetime:
-    """A time in seconds since 1970 by this computer's clock and zone."""
+    """Convert seconds since 1970 to a datetime in the local time zone."""
     return dt.datetime.fromtimestamp(seconds, tz=dt.timezone.utc).astimezone()
 
 
 def state_words(rule: AlarmRule, state: AlarmState, now_s: float) -> tuple[str, str, str | None]:
-    """The chip: its words, its status, its icon where it is not the status' own."""
+    """Return text, status and icon of an alarm's chip; None for the icon of the status."""
     seen = seen_words(rule.condition, state.seen)
     match state.phase:
         case "faulty":
@@ -57,7 +57,7 @@ def state_words(rule: AlarmRule, state: AlarmState, now_s: float) -> tuple[str, 
 
 
 def note_words(rule: AlarmRule, state: AlarmState, alarms: SessionAlarms, now: dt.datetime) -> str:
-    """What stands behind the chip: what came of its actions, how often it came, or when it came last."""
+    """Return the note next to the chip: result of the actions, trigger count or time of the last trigger."""
     parts = []
     retry_s = alarms.alarms.retry_in_s(rule.id)
     last = alarms.history.last(rule.id)
@@ -87,7 +87,7 @@ def _uncapital(words: str) -> str:
 def history_columns(
     condition: Callable[[AlarmRecord], str], now: Callable[[], dt.datetime]
 ) -> tuple[Column[AlarmRecord], ...]:
-    """The table of what happened; ``condition`` is the severity of a record's alarm."""
+    """Return the columns of the history; `condition` returns the severity of a record's alarm."""
 
     def when(record: AlarmRecord) -> Cell:
         then = moment(record.at_s)
@@ -119,14 +119,14 @@ def history_columns(
 
 
 def deeds_words(record: AlarmRecord) -> str:
-    """What was done: "restart_lidar did not answer, sound"; "nothing, snoozed"."""
+    """Return the executed actions, such as "restart_lidar did not answer, sound"."""
     if record.was_snoozed and not record.deeds:
         return _("none, snoozed")
     return ", ".join(deed.words for deed in record.deeds)
 
 
 def csv_text(records: Iterable[AlarmRecord]) -> str:
-    """What happened as comma-separated values (RFC 4180), oldest first; times as ISO 8601."""
+    """Return the history as CSV (RFC 4180), oldest first, with ISO 8601 times."""
     out = io.StringIO()
     rows = csv.writer(out)
     rows.writerow(("at", "alarm", "lasted_s", "times", "did"))
@@ -138,5 +138,5 @@ def csv_text(records: Iterable[AlarmRecord]) -> str:
 
 
 def _harmless(text: str) -> str:
-    """A table program takes what begins so for a formula."""
+    # Prevent CSV injection: spreadsheets evaluate such cells as formulas.
     return f"'{text}" if text[:1] in {"=", "+", "-", "@", "\t", "\r"} else text

@@ -1,4 +1,4 @@
-"""Alarms: rules in plain words, how each is now, what happened, and a new one in two keys."""
+"""Alarms panel: list of rules, their states, and the history."""
 
 from __future__ import annotations
 
@@ -55,7 +55,7 @@ from nep.programs.alarms.sentences import condition_words, time_words
 if TYPE_CHECKING:
     from app.core.network.watches import Watch
 
-STATES_EVERY = 6  # refreshes of 30 a second: how alarms are is said anew five times a second
+STATES_EVERY = 6  # refreshes at 30 Hz: states are updated five times a second
 SNOOZE_S = 600.0
 CALM_CHOICES_S = (0.5, 2.0, 10.0, 60.0)
 ICONS = {"image": "image", "json": "braces", "string": "type", "bytes": "binary", "msgpack": "braces"}
@@ -64,7 +64,7 @@ MOST_OFFERED = 500
 
 
 class AlarmsPanel(PanelWidget):
-    """Rows of alarms, and their history below."""
+    """List of alarms with their history below."""
 
     def __init__(self, context: PanelContext) -> None:
         super().__init__(context, _("Alarms"))
@@ -83,7 +83,7 @@ class AlarmsPanel(PanelWidget):
         self._arrange()
         self.refresh()
 
-    # -- its parts ----------------------------------------------------------------------------------------
+    # -- construction -------------------------------------------------------------------------------------
 
     def _make_header(self) -> None:
         self.count = label("", "small", role="textSecondary")
@@ -159,7 +159,7 @@ class AlarmsPanel(PanelWidget):
         column.addLayout(foot)
         self.pages: QStackedWidget = self.show_one_of(self.empty, inside)
 
-    # -- what it shows ------------------------------------------------------------------------------------
+    # -- display ------------------------------------------------------------------------------------------
 
     def refresh(self) -> None:
         self._ticks += 1
@@ -247,14 +247,14 @@ class AlarmsPanel(PanelWidget):
         on = len(self.alarms.on)
         return (str(on), "error") if on else None
 
-    # -- what a person does -------------------------------------------------------------------------------
+    # -- user actions -------------------------------------------------------------------------------------
 
     def begin(self) -> None:
-        """A new alarm, whose topic is asked for at once."""
+        """Create an alarm and ask for its topic."""
         self.edit(self.alarms.new(AlarmCondition("silent", for_s=2.0)).id, "subject")
 
     def edit(self, rule_id: str, slot: str) -> None:
-        """Show this alarm and open one of its slots; with "" only go there."""
+        """Scroll to an alarm and open one of its slots; with "" only set the focus."""
         self._show_rules()
         self._seen = ()
         self._fresh = rule_id if slot == "limit" else ""
@@ -293,12 +293,12 @@ class AlarmsPanel(PanelWidget):
             self._type(row, rule, part)
 
     def _type(self, row: AlarmRow, rule: AlarmRule, part: PhrasePart) -> None:
-        """Let a person type into a slot."""
         if self.field is not None:
             self.field.leave(keeps_focus=False)
         condition = rule.condition
         if part.role in {"value", "limit"} and condition.name and self._peek is None:
-            self._peek = self.session.watch(condition.name)  # its newest message says which values there are
+            # its newest message supplies field names and values to offer
+            self._peek = self.session.watch(condition.name)
         self.field = SlotField(
             self.theme,
             row,
@@ -319,7 +319,7 @@ class AlarmsPanel(PanelWidget):
         if made is None:
             return False
         if part.role == "limit" and self._fresh == rule.id:
-            made, self._fresh = replace(made, is_on=True), ""  # it waited for its limit
+            made, self._fresh = replace(made, is_on=True), ""  # it was disabled until its limit was entered
         if made != rule:
             self._put(made)
         return True
@@ -334,7 +334,6 @@ class AlarmsPanel(PanelWidget):
         return next(row for row in self.rows if slot in row.slots.values())
 
     def _existing(self, part: PhrasePart, row: AlarmRow) -> Sequence[str]:
-        """What exists now for a slot."""
         rule = self._rule(row.rule_id)
         if rule is None:
             return ()
@@ -536,7 +535,7 @@ class AlarmsPanel(PanelWidget):
         QGuiApplication.clipboard().setText(said)
         self.context.toast(_("Copied {line}").format(line=said))
 
-    # -- what every panel has -----------------------------------------------------------------------------
+    # -- overrides ----------------------------------------------------------------------------------------
 
     def more_actions(self) -> list[QAction]:
         self._clear.setEnabled(len(self.alarms.history) > 0)

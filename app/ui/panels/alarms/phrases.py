@@ -1,4 +1,4 @@
-"""An alarm as a sentence with slots, and what is chosen in each. Pure: no widgets here."""
+"""Alarm rules as sentences with slots, and parsing of their values. No widgets."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from nep.text import quotable
 
 PartKind = Literal["word", "slot", "dashed"]
 CHOICES = frozenset({"kind", "add"})
-"""Slots whose words are chosen from a menu; into the others one types."""
+"""Slots that are chosen from a menu; the others are typed."""
 
 _TEMPLATES: Mapping[str, str] = {
     "silent": lazy("When {subject} is {kind} for {time}"),
@@ -65,7 +65,7 @@ MENU_WORDS: Sequence[Sequence[tuple[str, str]]] = (
     ),
     (("leaves", lazy("A node leaves")), ("comes", lazy("A node joins"))),
 )
-"""The kinds, in the groups of a menu."""
+"""Alarm kinds grouped as in the menu."""
 SLOT_NAMES: Mapping[str, str] = {
     "subject": lazy("Subject"),
     "value": lazy("Value"),
@@ -122,7 +122,7 @@ _DEFAULTS: Mapping[str, tuple[Scalar, float]] = {
 
 @dataclass(frozen=True, slots=True)
 class PhrasePart:
-    """One word or slot of an alarm's sentence. ``key`` tells slots apart: "subject", "action:0"."""
+    """Word or slot of an alarm's sentence. `key` identifies slots, such as "subject" or "action:0"."""
 
     key: str
     text: str
@@ -132,17 +132,17 @@ class PhrasePart:
 
     @property
     def role(self) -> str:
-        """What the slot is for, whichever action it belongs to."""
+        """Purpose of the slot: `key` without the index of the action."""
         return self.key.partition(":")[0]
 
     @property
     def place(self) -> int:
-        """The place of its action."""
+        """Index of the action that the slot belongs to."""
         return int(self.key.partition(":")[2] or 0)
 
 
 def parts_of(rule: AlarmRule, icon: str = "braces") -> list[PhrasePart]:
-    """The sentence; ``icon`` is that of the topic's type."""
+    """Return the words and slots of a rule; `icon` is that of the topic's type."""
     condition = rule.condition
     parts: list[PhrasePart] = []
     for words, hole, _spec, _conversion in Formatter().parse(_(_TEMPLATES[condition.kind])):
@@ -209,12 +209,12 @@ def _action_parts(place: int, action: AlarmAction) -> list[PhrasePart]:
 
 
 def payload_text(payload: object) -> str:
-    """JSON of what is asked or sent, on one line."""
+    """Return a payload as one line of JSON."""
     return json.dumps(payload, ensure_ascii=False)
 
 
 def typed_now(rule: AlarmRule, part: PhrasePart) -> str:
-    """What stands in the field when a slot is opened."""
+    """Return the initial text of the field of a slot."""
     condition = rule.condition
     match part.role:
         case "subject":
@@ -234,7 +234,7 @@ def typed_now(rule: AlarmRule, part: PhrasePart) -> str:
 
 
 def taken(rule: AlarmRule, part: PhrasePart, text: str) -> AlarmRule | None:
-    """The rule with what was typed into a slot; None when it can't be that."""
+    """Return the rule with `text` in a slot, or None if the text is invalid."""
     condition, text = rule.condition, text.strip()
     match part.role:
         case "subject":
@@ -263,7 +263,7 @@ _WRONG = object()
 
 
 def read_limit(condition: AlarmCondition, text: str) -> object:
-    """A number where one is needed; else what JSON says of it, or the text as it is."""
+    """Parse a limit: a number for kinds that need one, else JSON, else the text itself."""
     if condition.kind in NUMBER_KINDS:
         figures, *words = text.replace("%", " ").split() or [""]
         if any(each[0].isdigit() for each in words):
@@ -281,7 +281,7 @@ def read_limit(condition: AlarmCondition, text: str) -> object:
 
 
 def read_time(text: str) -> float | None:
-    """Seconds of "2", "2 s", "1.5 min", "3 h"; nothing is 0. None for what is no time."""
+    """Parse "2", "2 s", "1.5 min" or "3 h" to seconds; empty text is 0, invalid text None."""
     typed = text.strip()
     if not typed:
         return 0.0
@@ -296,14 +296,14 @@ def read_time(text: str) -> float | None:
 
 
 def with_action(rule: AlarmRule, place: int, action: AlarmAction | None) -> AlarmRule:
-    """The rule with another action in this place, or one more; None removes it."""
+    """Return the rule with its action at an index replaced, appended, or removed (None)."""
     actions = [*rule.actions]
     actions[place : place + 1] = [] if action is None else [action]
     return replace(rule, actions=tuple(actions))
 
 
 def with_kind(rule: AlarmRule, kind: str) -> AlarmRule:
-    """The rule with another kind; what still fits it is kept."""
+    """Return the rule with another kind; limit, duration and name are kept where they apply."""
     condition = rule.condition
     if kind == condition.kind:
         return rule
@@ -322,7 +322,7 @@ def with_kind(rule: AlarmRule, kind: str) -> AlarmRule:
 
 
 def rejection_of(part: PhrasePart, rule: AlarmRule) -> str:
-    """Return what a slot takes, for a text that it rejects."""
+    """Return what a slot accepts, for a text that it rejected."""
     match part.role:
         case "limit" if rule.condition.kind in NUMBER_KINDS:
             return _(SEPARATORS)
@@ -335,7 +335,7 @@ def rejection_of(part: PhrasePart, rule: AlarmRule) -> str:
 
 
 def example_of(part: PhrasePart, rule: AlarmRule) -> str:
-    """What may be typed into a slot, for an empty field."""
+    """Return the placeholder of a slot's field."""
     match part.role:
         case "subject":
             return _("a node") if rule.condition.is_about_node else _("a topic")

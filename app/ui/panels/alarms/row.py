@@ -1,4 +1,4 @@
-"""One alarm in the list: its switch, its sentence, how it is now, snooze and more."""
+"""Row of one alarm: switch, sentence, state, snooze and more."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from nep.programs.alarms.sentences import condition_words
 
 
 class AlarmRow(QWidget):
-    """Shows a rule; what a person wants of it is told by signals, with the slot's part where there is one."""
+    """Row of one alarm. Signals of slots carry their `PhrasePart`."""
 
     switched = Signal(bool)
     slot_pressed = Signal(object)
@@ -70,7 +70,7 @@ class AlarmRow(QWidget):
         column.addWidget(Separator(self._theme))
 
     def show_rule(self, rule: AlarmRule, icon: str, *, snoozed: bool) -> None:
-        """Show the rule; slots that stay keep the keyboard."""
+        """Show the rule; unchanged slots keep the keyboard focus."""
         said = condition_words(rule.condition)
         self.setAccessibleName(said)
         self.switch.setAccessibleName(_("Enable: {condition}").format(condition=said))
@@ -124,7 +124,7 @@ class AlarmRow(QWidget):
         return slot
 
     def show_state(self, words: str, status: str, icon: str | None, note: str) -> None:
-        """How it is now, and what else is worth saying."""
+        """Show the state in the chip, and a note."""
         self.chip.set(words, status, icon)
         if self.note.text() != note:
             self.note.setText(note)

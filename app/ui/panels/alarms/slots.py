@@ -1,4 +1,4 @@
-"""The slots of a sentence: a word that is chosen, and the field in which one types another."""
+"""Editable words of an alarm's sentence and the field to type their values."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ FIELD_WIDTH = 240
 
 
 class AlarmSlot(PaintedButton):
-    """A word of an alarm's sentence that a person may change; Delete and Backspace remove an action."""
+    """Button for a word of the sentence; Delete and Backspace remove an action."""
 
     shortens = True
     removed = Signal()
@@ -91,10 +91,10 @@ class AlarmSlot(PaintedButton):
 
 
 class SlotField(QLineEdit):
-    """Lies over a slot while one types; what exists is offered. Enter and Tab take it, Esc gives up.
+    """Line edit above a slot, with completion. Enter and Tab accept the text, Esc cancels.
 
-    ``take`` is given the text and says whether it can be that; what can't stays, with an edge in red and the
-    sentence ``rejection``.
+    `take` receives the text and returns False if it is invalid; the field then stays, outlined in red, with
+    the sentence `rejection`. `row` is the parent, because the field is taller than the `slot`.
     """
 
     ended = Signal()
@@ -110,7 +110,6 @@ class SlotField(QLineEdit):
         *,
         rejection: str = "",
     ) -> None:
-        """``row`` is what the sentence of the ``slot`` lies in: the field is higher than a line of it."""
         super().__init__(text, row)
         self.slot, self._take, self._is_over = slot, take, False
         self._rejection = rejection
@@ -127,7 +126,7 @@ class SlotField(QLineEdit):
         popup = completer.popup()
         if popup is not None:
             popup.setProperty("offers", "true")
-            popup.setItemDelegate(QStyledItemDelegate(popup))  # which the style sheet can give room
+            popup.setItemDelegate(QStyledItemDelegate(popup))  # lets the style sheet set the padding of items
         self.setCompleter(completer)
         self.textEdited.connect(lambda _text: self._mark(wrong=False))
         self._place(theme, row)
@@ -146,7 +145,7 @@ class SlotField(QLineEdit):
         self.setGeometry(rect)
 
     def offer(self, words: Sequence[str]) -> None:
-        """What exists now."""
+        """Set the completions."""
         if list(words) == self._offered.stringList():
             return
         self._offered.setStringList(list(words))
@@ -159,7 +158,7 @@ class SlotField(QLineEdit):
         completer.complete()
 
     def _chosen(self, _text: str) -> None:
-        """One of those that exist was chosen: it is taken as soon as it stands in the field."""
+        # QCompleter sets the text after this signal.
         QTimer.singleShot(0, self, self._take_and_leave)
 
     def _take_and_leave(self) -> None:
@@ -208,7 +207,7 @@ class SlotField(QLineEdit):
                 QToolTip.hideText()
 
     def leave(self, *, keeps_focus: bool = True) -> None:
-        """The field goes; the keyboard goes back to its slot."""
+        """Close the field and return the focus to its slot."""
         if self._is_over:
             return
         self._is_over = True
