@@ -1,6 +1,6 @@
-"""Behaviour: the block editor, its tabs, and the program that its blocks make.
+"""Behaviour panel: block editor, tabs and the generated program.
 
-`panel` is the whole, `tabs` and `tab` its head, `live_values` what sensors' blocks show.
+`panel` is the panel, `tabs` and `tab` its title bar, `live_values` the values on sensor blocks.
 """
 
 from app.ui.panels.behaviour.panel import PANEL as PANEL

@@ -1,4 +1,4 @@
-"""The backpack of the block editor: the page asks, its file is changed, and the page hears what is in it."""
+"""Connection of the block editor's backpack to its file."""
 
 from __future__ import annotations
 
@@ -14,11 +14,11 @@ from app.ui.panels.base import PanelContext
 from nep.i18n import _, ngettext
 from nep.text import bounded_str
 
-LOOK_EVERY = 30  # refreshes of 30 a second: what another Studio has put in shows within a second
+LOOK_EVERY = 30  # refreshes at 30 Hz: changes of another Studio appear within a second
 
 
 class Shows(Protocol):
-    """The editor, as far as it shows the backpack."""
+    """Part of the editor that shows the backpack."""
 
     backpack_asked: SignalInstance
 
@@ -26,9 +26,10 @@ class Shows(Protocol):
 
 
 class BackpackKeeper:
-    """Does what the page asks, as JSON whose "do" is put (blocks, count, notes), remove (id), empty or look.
+    """Handles the page's requests about the backpack.
 
-    Each change offers to undo it.
+    A request is JSON with "do": put (blocks, count, notes), remove (id), empty or look. Every
+    change can be undone from its toast.
     """
 
     def __init__(self, context: PanelContext, backpack: Backpack, editor: Shows) -> None:
@@ -39,13 +40,13 @@ class BackpackKeeper:
         self.look()
 
     def tick(self) -> None:
-        """Look now and then whether another Studio has changed it; call it with every refresh."""
+        """Poll for changes by another Studio; call on every refresh."""
         self._ticks += 1
         if self._ticks % LOOK_EVERY == 0:
             self.look()
 
     def look(self) -> None:
-        """Show what is in it now."""
+        """Reload the backpack if its file changed and show it."""
         self._backpack.look()
         self._show()
 
@@ -76,7 +77,7 @@ class BackpackKeeper:
             self._take_out(self._backpack.empty, emptied=True)
 
     def _put(self, blocks: Sequence[Mapping[str, object]], count: int, *, left: bool) -> None:
-        """``left``: there were notes, too, which belong to their page and stay there."""
+        # `left`: the selection contained notes, which the backpack doesn't store.
         made: list[Packed] = []
         if blocks and self._try(lambda: made.extend(self._backpack.put(blocks))):
             words = ngettext(
@@ -95,7 +96,6 @@ class BackpackKeeper:
             self._context.toast(words, _("Undo"), lambda: self._try(lambda: self._backpack.restore(gone)))
 
     def _try(self, change: Callable[[], object]) -> bool:
-        """Whether it could be done; a person is told why not."""
         try:
             change()
         except BackpackError as error:

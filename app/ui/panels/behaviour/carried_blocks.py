@@ -1,4 +1,4 @@
-"""Blocks that are carried out of the page: a tab under them opens, and takes them when they are let go."""
+"""Dragging of blocks out of the page and onto the tabs of other behaviours."""
 
 from __future__ import annotations
 
@@ -15,13 +15,13 @@ from app.ui.panels.behaviour.tabs import NEW, BehaviourTabs
 from nep.i18n import _, ngettext
 
 SCROLL_MS = 16
-OPENS_MS = 500  # as folders in a file manager
-BESIDE = QPoint(14, 16)  # from the mouse to the picture: what is under the mouse can be read
+OPENS_MS = 500  # like spring-loaded folders in file managers
+BESIDE = QPoint(14, 16)  # offset from the mouse, so that the tab under it stays readable
 OPACITY = 0.85
 
 
 class Carrier(Protocol):
-    """The editor, as far as blocks leave it."""
+    """Part of the editor that blocks are dragged out of."""
 
     block_carried: SignalInstance
     carried_seen: SignalInstance
@@ -33,13 +33,12 @@ class Carrier(Protocol):
 
 
 class CarriedPicture(QWidget):
-    """What is carried, at the mouse: the page shows nothing outside of itself.
+    """Picture of the dragged blocks at the mouse, because the page can't paint outside itself.
 
-    It lies over a window, takes no clicks, and is hidden until it has a place and a picture.
+    An overlay of `window` that ignores the mouse; hidden until it has position and picture.
     """
 
     def __init__(self, window: QWidget) -> None:
-        """``window`` is the one in which things are carried."""
         super().__init__(window)
         self._picture = QPixmap()
         self._place: QPoint | None = None
@@ -48,7 +47,7 @@ class CarriedPicture(QWidget):
         self.hide()
 
     def set_picture(self, data: bytes, ratio: float) -> None:
-        """How it looks: a PNG with so many pixels in one of the page; too late, it is nothing."""
+        """Set the picture: PNG data with `ratio` pixels per page pixel. Ignored after the drag ended."""
         picture = QPixmap()
         if self._place is None or not picture.loadFromData(data):
             return
@@ -58,7 +57,7 @@ class CarriedPicture(QWidget):
         self.move_to(self._place)
 
     def move_to(self, place: QPoint | None) -> None:
-        """The mouse is at this place of the screen; None: nothing is carried any more."""
+        """Move to a position on the screen; None ends the drag."""
         self._place = place
         if place is None:
             self._picture = QPixmap()
@@ -79,11 +78,12 @@ class CarriedPicture(QWidget):
 
 
 class CarriedBlocks:
-    """Marks the tab under a block that is carried out of the page, and lets it have the block there.
+    """Highlights the tab under blocks dragged out of the page, and drops them there.
 
-    A tab on which it is held for a while opens, and the block can be dragged on there. Let go on "+" a new
-    behaviour takes it; let go elsewhere it is where it was. Held near an end of the row it brings the tabs
-    that are out of sight there.
+    A tab opens after the mouse has stayed on it for a while, and the drag continues on its page. A drop on
+    "+" creates a behaviour; a drop elsewhere returns the blocks. Near an end of the tab bar the tabs scroll.
+
+    `flush` calls back once the newest edits have arrived; `show` shows the current behaviour at once.
     """
 
     def __init__(
@@ -95,10 +95,9 @@ class CarriedBlocks:
         flush: Callable[[Callable[[], None]], None],
         show: Callable[[], None],
     ) -> None:
-        """``flush`` calls back once the newest edits are known; ``show`` shows the current behaviour now."""
         self._context, self._session, self._tabs, self._editor = context, session, tabs, editor
         self._flush, self._show = flush, show
-        self._home = ""  # the tab that it comes from
+        self._home = ""  # key of the tab that the drag started on
         self._held_at: QPoint | None = None
         self._picture: CarriedPicture | None = None
         self._aimed = ""
@@ -115,13 +114,12 @@ class CarriedBlocks:
         editor.blocks_brought.connect(self._brought)
 
     def _target(self, place: QPoint) -> str:
-        """The tab there which can take blocks of their behaviour, by its key, or `NEW`; "" for none."""
         found = self._tabs.target_at(place)
         return found if found != self._home else ""
 
     def _carried(self, place: QPoint | None, home: str) -> None:
         self._held_at = place
-        if place is not None:  # else it has been let go, and what shows now says nothing about where it was
+        if place is not None:  # None after the drop: the visible tab may already be another one
             self._home = home
         self._show_at(place)
         self._aim(place)
@@ -135,10 +133,9 @@ class CarriedBlocks:
         if place is not None and self._tabs.scroll_at(place):
             self._aim(place)
         else:
-            self._scrolling.stop()  # what is moved from here on starts it again
+            self._scrolling.stop()  # the next mouse move starts it again
 
     def _aim(self, place: QPoint | None) -> None:
-        """Mark the tab there; it opens when it stays the one, unless it is the one that shows."""
         self._tabs.aim(self._target(place) if place is not None else "")
         found = self._tabs.target_at(place) if place is not None else ""
         if found == self._aimed:
@@ -150,7 +147,6 @@ class CarriedBlocks:
             self._opening.start()
 
     def _open(self) -> None:
-        """Let the tab show on which something is held; the page keeps it in the hand."""
         if self._held_at is not None and self._aimed not in {"", NEW}:
             self._context.run(f"tab:{self._aimed}")
             self._show()
@@ -160,7 +156,6 @@ class CarriedBlocks:
             self._picture.set_picture(data, ratio)
 
     def _show_at(self, place: QPoint | None) -> None:
-        """Let the picture follow the mouse, in the window in which the tabs are now."""
         window = self._tabs.window()
         if place is not None and (self._picture is None or self._picture.parentWidget() is not window):
             if self._picture is not None:
@@ -182,7 +177,7 @@ class CarriedBlocks:
             self._bring()
             return
         self._context.run("file.new")
-        self._flush(self._bring)  # after its own flush, with which the new behaviour comes
+        self._flush(self._bring)  # after the flush of file.new, which shows the new behaviour
 
     def _bring(self) -> None:
         if self._session.document.key != self._home:
@@ -201,7 +196,7 @@ class CarriedBlocks:
 
 
 def brought_words(count: int, how: str, name: str) -> str:
-    """That so many blocks ("moved", "copied", "added") are in the behaviour of that name; 0: a note."""
+    """Return the toast after blocks were "moved", "copied" or "added" to a behaviour; count 0 is a note."""
     if not count:
         words = _("Moved the note to {name}") if how == "moved" else _("Copied the note to {name}")
     elif how == "moved":

@@ -1,4 +1,4 @@
-"""What sensor blocks say now: "84 %" on the battery."""
+"""Live values on sensor blocks, such as "84 %" on the battery."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ SILENT = "silent"
 
 
 class KnownValues(Protocol):
-    """What is known of a robot that is there (`app.core.robots.robot_link.RobotLink`)."""
+    """Known state of a robot (`app.core.robots.robot_link.RobotLink`)."""
 
     @property
     def robot(self) -> Robot: ...
@@ -25,15 +25,15 @@ class KnownValues(Protocol):
 
 
 class RobotLookup(Protocol):
-    """Where robots are found by their names."""
+    """Lookup of robots by name."""
 
     def link(self, name: str) -> KnownValues | None: ...
 
 
 def live_words(fleet: RobotLookup, sensors: Iterable[tuple[str, str]]) -> tuple[dict[str, str], set[str]]:
-    """Words by ``<robot>/<sensor>`` and ``<robot>/<sensor>/<field>``, and which of them are old.
+    """Return texts by ``<robot>/<sensor>`` or ``<robot>/<sensor>/<field>``, and the keys that are stale.
 
-    Old is what a robot told that has fallen silent. A robot that is away says nothing.
+    Values are stale when the robot is silent. A disconnected robot has none.
     """
     words: dict[str, str] = {}
     old: set[str] = set()
@@ -50,7 +50,6 @@ def live_words(fleet: RobotLookup, sensors: Iterable[tuple[str, str]]) -> tuple[
 
 
 def _words(key: str, sensor: Sensor, value: object) -> dict[str, str]:
-    """One sensor, or each field of one that has several."""
     if sensor.kind != "object":
         return {key: reading_of(sensor, value).value}
     parts = value if isinstance(value, Mapping) else {}

@@ -1,4 +1,4 @@
-"""Behaviour: the block editor, and the program that its blocks make."""
+"""Behaviour panel: the block editor and the generated program."""
 
 from __future__ import annotations
 
@@ -38,19 +38,19 @@ if TYPE_CHECKING:
     from app.core.robots.robot_link import RobotLink
     from app.core.run.control import Runs
 
-LIVE_EVERY = 6  # refreshes of 30 a second: words on sensor blocks are renewed five times a second
+LIVE_EVERY = 6  # refreshes at 30 Hz: values on sensor blocks are updated five times a second
 PINNED = "toolbox_pinned"
 ALARMS = frozenset({NOT_STOPPED, STOPPING, "silent"})
 WAIT_WORDS = lazy("Loading blocks.")
 WAIT_UNTIL_S = 0.5
 WANTED = {"robot": "robots.virtual", "examples": "help.examples"}
-"""The commands behind the buttons of an empty canvas."""
-_GAP = re.compile(r"\([^()]*\)")  # as the help writes what is filled in: "(robot) say (text)"
+"""Commands of the buttons on an empty canvas."""
+_GAP = re.compile(r"\([^()]*\)")  # placeholders in the help, such as "(robot) say (text)"
 Json = Mapping[str, object]
 
 
 class Editor(Protocol):
-    """What the panel needs of the block editor (`app.ui.blockly.view.BlocklyView`)."""
+    """Interface of the block editor (`app.ui.blockly.view.BlocklyView`)."""
 
     changed: SignalInstance
     history_changed: SignalInstance
@@ -107,15 +107,16 @@ class Editor(Protocol):
 
 
 def blockly(parent: QWidget) -> Editor:
-    """The real editor, made when the panel is first seen."""
-    # Qt WebEngine takes a fifth of a second to import: only when the editor is seen for the first time.
+    """Create the real editor; called when the panel is first shown."""
+    # Importing Qt WebEngine takes about 200 ms.
     from app.ui.blockly.view import BlocklyView  # noqa: PLC0415
 
-    return cast("Editor", BlocklyView(parent))  # its signals are instances, which mypy cannot see
+    # mypy doesn't know that signals of instances are SignalInstance
+    return cast("Editor", BlocklyView(parent))
 
 
 class BehaviourPanel(PanelWidget):
-    """The behaviour that is open: Blocks to build with, Python to read."""
+    """The active behaviour as blocks (to edit) or Python (to read)."""
 
     def __init__(self, context: PanelContext, make_editor: Callable[[QWidget], Editor] = blockly) -> None:
         super().__init__(context, _("Behaviour"))
@@ -146,8 +147,8 @@ class BehaviourPanel(PanelWidget):
         self._given: dict[str, tuple[int, int]] = {}
         self._watches: dict[str, Watch] = {}
         self._sensors: tuple[tuple[str, str], ...] = ()
-        self._offered: tuple[tuple[str, str], ...] = ()  # in the toolbox, while it is open
-        self._watched: tuple[str, ...] = ()  # the variables whose values the page shows
+        self._offered: tuple[tuple[str, str], ...] = ()  # sensors in the flyout while it is open
+        self._watched: tuple[str, ...] = ()  # ids of variables whose values the page shows
         self._ticks = 0
         self._carried: CarriedBlocks | None = None
         self._backpack: BackpackKeeper | None = None
@@ -155,7 +156,7 @@ class BehaviourPanel(PanelWidget):
     def replaces_title(self) -> QWidget:
         return self._bar
 
-    # -- what it shows ------------------------------------------------------------------------------------
+    # -- display ------------------------------------------------------------------------------------------
 
     def refresh(self) -> None:
         self._ticks += 1
@@ -175,7 +176,6 @@ class BehaviourPanel(PanelWidget):
             self._show_run(self.editor)
 
     def _show_run(self, editor: Editor) -> None:
-        """Show on the blocks what runs, what was found, and what robots and variables tell."""
         runs, document = self.session.runs, self.session.document
         mine = runs.document is document
         if self._new("blocks", (runs.blocks_revision, mine)):
@@ -201,7 +201,7 @@ class BehaviourPanel(PanelWidget):
         editor.set_first_step(pgettext("block", "when started"), robot)
 
     def show_current(self) -> None:
-        """Show another tab at once: a person who pressed on it does not wait for the next tick."""
+        """Show the active tab at once, without waiting for the next tick."""
         if self.editor is not None and self.editor.is_ready:
             self._bar.tabs.show_tabs(
                 tab_facts(self.session.documents, self.session.runs), self.session.document.key
@@ -209,7 +209,6 @@ class BehaviourPanel(PanelWidget):
             self._show_blocks(self.editor)
 
     def _show_blocks(self, editor: Editor) -> None:
-        """Let the editor show the current behaviour, and forget those that were closed."""
         document = self.session.document
         now = (document.revision, document.mends)
         known = self._given.get(document.key)
@@ -227,7 +226,6 @@ class BehaviourPanel(PanelWidget):
             editor.close_tab(key)
 
     def _new(self, what: str, now: object) -> bool:
-        """Whether this differs from what was shown."""
         if self._shown.get(what) == now and what in self._shown:
             return False
         self._shown[what] = now
@@ -273,7 +271,6 @@ class BehaviourPanel(PanelWidget):
         return editor
 
     def _refuse(self, missing: MissingLibraries) -> None:
-        """Say in place of the blocks what to install; the program can be read all the same."""
         tell_missing(self.session.alerts, missing)
         state = EmptyState(self.theme, "circle-x", missing.title, missing.remedy)
         if missing.command:
@@ -286,7 +283,7 @@ class BehaviourPanel(PanelWidget):
         self.context.toast(_("Copied “{command}”").format(command=command))
 
     def _program_changed(self, program: Program) -> None:
-        """The program is another one: its problems, the sensors it reads, its text."""
+        # Connected to the session: updates absent blocks, sensors and the program's text.
         if self.editor is not None:
             self.editor.set_absent(program.absent)
         self._sensors = tuple(program.sensors)
@@ -309,7 +306,7 @@ class BehaviourPanel(PanelWidget):
         self._watched = ids
 
     def edit_variable(self, edit: Mapping[str, object]) -> None:
-        """Make, rename or delete a variable, or show it; the blocks come to the front."""
+        """Create, rename, delete or show a variable in the blocks view."""
         self.set_mode("blocks")
         if self.editor is not None:
             if edit.get("do") == "undo":
@@ -320,7 +317,7 @@ class BehaviourPanel(PanelWidget):
                 self.editor.edit_variable(edit)
 
     def _keep_pinned(self, keeps: bool) -> None:
-        """Remember it for the next start; settings that cannot be written are told by the status bar."""
+        # Failed writes are shown by the status bar.
         with suppress(SettingsError):
             self.session.settings.set(PINNED, keeps)
 
@@ -329,7 +326,6 @@ class BehaviourPanel(PanelWidget):
         self.context.toast(words, _("Undo"), editor.undo_deletion)
 
     def _show_live(self) -> None:
-        """What sensor blocks say now: "84 %" on the battery, in the behaviour and in the open toolbox."""
         sensors = dict.fromkeys((*self._sensors, *self._offered))
         self._look_at({robot for robot, _name in sensors})
         if self.editor is not None:
@@ -340,7 +336,7 @@ class BehaviourPanel(PanelWidget):
         if self.editor is not None:
             self.editor.set_theme(self.theme.blockly_tokens(), self.theme.dark)
 
-    # -- what a person does -------------------------------------------------------------------------------
+    # -- user actions -------------------------------------------------------------------------------------
 
     def set_mode(self, mode: str) -> None:
         """Show "blocks" or "python"."""
@@ -351,63 +347,63 @@ class BehaviourPanel(PanelWidget):
             self.flush(lambda: self.program.show_program(self.session.document.program().source))
 
     def copy_program(self) -> None:
-        """Put the Python text on the clipboard."""
+        """Copy the program's text to the clipboard."""
         QGuiApplication.clipboard().setText(self.program.toPlainText())
         self.context.toast(_("Copied the program"))
 
     def flush(self, done: Callable[[], None]) -> None:
-        """Take over the newest edits (the editor tells them 150 ms late), then call ``done``."""
+        """Fetch edits that the editor has not sent yet (it debounces them by 150 ms), then call `done`."""
         if self.editor is None:
             done()
             return
 
-        # An edit that was still on its way is told before the answer. A behaviour that nobody edited stays
-        # the file's own JSON, which Blockly would write another way.
+        # Pending edits arrive before the reply. The reply itself is ignored: an unedited behaviour keeps the
+        # JSON of its file, which Blockly would serialize differently.
         self.editor.flush(lambda _workspace: done())
 
     def undo(self) -> None:
-        """Take back the last edit of the blocks."""
+        """Undo the last edit of the blocks."""
         if self.editor is not None:
             self.editor.undo()
 
     def redo(self) -> None:
-        """Do it again."""
+        """Redo the last undone edit."""
         if self.editor is not None:
             self.editor.redo()
 
     def edit_blocks(self, what: str) -> None:
-        """Do "copy", "cut", "paste" or "duplicate" with the blocks, unless the page has the keys itself."""
+        """Run "copy", "cut", "paste" or "duplicate" on the selected blocks if the blocks view is active."""
         if self.editor is not None and self.mode == "blocks":
             self.editor.edit(what)
 
     def edit_from_menu(self, what: str) -> None:
-        """Do "cut", "copy", "paste" or "selectAll" in the page's field with the keys, else with blocks."""
+        """Run "cut", "copy", "paste" or "selectAll" on the page's focused text field, else on the blocks."""
         if self.editor is not None and self.mode == "blocks":
             self.editor.edit_from_menu(what)
 
     def picture(self, kind: str, white: bool, done: Callable[[bytes], None]) -> None:
-        """Make a "png" or "svg" of all blocks; b"" when there are none."""
+        """Render all blocks as "png" or "svg" and pass the data to `done`; b"" if there are none."""
         if self.editor is None:
             done(b"")
         else:
             self.editor.picture(kind, white, done)
 
     def pdf(self, title: str, date: str, layout: QPageLayout, done: Callable[[bytes], None]) -> None:
-        """Make a PDF of all blocks on paper of this layout; b"" when there are none."""
+        """Render all blocks as a PDF with this page layout and pass it to `done`; b"" without blocks."""
         if self.editor is None:
             done(b"")
         else:
             self.editor.pdf(title, date, layout, done)
 
     def find_blocks(self, *, to_add: bool) -> None:
-        """Let the keys go to the field that finds blocks in the behaviour, or blocks to add."""
+        """Open the search in the toolbox (`to_add`), or the search in the behaviour."""
         self.set_mode("blocks")
         if self.editor is not None:
             self.setFocus(Qt.FocusReason.ShortcutFocusReason)
             (self.editor.open_search if to_add else self.editor.open_find)()
 
     def point_at(self, block: str) -> None:
-        """Show a person where the block of this type is that comes next, and where it goes; "" ends that."""
+        """Point at the block of this type in the toolbox and at its destination; "" ends that."""
         if self.editor is None:
             return
         if not block:
@@ -423,7 +419,7 @@ class BehaviourPanel(PanelWidget):
         self.editor.point_at(block, name, then)
 
     def show_block(self, block: str) -> None:
-        """Show the blocks, and this one in the middle."""
+        """Show the blocks view with this block centred."""
         self.set_mode("blocks")
         if self.editor is not None:
             self.editor.show_block(block)
@@ -436,7 +432,7 @@ class BehaviourPanel(PanelWidget):
             self.session.tabs.edited(document, was_blank=was_blank)
 
     def rename_tab(self, key: str) -> None:
-        """Let a person edit the name of a tab."""
+        """Start to edit the name of a tab."""
         self._bar.tabs.edit(key)
 
     def _why_not_named(self, key: str, name: str) -> str:
@@ -448,7 +444,7 @@ class BehaviourPanel(PanelWidget):
         self._bar.redo.setEnabled(can_redo)
 
     def _key(self, key: str) -> None:
-        self.context.run(f"key:{key}")  # whatever that key is for, as the person chose
+        self.context.run(f"key:{key}")  # the shortcut table knows the command of this key
 
     def save_state(self) -> dict[str, object]:
         return {"mode": self.mode}
@@ -465,13 +461,12 @@ class BehaviourPanel(PanelWidget):
 
 
 class BlocksWait:
-    """Says in the middle of ``place`` that the blocks are on their way.
+    """Loading message in the middle of `place`.
 
-    Only after half a second: a page that is quick is not announced, so nothing flickers.
+    It appears only after half a second, so that fast loading doesn't flicker. `clock` returns seconds.
     """
 
     def __init__(self, place: QWidget, clock: Callable[[], float] = time.monotonic) -> None:
-        """``clock`` gives seconds."""
         self._place, self._clock = place, clock
         self._since: float | None = None
         self.words = label(_(WAIT_WORDS), "bodyLarge", role="textSecondary", wrap=True)
@@ -481,7 +476,7 @@ class BlocksWait:
         self.words.hide()
 
     def tell(self, *, ready: bool) -> None:
-        """Whether the page is there now; call it with every refresh."""
+        """Report the page's readiness; call on every refresh."""
         now = self._clock()
         if ready:
             self._since = None
@@ -496,12 +491,12 @@ class BlocksWait:
 
 
 def alarms_of(links: Iterable[RobotLink]) -> dict[str, tuple[str, str]]:
-    """What the toolbox says of robots that may move or do not answer, instead of a green dot."""
+    """Return icon and text for the toolbox of robots that may be moving or don't answer."""
     return {link.name: (ROBOT_STATUS[link.state], link.state_words) for link in links if link.state in ALARMS}
 
 
 def tab_facts(documents: Iterable[Document], runs: Runs) -> list[TabFacts]:
-    """What the tabs of behaviours show."""
+    """Return the facts that the tabs of behaviours show."""
     shown = list(documents)
     found = []
     for document, title in zip(shown, told_apart([(each.name, each.path) for each in shown]), strict=True):

@@ -1,4 +1,4 @@
-"""The program of a behaviour as Python text: coloured, to read and to copy, never to edit."""
+"""Read-only view of a behaviour's Python program with syntax highlighting."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from app.ui.theme.theme import Theme
 from app.ui.widgets.menus import EditMenu
 from nep.i18n import _
 
-# The first rule that fits a place colours it: text and comments before the words inside them.
+# The first rule that matches wins: strings and comments come before keywords.
 _RULES: tuple[tuple[str, str], ...] = (
     ("ok", r"""[fFrRbB]{0,2}(?:\"(?:\\.|[^\"\\])*\"|'(?:\\.|[^'\\])*')"""),
     ("textTertiary", r"#[^\n]*"),
@@ -40,7 +40,7 @@ class _Colours(QSyntaxHighlighter):
 
 
 class ProgramView(QPlainTextEdit):
-    """Python text in the colours of the theme."""
+    """Read-only Python text in the colours of the theme."""
 
     def __init__(self, theme: Theme) -> None:
         super().__init__()
@@ -63,7 +63,7 @@ class ProgramView(QPlainTextEdit):
         self._colours.rehighlight()
 
     def show_program(self, source: str) -> None:
-        """Show this text; the place that is read stays."""
+        """Show the program and keep the scroll position."""
         if source != self.toPlainText():
             bar = self.verticalScrollBar()
             place = bar.value()
@@ -71,6 +71,6 @@ class ProgramView(QPlainTextEdit):
             bar.setValue(place)
 
     def line_with(self, words: str) -> int:
-        """The number of the first line with these words, from 1; 0 when there is none."""
+        """Return the number of the first line that contains `words`, counted from 1; 0 if none does."""
         found = self.document().find(QRegularExpression(QRegularExpression.escape(words)))
         return found.blockNumber() + 1 if not found.isNull() else 0

@@ -1,4 +1,4 @@
-"""One open behaviour as a tab: its name, a dot while it is not saved, an amber one while it runs, close."""
+"""Tab of one open behaviour."""
 
 from __future__ import annotations
 
@@ -28,12 +28,12 @@ MOST_LETTERS = 200
 SAID_MS = 20_000
 PADDING = 12
 ICON = 16
-SLOT = 18  # the unsaved dot, or close under the mouse
+SLOT = 18  # place of the unsaved dot or, on hover, the close button
 
 
 @dataclass(frozen=True)
 class TabFacts:
-    """What a tab shows."""
+    """Facts that a tab shows."""
 
     key: str
     name: str
@@ -41,12 +41,12 @@ class TabFacts:
     runs: bool = False
     tip: str = ""
     plain_name: str = ""
-    """Its name alone, which a person edits: without the folder that tells it from another."""
+    """Name to edit, without the folder that distinguishes equal names."""
     has_file: bool = False
 
 
 class BehaviourTab(PaintedButton):
-    """One open behaviour. Amber dot in place of the icon: its program runs; small dot: not saved."""
+    """Tab of one behaviour. An amber dot instead of the icon: running; a small dot: not saved."""
 
     chosen = Signal()
     close_pressed = Signal()
@@ -62,7 +62,7 @@ class BehaviourTab(PaintedButton):
         self.setMouseTracking(True)
 
     def show_facts(self, facts: TabFacts, current: bool) -> bool:
-        """Show these; whether the width changed."""
+        """Show the facts; return True if the width of the tab changed."""
         if facts == self.facts and current == self.isChecked():
             return False
         wider = facts.name != self.facts.name or current != self.isChecked() or facts.runs != self.facts.runs
@@ -96,7 +96,7 @@ class BehaviourTab(PaintedButton):
         return font
 
     def close_rect(self) -> QRectF:
-        """Where a press closes."""
+        """Return the rectangle of the close button."""
         rect = QRectF(self.rect())
         return QRectF(rect.right() - SLOT - 1, rect.center().y() - 8, 16, 16)
 
@@ -202,16 +202,16 @@ class BehaviourTab(PaintedButton):
 
 
 class NameField(QLineEdit):
-    """A tab's name in the making, in the place of the tab: Enter takes it, Esc leaves it as it was.
+    """Field to rename a tab in place: Enter accepts, Esc cancels.
 
-    A press elsewhere takes it too, unless the behaviour can't be called so; then it stays as it was.
+    A click elsewhere accepts a valid name and cancels otherwise. `why_not` returns the reason why a name is
+    invalid, or "".
     """
 
     taken = Signal(str)
     left = Signal()
 
     def __init__(self, theme: Theme, name: str, why_not: Callable[[str], str], parent: QWidget) -> None:
-        """``why_not`` says in a sentence why a name can't be had, "" when it can."""
         super().__init__(name, parent)
         self._theme, self._why_not, self._ended = theme, why_not, False
         self.setAccessibleName(_("Behaviour name"))
@@ -257,7 +257,6 @@ class NameField(QLineEdit):
             self.left.emit()
 
     def _mark(self, problem: str) -> None:
-        """Say below the field what is wrong with the name."""
         wrong = "true" if problem else ""
         if self.property("wrong") != wrong:
             self.setProperty("wrong", wrong)

@@ -1,4 +1,4 @@
-"""The title of the behaviour: the open ones as tabs, "+" for a new one, undo and redo, Blocks or Python."""
+"""Title bar of the behaviour panel: tabs, "+", undo, redo, and the switch between Blocks and Python."""
 
 from __future__ import annotations
 
@@ -17,22 +17,22 @@ from nep.i18n import _
 
 SHORTEST = 76
 GAP = 4
-NAME_WIDTH = 180  # to edit a name in
+NAME_WIDTH = 180  # width of the name field
 SCROLL_NEAR, SCROLL_STEP = 32, 8  # px
 NEW = "+"
-"""In the place of a tab's key: the button for a new one."""
+"""Stands for the "+" button in place of a tab's key."""
 
 
 class BehaviourTabs(QWidget):
-    """All tabs side by side and "+"; narrow room shortens them, then the wheel moves them along.
+    """Tab bar with "+". Tabs shrink when space is short, then scroll with the wheel.
 
-    While some are out of sight, a button lists all.
+    While some tabs are scrolled out of view, a button lists all of them.
     """
 
     chosen = Signal(str)
     closed = Signal(str)
     moved = Signal(str, int)
-    asked = Signal(str, str)  # a command of a tab's menu, and the tab's key
+    asked = Signal(str, str)  # command of a tab's context menu, key of the tab
     renamed = Signal(str, str)
 
     def __init__(self, theme: Theme) -> None:
@@ -42,11 +42,11 @@ class BehaviourTabs(QWidget):
         self._current = ""
         self._left = 0.0
         self.why_not: Callable[[str, str], str] = lambda _key, _name: ""
-        """Why a tab, by its key, can't have a name; "" when it can."""
+        """Returns why a tab (key) can't have a name, or ""."""
         self.field: NameField | None = None
         self._edited = ""
         self.tabs: dict[str, BehaviourTab] = {}
-        self._room = QWidget(self)  # cuts off what the wheel has moved out of sight
+        self._room = QWidget(self)  # clips tabs that are scrolled out of view
         self.add = IconButton(theme, "plus", _("New behaviour"), "Ctrl+N", parent=self)
         self.add.setProperty("command", "file.new")
         self.list = IconButton(theme, "chevron-down", _("All open behaviours"), parent=self)
@@ -57,7 +57,7 @@ class BehaviourTabs(QWidget):
         theme.changed.connect(self._restyle)
 
     def show_tabs(self, facts: Sequence[TabFacts], current: str) -> None:
-        """Show exactly these, in this order."""
+        """Show exactly these tabs in this order."""
         wanted = tuple(facts)
         if (wanted, current) == (self._facts, self._current):
             return
@@ -90,7 +90,6 @@ class BehaviourTabs(QWidget):
         return self.tabs[key]
 
     def _list_all(self) -> None:
-        """Open below the button what is open; who chooses one goes there."""
         menu = Menu(self._theme, self)
         menu.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
         for each in self._facts:
@@ -100,10 +99,10 @@ class BehaviourTabs(QWidget):
             entry.triggered.connect(lambda _on=False, key=each.key: self.chosen.emit(key))
         drop_below(menu, self.list)
 
-    # -- blocks from the page ---------------------------------------------------------------------
+    # -- drops of blocks --------------------------------------------------------------------------
 
     def target_at(self, place: QPoint) -> str:
-        """The key of the tab at that place of the screen, `NEW` for "+", "" where there is neither."""
+        """Return the key of the tab at a screen position, `NEW` for "+", or ""."""
         if not self.isVisible():
             return ""
         here = self.mapFromGlobal(place)
@@ -114,7 +113,7 @@ class BehaviourTabs(QWidget):
         return next((key for key, tab in self.tabs.items() if tab.geometry().contains(here)), "")
 
     def scroll_at(self, place: QPoint) -> bool:
-        """Move the tabs on while something is held near an end where more of them are; whether they moved."""
+        """Scroll while a drag is near an end of the bar; return True if the tabs moved."""
         here, room = self.mapFromGlobal(place), self._room.geometry()
         if not self.isVisible() or not room.contains(here):
             return False
@@ -128,15 +127,15 @@ class BehaviourTabs(QWidget):
         return self._left != before
 
     def aim(self, key: str) -> None:
-        """Put a ring round this tab, or "+" (`NEW`): what is in the hand goes there; "" takes it away."""
+        """Highlight the drop target: a tab's key, `NEW` for "+", or "" for none."""
         for each, tab in self.tabs.items():
             tab.set_aimed(each == key)
         self.add.set_aimed(key == NEW)
 
-    # -- another name -----------------------------------------------------------------------------
+    # -- renaming ---------------------------------------------------------------------------------
 
     def edit(self, key: str) -> None:
-        """Let a person edit the name of a tab, in its place."""
+        """Edit the name of a tab in place."""
         if key not in self.tabs:
             return
         self._end_edit()
@@ -163,7 +162,7 @@ class BehaviourTabs(QWidget):
             self.tabs[self._edited].setFocus(Qt.FocusReason.OtherFocusReason)
 
     def _place_field(self) -> None:
-        self.add.setVisible(self.field is None)  # the field may be where it stands
+        self.add.setVisible(self.field is None)  # the field may cover it
         if self.field is None or self._edited not in self.tabs:
             return
         tab = self.tabs[self._edited].geometry()
@@ -177,7 +176,6 @@ class BehaviourTabs(QWidget):
         self.chosen.emit(keys[(keys.index(self._current) + step) % len(keys)])
 
     def _drag(self, key: str, x: int) -> None:
-        """A tab changes places with the one whose middle it passes."""
         keys = [each.key for each in self._facts]
         place = keys.index(key)
         for step in (-1, 1):
@@ -188,17 +186,14 @@ class BehaviourTabs(QWidget):
                     self.moved.emit(key, other)
                     return
 
-    # -- places -----------------------------------------------------------------------------------
+    # -- layout -----------------------------------------------------------------------------------
 
     def _restyle(self) -> None:
         self.updateGeometry()
         self._place(bring=True)
 
     def _widths(self) -> list[int]:
-        """As wide as the names want; all but the current one shorter where that does not fit.
-
-        The current one is never wider than the room for all.
-        """
+        # The active tab keeps its full width up to the available room; the others shrink down to SHORTEST.
         wanted = [self.tabs[each.key].sizeHint().width() for each in self._facts]
         room = self._room_width(scrolls=False) - GAP * len(wanted)
         least = round(self._theme.scaled(SHORTEST))
@@ -215,7 +210,6 @@ class BehaviourTabs(QWidget):
         return cut(max(most, least))
 
     def _room_width(self, *, scrolls: bool) -> int:
-        """What "+", and where tabs are out of sight the list of all, leave for tabs."""
         taken = self.add.sizeHint().width() + GAP
         return self.width() - taken - (self.list.sizeHint().width() + GAP if scrolls else 0)
 
@@ -279,7 +273,7 @@ class BehaviourTabs(QWidget):
         event.accept()
 
     def menu_of(self, key: str) -> Menu:
-        """What can be done with a tab."""
+        """Return the context menu of a tab."""
         menu = Menu(self._theme, self)
         menu.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
         rename = menu.addAction(self._theme.icon("pencil"), f"{_('Rename')}\tF2")
@@ -308,7 +302,7 @@ class BehaviourTabs(QWidget):
 
 
 class BehaviourTitle(QWidget):
-    """Fills the title's row of the behaviour panel."""
+    """Replacement of the panel's title: tabs and buttons."""
 
     def __init__(self, theme: Theme) -> None:
         super().__init__()
@@ -334,7 +328,7 @@ class BehaviourTitle(QWidget):
         row.addWidget(self.mode)
 
     def show_mode(self, mode: str) -> None:
-        """Undo and redo belong to the blocks, copy to the program."""
+        """Show undo and redo for the blocks, copy for the program."""
         self.mode.set_value(mode)
         self.undo.setVisible(mode == "blocks")
         self.redo.setVisible(mode == "blocks")
