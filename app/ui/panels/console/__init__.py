@@ -1,6 +1,6 @@
-"""Console: what happened, line by line.
+"""Console panel: log records of Studio, programs and robots.
 
-The records are `app.core.console`; `list` paints them and says which are wanted.
+The records are stored in `app.core.console`; `list` filters and paints them.
 """
 
 from app.ui.panels.console.panel import PANEL as PANEL

@@ -1,4 +1,4 @@
-"""The Console's lines: a list model of log records, newest first, and how one line is painted."""
+"""List model of log records, newest first, and the delegate that paints them."""
 
 from __future__ import annotations
 
@@ -46,15 +46,15 @@ WORDS = {
     "error": lazy("error"),
     "critical": lazy("fatal"),
 }
-"""Words that fit into the column of levels."""
+"""Names of the levels, short enough for their column."""
 ROW = {"compact": 22, "comfortable": 30}
 ICON = 14
-MESSAGE = 24  # letters of the text that should be seen
+MESSAGE = 24  # characters of the text that should stay visible
 _ROOT = QModelIndex()
 
 
 def line_of(record: ConsoleRecord, level: str = "") -> str:
-    """A record as text, for the clipboard: as logs are written, unless its ``level`` is said otherwise."""
+    """Format a record as a log line for the clipboard, with `level` in place of its own if given."""
     moment = time.localtime(record.stamp_s)
     clock = f"{time.strftime('%H:%M:%S', moment)}.{int(record.stamp_s % 1 * 1000):03d}"
     logger = f" [{record.logger}]" if record.logger else ""
@@ -62,7 +62,7 @@ def line_of(record: ConsoleRecord, level: str = "") -> str:
 
 
 def tip_of(record: ConsoleRecord) -> str:
-    """What is known of a record beside its text: where in the program it was logged."""
+    """Return the tooltip: full text, time, level, and the place in the source that logged the record."""
     where = "  ".join(part for part in (record.logger, record.place) if part)
     clock = time.strftime("%H:%M:%S", time.localtime(record.stamp_s))
     said = f"{record.text}\n{clock} {_level_words(record)}"
@@ -70,7 +70,7 @@ def tip_of(record: ConsoleRecord) -> str:
 
 
 def first_line(text: str) -> str:
-    """A text in one row; how many lines follow is said."""
+    """Return the first line of a text with the number of further lines."""
     first, _end, rest = text.partition("\n")
     if not rest:
         return first
@@ -84,13 +84,12 @@ def _level_words(record: ConsoleRecord) -> str:
 
 
 class RecordFilter:
-    """Whether a record is shown: by its level, its node ("" for all), and words that it must hold."""
+    """Predicate for records: level, node ("" for all) and words that the record must contain."""
 
     def __init__(self, levels: frozenset[str], node: str, words: str) -> None:
         self._levels, self._node, self._words = levels, node, words.casefold().split()
 
     def __call__(self, record: ConsoleRecord) -> bool:
-        """Decide."""
         if record.level not in self._levels or (self._node and record.origin != self._node):
             return False
         if not self._words:
@@ -100,7 +99,7 @@ class RecordFilter:
 
 
 class ConsoleModel(QAbstractListModel):
-    """Some of the console's records, newest first; new ones are inserted above, the oldest leave below."""
+    """Filtered records, newest first: new rows are inserted at the top, evicted ones leave at the bottom."""
 
     def __init__(self) -> None:
         super().__init__()
@@ -121,14 +120,14 @@ class ConsoleModel(QAbstractListModel):
         return plain.tip(tip_of(record)) if role == Qt.ItemDataRole.ToolTipRole else None
 
     def show_all(self, records: Sequence[ConsoleRecord], wanted: Callable[[ConsoleRecord], bool]) -> None:
-        """Begin anew with those of the records (oldest first) that are wanted."""
+        """Reset the model to the matching records; `records` are sorted oldest first."""
         self.beginResetModel()
         self._records = deque(record for record in records if wanted(record))
         self._newest = records[-1].number if records else 0
         self.endResetModel()
 
     def follow(self, records: Sequence[ConsoleRecord], wanted: Callable[[ConsoleRecord], bool]) -> int:
-        """Take over what came since the last time, and let go what is kept no more; how many rows came."""
+        """Add new matching records, remove evicted ones and return the number of rows added."""
         if not records or records[-1].number < self._newest or records[0].number > self._newest + 1:
             self.show_all(records, wanted)
             return len(self._records)
@@ -161,9 +160,9 @@ class ConsoleModel(QAbstractListModel):
 
 
 class LineDelegate(QStyledItemDelegate):
-    """Paints one record: time, level with icon and word, who says it, the text.
+    """Paints one record: time, level (icon and name), origin, text.
 
-    Time and level stand in columns; the text follows who says it.
+    Time and level are aligned in columns; the text directly follows the origin.
     """
 
     def __init__(self, theme: Theme, density: Callable[[], str], font: Callable[[], QFont]) -> None:
@@ -174,7 +173,7 @@ class LineDelegate(QStyledItemDelegate):
         return QSize(100, self.row_height())
 
     def row_height(self) -> int:
-        """Pixels of one row, grown with the text."""
+        """Return the height of a row in pixels, scaled with the text size."""
         return round(self._theme.scaled(ROW[self._density()]))
 
     def paint(self, painter: QPainter, option: QStyleOptionViewItem, index: Index) -> None:
@@ -207,10 +206,10 @@ class LineDelegate(QStyledItemDelegate):
             rect.setLeft(part.right() + 7)
 
     def columns(self, record: ConsoleRecord, width: float) -> dict[str, float]:
-        """What stands before the text, with its width, in a row of that width.
+        """Return the parts before the text with their widths, for a row of this width.
 
-        Where little is left for the text, first the logger goes, then the level's word (its icon says it
-        too), then the time; who says it stays. All of it is in the row's tooltip.
+        When space is short, the logger is left out first, then the level's name (the icon stays), then the
+        time. The tooltip contains everything.
         """
         font = self._font()
         text = MESSAGE * paint.width_of(font, "n")
@@ -229,7 +228,6 @@ class LineDelegate(QStyledItemDelegate):
 
     @staticmethod
     def _parts(record: ConsoleRecord, *, logger: bool) -> list[tuple[str, str, float]]:
-        """What stands in the rest of a row: words, their colour, how much of what is left they may take."""
         parts = [(record.origin, "textTertiary", 0.4), (first_line(record.text), "text", 1.0)]
         name = record.logger.rpartition(".")[2] if logger else ""
         if name:
@@ -238,7 +236,10 @@ class LineDelegate(QStyledItemDelegate):
 
 
 class LineList(QListView):
-    """The list of lines. ``/`` asks for the field of words; `resized` when its place changed."""
+    """List view of the records.
+
+    Key ``/`` emits `find_wanted`; `resized` is emitted on a change of geometry.
+    """
 
     find_wanted = Signal()
     resized = Signal()
@@ -265,7 +266,7 @@ class LineList(QListView):
 
 
 class FindWords(SearchField):
-    """The words that lines must hold. Down goes to the lines, Esc shows all of them again."""
+    """Field of the words to find. Down moves the focus to the list; Esc clears and hides the field."""
 
     left = Signal()
 

@@ -1,4 +1,4 @@
-"""Console: what happened, line by line, the newest first: Studio's own lines and what programs log."""
+"""Console panel: log records of Studio and of programs, newest first."""
 
 from __future__ import annotations
 
@@ -46,7 +46,7 @@ MOST_NODES = 20
 
 
 class ConsolePanel(PanelWidget):
-    """The lines, and which of them are shown: by level, by node, by words."""
+    """List of log records with filters by level, node and words."""
 
     def __init__(self, context: PanelContext) -> None:
         super().__init__(context, _("Console"))
@@ -103,7 +103,7 @@ class ConsolePanel(PanelWidget):
         self._find.triggered.connect(self.focus_filter)
         return made
 
-    # ---- showing
+    # display
 
     def source_changed(self) -> None:
         self._seen = -1
@@ -125,7 +125,7 @@ class ConsolePanel(PanelWidget):
         self._say_nothing()
 
     def _follow(self, records: Sequence[ConsoleRecord]) -> None:
-        """New lines come above; who reads further down keeps the lines that he reads."""
+        # Keeps the visible lines in place when the person has scrolled down.
         bar = self.list.verticalScrollBar()
         before = bar.value()
         came = self.model.follow(records, self._wanted())
@@ -146,7 +146,6 @@ class ConsolePanel(PanelWidget):
         self._say_newer()
 
     def _say_newer(self) -> None:
-        """The way back to the newest line, with how many came meanwhile."""
         away = self.list.verticalScrollBar().value() > 0
         if self._unseen:
             said = ngettext("{count} new", "{count} new", self._unseen)
@@ -158,7 +157,6 @@ class ConsolePanel(PanelWidget):
         self._place_newer()
 
     def _place_newer(self) -> None:
-        """Keep the way back at the top right of the list."""
         port = self.list.viewport()
         self.newer.move(port.width() - self.newer.width() - 12, 8)
 
@@ -184,28 +182,28 @@ class ConsolePanel(PanelWidget):
         words = ", ".join(filter(None, chosen))
         return [filter_hindrance(self.title(), words, self.show_all)] if words else []
 
-    # ---- what a person chooses
+    # filters
 
     def set_level(self, level: str) -> None:
-        """Show everything ("all", with details "debug"), from warnings on ("warn"), or errors ("error")."""
+        """Set the lowest level: "debug", "all" (without debug), "warn" or "error"."""
         if level in SHOWN:
             self.level = level
             self._name_filter()
 
     def set_node(self, node: str) -> None:
-        """Show the lines of one node; of all when it is empty."""
+        """Show only records of one node; "" for all."""
         self.node = node
         self._name_filter()
 
     def show_all(self) -> None:
-        """Take all filters away."""
+        """Remove all filters."""
         self.words.clear()
         self.words.hide()
         self.set_node("")
         self.set_level("all")
 
     def clear(self) -> None:
-        """Forget all lines."""
+        """Delete all records."""
         self.session.shown_console.clear()
         self.refresh()
 
@@ -256,10 +254,10 @@ class ConsolePanel(PanelWidget):
     def _to_lines(self) -> None:
         self.list.setFocus(Qt.FocusReason.OtherFocusReason)
 
-    # ---- copying
+    # copying
 
     def copy(self) -> None:
-        """Put the chosen lines on the clipboard, oldest first."""
+        """Copy the selected lines to the clipboard, oldest first."""
         self._copy_rows(sorted((index.row() for index in self.list.selectedIndexes()), reverse=True))
 
     def _copy_everything(self) -> None:
@@ -272,11 +270,11 @@ class ConsolePanel(PanelWidget):
             said = ngettext("Copied {count} line", "Copied {count} lines", len(rows))
             self.context.toast(said.format(count=grouped(len(rows))))
 
-    # ---- how it looks, and what is kept
+    # appearance and saved state
 
     def theme_changed(self) -> None:
         super().theme_changed()
-        self.list.doItemsLayout()  # rows grow with the text
+        self.list.doItemsLayout()  # row heights depend on the font
         self._say_newer()
 
     def save_state(self) -> dict[str, object]:
