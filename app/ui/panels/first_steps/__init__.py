@@ -1,3 +1,3 @@
-"""First steps: six things to do, each checked as soon as the blocks and the run show it."""
+"""First steps panel: six steps, each checked off when blocks and run show that it is done."""
 
 from app.ui.panels.first_steps.panel import PANEL as PANEL

@@ -1,4 +1,4 @@
-"""First steps: a card beside the blocks that shows the next step and checks those that are done."""
+"""First steps panel: shows the next step and checks off completed ones."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ WHAT_NEXT = lazy("You can now build, run and stop a behaviour. Open an example t
 
 
 class _Mark(QWidget):
-    """A check mark, or the number of the step in a ring; filled for the one that is next."""
+    """Check mark, or the number of the step in a ring; filled for the next step."""
 
     def __init__(self, theme: Theme, number: int) -> None:
         super().__init__()
@@ -57,7 +57,7 @@ class _Mark(QWidget):
 
 
 class StepRow(QWidget):
-    """One step; the one that is next has a tint, its hint, and a button."""
+    """Row of one step; the next step is tinted and has hint and button."""
 
     def __init__(self, theme: Theme, number: int, step: Lesson, show_me: Callable[[Lesson], None]) -> None:
         super().__init__()
@@ -85,7 +85,7 @@ class StepRow(QWidget):
         row.addLayout(text, 1)
 
     def show_state(self, state: str) -> None:
-        """Show it as what ``state`` says: done, next or later."""
+        """Show the step as "done", "next" or "later"."""
         self.mark.state = state
         paint.show_when(self.hint, state == "next")
         paint.show_when(self.button, state == "next")
@@ -96,7 +96,7 @@ class StepRow(QWidget):
         self.mark.update()
 
     def show_hint(self, *, loose: bool) -> None:
-        """Say where the block is, or that it stands ``loose`` on the page and is to be put into its place."""
+        """Show where to find the block or, if `loose`, that it must be attached to the script."""
         self.hint.setText(spoken(LOOSE if loose else self.step.hint))
 
     def paintEvent(self, _event: QPaintEvent) -> None:
@@ -109,17 +109,19 @@ class StepRow(QWidget):
 
 
 def spoken(text: str) -> str:
-    """The words of a step, with the names that its blocks have."""
+    """Return a step's text with the names of its blocks filled in."""
     return _(text).format(
         start=pgettext("block", "when started"), say=pgettext("robot", "say"), turn=pgettext("robot", "turn")
     )
 
 
 class FirstStepsPanel(PanelWidget):
-    """Six steps to a robot that speaks, turns and stops; which are done is kept between starts."""
+    """Six steps to a robot that speaks, turns and stops. Completed steps are saved in the settings.
+
+    `clock` returns seconds; the hint appears by itself after 20 s without progress.
+    """
 
     def __init__(self, context: PanelContext, clock: Callable[[], float] = time.monotonic) -> None:
-        """``clock`` gives seconds: a hint comes by itself after twenty."""
         super().__init__(context, _("First steps"))
         self._clock = clock
         kept: object = self.session.settings.get(KEPT, [])
@@ -156,10 +158,10 @@ class FirstStepsPanel(PanelWidget):
         return (self._again,)
 
     def following(self) -> Lesson | None:
-        """The step that is next; None when all are done."""
+        """Return the next step, or None when all are done."""
         return next((step for step in STEPS if step.id not in self.done), None)
 
-    # -- looking ----------------------------------------------------------------------------------
+    # -- checking ---------------------------------------------------------------------------------
 
     def refresh(self) -> None:
         if self.following() is None:
@@ -191,7 +193,7 @@ class FirstStepsPanel(PanelWidget):
         )
 
     def _hint_after_a_while(self) -> None:
-        """Who does nothing for twenty seconds is shown where to go on, once for each step."""
+        # Shown once per step.
         step, now = self.following(), self._clock()
         seen = (self.session.document.edits, self.session.runs.active)
         if step is None:
@@ -217,7 +219,7 @@ class FirstStepsPanel(PanelWidget):
         )
         self.pages.setCurrentIndex(0 if step is not None else 1)
         button = next((row.button for row in self.rows if row.step is step), None)
-        if held and button is not None:  # who pressed the last button goes on here
+        if held and button is not None:  # keeps the focus for keyboard users
             button.setFocus(Qt.FocusReason.OtherFocusReason)
 
     def _keep(self) -> None:
@@ -227,10 +229,10 @@ class FirstStepsPanel(PanelWidget):
         except SettingsError as error:
             self.session.console.add("warn", "studio", str(error))
 
-    # -- what a person does -----------------------------------------------------------------------
+    # -- user actions -----------------------------------------------------------------------------
 
     def show_me(self, step: Lesson) -> None:
-        """Point at what the step is about."""
+        """Point at the block or button of the step."""
         self._pointed_for = step.id
         if step.id == "robot":
             self.context.run("robots.virtual")
@@ -240,7 +242,6 @@ class FirstStepsPanel(PanelWidget):
             self.context.run(f"point.button:{step.button}")
 
     def _type(self, end: str) -> str:
-        """The type of the block with this end that a connected robot has."""
         if end == START:
             return START
         blocks = self.session.documents.definitions().get("blocks")
@@ -252,7 +253,7 @@ class FirstStepsPanel(PanelWidget):
         self.context.run("point.block:-")
 
     def start_again(self) -> None:
-        """Begin anew, on a page of its own: nobody's blocks are touched."""
+        """Start again on a new page; existing blocks are left alone."""
         self.done = frozenset()
         self._waits_since = None
         self._keep()

@@ -1,4 +1,4 @@
-"""The six first steps, and which of them the blocks, the robots and the run show to be done."""
+"""The six first steps and the check for their completion."""
 
 from __future__ import annotations
 
@@ -10,15 +10,18 @@ from nep.i18n import lazy
 START = "events_started"
 SAY, TURN = "_do_say", "_do_turn"
 Script = tuple[tuple[str, str], ...]
-"""(type, id) of each block of a script."""
+"""Type and id of each block of a script."""
 
 
 @dataclass(frozen=True)
 class Lesson:
-    """One step: its words, with ``{names}`` of blocks; the words of its hint; what to point at.
+    """One step.
 
-    ``takes`` is the end of the type of the block that is to be taken, ``button`` the command of the button
-    that is to be pressed.
+    Attributes:
+        text: Sentence with ``{names}`` of blocks.
+        hint: Where to find the block or button.
+        takes: Suffix of the type of the block to drag.
+        button: Command of the button to press.
     """
 
     id: str
@@ -59,9 +62,9 @@ STEPS: tuple[Lesson, ...] = (
 
 @dataclass(frozen=True)
 class Built:
-    """What the blocks have below "when started": the ids of blocks that speak, and whether one turns.
+    """Result of `built_in`: ids of "say" blocks below "when started", and True for a "turn" block.
 
-    ``loose`` are the ends of types of which only loose blocks are there: below nothing that starts them.
+    `loose` has the type suffixes of blocks that occur only in scripts without an event.
     """
 
     started: bool = False
@@ -72,7 +75,7 @@ class Built:
 
 @dataclass(frozen=True)
 class Now:
-    """What can be seen now. ``ran`` are the ids of the blocks that have run, ``stopped``: by Stop."""
+    """Present state. `ran` has the ids of blocks that have run; `stopped` is True after Stop."""
 
     can_speak: bool = False
     built: Built = field(default_factory=Built)
@@ -81,7 +84,7 @@ class Now:
 
 
 def built_in(workspace: Mapping[str, object], others: Collection[str] = ()) -> Built:
-    """What a person has built of these blocks; those with the ids ``others`` are of an example."""
+    """Return what a person has built; `others` are the ids of blocks that came with an example."""
     started: list[Script] = []
     loose: list[Script] = []
     is_started = False
@@ -103,9 +106,9 @@ def _has(scripts: Sequence[Script], end: str) -> bool:
 
 
 def shown_by(now: Now, done: Collection[str]) -> frozenset[str]:
-    """The ids of the steps that this shows to be done; what was ``done`` before stays so.
+    """Return the ids of completed steps; steps in `done` stay completed.
 
-    Stop counts once the program has run with its turn: nobody is told "done" for what they did by chance.
+    Stop counts only after a run with a turn, so that it can't be completed by chance.
     """
     found = set(done)
     if now.can_speak:
@@ -124,14 +127,13 @@ def shown_by(now: Now, done: Collection[str]) -> frozenset[str]:
 
 
 def _tops(workspace: Mapping[str, object]) -> list[Mapping[str, object]]:
-    """The first blocks of all scripts."""
     blocks = workspace.get("blocks")
     tops = blocks.get("blocks") if isinstance(blocks, Mapping) else None
     return [top for top in tops if isinstance(top, Mapping)] if isinstance(tops, list) else []
 
 
 def _inside(block: Mapping[str, object]) -> Iterator[tuple[str, str]]:
-    """(type, id) of a block, of what it holds, and of what hangs below it: no calls, which nest less deep."""
+    # Iterative, because deeply nested blocks would exceed the recursion limit.
     waiting: list[object] = [block]
     while waiting:
         each = waiting.pop()
