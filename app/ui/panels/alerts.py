@@ -1,4 +1,4 @@
-"""Alerts: all present problems of the network and the robots, each with its next step."""
+"""Alerts panel: present problems of network and robots, each with its next step."""
 
 from __future__ import annotations
 
@@ -17,13 +17,13 @@ if TYPE_CHECKING:
 
 
 class AlertsPanel(PanelWidget):
-    """Everything that is wrong now, the worst first."""
+    """List of active alerts, most severe first."""
 
     def __init__(self, context: PanelContext) -> None:
         super().__init__(context, _("Alerts"))
         self._seen = -1
         self.rows: list[AlertRow] = []
-        self.shown: list[ActiveAlert] = []  # each in the row of its place
+        self.shown: list[ActiveAlert] = []  # parallel to `rows`
         self.chip = Chip(self.theme)
         self.chips = [self.chip]
         self.empty = EmptyState(
@@ -40,13 +40,13 @@ class AlertsPanel(PanelWidget):
         if alerts.revision == self._seen:
             return
         self._seen = alerts.revision
-        is_plain = self.density == "comfortable"  # the Behaviour layout: nobody there looks after ports
+        # Behaviour layout: hides alerts for developers, such as ports
+        is_plain = self.density == "comfortable"
         active = [alert for alert in alerts.active if not (is_plain and alert.for_developers)]
         if active != self.shown:
             self._show(active)
 
     def _show(self, active: list[ActiveAlert]) -> None:
-        """Rows that are there stay: an alert that counts on is the same one."""
         known = {alert.id: row for alert, row in zip(self.shown, self.rows, strict=True)}
         self.shown = active
         self.rows = [known.pop(each.id) if each.id in known else self._row(each.id) for each in active]
@@ -70,7 +70,6 @@ class AlertsPanel(PanelWidget):
 
 
 def _since(alert: ActiveAlert) -> str:
-    """Since when it is so, and how often it was."""
     clock = time.localtime(alert.since_s)
     since = f"{clock.tm_hour}:{clock.tm_min:02d}"
     if alert.count < 2:

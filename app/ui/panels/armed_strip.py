@@ -1,4 +1,4 @@
-"""The switch without which nothing is sent, and the question that a robot's topic asks again."""
+"""Switch that arms sending, and the confirmation for topics of robots."""
 
 from __future__ import annotations
 
@@ -23,16 +23,16 @@ MINUTES = (1, 5, 15, 60)
 
 
 def left_words(seconds: float) -> str:
-    """How long it stays armed: "3:48"."""
+    """Format the remaining time as "3:48"."""
     whole = math.ceil(seconds)
     return f"{whole // 60}:{whole % 60:02d}"
 
 
 class ArmedStrip(QWidget):
-    """Stands on top of each panel from which something can be sent."""
+    """Strip at the top of each panel that can send."""
 
     for_replay = False
-    """Whether what it arms can be sent while a recording shows."""
+    """True: its targets can be sent while a recording is shown."""
 
     def __init__(self, context: PanelContext) -> None:
         super().__init__()
@@ -78,11 +78,11 @@ class ArmedStrip(QWidget):
 
     @property
     def acting(self) -> SessionActing:
-        """The session's."""
+        """Sending state of the session."""
         return self._context.session.acting
 
     def refresh(self) -> None:
-        """Say what is so now."""
+        """Show switch, targets and counts."""
         acting = self.acting
         arming, question = acting.arming, acting.question
         left, replaying = left_words(arming.left_s), self._context.session.is_replaying
@@ -111,19 +111,19 @@ class ArmedStrip(QWidget):
         self.update()
 
     def off_words(self) -> str:
-        """What is so while it is switched off."""
+        """Return the text of the strip while sending is off."""
         return _("Sending is off")
 
     def arm(self) -> str:
-        """Switch it on; why it can't be, as a sentence."""
+        """Arm sending; return a sentence if that is not possible, else ""."""
         return self.acting.arm()
 
     def more_words(self) -> str:
-        """What has been sent so far, where the panel does not say it itself."""
+        """Return a summary of the sent messages, for panels that don't show it themselves."""
         return ""
 
     def token_words(self, target: Target) -> str:
-        """What stands for something that is sent to."""
+        """Return the text of a target's token."""
         return target.name
 
     def _show_tokens(self, targets: tuple[Target, ...]) -> None:
@@ -143,7 +143,7 @@ class ArmedStrip(QWidget):
             self._flow.addWidget(token)
             self.tokens.append(token)
         self._flow.removeWidget(self.counts)
-        self._flow.addWidget(self.counts)  # behind them
+        self._flow.addWidget(self.counts)  # keeps it last
 
     def _switched(self) -> None:
         if self.acting.arming.is_on:
@@ -163,7 +163,7 @@ class ArmedStrip(QWidget):
 
 
 class ArmedMinutes(Menu):
-    """How long it stays armed, as an entry with a menu among a panel's other actions."""
+    """Menu of the time after which sending is disarmed."""
 
     def __init__(self, theme: Theme, parent: QWidget, acting: SessionActing) -> None:
         super().__init__(theme, parent, _("Stays armed for"))
@@ -182,7 +182,7 @@ class ArmedMinutes(Menu):
         self._acting.armed_s = minutes * 60.0
 
     def entry(self) -> QAction:
-        """The entry, with what is so now."""
+        """Return the menu's action with the current choice checked."""
         for count, action in self._choices.items():
             action.setChecked(round(self._acting.armed_s / 60) == count)
         return self.menuAction()

@@ -1,8 +1,8 @@
-"""What a panel is: one dockable view of the session, described by one `Panel`.
+"""Base class of panels, their registration (`Panel`) and their access to the window (`PanelContext`).
 
-A panel reads the session in `PanelWidget.refresh`, 30 times a second while it can be seen, and does nothing
-there when nothing changed. It never imports another panel; what concerns the window goes through
-`PanelContext`.
+A panel is one dockable view of the session. `PanelWidget.refresh` is called 30 times a second while the panel
+is visible and must return at once when the data is unchanged. Panels don't import each other; they reach the
+window through `PanelContext`.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ ANY_TYPE = "*"
 
 
 class ShowToast(Protocol):
-    """Says for some seconds what the person just did."""
+    """Callable that shows a toast for some seconds."""
 
     def __call__(
         self,
@@ -39,22 +39,25 @@ class ShowToast(Protocol):
         *,
         until: Callable[[], bool] | None = None,
     ) -> None:
-        """Show ``words``, "Copied robots.Pepper.pose.y", and perhaps a ``button`` that does ``run``.
-
-        They go earlier once ``until`` is so: what they say has happened.
-        """
+        # Shows `words`, such as "Copied robots.Pepper.pose.y", and a `button` that calls `run`. The toast
+        # closes early once `until` returns True.
+        ...
 
 
 @dataclass(frozen=True, slots=True)
 class PanelContext:
-    """What a panel may use of the window.
+    """Functions of the window that a panel may use.
 
-    ``open_topic`` shows a topic in the panel that fits its type, ``toast`` says what was just done, ``run``
-    does one of the window's commands by its name (`app.ui.shell.commands.table`), ``files`` asks for files,
-    ``keys_to_question`` gives the keyboard to what a running behaviour asks, if it asks something. ``plot``
-    plots a field of a topic; without a path it asks which. ``open_beside`` shows a topic in one more panel.
-    ``why`` asks the connection doctor why a panel shows nothing of a topic, or ("") of any. ``panels`` are
-    those that can be seen now.
+    Attributes:
+        open_topic: Show a topic in the panel that fits its message type.
+        toast: Report what the person just did.
+        run: Run a command of the window by its id (`app.ui.shell.commands.table`).
+        files: Open and save dialogs.
+        keys_to_question: Give the keyboard focus to the question of a running behaviour, if any.
+        plot: Plot a field of a topic; with an empty path, ask for the field.
+        open_beside: Show a topic in an additional panel.
+        why: Open the connection doctor for a panel and a topic; "" stands for any topic.
+        panels: Return the visible panels.
     """
 
     session: Session
@@ -72,9 +75,13 @@ class PanelContext:
 
 @dataclass(frozen=True, slots=True)
 class Hindrance:
-    """Something in a panel itself that keeps what comes from being shown, and the button that ends it.
+    """Reason within a panel why new data is hidden, with a button that resolves it.
 
-    ``sentence`` says what, ``mend`` what to do, ``button`` what ``run`` does: "Let it go on".
+    Attributes:
+        sentence: The reason.
+        mend: What to do; may be empty.
+        button: Text of the button, such as "Resume".
+        run: Action of the button.
     """
 
     sentence: str
@@ -84,7 +91,7 @@ class Hindrance:
 
 
 def paused_hindrance(panel: str, go_on: Callable[[], object]) -> Hindrance:
-    """A panel of this title holds what it shows."""
+    """Return the hindrance of a paused panel; `panel` is its title."""
     return Hindrance(
         _("{panel} is paused and doesn't show new data.").format(panel=panel),
         "",
@@ -94,7 +101,7 @@ def paused_hindrance(panel: str, go_on: Callable[[], object]) -> Hindrance:
 
 
 def filter_hindrance(panel: str, words: str, clear: Callable[[], object]) -> Hindrance:
-    """A panel of this title shows only what has these words."""
+    """Return the hindrance of a panel whose filter contains `words`; `panel` is its title."""
     return Hindrance(
         _("{panel} only shows entries with “{words}”.").format(panel=panel, words=words),
         "",
@@ -104,17 +111,21 @@ def filter_hindrance(panel: str, words: str, clear: Callable[[], object]) -> Hin
 
 
 def numbered(title: str, number: int) -> str:
-    """A title that tells one panel from others of its kind: "Plot", "Plot 2"."""
+    """Return a numbered title, such as "Plot 2"; number 1 is left out."""
     return title if number < 2 else _("{panel} {number}").format(panel=title, number=number)
 
 
 @dataclass(frozen=True, slots=True)
 class Panel:
-    """A panel's description.
+    """Description of a panel, found by `app.ui.panels.registry`.
 
-    ``name`` is its id in saved layouts, ``icon`` a Lucide name, ``accepts`` the codecs of the topics that it
-    can show ("image"), or `ANY_TYPE`; ``make`` builds one. Where ``several`` make sense,
-    each with its own topic, they may be open side by side.
+    Attributes:
+        name: Id in saved layouts.
+        title: Title, marked with `lazy`.
+        icon: Name of a Lucide icon.
+        accepts: Codecs of the topics that the panel can show, such as "image", or `ANY_TYPE`.
+        make: Factory of the widget.
+        several: Several panels of this kind may be open, each with its own topic.
     """
 
     name: str
@@ -126,18 +137,18 @@ class Panel:
 
 
 class PanelWidget(QWidget):
-    """The inside of a panel, and what stands in its title.
+    """Base class of the contents of a panel.
 
-    The window shows in the title: `title` and `subtitle` in mono (or `replaces_title` in their place), then
-    `header_widgets`, and `more_actions` in "more". `title_changed` when title or subtitle did.
+    The title bar of the dock shows `title` and `subtitle` (or the widget of `replaces_title`), then
+    `header_widgets`; its "more" menu contains `more_actions`. `title_changed` is emitted when title or
+    subtitle change.
     """
 
     title_changed = Signal()
     shows_pictures = False
-    """Whether `refresh` is called 60 times a second, so that no picture of 30 a second is passed over."""
+    """True: `refresh` is called 60 times a second, so that no frame of a 30 fps video is skipped."""
 
     def __init__(self, context: PanelContext, title: str) -> None:
-        """A panel called ``title``."""
         super().__init__()
         self.context = context
         self.session = context.session
@@ -152,7 +163,10 @@ class PanelWidget(QWidget):
         self.theme.changed.connect(self.theme_changed)
 
     def show_one_of(self, *pages: QWidget) -> QStackedWidget:
-        """Fill the panel, edge to edge, with one of these at a time; the first one to begin with."""
+        """Fill the panel without margins with a stack of `pages`; the first one is visible.
+
+        Return the stack.
+        """
         stack = QStackedWidget()
         for page in pages:
             stack.addWidget(page)
@@ -162,34 +176,34 @@ class PanelWidget(QWidget):
         return stack
 
     def title(self) -> str:
-        """Its name in the title: "Plot", and "Plot 2" for the second one."""
+        """Return the displayed title: "Plot", or "Plot 2" for the second panel of a kind."""
         return numbered(self._title, self._number)
 
     def set_number(self, number: int) -> None:
-        """Which one of its kind it is, from 1."""
+        """Set the number among the panels of this kind, counted from 1."""
         self._number = number
         self.setAccessibleName(self.title())
 
     def subtitle(self) -> str:
-        """What it shows: a topic; empty when it shows one thing only."""
+        """Return the topic shown; empty for panels that don't show a single topic."""
         return self._subtitle
 
     def header_widgets(self) -> Sequence[QWidget]:
-        """Chips, which have ``place`` "start" and stand right after the title, then buttons, at the right."""
+        """Return the widgets of the title bar: chips next to the title (`place` is "start"), then buttons."""
         for chip in self.chips:
             chip.setProperty("place", "start")
         return [*self.chips, *self.header]
 
     def replaces_title(self) -> QWidget | None:
-        """A widget that fills the title's row in place of the name; None in most panels."""
+        """Return a widget that replaces title and subtitle in the title bar, or None."""
         return None
 
     def more_actions(self) -> Sequence[QAction]:
-        """What "more" offers above floating and closing."""
+        """Return the panel's own actions in the "more" menu, placed above those of the dock."""
         return ()
 
     def set_title(self, title: str, subtitle: str | None = None) -> None:
-        """Change title and subtitle; nothing is told when they are the same."""
+        """Set title and subtitle (None keeps the subtitle); emit `title_changed` only if they differ."""
         wanted = (title, self._subtitle if subtitle is None else subtitle)
         if wanted != (self._title, self._subtitle):
             self._title, self._subtitle = wanted
@@ -197,76 +211,76 @@ class PanelWidget(QWidget):
             self.title_changed.emit()
 
     def refresh(self) -> None:
-        """Show what is in the session now; called 30 times a second while the panel can be seen."""
+        """Show the current state of the session; called 30 times a second while the panel is visible."""
 
     def badge(self) -> tuple[str, str] | None:
-        """What waits in it while it stands behind another panel: a count and a status; None for nothing.
+        """Return count and status for the tab while another panel covers this one; None without anything new.
 
-        Asked with every tick of a panel that shares its place, so it costs nothing when nothing changed.
+        Called on every tick while the panel shares its dock, so it must be cheap when nothing changed.
         """
         return None
 
     def set_density(self, density: Density) -> None:
-        """Comfortable rows and text in the Behaviour layout, compact ones in Developer."""
+        """Set the density of rows and text: comfortable in the Behaviour layout, compact in Developer."""
         self.density = density
         self.theme_changed()
 
     def theme_changed(self) -> None:
-        """Colours, fonts or density changed."""
+        """Update after a change of colours, fonts or density."""
         self.update()
 
     def text_font(self) -> QFont:
-        """The font of the panel's words in its density."""
+        """Return the font of body text at the panel's density."""
         return self.theme.font("bodyLarge" if self.density == "comfortable" else "body")
 
     def row_height(self) -> int:
-        """The height of a row in its density, grown with the text."""
+        """Return the height of a row in pixels, scaled with the text size."""
         return round(self.theme.scaled(self.theme.size("row", self.density)))
 
     def source_changed(self) -> None:
-        """The session shows another source, a recording or the live network: begin anew with that."""
+        """Reset the panel after the session switched between live network and recording."""
 
     def show_topic(self, name: str) -> None:
-        """Show this topic, if the panel accepts topics."""
+        """Show a topic; only for panels that accept topics."""
 
     def focus_filter(self) -> bool:
-        """Go to the panel's filter (`/`); False when it has none."""
+        """Move the focus to the filter (key `/`); return False if there is none."""
         return False
 
     def hindrances(self) -> Sequence[Hindrance]:
-        """What of the panel itself hides what comes: that it is paused, its filter."""
+        """Return the panel's own reasons for hiding new data, such as pause or filter."""
         return ()
 
     def waits_for(self) -> str:
-        """The topic of which it is to show a message and has seen none; empty when it waits for none."""
+        """Return the topic of which no message has arrived yet; empty when the panel waits for none."""
         return ""
 
     def why(self, topic: str = "") -> EmptyAction:
-        """The way to the connection doctor for when nothing is seen of a topic, or ("") of any."""
+        """Return the action that opens the connection doctor for a topic, or for any topic ("")."""
         return EmptyAction(_("Why do I see nothing?"), lambda: self.context.why(self, topic), "stethoscope")
 
     def save_state(self) -> dict[str, object]:
-        """What is to be as it was when the layout comes back."""
+        """Return the state to save in the layout (JSON values)."""
         return {}
 
     def restore_state(self, state: Mapping[str, object]) -> None:
-        """Take over what `save_state` gave; whatever does not fit is left out."""
+        """Restore the state from `save_state`; invalid entries are ignored."""
 
     def looks(self) -> Iterable[Suspendable | None]:
-        """The watches and streams that only cost while the panel can be seen; None stands for none."""
+        """Return watches and streams to suspend while the panel is hidden; None entries are skipped."""
         return ()
 
     def rest(self) -> None:
-        """Nobody has seen the panel for a while: it keeps what it shows and gets nothing new."""
+        """Suspend the panel's watches after it has been hidden for a while; its contents stay."""
         for look in self.looks():
             if look is not None:
                 look.rest()
 
     def wake(self) -> None:
-        """The panel can be seen, perhaps again: it gets what is new."""
+        """Resume the panel's watches when it becomes visible."""
         for look in self.looks():
             if look is not None:
                 look.wake()
 
     def shut(self) -> None:
-        """The panel leaves the window: end its watches and streams."""
+        """Close watches and streams before the panel is removed from the window."""

@@ -1,4 +1,4 @@
-"""Camera: what the robot sees, with boxes around what it recognises."""
+"""Camera panel: the robot's camera with boxes around detected objects."""
 
 from __future__ import annotations
 
@@ -24,11 +24,11 @@ if TYPE_CHECKING:
     from app.core.robots.robot_link import RobotLink
 
 LOOKS_EVERY_S = 0.1
-"""What no picture and no recognised thing tells of, such as the rate, is seen so often."""
+"""Refresh period of everything that doesn't arrive with a picture or detection, such as the rate."""
 
 
 class CameraPanel(OneRobotPanel):
-    """The camera of the robot that was chosen, or of the first one that has a camera."""
+    """Camera of the chosen robot, or of the first robot that has one."""
 
     shows_pictures = True
 
@@ -36,7 +36,7 @@ class CameraPanel(OneRobotPanel):
         super().__init__(context, _("Camera"))
         self._topic = ""
         self._stream: ImageStream | None = None
-        # It stays whole; the topic beside it is what can be shortened.
+        # never shortened: the topic next to it is elided instead
         self.rate = SteadyLabel("body", "textSecondary", least=110)
         self.header = [self.rate]
         self._rates = RateWords()
@@ -71,7 +71,7 @@ class CameraPanel(OneRobotPanel):
             and len(seen) == len(self._seen)
             and all(map(is_, seen, self._seen))
         ):
-            return  # asked 60 times a second, there mostly is nothing new
+            return  # polled 60 times a second, mostly without a new picture
         self.view.take(self._stream, boxes_on(link, self._topic))
         silent = silent_s is not None and silent_s > SILENT_AFTER_S
         sentence = self._rates.of(self._stream)
@@ -82,13 +82,13 @@ class CameraPanel(OneRobotPanel):
         self._seen, self._size, self._looks_s = seen, size, now + LOOKS_EVERY_S
 
     def _seen_now(self, link: RobotLink, silent_s: float | None) -> tuple[object, ...]:
-        """All that is shown: each the same object as before when nothing about it is new."""
+        # Identity matters: unchanged items must be the same objects as in the last call.
         found = (link.values.get(name) for name in self._detecting)
         picture = self._stream.picture if self._stream is not None else None
         return (picture, None if silent_s is None else int(silent_s * 2), *found)
 
     def wanted_robot(self) -> RobotLink | None:
-        """The first that has a camera; the one that a person chose to see goes before the others."""
+        """Return the chosen robot if it has a camera, else the first connected robot with one."""
         fleet = self.session.fleet
         shown = fleet.shown
         there = [shown, *fleet.connected] if shown is not None and shown.connected else fleet.connected
@@ -121,7 +121,6 @@ class CameraPanel(OneRobotPanel):
 
 
 def _topic_of(link: RobotLink) -> str:
-    """Where the pictures of a robot's first camera come; empty when it has none."""
     camera = camera_of(link)
     return camera.topic if camera is not None else ""
 

@@ -1,7 +1,7 @@
-"""Connection doctor: why nothing is seen, of one topic or of any, each finding with its next step.
+"""Connection doctor panel: why no messages arrive, for one topic or any; each finding has a next step.
 
-What keeps programs from finding each other is found beside the window (`app.core.network.doctor`); what hides
-messages in Studio itself, a recording that is open, a panel that is paused, is looked at with every refresh.
+`app.core.network.doctor` checks the network in the background. Causes within Studio itself, such as an open
+recording or a paused panel, are checked on every refresh.
 """
 
 from __future__ import annotations
@@ -28,23 +28,23 @@ from nep.programs.doctor import Finding, in_order, report
 STATUS = {"error": "error", "warning": "warn", "info": "info", "ok": "ok"}
 BAD = frozenset({"error", "warning"})
 WAITS_S = 2.0
-"""A panel that waits for so long for a topic is told of."""
+"""Time after which a panel that waits for a topic is reported."""
 MOST_OFFERED = 500
-"""Topics in the list of what may be missed; a longer one helps nobody."""
+"""Maximum number of topics in the list of missing topics."""
 
 
 @dataclass(frozen=True, slots=True)
 class NextStep:
-    """The next step of a finding: its button's words, and what that does."""
+    """Next step of a finding: text and action of its button."""
 
     words: str
     run: Callable[[], object]
     mends: bool = True
-    """Whether it ends what is wrong: then the doctor looks again."""
+    """True: the step fixes the problem, so the doctor checks again afterwards."""
 
 
 class DoctorPanel(PanelWidget):
-    """Everything that was looked at, the worst first; above it what is missed."""
+    """List of findings, most severe first, below the choice of the missing topic."""
 
     def __init__(self, context: PanelContext) -> None:
         super().__init__(context, _("Connection doctor"))
@@ -53,11 +53,11 @@ class DoctorPanel(PanelWidget):
         self._master = ""
         self._asker: PanelWidget | None = None
         self._own: list[Hindrance] = []
-        self._waits: dict[tuple[PanelWidget, str], float] = {}  # since when which panel waits for what
+        self._waits: dict[tuple[PanelWidget, str], float] = {}  # start of waiting, by panel and topic
         self._near: dict[str, str | None] = {}
         self._told: tuple[object, ...] = ()
         self.rows: list[AlertRow] = []
-        self.shown: list[Finding] = []  # each in the row of its place
+        self.shown: list[Finding] = []  # parallel to `rows`
         self.chip = Chip(self.theme)
         self.chips = [self.chip]
         self.again = IconButton(self.theme, "refresh-cw", _("Check again"), size=26)
@@ -100,10 +100,10 @@ class DoctorPanel(PanelWidget):
         column.addWidget(Separator(self.theme))
         column.addLayout(foot)
 
-    # -- what it shows ------------------------------------------------------------------------------------
+    # -- display ------------------------------------------------------------------------------------------
 
     def begin_for(self, asker: PanelWidget | None) -> None:
-        """Look also at what in this panel hides what comes; its topic was told to the doctor already."""
+        """Include the reasons of this panel; the caller has already passed its topic to the doctor."""
         if self._asker is not None:
             self._asker.destroyed.disconnect(self._forget_asker)
         self._asker = asker
@@ -117,7 +117,7 @@ class DoctorPanel(PanelWidget):
     def refresh(self) -> None:
         doctor = self.session.doctor
         if self.session.master.kind != self._master:
-            # a master came or went while the panel is looked at: what was found is not true any more
+            # the master changed while the panel is open: earlier findings are outdated
             self._master = self.session.master.kind
             doctor.look()
         elif doctor.told_of != doctor.missed and not doctor.looking:
@@ -134,7 +134,7 @@ class DoctorPanel(PanelWidget):
         is_new = doctor.looked_s is None or doctor.told_of != doctor.missed
         if so_far is None and doctor.looked_s is None:
             return
-        self._own = own  # an earlier look at the same stays until the next is done
+        self._own = own  # earlier findings stay until the next check is done
         found = self._all(own, so_far if so_far is not None and is_new else doctor.findings)
         if found != self.shown or told != self._told:
             self._told = told
@@ -153,7 +153,6 @@ class DoctorPanel(PanelWidget):
         return list(in_order([*here, *found]))
 
     def _hindrances(self) -> Iterator[Hindrance]:
-        """What hides messages in Studio itself; the panel that asked tells the rest."""
         session, topic = self.session, self.session.doctor.missed
         libraries = session.alerts.get(not_installed.ALERT)
         if libraries is not None:
@@ -168,7 +167,7 @@ class DoctorPanel(PanelWidget):
         yield from self._waiting()
 
     def _waiting(self) -> Iterator[Hindrance]:
-        """Panels that wait for a topic, but for the one that is missed: of that all is told below."""
+        # Except for the missing topic: the other findings are about it.
         missed, now = self.session.doctor.missed, time.monotonic()
         shown = self.context.panels() if self.session.replay is None else ()
         waiting = {(panel, topic) for panel in shown if (topic := panel.waits_for()) and topic != missed}
@@ -186,7 +185,7 @@ class DoctorPanel(PanelWidget):
                 _("{panel} is waiting for {topic}; no message has arrived.").format(**names), "", *ask
             )
         sentence = _("{panel} is waiting for {topic}, which has no publisher.").format(**names)
-        if topic not in self._near:  # thousands of names take long to be compared
+        if topic not in self._near:  # cached: comparing thousands of names takes long
             sent = [each.key for each in live.topics if each.publisher_nodes]
             self._near = {topic: nearest(topic, sent[:MOST_OFFERED])}
         near = self._near[topic]
@@ -206,7 +205,7 @@ class DoctorPanel(PanelWidget):
         return Hindrance(sentence, mend, _("Back to live"), lambda: self.context.run("replay.live"))
 
     def _network_hides(self, topic: str, lost: str) -> Iterator[Hindrance]:
-        """What is known of a topic of another network, which this doctor can't look into."""
+        # Topics of another network: the doctor can't check them.
         unread = self.session.live.networks.unread(topic)
         words = lost or (f"{topic_words(topic)}: {unread}." if unread else "")
         if words:
@@ -214,7 +213,6 @@ class DoctorPanel(PanelWidget):
             yield Hindrance(words, mend, _("Other networks"), lambda: self.context.run(LOOK_COMMAND))
 
     def _offer_topics(self) -> None:
-        """Offer the topics that there are, and the one that is missed."""
         live, missed = self.session.live, self.session.doctor.missed
         facts = (live.topics.revision, live.networks.revision, missed)
         if facts == self._offered or self.missed.view().isVisible():
@@ -272,7 +270,7 @@ class DoctorPanel(PanelWidget):
         row.button.clicked.connect(lambda: self._do(finding, step))
         return row
 
-    # -- the next steps -----------------------------------------------------------------------------------
+    # -- next steps ---------------------------------------------------------------------------------------
 
     def _step(self, finding: Finding) -> NextStep | None:
         kind, _colon, rest = finding.id.partition(":")
@@ -310,7 +308,6 @@ class DoctorPanel(PanelWidget):
             self.context.toast(_("Done. Checking again"))
 
     def _use(self, topic: str) -> None:
-        """Show the topic that was meant where the other one was missed."""
         if self._asker is not None:
             self._asker.show_topic(topic)
         else:
@@ -327,12 +324,11 @@ class DoctorPanel(PanelWidget):
         self.context.toast(_("Copied “{command}”").format(command=command))
 
     def _choose_missed(self) -> None:
-        """A person says what they miss: no panel asks any more."""
         self.session.doctor.miss(self.missed.value)
         self.begin_for(None)
 
     def copy_report(self) -> None:
-        """Put everything that was found on the clipboard, to be sent to somebody."""
+        """Copy all findings to the clipboard as a report."""
         missed = self.session.doctor.missed
         about = _("Missing: {topic}").format(topic=topic_words(missed)) + "\n" if missed else ""
         QGuiApplication.clipboard().setText(about + report(self.shown))

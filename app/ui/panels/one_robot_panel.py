@@ -1,4 +1,4 @@
-"""A panel of one robot: which one it shows, and the watch that brings what that robot tells."""
+"""Base class of panels that show one robot."""
 
 from __future__ import annotations
 
@@ -15,23 +15,24 @@ if TYPE_CHECKING:
 
 
 class OneRobotPanel(PanelWidget):
-    """Shows the robot that a person chose to see, else the first; one that goes stays until another is there.
+    """Panel of one robot: the one chosen by the person, else the first.
 
-    Calls `fleet_changed` when robots came, went or were chosen, `show_robot` when another one is to be shown,
-    and `refresh_robot` with every refresh.
+    A robot that disconnects stays visible until another one is available. Calls `fleet_changed` when robots
+    connect, disconnect or are chosen, `show_robot` when another robot is to be shown, and `refresh_robot` on
+    every refresh.
     """
 
     def __init__(self, context: PanelContext, title: str) -> None:
         super().__init__(context, title)
         self._robot = ""
-        self._shown: object = None  # what `key_of` said of it
+        self._shown: object = None  # value of `key_of` for the robot shown
         self._watch: Watch | None = None
         self._revision = -1
 
     def showEvent(self, event: QShowEvent) -> None:
         super().showEvent(event)
         if self.session.fleet.revision != self._revision:
-            self.refresh()  # before it is painted: until the next tick it would say that no robot is there
+            self.refresh()  # before painting: otherwise the empty state would flash until the next tick
 
     def refresh(self) -> None:
         fleet = self.session.fleet
@@ -44,31 +45,31 @@ class OneRobotPanel(PanelWidget):
         self.refresh_robot(fleet.link(self._robot) if self._robot else None)
 
     def turn_to(self, link: RobotLink) -> None:
-        """Show this robot from now on."""
+        """Switch to this robot and watch its topics."""
         self.shut()
         self._robot, self._shown, self._revision = link.name, self.key_of(link), self.session.fleet.revision
         self._watch = self.session.fleet.look_at(link.name)
         self.show_robot(link)
 
-    # -- what a panel says of itself ----------------------------------------------------------------------
+    # -- overridden by subclasses -------------------------------------------------------------------------
 
     def wanted_robot(self) -> RobotLink | None:
-        """The robot to show now; None leaves what is shown."""
+        """Return the robot to show; None keeps the current one."""
         fleet = self.session.fleet
         return fleet.shown or fleet.link(self._robot)
 
     def key_of(self, link: RobotLink) -> object:
-        """What of a robot decides what the panel is made of: when it differs, `show_robot` is called anew."""
+        """Return the properties that determine the panel's widgets; a change calls `show_robot` again."""
         return link.name
 
     def fleet_changed(self) -> None:
-        """Robots came, went or were chosen."""
+        """Update after robots connected, disconnected or were chosen."""
 
     def show_robot(self, link: RobotLink) -> None:
-        """Make the panel anew for this robot."""
+        """Build the widgets for this robot."""
 
     def refresh_robot(self, link: RobotLink | None) -> None:
-        """Show how the robot is now; None while there has not been any."""
+        """Show the robot's current state; None before the first robot."""
 
     def looks(self) -> Iterable[Suspendable | None]:
         return (self._watch,)

@@ -1,4 +1,4 @@
-"""Every panel of Studio and of installed plug-ins, by name: found when somebody asks for one."""
+"""Registry of all panels of Studio and of installed plug-ins, imported on first use."""
 
 from __future__ import annotations
 
@@ -13,14 +13,14 @@ from nep.system.plugins import discover
 
 
 class PanelRegistry(Mapping[str, Panel]):
-    """The panels by name. The start page needs none of them, and they are many modules."""
+    """Panels by name. Lazy, because the start page needs no panel and importing all modules takes time."""
 
     @cached_property
     def _found(self) -> Mapping[str, Panel]:
         return discover(panels.__name__, "PANEL", Panel)
 
     def steps(self) -> Sequence[Callable[[], object]]:
-        """What finds them, in steps of some milliseconds."""
+        """Return callables that import the panels one module at a time, a few milliseconds each."""
         names = [info.name for info in pkgutil.iter_modules(panels.__path__, f"{panels.__name__}.")]
         return [*(partial(importlib.import_module, name) for name in names), lambda: self._found]
 

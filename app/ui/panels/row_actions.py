@@ -1,4 +1,4 @@
-"""What a person can do with a topic or a node, the same wherever it is listed or drawn."""
+"""Context menu actions of topics, services and nodes, shared by all lists and diagrams."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from nep.i18n import _
 
 
 class RowAction(NamedTuple):
-    """An entry in the menu of a row: its words, its icon, what it does."""
+    """Entry of a row's context menu."""
 
     words: str
     icon: str
@@ -23,14 +23,14 @@ class RowAction(NamedTuple):
 
 
 def filled(menu: Menu, theme: Theme, actions: Iterable[RowAction]) -> Menu:
-    """The menu with these entries in it."""
+    """Add the actions to the menu and return it."""
     for action in actions:
         menu.addAction(theme.icon(action.icon), action.words, action.run)
     return menu
 
 
 def topic_actions(context: PanelContext, key: str) -> list[RowAction]:
-    """What can be done with a topic, by the name that it has among those of all networks (`key_of`)."""
+    """Return the actions of a topic; `key` is its name with network (`key_of`)."""
     network, name = split_key(key)
     actions = [
         RowAction(_("Show messages"), "list-tree", lambda: show_messages(context, key)),
@@ -38,7 +38,7 @@ def topic_actions(context: PanelContext, key: str) -> list[RowAction]:
     ]
     if has_fields(context, key):
         actions.append(RowAction(_("Plot a field"), "chart-line", lambda: context.plot(key, "")))
-    if not network:  # messages, alarms and recordings are of Studio's own network
+    if not network:  # publishing, alarms and recordings work on Studio's own network only
         if has_fields(context, key):
             actions.append(
                 RowAction(_("Publish to this topic"), "send", lambda: context.run(f"publish.topic:{key}"))
@@ -49,7 +49,7 @@ def topic_actions(context: PanelContext, key: str) -> list[RowAction]:
 
 
 def service_actions(context: PanelContext, name: str) -> list[RowAction]:
-    """What can be done with a service of Studio's own network."""
+    """Return the actions of a service of Studio's own network."""
     return [
         RowAction(_("Call service"), "play", lambda: context.run(f"service.call:{name}")),
         copies(context, name),
@@ -57,7 +57,7 @@ def service_actions(context: PanelContext, name: str) -> list[RowAction]:
 
 
 def node_actions(context: PanelContext, network: str, name: str) -> list[RowAction]:
-    """What can be done with a node of a network ("" is Studio's own)."""
+    """Return the actions of a node; `network` is "" for Studio's own."""
     actions: list[RowAction] = []
     if not network:
         actions.append(RowAction(_("New alarm"), "bell", lambda: context.run(f"alarm.node:{name}")))
@@ -65,7 +65,7 @@ def node_actions(context: PanelContext, network: str, name: str) -> list[RowActi
 
 
 def copies(context: PanelContext, name: str) -> RowAction:
-    """Copies the name of what it is about."""
+    """Return the action that copies a name."""
 
     def copy() -> None:
         QGuiApplication.clipboard().setText(name)
@@ -75,12 +75,12 @@ def copies(context: PanelContext, name: str) -> RowAction:
 
 
 def show_messages(context: PanelContext, key: str) -> None:
-    """Show the messages of a topic; it is not new any more."""
+    """Show the messages of a topic and clear its mark as new."""
     context.session.mark_seen(key)
     context.open_topic(key)
 
 
 def has_fields(context: PanelContext, key: str) -> bool:
-    """Whether there may be something to plot in its messages: there is nothing in pictures."""
+    """Return False if the topic has no fields to plot (images)."""
     topic = context.session.topic(key)
     return topic is None or topic.codec != "image"

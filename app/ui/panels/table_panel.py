@@ -1,4 +1,4 @@
-"""TablePanel: a panel that is one table, with a filter in its title; where it has no rows it says why."""
+"""Base class of panels that consist of one table with a filter in the title bar and an empty state."""
 
 from __future__ import annotations
 
@@ -26,25 +26,24 @@ Row = TypeVar("Row")
 
 @dataclass(frozen=True)
 class TableWords:
-    """What a table says of its rows, each marked with `lazy`: "Topics", "Filter topics"."""
+    """Texts of a table panel, each marked with `lazy`, such as "Topics" and "Filter topics"."""
 
     title: str
     filter: str
     nothing_fits: str
     clear_the_filter: str
     not_recorded: str = ""
-    """... and why a recording shows none; "" for what is not of the source that shows."""
+    """Empty state while a recording is open; "" for tables that don't depend on the source."""
 
 
 class TablePanel(PanelWidget, Generic[Row]):
-    """Whoever derives makes the table and says what `rebuild` shows and `open_row` opens.
+    """Panel with one table. Subclasses implement `make_model`, `make_table`, `rebuild` and `open_row`.
 
-    `pages` has the table and `empty`, which `show_table` changes; `line` parts it from `foot`, a few words
-    below.
+    `pages` holds the table and `empty`, the empty state; `show_table` switches between them. `line` separates
+    the table from `foot`, a short text below it.
     """
 
     def __init__(self, context: PanelContext, words: TableWords, icon: str) -> None:
-        """``icon`` is that of the empty state."""
         self._words = words
         super().__init__(context, _(words.title))
         theme = self.theme
@@ -69,31 +68,31 @@ class TablePanel(PanelWidget, Generic[Row]):
         self.pages.addWidget(self.table)
         self.pages.addWidget(self.empty)
         self.setFocusProxy(self.table)
-        self._columns = Menu(theme, self, _("Columns"))  # filled anew when "more" opens
+        self._columns = Menu(theme, self, _("Columns"))  # refilled whenever the "more" menu opens
         self._columns.setIcon(theme.icon("columns-2"))
 
     def make_model(self) -> TableModel[Row]:
-        """The model of the rows; asked once."""
+        """Create the model of the rows; called once."""
         raise NotImplementedError
 
     def make_table(self, model: TableModel[Row]) -> TableView[Row]:
-        """The table that shows them; asked once."""
+        """Create the table view; called once."""
         raise NotImplementedError
 
     def rebuild(self) -> None:
-        """Show the rows that the filter leaves, in the table's order."""
+        """Show the rows that match the filter, in the table's sort order."""
         raise NotImplementedError
 
     def open_row(self, key: str) -> None:
-        """A person opened the row of this key."""
+        """Open the row with this key (double click or Enter)."""
         raise NotImplementedError
 
     def row_actions(self, key: str) -> Sequence[RowAction]:
-        """What the menu of the row of this key offers; no menu where that is nothing."""
+        """Return the actions of a row's context menu; empty for no menu."""
         return (RowAction(_("Show"), "eye", lambda: self.open_row(key)),)
 
     def menu_of(self, key: str) -> Menu | None:
-        """The menu of the row of this key; None where there is nothing to do."""
+        """Return the context menu of a row, or None if it has no actions."""
         actions = self.row_actions(key)
         return filled(Menu(self.theme, self), self.theme, actions) if actions else None
 
@@ -104,11 +103,11 @@ class TablePanel(PanelWidget, Generic[Row]):
             menu.popup(at)
 
     def filter_words(self) -> list[str]:
-        """What a row must have, each of them, to be shown."""
+        """Return the words of the filter; a row must contain all of them."""
         return self.filter.text().casefold().split()
 
     def show_table(self, any_rows: bool, filtered: bool) -> None:
-        """Show the table, or why it has no rows."""
+        """Show the table, or the empty state that fits `filtered`."""
         self.pages.setCurrentIndex(0 if any_rows else 1)
         self.doctor.setVisible(not any_rows and not filtered)
         if any_rows:
@@ -132,7 +131,7 @@ class TablePanel(PanelWidget, Generic[Row]):
             self.say_empty()
 
     def missed_topic(self) -> str:
-        """The topic that a person types into the filter, and that is not there; "" where that is none."""
+        """Return the topic typed into the filter if it does not exist, else ""."""
         return ""
 
     def hindrances(self) -> list[Hindrance]:
@@ -140,7 +139,7 @@ class TablePanel(PanelWidget, Generic[Row]):
         return [filter_hindrance(self.title(), words, self.filter.clear)] if words else []
 
     def say_empty(self) -> None:
-        """Say in `empty` that there is nothing yet: a master is there, or is looked for."""
+        """Set the texts of `empty` for a table without rows, depending on the state of the master."""
         raise NotImplementedError
 
     def focus_filter(self) -> bool:
@@ -167,10 +166,9 @@ class TablePanel(PanelWidget, Generic[Row]):
 
 
 class DoctorLine(QWidget):
-    """``Expected to see something?`` with its button."""
+    """Line with the question "Expected to see something?" and a link to the connection doctor."""
 
     def __init__(self, theme: Theme, ask: Callable[[], object]) -> None:
-        """``ask`` opens the connection doctor."""
         super().__init__()
         words = ElidedLabel("small", "textSecondary")
         words.setText(_("Expected to see something?"))
