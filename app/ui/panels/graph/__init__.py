@@ -1,7 +1,7 @@
-"""Graph: who talks to whom, with rates on the lines, grouped by computer or robot.
+"""Graph panel: nodes and the topics between them with rates, grouped by computer or robot.
 
-`scene` measures it, `painting` paints it, `canvas` lets a person move in it, `card` tells of what is chosen,
-`words` has the words of all.
+`scene` computes geometry and texts, `painting` renders it, `canvas` handles mouse and keys, `card` shows the
+selected item, and `words` has the texts.
 """
 
 from app.ui.panels.graph.panel import PANEL as PANEL

@@ -1,4 +1,4 @@
-"""GraphCanvas: the graph on the screen, to be moved, enlarged and walked through by mouse and keys."""
+"""Canvas of the graph: pan, zoom and selection by mouse and keys."""
 
 from __future__ import annotations
 
@@ -33,11 +33,11 @@ STEP = 1.2
 MARGIN = 20.0
 PAN = 60.0
 CLICK = 4.0
-"""How far the mouse may move in a press that chooses, in px."""
+"""Maximum mouse movement of a click, in px."""
 AT_ONCE = 250
-"""Nodes and lines whose figures are renewed in one tick."""
+"""Nodes and lines updated per tick."""
 MOST_AREAS = 60
-"""More areas than these are painted as one."""
+"""Above this number of changed areas, their bounding rectangle is repainted instead."""
 _ARROWS: dict[int, Arrow] = {
     Qt.Key.Key_Left: "left",
     Qt.Key.Key_Right: "right",
@@ -49,12 +49,14 @@ LETTERS = {Qt.Key.Key_G: "g", Qt.Key.Key_H: "h", Qt.Key.Key_S: "s", Qt.Key.Key_S
 
 
 class GraphCanvas(QWidget):
-    """Shows one scene. It stays where it is when the scene is another one, until a person wants all of it.
+    """Canvas that shows one scene. It keeps its viewport when the scene changes, unless everything is shown.
 
-    `chosen` tells what a person chose (None: nothing), `opened` a topic that is to be looked at, `entered` a
-    node whose card is wanted, `toggled` a group to be opened or closed, `quiet_wanted` one whose quiet nodes
-    are wanted, `letter` a key that is the panel's, `moved` that the part that shows is another. `menu_wanted`
-    tells of what is chosen, and where on the screen, a menu is wanted.
+    Signals: `chosen` (selection, or None), `opened` (key of a topic to inspect), `entered` (focus the card),
+    `toggled` (group to expand or collapse), `quiet_wanted` (group whose quiet nodes to show), `letter` (key
+    for the panel), `moved` (viewport changed), `menu_wanted` (selection and screen position of a context
+    menu).
+
+    `describe` returns the selection as text for screen readers, `tip` the tooltip of a topic.
     """
 
     chosen = Signal(object)
@@ -69,7 +71,6 @@ class GraphCanvas(QWidget):
     def __init__(
         self, theme: Theme, describe: Callable[[GraphChoice | None], str], tip: Callable[[str], str]
     ) -> None:
-        """``describe`` says in words what is chosen, ``tip`` what is known of a topic under the mouse."""
         super().__init__()
         self._theme, self._describe, self._tip = theme, describe, tip
         self.scene: GraphScene | None = None
@@ -81,7 +82,7 @@ class GraphCanvas(QWidget):
         self._pressed: QPointF | None = None
         self._dragged = False
         self.painted = 0
-        """How often it was painted; tests and benchmarks ask."""
+        """Number of paint events, for tests and benchmarks."""
         self.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
         self.setProperty("ownFocus", "true")
         self.setMouseTracking(True)
@@ -96,10 +97,10 @@ class GraphCanvas(QWidget):
     def minimumSizeHint(self) -> QSize:
         return QSize(120, 80)
 
-    # -- what it shows ---------------------------------------------------------------------------------------
+    # -- display ------------------------------------------------------------------------------------------
 
     def show_scene(self, scene: GraphScene | None) -> None:
-        """Show another graph, or the same with other places."""
+        """Show another graph, or the same graph with another layout."""
         self.scene = scene
         if self.choice is not None and not self._is_there(self.choice):
             self.choose(None)
@@ -117,20 +118,20 @@ class GraphCanvas(QWidget):
         return (graph.node(choice.key) if choice.kind == "node" else graph.line_of(choice.key)) is not None
 
     def renew_soon(self) -> None:
-        """Figures have changed, or others are in sight: `renew` takes them over."""
+        """Schedule an update of the visible figures; `renew` performs it."""
         if self.scene is not None:
             self._waiting = self.scene.seen(self.visible())
 
     def renew(self, figures: FiguresOf) -> int:
-        """Take over the figures of the next `AT_ONCE` in sight, and paint only what they change.
+        """Update the figures of the next `AT_ONCE` visible items and repaint only changed areas.
 
-        Returns how many areas that are. Called with every tick, so that none takes long.
+        Return the number of repainted areas. Called on every tick, so that no call takes long.
         """
         scene = self.scene
         if scene is None or not self._waiting:
             return 0
         if not scene.has_figures(self.scale):
-            self._waiting = []  # they are renewed when it is enlarged
+            self._waiting = []  # updated when the person zooms in
             return 0
         now, self._waiting = self._waiting[:AT_ONCE], self._waiting[AT_ONCE:]
         has_words = scene.has_words(self.scale)
@@ -145,7 +146,7 @@ class GraphCanvas(QWidget):
         return len(areas)
 
     def choose(self, choice: GraphChoice | None, *, by_key: bool = False) -> None:
-        """Choose something, or nothing; what keys choose comes into sight and is said."""
+        """Select an item, or nothing; a selection by key is scrolled into view and announced."""
         if choice == self.choice:
             return
         self.choice = choice
@@ -157,15 +158,15 @@ class GraphCanvas(QWidget):
         self.update()
         self.chosen.emit(choice)
 
-    # -- the part that shows ---------------------------------------------------------------------------------
+    # -- viewport -----------------------------------------------------------------------------------------
 
     def visible(self) -> QRectF:
-        """The part of the scene that is in sight."""
+        """Return the visible part of the scene, in scene coordinates."""
         left_top = -self._offset / self.scale
         return QRectF(left_top.x(), left_top.y(), self.width() / self.scale, self.height() / self.scale)
 
     def show_all(self) -> None:
-        """Show everything, not larger than 100 %; so it stays until a person moves or enlarges it."""
+        """Fit the whole graph into the view (at most 100 %); it stays fitted until the next pan or zoom."""
         self._shows_all = True
         if self.scene is None or self.scene.bounds.isEmpty():
             return
@@ -177,11 +178,11 @@ class GraphCanvas(QWidget):
         self.moved.emit()
 
     def zoom_by(self, factor: float, at: QPointF | None = None) -> None:
-        """Enlarge around a point of the screen, or the middle."""
+        """Zoom by a factor around a point of the widget, by default its centre."""
         self.zoom_to(self.scale * factor, at)
 
     def zoom_to(self, scale: float, at: QPointF | None = None) -> None:
-        """Show it in this size (1.0 is 100 %) around a point of the screen, or the middle."""
+        """Zoom to a scale (1.0 is 100 %) around a point of the widget, by default its centre."""
         at = at if at is not None else QPointF(self.width() / 2, self.height() / 2)
         scale = min(MOST_SCALE, max(LEAST_SCALE, scale))
         self._offset = at - (at - self._offset) * (scale / self.scale)
@@ -191,14 +192,14 @@ class GraphCanvas(QWidget):
         self.moved.emit()
 
     def move_by(self, dx: float, dy: float) -> None:
-        """Move it by so many px of the screen."""
+        """Pan by a distance in px."""
         self._offset += QPointF(dx, dy)
         self._shows_all = False
         self.update()
         self.moved.emit()
 
     def show_place(self, at: QPointF) -> None:
-        """Bring a place of the scene into the middle."""
+        """Centre the view on a point of the scene."""
         middle = self.visible().center()
         self.move_by((middle.x() - at.x()) * self.scale, (middle.y() - at.y()) * self.scale)
 
@@ -208,7 +209,6 @@ class GraphCanvas(QWidget):
             self.show_place(rect.center())
 
     def _place_of(self, choice: GraphChoice | None) -> QRectF:
-        """Where a node, or the words of a topic, are in the scene; null where nothing is."""
         scene = self.scene
         if scene is None or choice is None:
             return QRectF()
@@ -230,7 +230,7 @@ class GraphCanvas(QWidget):
     def _to_scene(self, at: QPointF) -> QPointF:
         return (at - self._offset) / self.scale
 
-    # -- Qt --------------------------------------------------------------------------------------------------
+    # -- Qt events ----------------------------------------------------------------------------------------
 
     def paintEvent(self, event: QPaintEvent) -> None:
         self.painted += 1
@@ -331,7 +331,7 @@ class GraphCanvas(QWidget):
             self.opened.emit(meant.key)
 
     def contextMenuEvent(self, event: QContextMenuEvent) -> None:
-        """What the mouse is over is chosen first, so that its card says what the menu is about."""
+        # Selects the item under the mouse first, so that its card fits the menu.
         if event.reason() == QContextMenuEvent.Reason.Keyboard:
             choice, place = self.choice, self._to_screen(self._place_of(self.choice)).center()
         else:
@@ -353,7 +353,7 @@ class GraphCanvas(QWidget):
         self.choose(meant)
 
     def _means(self, at: QPointF) -> GraphChoice | tuple[str, bool] | None:
-        """What a press there would choose: a node, a topic, or (a group, whether by its head)."""
+        # The bool of a group is True for its title, False for its number of quiet nodes.
         scene = self.scene
         if scene is None:
             return None
@@ -368,14 +368,14 @@ class GraphCanvas(QWidget):
         return (group[0].key, group[1]) if group is not None else None
 
     def open_group(self, key: str) -> bool:
-        """Open a group that is drawn as one box."""
+        """Expand a group that is drawn as one box; return False for other nodes."""
         node = self.scene.graph.node(key) if self.scene is not None else None
         if node is None or node.kind != "group":
             return False
         (self.quiet_wanted if node.quiet == node.members else self.toggled).emit(node.group)
         return True
 
-    # -- keys ------------------------------------------------------------------------------------------------
+    # -- keys ---------------------------------------------------------------------------------------------
 
     def keyPressEvent(self, event: QKeyEvent) -> None:
         key = event.key()
@@ -393,7 +393,6 @@ class GraphCanvas(QWidget):
             super().keyPressEvent(event)
 
     def _zoom_key(self, event: QKeyEvent) -> bool:
-        """Letters of the panel, and what enlarges; False for other keys."""
         held = event.modifiers() & ~(Qt.KeyboardModifier.ShiftModifier | Qt.KeyboardModifier.KeypadModifier)
         key = event.key()
         if held:
@@ -427,7 +426,7 @@ class GraphCanvas(QWidget):
 
 
 class GraphOverview(QWidget):
-    """The whole graph small, with a frame around the part that shows; a press goes there."""
+    """Overview with a frame around the visible part; a click centres the view there."""
 
     def __init__(self, theme: Theme, canvas: GraphCanvas) -> None:
         super().__init__(canvas)
@@ -439,7 +438,7 @@ class GraphOverview(QWidget):
         self.hide()
 
     def _follow(self) -> None:
-        """Stand in the corner while not everything is in sight, and there is room."""
+        # Visible while part of the graph is out of view and there is room for it.
         canvas, scene = self._canvas, self._canvas.scene
         wanted = (
             scene is not None

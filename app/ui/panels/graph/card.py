@@ -1,4 +1,4 @@
-"""The card of what is chosen in the graph: a topic, a service or a node, with its figures and next steps."""
+"""Card of the selected topic, service or node in the graph, with figures and next steps."""
 
 from __future__ import annotations
 
@@ -26,15 +26,15 @@ if TYPE_CHECKING:
 
 WIDTH = 316
 MOST_ROWS = 40
-"""Publishers, subscribers or topics that are listed; how many more there are is said."""
+"""Maximum number of listed publishers, subscribers or topics; the number of omitted ones is shown."""
 
 Row = tuple[str, str, tuple[str, ...]]
-"""What a press on a row chooses ("" for nothing), its name, and its figures."""
+"""Key to select on click ("" for none), name, and figures."""
 
 
 @dataclass(frozen=True, slots=True)
 class CardTable:
-    """Rows under a head. ``columns`` are the words above the figures."""
+    """Table with a title; `columns` are the headers of the figures."""
 
     title: str
     columns: tuple[str, ...]
@@ -44,7 +44,7 @@ class CardTable:
 
 @dataclass(frozen=True, slots=True)
 class CardFigure:
-    """One large figure: what it is, its value, a line below, and perhaps a curve."""
+    """Large figure with a note and an optional curve."""
 
     title: str
     value: str
@@ -55,7 +55,7 @@ class CardFigure:
 
 @dataclass(frozen=True, slots=True)
 class CardContent:
-    """Everything that a card says of one thing."""
+    """Contents of a card."""
 
     title: str
     kind: str
@@ -64,18 +64,18 @@ class CardContent:
     tables: tuple[CardTable, ...] = ()
     foot: str = ""
     topic: str = ""
-    """What *Inspect* opens; "" where there is nothing to inspect."""
+    """Topic opened by *Inspect*; "" to hide the button."""
     has_fields: bool = False
-    """Whether a field of its messages can be plotted."""
+    """True if the messages have fields to plot."""
     alarm: str = ""
-    """The window's command that begins an alarm about it; "" where there can't be one."""
+    """Command that creates an alarm for the item; "" if none is possible."""
 
 
 class GraphCard(QWidget):
-    """Shows a `CardContent`; what did not change is left alone.
+    """Shows a `CardContent`; unchanged parts are left as they are.
 
-    `closed` when a person closes it, `inspected`, `plotted` and `record_wanted` tell a topic, `warned` the
-    command that begins an alarm, `chose` a node's or topic's key. The next steps stand in `steps`.
+    Signals: `closed`, `inspected`, `plotted` and `record_wanted` (topic), `warned` (command that creates an
+    alarm), `chose` (kind and key of an item). `steps` holds the buttons.
     """
 
     closed = Signal()
@@ -145,7 +145,7 @@ class GraphCard(QWidget):
         return head
 
     def first_stop(self) -> QWidget:
-        """What gets the keyboard when a person goes into the card: the first row, else *Inspect*."""
+        """Return the widget to focus on entry: the first row, else *Inspect*, else the close button."""
         rows = [row.button for table in self._tables for row in table.rows]
         first = next((button for button in rows if button.isVisibleTo(self)), None)
         return first or (self.inspect if self.inspect.isVisibleTo(self) else self.close_button)
@@ -167,7 +167,7 @@ class GraphCard(QWidget):
             self.record_wanted.emit(self.content.topic)
 
     def show_content(self, content: CardContent | None) -> None:
-        """Say this, or nothing: then the card is not there."""
+        """Show the contents; None hides the card."""
         if content == self.content:
             return
         before, self.content = self.content, content
@@ -218,13 +218,13 @@ class GraphCard(QWidget):
 
 
 def _shape(content: CardContent) -> object:
-    """What decides which widgets there are."""
+    # Widgets are rebuilt only when this value changes.
     tables = [(table.title, table.columns, [row[:2] for row in table.rows]) for table in content.tables]
     return content.title, len(content.figures), content.facts, tables
 
 
 class _FigureBox(QWidget):
-    """One of the large figures."""
+    """Large figure with title, note and curve."""
 
     def __init__(self, theme: Theme) -> None:
         super().__init__()
@@ -244,7 +244,6 @@ class _FigureBox(QWidget):
         column.addWidget(self._note)
 
     def say(self, figure: CardFigure) -> None:
-        """Show this figure."""
         self._title.setText(figure.title)
         if self._value.text() != figure.value:
             self._value.setText(figure.value)
@@ -266,7 +265,7 @@ class _TableRow:
 
 
 class _Table(QWidget):
-    """Names, each of which chooses what it names, with figures at their right."""
+    """Table of clickable names with figures to their right."""
 
     def __init__(self, theme: Theme, table: CardTable, chose: Callable[[str, str], object]) -> None:
         super().__init__()
@@ -293,22 +292,27 @@ class _Table(QWidget):
             self.rows.append(_TableRow(button, shown))
 
     def say(self, table: CardTable) -> None:
-        """Show the figures of the moment."""
         for row, (_key, _name, figures) in zip(self.rows, table.rows, strict=True):
             for shown, words in zip(row.figures, figures, strict=True):
                 if shown.text() != words:  # type: ignore[attr-defined]
                     shown.setText(words)  # type: ignore[attr-defined]
 
 
-# -- what is said --------------------------------------------------------------------------------------------
+# -- contents ---------------------------------------------------------------------------------------------
 
 
 @dataclass(frozen=True, slots=True)
 class CardFacts:
-    """Where a card's facts come from: topics and services by name, the graph, names and boxes of nodes.
+    """Sources of a card's facts.
 
-    ``box_of`` gives the box of a node's entry, "" where it is not drawn; ``calls`` are calls a second;
-    ``shows`` says of a topic's name whether it is told of at all.
+    Attributes:
+        topic_of: Return a topic by key.
+        view: Graph reported by the master.
+        name_of: Return the name of a node by its key.
+        box_of: Return the box of a node in the drawing; "" if it is not drawn.
+        calls: Calls per second, by service.
+        shows: Return False for topics to leave out.
+        now_ns: Clock, ns since 1970.
     """
 
     topic_of: Callable[[str], Topic | None]
@@ -321,7 +325,7 @@ class CardFacts:
 
 
 def topic_card(key: str, facts: CardFacts) -> CardContent | None:
-    """What is known of a topic or service; None when it is not known."""
+    """Return the card of a topic or service, or None if it is unknown."""
     topic = facts.topic_of(key)
     if topic is not None:
         return _of_topic(topic, facts)
@@ -371,7 +375,7 @@ def _of_topic(topic: Topic, facts: CardFacts) -> CardContent:
         clock_words(facts.view) if not topic.network else "",
         topic.key,
         topic.codec != "image",
-        "" if topic.network else f"alarm.topic:{topic.name}",  # alarms are about Studio's own network
+        "" if topic.network else f"alarm.topic:{topic.name}",  # alarms work on Studio's own network only
     )
 
 
@@ -393,7 +397,7 @@ def _lost(topic: Topic) -> CardFigure:
 
 
 def _latency(topic: Topic) -> CardFigure:
-    """Of the newest message, where somebody looks at the topic; nobody measures it otherwise."""
+    # Measured only while the topic is subscribed to.
     newest = topic.newest
     latency = newest.latency_s if newest is not None else None
     if latency is None:
@@ -429,7 +433,7 @@ def _row(facts: CardFacts, entry: str, figures: tuple[str, ...]) -> Row:
 
 
 def node_card(node: DrawnNode, services: Sequence[tuple[str, bool]], facts: CardFacts) -> CardContent | None:
-    """What is known of a node; ``services`` are those that it serves (True) or calls."""
+    """Return a node's card; `services` are those that it offers (True) or calls (False)."""
     entry = node.entry
     if entry is None:
         return None
@@ -475,7 +479,7 @@ def _topics_of(title: str, network: str, names: Sequence[str], facts: CardFacts)
 
 
 def clock_words(view: GraphView | None) -> str:
-    """How surely the clocks of computers are known; "" when nobody has measured it."""
+    """Return the largest uncertainty of the computers' clock offsets; "" if none was measured."""
     if view is None:
         return ""
     known = [node.clock_uncertainty_ns for node in view.nodes.values() if node.clock_uncertainty_ns]

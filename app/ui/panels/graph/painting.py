@@ -1,4 +1,4 @@
-"""A scene painted: on the screen, and in a saved picture."""
+"""Painting of a graph scene, on the screen or to a file."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from app.ui.widgets import paint
 CHOSEN_WIDTH = 2.25
 DIM = 0.3
 LEAST_TEXT_PX = 6.0
-"""Smaller names are not painted: nobody could read them."""
+"""Text below this size is not painted, because it would be illegible."""
 
 
 def paint_scene(
@@ -26,13 +26,13 @@ def paint_scene(
     *,
     rings: bool = False,
 ) -> None:
-    """Paint what is in ``clip``, as large as ``scale`` says; ``rings`` show what the keys chose."""
+    """Paint the part of the scene within `clip` at `scale`; `rings` adds focus rings for the keyboard."""
     painter.setRenderHint(QPainter.RenderHint.Antialiasing)
     _Painting(scene, painter, clip, scale, chosen, rings=rings).paint()
 
 
 class _Painting:
-    """One painting of a scene: the colours of the moment, and who is at the chosen line."""
+    """One paint pass: colours, and the ends of the selected line."""
 
     def __init__(
         self,
@@ -56,7 +56,7 @@ class _Painting:
         self.ends = {*line.sources, *line.targets} if line is not None else set[str]()
 
     def paint(self) -> None:
-        """Groups, lines, their words, then nodes: each may lie on what is before it."""
+        # Back to front: groups, lines, their labels, nodes.
         painter, clip = self.painter, self.clip
         for group in self.scene.groups:
             if group.rect.intersects(clip):
@@ -134,7 +134,6 @@ class _Painting:
             self.painter.drawPolygon(arrow)
 
     def _label(self, item: LineItem, rect: QRectF) -> None:
-        """The names in the colour of text, the figure behind them quieter; on a chip when chosen."""
         theme, painter = self.theme, self.painter
         names, _space, figure = item.figures.words.rpartition(" ")
         if not names or not figure.endswith(("/s", "/min")):
@@ -157,7 +156,6 @@ class _Painting:
             _text(painter, area, figure, self.scene.label_font, quiet)
 
     def _losses(self, item: LineItem) -> None:
-        """What is lost, at the ends of the chosen line where it is."""
         if not self.has_small:
             return
         theme, painter, font = self.theme, self.painter, self.scene.small_font
@@ -198,7 +196,7 @@ class _Painting:
             self._words(item, "textDisabled" if node.is_gone else "textSecondary" if faint else "text")
 
     def _other_side(self, rect: QRectF, joins: str, edge: QColor) -> None:
-        """The part of a bridge that belongs to the other network."""
+        # The part of a bridge that names the other network.
         theme, painter = self.theme, self.painter
         part = QRectF(rect.right() - JOIN, rect.top() + 1, JOIN - 1, rect.height() - 2)
         paint.box(painter, part, theme.radius("small"), theme.colour("sunken"))
@@ -231,7 +229,7 @@ class _Painting:
 
 
 def _text(painter: QPainter, rect: QRectF, text: str, font: QFont, colour: QColor) -> None:
-    """One line of text that fits: `paint.words` without measuring it again."""
+    # Faster than `paint.words`, which measures the text again.
     painter.setFont(font)
     painter.setPen(colour)
     painter.drawText(rect, int(paint.LEFT), text)

@@ -1,4 +1,4 @@
-"""Graph: who talks to whom. Nodes in groups, topics and services as lines with their rates."""
+"""Graph panel: nodes in groups, topics and services as lines with their rates."""
 
 from __future__ import annotations
 
@@ -68,18 +68,18 @@ from nep.i18n import _, lazy, ngettext
 SVG = FileKind(lazy("An image that stays sharp at any size"), ".svg")
 DOT = FileKind(lazy("Graph for other programs"), ".dot")
 MOST_AT_ONCE = 500
-"""Lines of a scene that are made and painted in one tick."""
+"""Lines above which building and first painting of a scene are spread over two ticks."""
 BESIDE_FROM = 700
-"""From this width on, in px at 100 % text, the card stands beside the graph, else below it."""
+"""Minimum width in px (at 100 % text size) for the card at the side; below it, the card is at the bottom."""
 QUIET_EVERY = 30
-"""Refreshes of 30 a second: who is quiet is looked at once a second."""
+"""Refreshes at 30 Hz: quiet nodes are determined once a second."""
 MOST_IN_MENU = 20
-"""Topics of one line that its menu has; the others are in the cards of its nodes."""
+"""Maximum number of topics in a line's menu; the cards of its nodes list all."""
 GROUPS: tuple[GroupBy, ...] = ("computer", "robot", "nothing")
 
 
 class GraphPanel(PanelWidget):
-    """The graph with its tools above, and the card of what is chosen beside it."""
+    """Graph with a toolbar above and the card of the selected item at the side."""
 
     def __init__(self, context: PanelContext) -> None:
         super().__init__(context, _("Graph"))
@@ -175,7 +175,7 @@ class GraphPanel(PanelWidget):
         self._beside.addWidget(self.card)
         return page
 
-    # -- what it shows ---------------------------------------------------------------------------------------
+    # -- display ------------------------------------------------------------------------------------------
 
     def source_changed(self) -> None:
         self._seen = ()
@@ -240,7 +240,7 @@ class GraphPanel(PanelWidget):
             self._thread.ask(graph, self._layout, self._sizes_asked)
 
     def _take_layout(self) -> None:
-        """Make the scene of a layout that was found; of many nodes it is shown, and painted, a tick later."""
+        # A large scene is shown one tick after it was built, to keep ticks short.
         scene, self._coming = self._coming, None
         made = self._thread.take()
         if made is not None:
@@ -291,7 +291,6 @@ class GraphPanel(PanelWidget):
             self.tools.say_quiet(graph.quiet_hidden, self._choices.hides_quiet)
 
     def _say_note(self, layout: GraphLayout) -> None:
-        """What is not drawn as it should be; the line is not there when all is well."""
         words = []
         if layout.left_out:
             left = ngettext(
@@ -305,7 +304,7 @@ class GraphPanel(PanelWidget):
         self.note.setText(". ".join(words))
         self.note.setVisible(bool(words))
 
-    # -- what a person chooses -------------------------------------------------------------------------------
+    # -- user actions -------------------------------------------------------------------------------------
 
     def _choose(self, **changes: object) -> None:
         self._choices = replace(self._choices, **changes)  # type: ignore[arg-type]
@@ -358,7 +357,7 @@ class GraphPanel(PanelWidget):
             menu.deleteLater()
 
     def menu_of(self, choice: GraphChoice) -> Menu:
-        """What can be done with a node, or with the topics and services of a line."""
+        """Return the context menu of a node, or of the topics and services of a line."""
         menu, scene = Menu(self.theme, self), self.canvas.scene
         graph = scene.graph if scene is not None else NodeGraph()
         if choice.kind == "node":
@@ -394,9 +393,9 @@ class GraphPanel(PanelWidget):
         elif self._asked is not None and self._asked.line_of(key) is not None:
             self.canvas.choose(GraphChoice("topic", key), by_key=True)
         else:
-            self._open(key)  # nobody hears it: there is no line
+            self._open(key)  # a topic without subscribers has no line
 
-    # -- the card and other words ----------------------------------------------------------------------------
+    # -- card and texts -----------------------------------------------------------------------------------
 
     def _card_facts(self) -> CardFacts:
         scene = self.canvas.scene
@@ -435,7 +434,6 @@ class GraphPanel(PanelWidget):
         return found
 
     def _described(self, choice: GraphChoice | None) -> str:
-        """What is chosen, as a screen reader says it."""
         scene = self.canvas.scene
         if choice is None or scene is None:
             return ""
@@ -476,14 +474,14 @@ class GraphPanel(PanelWidget):
             else _("{names} and {count} more").format(names=", ".join(names), count=more)
         )
 
-    # -- files -----------------------------------------------------------------------------------------------
+    # -- files --------------------------------------------------------------------------------------------
 
     def _ask_file(self, kind: FileKind) -> None:
         suggestion = Path.home() / _("graph")
         self.context.files.save_as(_("Export the graph"), suggestion, (kind,), self.save)
 
     def save(self, path: Path, kind: FileKind) -> None:
-        """Write the graph there; the window says whether that went well."""
+        """Write the graph to a file and report the result in a toast."""
         scene = self.canvas.scene
         if scene is None or not scene.nodes:
             return
@@ -497,7 +495,7 @@ class GraphPanel(PanelWidget):
             self.context.toast(_("Saved {name}").format(name=path.name))
 
     def picture(self) -> bytes:
-        """The whole graph as SVG, in the colours of the moment; b"" when there is none."""
+        """Return the whole graph as SVG in the current colours; b"" if it is empty."""
         scene = self.canvas.scene
         if scene is None or not scene.nodes:
             return b""
@@ -518,12 +516,12 @@ class GraphPanel(PanelWidget):
         return bytes(buffer.data().data())
 
     def dot(self) -> str:
-        """The graph in the language of Graphviz."""
+        """Return the graph in the DOT language of Graphviz."""
         graph = self.canvas.scene.graph if self.canvas.scene is not None else NodeGraph()
         names = {group.key: group_name(group.key, self._host) for group in graph.groups}
         return dot_of(graph, names, lambda line: self._figures_of(line).words)
 
-    # -- the window ------------------------------------------------------------------------------------------
+    # -- overrides ----------------------------------------------------------------------------------------
 
     def focus_filter(self) -> bool:
         self.tools.filter.setFocus(Qt.FocusReason.ShortcutFocusReason)
@@ -542,7 +540,6 @@ class GraphPanel(PanelWidget):
         self._fit()
 
     def _fit(self) -> None:
-        """The card beside the graph, or below it where there is too little room."""
         is_wide = self.width() >= self.theme.scaled(BESIDE_FROM)
         ways = QBoxLayout.Direction
         self._beside.setDirection(ways.LeftToRight if is_wide else ways.TopToBottom)

@@ -1,7 +1,7 @@
-"""The graph measured: where everything is, what stands there, and what is under the mouse.
+"""Geometry and texts of the graph, with hit testing.
 
-Lengths are those of the layout; who paints scales the painter. What a figure changes is told as areas, so
-that nothing else is painted anew.
+Coordinates are those of the layout; the painter applies the scale. Updates return the changed areas, so that
+only these are repainted.
 """
 
 from __future__ import annotations
@@ -30,16 +30,16 @@ from app.ui.widgets import paint
 CORNER = 10.0
 ARROW_LONG, ARROW_WIDE = 9.0, 8.0
 ROUND = 14.0
-"""How far arrows and thick lines reach beyond their ways."""
+"""Margin around lines for arrows and thick pens."""
 CELL = (160.0, 48.0)
 LABEL_ROOM = 7
-"""Letters that a label keeps for its figure."""
+"""Characters reserved in a label for its figure."""
 LEAST_SMALL_PX = 7.0
-"""Smaller letters are not painted: nobody could read them."""
+"""Text below this size is not painted, because it would be illegible."""
 TINY = 0.2
-"""In smaller sizes thousands of lines are in sight, of which no figure can be read or thickness be seen."""
+"""Below this scale thousands of lines are visible, so figures and line widths are left out."""
 REACH = 6.0
-"""How near to a line a press of the mouse means it, in px of the screen."""
+"""Maximum distance of a click from a line, in px."""
 JOIN = 48.0
 """Width of the part of a bridge that names the other network."""
 
@@ -49,20 +49,20 @@ FiguresOf = Callable[[GraphLine], LineFigures]
 
 @dataclass(slots=True)
 class NodeItem:
-    """A box that is painted: its place, and its words as they were painted last."""
+    """Painted box of a node, with the texts painted last."""
 
     node: DrawnNode
     rect: QRectF
     name: str
     said: str = ""
     line: str = ""
-    """The same, as much of it as there is room for."""
+    """`said`, elided to the available width."""
     is_dim: bool = False
 
 
 @dataclass(slots=True)
 class LineItem:
-    """A line that is painted: its ways, and where its words stand once they are placed, if there is room."""
+    """Painted line: its routes, and the rectangle of its label once placed, if there was room."""
 
     line: GraphLine
     ways: dict[tuple[str, str], Sequence[Place]]
@@ -75,10 +75,10 @@ class LineItem:
     _arrows: list[QPolygonF] | None = None
     _plain: list[QPolygonF] | None = None
 
-    # Each is made when it is first painted: all of a large graph at once would hold the window up.
+    # Created on first paint: all paths of a large graph at once would block the window.
 
     def path(self) -> QPainterPath:
-        """The ways with round corners."""
+        """Return the routes with rounded corners."""
         if self._path is None:
             self._path = QPainterPath()
             for points in self.ways.values():
@@ -86,13 +86,13 @@ class LineItem:
         return self._path
 
     def arrows(self) -> list[QPolygonF]:
-        """The arrow of each way."""
+        """Return the arrow head of each route."""
         if self._arrows is None:
             self._arrows = [_arrow(points) for points in self.ways.values()]
         return self._arrows
 
     def plain(self) -> list[QPolygonF]:
-        """The ways with sharp corners, for a size in which nobody sees the difference."""
+        """Return the routes with sharp corners, for small scales."""
         if self._plain is None:
             self._plain = [QPolygonF([QPointF(*at) for at in points]) for points in self.ways.values()]
         return self._plain
@@ -100,7 +100,7 @@ class LineItem:
 
 @dataclass(slots=True)
 class GroupItem:
-    """A group that is painted; ``quiet`` is where the number of its hidden nodes stands."""
+    """Painted group; `quiet` is the rectangle of the number of hidden nodes."""
 
     group: GraphGroup
     rect: QRectF
@@ -109,12 +109,11 @@ class GroupItem:
 
 
 class GraphScene:
-    """What is painted of one graph, measured once; `renew` takes over its figures."""
+    """Geometry of one graph, computed once; `renew` updates its figures. `host` is this computer's name."""
 
     def __init__(
         self, theme: Theme, graph: NodeGraph, layout: GraphLayout, sizes: LayoutSizes, host: str
     ) -> None:
-        """``host`` is this computer's name."""
         self.theme = theme
         self.graph, self.layout, self.sizes, self._host = graph, layout, sizes, host
         self._fonts()
@@ -171,17 +170,17 @@ class GraphScene:
             group, rect, self._elided(self.title_font, group_name(group.key, self._host), room), chip
         )
 
-    # -- figures ---------------------------------------------------------------------------------------------
+    # -- figures ------------------------------------------------------------------------------------------
 
     def seen(self, area: QRectF) -> list[NodeItem | LineItem]:
-        """The nodes and lines in an area."""
+        """Return the nodes and lines within an area."""
         nodes = [item for item in self.nodes.values() if item.rect.intersects(area)]
         return [*nodes, *(item for item in self.lines if item.bounds.intersects(area))]
 
     def renew(self, item: NodeItem | LineItem, figures: FiguresOf, *, with_words: bool) -> QRectF | None:
-        """Take over the figures of one node or line; the area that looks otherwise than before, or None.
+        """Update the figures of one item and return the area to repaint, or None if nothing changed.
 
-        The words of a line find their room when they are first asked for (``with_words``).
+        The label of a line is placed on the first call with `with_words`.
         """
         if isinstance(item, NodeItem):
             said = node_line(item.node) if with_words else item.said
@@ -203,13 +202,13 @@ class GraphScene:
         return area
 
     def complete(self, figures: FiguresOf) -> None:
-        """Take over everything at once, as a saved picture needs it."""
+        """Update all items at once, for an exported picture."""
         every: list[NodeItem | LineItem] = [*self.nodes.values(), *self.lines]
         for item in every:
             self.renew(item, figures, with_words=True)
 
     def _room_for(self, item: LineItem) -> QRectF | None:
-        """Room for the words of a line that nothing else has: along its longest level part, or beside it."""
+        # Tries the longest horizontal segment first, and prefers places that no other line crosses.
         letters = len(line_name(item.line.topics)) + LABEL_ROOM
         wide, high = letters * self.letter + 4, QFontMetricsF(self.label_font).height()
         rooms = [rect for rect in _rooms(item, wide, high) if self._taken.is_free(rect)]
@@ -219,7 +218,7 @@ class GraphScene:
         return found
 
     def dim(self, words: Sequence[str]) -> None:
-        """Let what has not all of these words fade; who talks with what has them does not."""
+        """Fade items that don't contain all `words`, except for nodes connected to matching topics."""
         bright = {
             key for key, item in self.nodes.items() if all(word in _haystack(item.node) for word in words)
         }
@@ -238,26 +237,26 @@ class GraphScene:
 
     @property
     def dimmed(self) -> int:
-        """How many nodes the filter lets fade."""
+        """Number of nodes faded by the filter."""
         return sum(item.is_dim for item in self.nodes.values())
 
     @staticmethod
     def has_figures(scale: float) -> bool:
-        """Whether figures change anything in this size; else lines are of one pixel, without arrows."""
+        """Return False for scales at which lines are 1 px wide without arrows and figures."""
         return scale >= TINY
 
     def has_words(self, scale: float) -> bool:
-        """Whether the smaller words can be read in this size, and are painted."""
+        """Return True if the small text is legible at this scale."""
         return scale * self.small_font.pixelSize() >= LEAST_SMALL_PX
 
-    # -- what is under the mouse -----------------------------------------------------------------------------
+    # -- hit testing --------------------------------------------------------------------------------------
 
     def node_at(self, at: QPointF) -> DrawnNode | None:
-        """The node there."""
+        """Return the node at a point of the scene."""
         return next((item.node for item in self.nodes.values() if item.rect.contains(at)), None)
 
     def group_at(self, at: QPointF) -> tuple[GraphGroup, bool] | None:
-        """The group whose head is there (True), or whose number of quiet nodes (False)."""
+        """Return the group at a point: True for its title, False for its number of quiet nodes."""
         for item in self.groups:
             if item.quiet is not None and item.quiet.contains(at):
                 return item.group, False
@@ -267,7 +266,7 @@ class GraphScene:
         return None
 
     def line_at(self, at: QPointF, scale: float) -> LineItem | None:
-        """The line nearest to there, if it is near enough on the screen, or whose words are there."""
+        """Return the line whose label is at the point, or the nearest line within reach."""
         labelled = (item for item in self.lines if item.label is not None and item.label.contains(at))
         found = next(labelled, None)
         if found is not None:
@@ -291,7 +290,6 @@ def _line_item(line: GraphLine, ways: dict[tuple[str, str], Sequence[Place]]) ->
 
 
 def _add_rounded(path: QPainterPath, points: Sequence[Place]) -> None:
-    """A way with round corners."""
     path.moveTo(*points[0])
     for before, at, after in zip(points, points[1:], points[2:], strict=False):
         radius = min(CORNER, math.dist(before, at) / 2, math.dist(at, after) / 2)
@@ -324,7 +322,7 @@ def _arrow(points: Sequence[Place]) -> QPolygonF:
 
 
 def _rooms(item: LineItem, wide: float, high: float) -> Iterator[QRectF]:
-    """Where words of this width could stand, the best place first: at level parts, then at upright ones."""
+    # Best candidates first: horizontal segments, then vertical ones.
     parts = _parts(item)
     level = [each for each in parts if abs(each[1][1] - each[0][1]) < 1]
     for begin, end in sorted(level, key=_length, reverse=True)[:6]:
@@ -341,12 +339,10 @@ def _rooms(item: LineItem, wide: float, high: float) -> Iterator[QRectF]:
 
 
 def _parts(item: LineItem) -> list[tuple[Place, Place]]:
-    """The straight parts of all its ways."""
     return [part for points in item.ways.values() for part in itertools.pairwise(points)]
 
 
 def _thin(begin: Place, end: Place) -> QRectF:
-    """The room that a straight part takes, if it is level or upright."""
     left, top = min(begin[0], end[0]), min(begin[1], end[1])
     return QRectF(left, top, abs(end[0] - begin[0]) + 0.5, abs(end[1] - begin[1]) + 0.5)
 
@@ -356,7 +352,6 @@ def _length(part: tuple[Place, Place]) -> float:
 
 
 def _distance(at: QPointF, points: Sequence[Place]) -> float:
-    """How far a point is from a way."""
     return min(_distance_to_part((at.x(), at.y()), begin, end) for begin, end in itertools.pairwise(points))
 
 
@@ -377,7 +372,7 @@ def _haystack(node: DrawnNode) -> str:
 
 
 class _TakenRoom:
-    """Which room is taken, by cells: thousands of words are placed at once."""
+    """Index of occupied rectangles in grid cells, because thousands of labels are placed."""
 
     def __init__(self, rects: Iterable[QRectF]) -> None:
         self._cells: dict[tuple[int, int], list[QRectF]] = {}
@@ -385,11 +380,9 @@ class _TakenRoom:
             self.add(rect)
 
     def is_free(self, rect: QRectF) -> bool:
-        """Whether nobody has taken any of this room."""
         return not any(other.intersects(rect) for cell in _cells(rect) for other in self._cells.get(cell, ()))
 
     def add(self, rect: QRectF) -> None:
-        """Take this room."""
         for cell in _cells(rect):
             self._cells.setdefault(cell, []).append(rect)
 

@@ -1,4 +1,4 @@
-"""What stands above and below the graph: filter, grouping, what is hidden, the size; and what lines mean."""
+"""Toolbar above the graph (filter, grouping, hidden items, zoom) and the legend below it."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from nep.i18n import _, ngettext, number
 
 
 class GraphTools(QWidget):
-    """The row above the graph; in a narrow panel it becomes several rows."""
+    """Toolbar of the graph; wraps in a narrow panel."""
 
     def __init__(self, theme: Theme) -> None:
         super().__init__()
@@ -50,17 +50,17 @@ class GraphTools(QWidget):
         self.show_choices(GraphChoices())
 
     def words(self) -> list[str]:
-        """What must be in what does not fade, each of them."""
+        """Return the words of the filter; items that lack one of them are faded."""
         return self.filter.text().casefold().split()
 
     def show_choices(self, choices: GraphChoices) -> None:
-        """Show what is chosen."""
+        """Show the current choices."""
         self.group.set_value(choices.group_by)
         self.quiet.setChecked(choices.hides_quiet)
         self.services.setChecked(choices.shows_services)
 
     def say_quiet(self, hidden: int, hides: bool) -> None:
-        """How many quiet nodes are hidden."""
+        """Show the number of hidden quiet nodes."""
         if hides and hidden:
             words = ngettext("{count} quiet node hidden", "{count} quiet nodes hidden", hidden)
             self.quiet.set_word(words.format(count=hidden))
@@ -68,12 +68,12 @@ class GraphTools(QWidget):
             self.quiet.set_word(_("Hide quiet nodes"))
 
     def say_scale(self, scale: float) -> None:
-        """In which size the graph is shown."""
+        """Show the zoom."""
         self.scale.setText(f"{number(scale * 100, '.0f')} %")
 
 
 class GraphLegend(QWidget):
-    """What lines and edges mean, in one row."""
+    """Legend of lines and edges, in one row."""
 
     def __init__(self, theme: Theme) -> None:
         super().__init__()
@@ -92,7 +92,7 @@ class GraphLegend(QWidget):
 
 
 class _Entry(QWidget):
-    """A line or an edge, and its words."""
+    """Sample of a line or edge with its text."""
 
     SIGN = 36.0
 

@@ -1,4 +1,4 @@
-"""What stands in the graph: the words of nodes, groups and lines, and how thick a line is."""
+"""Texts of nodes, groups and lines in the graph, and the width of lines."""
 
 from __future__ import annotations
 
@@ -15,10 +15,10 @@ from nep.i18n import _, ngettext, number, pgettext
 
 BRIDGE = "bridge-"
 NAMED = 2
-"""Topics whose names stand at a line; of more the number follows."""
+"""Maximum number of topic names in a line's label; further ones are counted."""
 THIN, THICK, STEPS = 1.25, 3.0, 7
 LEAST_BPS, DECADES = 100.0, 5.0
-"""A line is thin up to 100 B/s, and thick from 10 MB/s on."""
+"""Lines are thin up to 100 B/s and thickest from 10 MB/s."""
 ICONS = {
     "studio": "app-window",
     "behaviour": "blocks",
@@ -35,7 +35,7 @@ FindTopic = Callable[[str], "Topic | None"]
 
 @dataclass(frozen=True, slots=True)
 class LineFigures:
-    """What stands at a line, and how thick it is in px; ``lost`` is who loses which share, by box."""
+    """Label and width (px) of a line; `lost` has the loss ratio by box of the subscriber."""
 
     words: str
     width: float
@@ -43,23 +43,23 @@ class LineFigures:
 
 
 def node_icon(node: DrawnNode) -> str:
-    """The icon of a node's kind."""
+    """Return the icon of a node's kind."""
     if node.page is not None:
         return node.page.icon
     return "camera" if node.has_pictures and node.kind == "program" else ICONS[node.kind]
 
 
 def node_name(node: DrawnNode, host: str) -> str:
-    """Its name; of a closed group what it is called."""
+    """Return the label of a node or collapsed group."""
     if node.kind == "group":
         return group_name(node.key, host)
-    if node.joins:  # what else its name says stands beside it
+    if node.joins:  # the rest of the name is painted in the bridge's right part
         return node.name.removeprefix(BRIDGE).rpartition(BRIDGE_TO)[0] or node.name
     return node.name
 
 
 def node_line(node: DrawnNode) -> str:
-    """The second line of a node: "Python, 4.1 %", "this window", "gone 4 s", "41 nodes"."""
+    """Return the second line of a node, such as "Python, 4.1 %", "this window", "gone 4 s" or "41 nodes"."""
     entry = node.entry
     if entry is None:
         return _members(node.members, node.quiet)
@@ -91,14 +91,14 @@ def _members(members: int, quiet: int) -> str:
 
 
 def quiet_words(group: GraphGroup) -> str:
-    """How many of a group are hidden because they are quiet."""
+    """Return the number of hidden quiet nodes of a group."""
     return ngettext("{count} quiet node", "{count} quiet nodes", group.quiet).format(
         count=grouped(group.quiet)
     )
 
 
 def counts_words(graph: NodeGraph) -> str:
-    """Say "7 of 9 nodes, 3 of them web pages, 13 topics"; blank without nodes."""
+    """Return a summary such as "7 of 9 nodes, 3 of them web pages, 13 topics"; "" without nodes."""
     there = graph.nodes_there
     if not there:
         return ""
@@ -119,12 +119,12 @@ def counts_words(graph: NodeGraph) -> str:
 
 
 def group_note(group: GraphGroup) -> str:
-    """What stands behind a group's name: the address of its computer, or the number of web pages."""
+    """Return the note next to a group's name: its computer's address, or the number of web pages."""
     return grouped(group.members) if group.key == WEB_GROUP else group.address
 
 
 def group_name(key: str, host: str) -> str:
-    """What a group is called by its key; ``host`` is this computer."""
+    """Return the name of a group by its key; `host` is this computer."""
     kind, _colon, name = key.partition(":")
     if kind == "network":
         known = kind_named(name)
@@ -139,9 +139,10 @@ def group_name(key: str, host: str) -> str:
 def line_figures(
     line: GraphLine, topic_of: FindTopic, hertz: Mapping[str, float], box_of: Callable[[str], str]
 ) -> LineFigures:
-    """What stands at a line now; ``hertz`` are the calls a second of services, where they are known.
+    """Return label, width and losses of a line.
 
-    ``box_of`` gives the box of a node's entry, "" where it is not drawn.
+    `hertz` are the calls per second of services, where known. `box_of` returns the box of a node's entry, ""
+    if it is not drawn.
     """
     names = line_name(line.topics)
     if line.kind == "service":
@@ -155,7 +156,7 @@ def line_figures(
 
 
 def _losses(topics: Sequence[Topic], box_of: Callable[[str], str]) -> tuple[tuple[str, float], ...]:
-    """The share that is lost at each subscriber that loses anything, the worst of its topics."""
+    # Per subscriber, the worst ratio of the line's topics.
     found: dict[str, float] = {}
     for topic in topics:
         for each in topic.info.subscribers if topic.info is not None else ():
@@ -167,19 +168,19 @@ def _losses(topics: Sequence[Topic], box_of: Callable[[str], str]) -> tuple[tupl
 
 
 def known_figure(value: float | None) -> float | None:
-    """The same; None for what is no number that a person could read."""
+    """Return the value, or None if it is missing, NaN or infinite."""
     return value if value is not None and math.isfinite(value) else None
 
 
 def line_name(topics: Sequence[str]) -> str:
-    """The names of a line's topics: two of them, and how many more there are."""
+    """Return the names of a line's topics; more than `NAMED` are summarized by their number."""
     named = " ".join(split_key(topic)[1] for topic in topics[:NAMED])
     more = len(topics) - NAMED
     return _("{names} and {count} more").format(names=named, count=more) if more > 0 else named
 
 
 def short_rate(rate_hz: float) -> str:
-    """52/s, 0.5/s, 2/min; what is rarer is 0/s."""
+    """Format a rate as "52/s", "0.5/s" or "2/min"; lower rates are "0/s"."""
     if rate_hz >= 9.95:
         return f"{grouped(round(rate_hz))}/s"
     if rate_hz >= 0.095:
@@ -188,7 +189,7 @@ def short_rate(rate_hz: float) -> str:
 
 
 def line_width(bytes_per_s: float) -> float:
-    """How thick a line is, in px; in a few steps, so that it is painted anew seldom."""
+    """Return the width of a line in px, quantized so that small changes cause no repaint."""
     if not bytes_per_s > LEAST_BPS:
         return THIN
     share = min(1.0, math.log10(bytes_per_s / LEAST_BPS) / DECADES)
@@ -196,5 +197,5 @@ def line_width(bytes_per_s: float) -> float:
 
 
 def percent_words(share: float) -> str:
-    """0.7 %, 12 %."""
+    """Format a ratio as "0.7 %" or "12 %"."""
     return number(share, ".1%").replace("%", " %")
