@@ -1,6 +1,7 @@
-"""Image: the pictures of one topic.
+"""Image panel: images of one topic.
 
-What paints and zooms is in `app.ui.pictures`; here are the panel, its menu and its PNG files.
+Painting and zoom are implemented in `app.ui.pictures`; this package has the panel, its menu and the PNG
+export.
 """
 
 from app.ui.panels.image.panel import PANEL as PANEL

@@ -1,4 +1,4 @@
-"""What a person can do with a picture: the same actions in the title, in menus and by keys."""
+"""Actions on an image, shared by title bar, menus and keys."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from nep.i18n import _, lazy
 
 @dataclass(frozen=True)
 class PictureRow:
-    """One action: its name, words, keys (the first one is shown), icon, whether a line stands above it."""
+    """Description of an action; the first key is shown in menus, `above` adds a separator before it."""
 
     name: str
     words: str
@@ -44,7 +44,7 @@ ROWS: tuple[PictureRow, ...] = (
 
 
 class PictureActions(QObject):
-    """The QActions of `ROWS` for one view; ``own`` does what the view can't: freeze, save, copy, point."""
+    """QActions of `ROWS` for one view; `own` implements those that the view doesn't have."""
 
     def __init__(self, theme: Theme, view: ZoomablePicture, own: Mapping[str, Callable[[], object]]) -> None:
         super().__init__(view)
@@ -62,7 +62,7 @@ class PictureActions(QObject):
         }
         self._by_name: dict[str, QAction] = {}
         self._by_key: dict[str, QAction] = {}
-        self._listed: list[QAction] = []  # with their lines
+        self._listed: list[QAction] = []  # with separators
         for row in ROWS:
             action = QAction(f"{_(row.words)}\t{row.keys[0]}", view)
             if row.icon is not None:
@@ -81,20 +81,19 @@ class PictureActions(QObject):
         view.place_changed.connect(self.show_checks)
 
     def __getitem__(self, name: str) -> QAction:
-        """The action of that name."""
         return self._by_name[name]
 
     def listed(self) -> list[QAction]:
-        """All of them with their lines, for a menu."""
+        """Return all actions with separators, for a menu."""
         return list(self._listed)
 
     def set_enabled(self, there: bool) -> None:
-        """Whether there is a picture to do something with."""
+        """Enable the actions if an image is shown."""
         for action in self._by_name.values():
             action.setEnabled(there)
 
     def show_checks(self) -> None:
-        """Mark which flips are on."""
+        """Check the actions of active flips."""
         self["across"].setChecked(self._view.place.flipped_across)
         self["down"].setChecked(self._view.place.flipped_down)
 

@@ -1,4 +1,4 @@
-"""The bar below a picture in which a person says how it is shown: brightness, contrast, colours, range."""
+"""Bar below an image for brightness, contrast, colour map and value range."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from app.ui.widgets.inputs.slider import Track
 from nep.i18n import _, lazy
 
 STEPS = 100
-"""Of a slider to each side of its middle, which leaves the picture as it is."""
+"""Steps of a slider to each side of its neutral middle."""
 WORDS = {
     "grey": lazy("Grey"),
     "viridis": lazy("Viridis"),
@@ -27,23 +27,25 @@ WORDS = {
     "inferno": lazy("Inferno"),
     "jet": lazy("Jet"),
 }
-"""Of the maps, which are called so everywhere."""
+"""Names of the colour maps."""
 
 
 class _EndEdit(NumberEdit):
-    """Writes numbers as short as they can be said."""
+    """Number field that shows numbers as short as possible."""
 
     def written(self, value: float) -> str:
         return f"{value:.7g}"
 
 
 class LookBar(QWidget):
-    """`changed` with the look that a person chose."""
+    """Bar of image settings; emits `changed` with the new `PictureLook`.
+
+    `picture` returns the image shown.
+    """
 
     changed = Signal(object)
 
     def __init__(self, theme: Theme, picture: Callable[[], Picture | None]) -> None:
-        """``picture`` gives the one that is shown."""
         super().__init__()
         self._picture = picture
         self._of_numbers = True
@@ -83,7 +85,7 @@ class LookBar(QWidget):
         return made
 
     def show_look(self, look: PictureLook) -> None:
-        """Show it without telling."""
+        """Show the settings without emitting `changed`."""
         self.look = look
         wanted = (
             (self.brightness, round(STEPS * (1 + look.brightness))),
@@ -105,7 +107,7 @@ class LookBar(QWidget):
                 field.show_number(end)
 
     def refresh(self) -> None:
-        """Offer only what does something to the picture that is shown."""
+        """Enable only the settings that affect the current image."""
         picture = self._picture()
         of_numbers = picture is None or picture.one_channel
         if of_numbers != self._of_numbers:
@@ -136,7 +138,7 @@ class LookBar(QWidget):
     def _read_range(self) -> None:
         try:
             low, high = (parse_number(field.text()) for field in (self.low, self.high))
-        except ValueError:  # one is not whole yet, and says so
+        except ValueError:  # a field is incomplete; it marks itself
             return
         if low < high:
             self._set(replace(self.look, low=low, high=high))

@@ -1,4 +1,4 @@
-"""Which topics draw on a picture, and what they draw now."""
+"""Topics whose annotations are drawn over an image."""
 
 from __future__ import annotations
 
@@ -18,14 +18,14 @@ MOST_OVERLAYS = 8
 
 
 def may_draw(topic: Topic) -> bool:
-    """Whether a topic's type or name says that its messages draw on pictures."""
+    """Return True if the topic's type or name indicates annotations for images."""
     if topic.codec not in {"json", "msgpack"}:
         return False
     return topic.msg_type.rpartition("/")[2] in TYPES or topic.name.rpartition("/")[2] == NAME
 
 
 class Overlays:
-    """The topics that a person chose to see on a picture; each is watched while the panel can be seen."""
+    """Overlay topics chosen by the person; each is watched while the panel is visible."""
 
     def __init__(self, session: Session) -> None:
         self._session = session
@@ -34,17 +34,17 @@ class Overlays:
 
     @property
     def chosen(self) -> tuple[str, ...]:
-        """The topics, by their names among those of all networks."""
+        """Keys of the chosen topics."""
         return tuple(self._watches)
 
     def choices(self) -> list[str]:
-        """Those that may be chosen now, and those that are, also where they are gone."""
+        """Return the keys of available overlay topics, and of chosen ones even if they are gone."""
         every = (*self._session.topics, *self._session.networks.topics)
         there = [topic.key for topic in every if topic.gone_s is None and may_draw(topic)]
         return [*there, *(key for key in self._watches if key not in there)]
 
     def choose(self, topic: str, shown: bool) -> None:
-        """Show what a topic draws, or not; `MOST_OVERLAYS` at most."""
+        """Show or hide the annotations of a topic; at most `MOST_OVERLAYS` are shown."""
         if shown and topic not in self._watches and len(self._watches) < MOST_OVERLAYS:
             self._watches[topic] = self._session.watch_shown(topic)
         elif not shown and topic in self._watches:
@@ -52,14 +52,14 @@ class Overlays:
             self._drawn.pop(topic, None)
 
     def begin_anew(self) -> None:
-        """Another source is shown: watch the same topics there."""
+        """Watch the same topics after a change of the source."""
         chosen = self.chosen
         self.close()
         for topic in chosen:
             self.choose(topic, shown=True)
 
     def on(self, width: int, height: int) -> tuple[Drawn, ...]:
-        """What they draw on a picture of so many pixels now; nothing is decoded twice."""
+        """Return the annotations for an image of this size in px; each message is decoded once."""
         found: list[Drawn] = []
         for key in self._watches:
             topic = self._session.topic(key)
@@ -71,11 +71,11 @@ class Overlays:
         return tuple(found)
 
     def looks(self) -> Iterable[Suspendable]:
-        """What only costs while the panel can be seen."""
+        """Return the watches to suspend while the panel is hidden."""
         return tuple(self._watches.values())
 
     def close(self) -> None:
-        """Watch nothing more."""
+        """Close all watches."""
         for watch in self._watches.values():
             watch.close()
         self._watches.clear()
@@ -83,7 +83,8 @@ class Overlays:
 
 
 def _drawn(message: Message | None, width: int, height: int) -> tuple[Drawn, ...]:
-    if message is None or message.size_bytes > LARGE_BYTES:  # which is read in no window's thread
+    # large messages are not decoded on the GUI thread
+    if message is None or message.size_bytes > LARGE_BYTES:
         return ()
     try:
         return drawn_by(message.payload, width, height)

@@ -1,4 +1,4 @@
-"""Image: the pictures of one topic at their own aspect, and how many of them are shown."""
+"""Image panel: images of one topic in their aspect ratio, with the frame rate."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ MOST_PLACES = 200
 
 
 class ImagePanel(PanelWidget):
-    """One picture stream; the first one that there is, until a person chooses another in the title."""
+    """Image stream of one topic: the first available one until the person chooses another."""
 
     shows_pictures = True
 
@@ -69,7 +69,6 @@ class ImagePanel(PanelWidget):
         self._say_nothing()
 
     def _with_look_bar(self) -> QWidget:
-        """The picture with the bar below it, and the one above it."""
         self.look_bar = LookBar(self.theme, lambda: self.view.picture)
         self.look_bar.changed.connect(self._set_look)
         self.look_bar.hide()
@@ -125,12 +124,12 @@ class ImagePanel(PanelWidget):
         self.header = [self.fit, self.tune, self.layers, self.freeze, self.keep]
 
     def topics(self) -> list[str]:
-        """The picture topics that there are now; those of other networks last."""
+        """Return the keys of available image topics; those of other networks come last."""
         every = (*self.session.topics, *self.session.networks.topics)
         return [topic.key for topic in every if topic.codec == CODEC and topic.gone_s is None]
 
     def show_topic(self, name: str) -> None:
-        """Look at another topic."""
+        """Switch to another topic."""
         if name == self._topic and self._stream is not None:
             return
         self._leave_stream()
@@ -153,13 +152,13 @@ class ImagePanel(PanelWidget):
         self._leave_stream()
         self._stream, self._revision = None, (-1, -1)
         self.overlays.begin_anew()
-        plays = self.session.replay is not None  # which Space does then
+        plays = self.session.replay is not None  # Space controls the replay then
         self.actions_of["freeze"].setShortcut(QKeySequence() if plays else QKeySequence(Qt.Key.Key_Space))
         if topic:
             self.show_topic(topic)
 
     def _show_place_of(self, topic: str) -> None:
-        """How a person looked, zoomed and turned, belongs to a topic: it comes back with it."""
+        # Zoom, rotation and image settings are remembered per topic.
         if len(self._places) >= MOST_PLACES:
             self._places.clear()
             self._looks.clear()
@@ -188,12 +187,13 @@ class ImagePanel(PanelWidget):
             self.empty.say(_("Can't be shown as an image"), f"{self._stream.error}.", "circle-x")
             look = EmptyAction(_("Open the message"), self._inspect, "list-tree")
             self.empty.set_actions([look, self.why(self._topic)])
-        elif self.session.replay is not None and self._there:  # before the topic's first picture
+        # the playhead is before the topic's first image
+        elif self.session.replay is not None and self._there:
             self.view.clear()
             self._say_nothing()
 
     def _look_at_robot(self) -> None:
-        is_live = self.session.replay is None  # what a robot sees now has no place in what it saw then
+        is_live = self.session.replay is None  # live detections don't belong on recorded images
         link = owner_of(self.session, self._topic) if is_live else None
         name = link.name if link is not None else ""
         if name != self._watched_robot:
@@ -223,7 +223,7 @@ class ImagePanel(PanelWidget):
         self._fit_title()
 
     def _fit_title(self) -> None:
-        """A narrow title keeps its name: what is left out is in "more"."""
+        # Buttons that don't fit are available in the "more" menu.
         for button in (self.freeze, self.tune, self.layers):
             button.setVisible(self._there is True)
         for button in (self.fit, self.keep):
@@ -233,7 +233,7 @@ class ImagePanel(PanelWidget):
         super().resizeEvent(event)
         self._fit_title()
 
-    # -- what a person does -------------------------------------------------------------------------------
+    # -- user actions -------------------------------------------------------------------------------------
 
     def waits_for(self) -> str:
         return self._topic if self.view.picture is None else ""
@@ -246,7 +246,6 @@ class ImagePanel(PanelWidget):
         self.freeze.setChecked(not self.freeze.isChecked())
 
     def _publish_points(self, *, on: bool) -> None:
-        """Let a click in the picture publish its point, or no longer."""
         self.points.turn(on)
         self.actions_of["point"].setChecked(on)
 
@@ -256,13 +255,13 @@ class ImagePanel(PanelWidget):
             self._stream.hold(held)
 
     def save_picture(self) -> None:
-        """Save what is shown as PNG, as large as it was received."""
+        """Save the image as PNG at its original size."""
         message = self._message()
         if message is not None:
             self.job.save(message)
 
     def save_sequence(self) -> None:
-        """Record every picture from now on; of a recording, show where all of them become files."""
+        """Record further images; for a recording, open the export of its images."""
         replay = self.session.replay
         if replay is None:
             self.context.run(f"record.topic:{self._topic}")
@@ -270,7 +269,7 @@ class ImagePanel(PanelWidget):
             self.context.run(f"recording.export:{replay.path}")
 
     def copy_picture(self) -> None:
-        """Put what is shown on the clipboard, as large as it was received."""
+        """Copy the image to the clipboard at its original size."""
         message = self._message()
         if message is not None:
             self.job.copy(message)
@@ -324,7 +323,7 @@ class ImagePanel(PanelWidget):
             action.setCheckable(True)
             action.setChecked(name == self._topic)
             action.triggered.connect(lambda _on=False, name=name: self.show_topic(name))
-        if menu.isEmpty():  # Qt shows no empty menu, and would keep it
+        if menu.isEmpty():  # Qt shows no empty menu, and would never delete it
             menu.addAction(_("No camera is publishing images")).setEnabled(False)
         menu.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
         drop_below(menu, self.choose)

@@ -1,4 +1,4 @@
-"""The bar above a picture while a click publishes its point: where to, as what, and whether it is armed."""
+"""Bar above an image for publishing the points that are clicked."""
 
 from __future__ import annotations
 
@@ -28,10 +28,9 @@ TOPIC_PX, MOST_LETTERS = 130, 200
 
 
 class PointStrip(ArmedStrip):
-    """The switch, which arms the topic of this panel's points with it."""
+    """Arming switch that also arms the topic of this panel's points."""
 
     def __init__(self, context: PanelContext, arm: Callable[[], str], said: Callable[[], str]) -> None:
-        """``arm`` switches it on, ``said`` tells what was sent."""
         self._arm, self._said = arm, said
         super().__init__(context)
 
@@ -46,10 +45,10 @@ class PointStrip(ArmedStrip):
 
 
 class PointBar(QWidget):
-    """Publishes what is clicked in ``view``, while it is on, armed by this panel, and nothing replays.
+    """Publishes clicks in `view` while it is on, armed by this panel, and no recording is open.
 
-    It is armed by the panel's own switch or button: a layout that names a topic that is armed elsewhere
-    sends nothing. `left` when a person closes it.
+    Only the panel's own switch or button arms it: a restored layout sends nothing, even if its topic is armed
+    elsewhere. `left` is emitted when the person closes the bar.
     """
 
     left = Signal()
@@ -59,7 +58,8 @@ class PointBar(QWidget):
         self._context, self._view, self._acting = context, view, context.session.acting
         self._pictures = ""
         self.is_on = False
-        self._armed: tuple[int, Target] | None = None  # in which turn of the switch, for what
+        # turn of the switch and target for which this panel is armed
+        self._armed: tuple[int, Target] | None = None
         self.count = self.heard = 0
         theme = context.theme
         self.topic = QLineEdit()
@@ -99,16 +99,16 @@ class PointBar(QWidget):
         for part in (row, self.problem, self.strip):
             column.addWidget(part)
 
-    # -- what it shows ------------------------------------------------------------------------------------
+    # -- display ------------------------------------------------------------------------------------------
 
     @property
     def target(self) -> Target:
-        """Where the points go."""
+        """Topic to which points are published."""
         return Target("topic", self.topic.text().strip() or self.topic.placeholderText())
 
     @property
     def is_armed(self) -> bool:
-        """Whether a click is published now."""
+        """True if a click is published."""
         arming, target = self._acting.arming, self.target
         return (
             self.is_on
@@ -118,7 +118,7 @@ class PointBar(QWidget):
         )
 
     def refresh(self) -> None:
-        """Show what is so now; a click is taken only while it is published."""
+        """Update the bar; clicks are accepted only while they are published."""
         self._view.takes_clicks = self.is_armed
         if not self.is_on:
             return
@@ -128,7 +128,7 @@ class PointBar(QWidget):
         self.strip.refresh()
 
     def show_pictures(self, key: str) -> None:
-        """The pictures are of another topic."""
+        """Set the topic of the images; the target follows."""
         if key != self._pictures:
             self._pictures = key
             self._view.forget_click()
@@ -136,7 +136,7 @@ class PointBar(QWidget):
             self._changed()
 
     def _changed(self) -> None:
-        """Points go elsewhere: that has to be armed anew."""
+        # Another target must be armed again.
         self._disarm()
         self.count = self.heard = 0
         try:
@@ -156,10 +156,10 @@ class PointBar(QWidget):
         said = ngettext("{count} point sent", "{count} points sent", self.count).format(count=self.count)
         return f"{said}, {heard_words(self.heard)}"
 
-    # -- what a person does -------------------------------------------------------------------------------
+    # -- user actions -------------------------------------------------------------------------------------
 
     def turn(self, on: bool) -> None:
-        """Let clicks publish points, once it is armed, or no longer."""
+        """Show or hide the bar; publishing still requires arming."""
         if on != self.is_on:
             self.is_on = on
             self.setVisible(on)
@@ -168,7 +168,7 @@ class PointBar(QWidget):
             self.refresh()
 
     def arm(self) -> str:
-        """Let points be sent to this topic, after asking if it moves a robot; why not, as a sentence."""
+        """Arm the topic, after a confirmation if it moves a robot; return the reason on failure."""
         if self.problem.text():
             return self.problem.text()
         arming, target = self._acting.arming, self.target
@@ -186,7 +186,7 @@ class PointBar(QWidget):
             self._context.toast(why_not)
 
     def _disarm(self) -> None:
-        """Send no points any more; what else is armed stays so."""
+        # Disarms this panel's target only.
         armed, self._armed = self._armed, None
         arming = self._acting.arming
         if armed is None or armed[0] != arming.turn:
@@ -197,7 +197,7 @@ class PointBar(QWidget):
             self._acting.forbid(armed[1])
 
     def send(self, point: PicturePoint) -> None:
-        """Publish a point that was clicked."""
+        """Publish a clicked point."""
         if not self.is_armed:
             return
         payload = point.payload(split_key(self._pictures)[1], self.kind.value)
@@ -217,14 +217,14 @@ class PointBar(QWidget):
             self.count, self.heard = self.count + 1, result.heard
             self._view.mark(point)
 
-    # -- kept with the layout -----------------------------------------------------------------------------
+    # -- saved state --------------------------------------------------------------------------------------
 
     def saved(self) -> dict[str, object]:
-        """For a layout; whether it is armed is never kept."""
+        """Return the state for the layout; armed is never saved."""
         return {"on": self.is_on, "topic": self.topic.text().strip(), "type": self.kind.value}
 
     def restore(self, saved: object) -> None:
-        """Take over what `saved` gave; whatever does not fit is left out. Nothing is armed by it."""
+        """Restore the state from `saved`; invalid entries are ignored and nothing is armed."""
         if not isinstance(saved, Mapping):
             return
         topic, kind = saved.get("topic"), saved.get("type")
@@ -236,6 +236,6 @@ class PointBar(QWidget):
         self.turn(saved.get("on") is True)
 
     def shut(self) -> None:
-        """The panel closes."""
+        """Disarm before the panel is closed."""
         self._view.forget_click()
         self._disarm()

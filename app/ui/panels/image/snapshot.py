@@ -1,4 +1,4 @@
-"""Saves and copies pictures in a thread of its own: a large one takes longer than a frame of the window."""
+"""Saving and copying of images in a background thread, because a large one takes longer than a frame."""
 
 from __future__ import annotations
 
@@ -21,18 +21,20 @@ if TYPE_CHECKING:
 
 LOOK_MS = 30
 Made = Path | QImage | str
-"""The file that was saved, the image that was made, or the sentence that says why not."""
+"""Path of the saved file, the image, or an error sentence."""
 
 
 class SnapshotJob(QObject):
-    """One picture at a time. Its thread touches nothing of Qt but images; the window's thread tells."""
+    """One snapshot at a time. Its thread uses no Qt class but QImage; signals are emitted on the GUI thread.
 
-    saved = Signal(str)  # the path of the file
+    `folder` returns the folder for files.
+    """
+
+    saved = Signal(str)  # path of the file
     copied = Signal(QImage)
-    failed = Signal(str)  # a sentence
+    failed = Signal(str)  # error sentence
 
     def __init__(self, parent: QObject, folder: Callable[[], Path] = snapshots.folder) -> None:
-        """``folder`` is where files go."""
         super().__init__(parent)
         self._folder = folder
         self._thread: threading.Thread | None = None
@@ -43,20 +45,20 @@ class SnapshotJob(QObject):
 
     @property
     def busy(self) -> bool:
-        """Whether one is being made, or not told yet."""
+        """True while a snapshot is in progress or its result not yet reported."""
         return self._thread is not None
 
     def save(self, message: Message) -> None:
-        """Save it as a PNG file; nothing while another one is being made."""
+        """Save the image as PNG; ignored while another snapshot is in progress."""
         folder = self._folder()
         self._start(lambda: snapshots.save(message, folder))
 
     def copy(self, message: Message) -> None:
-        """Make an image of it, as large as it was received; nothing while another one is being made."""
+        """Decode the image at its original size; ignored while another snapshot is in progress."""
         self._start(lambda: QImage.fromData(png_of(message)))
 
     def wait(self) -> None:
-        """The window closes: until what was begun has ended, two seconds at most; nothing is told then."""
+        """Wait up to two seconds for the thread without reporting the result; called on close."""
         self._timer.stop()
         if self._thread is not None:
             self._thread.join(2.0)
@@ -70,7 +72,7 @@ class SnapshotJob(QObject):
             self._timer.start()
 
     def _do(self, work: Callable[[], Made]) -> None:
-        """In the thread: make it; whatever goes wrong is a sentence."""
+        # Runs in the background thread; any error becomes a sentence.
         try:
             made: Made = work()
         except NepError as error:
@@ -78,7 +80,7 @@ class SnapshotJob(QObject):
         except OSError as error:
             what = error.filename or _("image")
             made = f"{what}: {(error.strerror or str(error)).lower()}"
-        except Exception as error:  # noqa: BLE001  a job that ends without a word would be busy for ever
+        except Exception as error:  # noqa: BLE001  otherwise the job would stay busy forever
             made = f"{type(error).__name__}: {error}"
         self._made.put(made)
 
