@@ -1,6 +1,6 @@
-"""Inspector: the newest message of one topic as a tree, or its bytes.
+"""Inspector panel: newest message of one topic as a tree, table or bytes.
 
-`body` changes between tree, bytes and sentences; `diff` compares two messages.
+`body` switches between these pages and the empty states; `diff` compares two messages.
 """
 
 from app.ui.panels.inspector.panel import PANEL as PANEL

@@ -1,4 +1,4 @@
-"""What a person can do with the message in the inspector: in its menus and by keys."""
+"""Actions on the message in the inspector, for menus and keys."""
 
 from __future__ import annotations
 
@@ -26,7 +26,15 @@ FIND = QKeyCombination(Qt.KeyboardModifier.ControlModifier, Qt.Key.Key_F)
 
 
 class InspectorActions(QObject):
-    """Copy a value, its path, or the message; find; compare."""
+    """Actions to copy, find, plot and compare. Keys are active within `panel`.
+
+    Args:
+        shown: Return the message shown.
+        value: Return its decoded payload.
+        find: Focus the find field.
+        toast: Report a completed action.
+        plot: Plot a field by its path.
+    """
 
     def __init__(
         self,
@@ -40,10 +48,6 @@ class InspectorActions(QObject):
         toast: Callable[[str], None],
         plot: Callable[[str], None],
     ) -> None:
-        """Keys work in ``panel``; ``shown`` is its message, ``value`` that decoded.
-
-        ``find`` goes to its field, ``plot`` plots a field by its path.
-        """
         super().__init__(panel)
         self._body, self._shown, self._value, self._toast, self._plot = body, shown, value, toast, plot
         rows: tuple[tuple[str, str, str, Callable[[], object]], ...] = (
@@ -67,11 +71,11 @@ class InspectorActions(QObject):
             if icon:
                 action.setIcon(theme.icon(icon))
             action.triggered.connect(lambda _on=False, do=does: do())
-            (body.tree if key.endswith("C") else panel).addAction(action)  # fields copy their own text
+            (body.tree if key.endswith("C") else panel).addAction(action)  # text fields have their own Ctrl+C
             self._actions.append(action)
 
     def eventFilter(self, watched: QObject, event: QEvent) -> bool:
-        """Inside the panel its own Ctrl+F goes before the window's, which finds blocks."""
+        # Ctrl+F finds in the panel; otherwise the window's shortcut would find blocks.
         if isinstance(event, QKeyEvent) and event.keyCombination() == FIND:
             if event.type() == QEvent.Type.ShortcutOverride:
                 event.accept()
@@ -82,28 +86,28 @@ class InspectorActions(QObject):
         return super().eventFilter(watched, event)
 
     def listed(self) -> list[QAction]:
-        """All of them, for a menu."""
+        """Return all actions, for a menu."""
         return list(self._actions)
 
     def set_enabled(self, there: bool) -> None:
-        """Whether there is a message in the tree."""
+        """Enable the actions if the tree shows a message."""
         for action in self._actions:
             action.setEnabled(there)
 
     def copy_value(self) -> None:
-        """Put the chosen value on the clipboard."""
+        """Copy the selected value."""
         node = self._chosen()
         if node is not None:
             self._copied(plain_words(node.value), _("Copied {path}").format(path=node.path))
 
     def copy_path(self) -> None:
-        """Put the chosen value's path on the clipboard."""
+        """Copy the path of the selected value."""
         node = self._chosen()
         if node is not None:
             self._copied(node.path, _("Copied the path {path}").format(path=node.path))
 
     def plot(self) -> None:
-        """Plot the chosen value, where it is a number, a text, yes or no, or a list of numbers."""
+        """Plot the selected value if it is a number, text, boolean or list of numbers."""
         node = self._chosen()
         path = field_of(node) if node is not None else ""
         if path:
@@ -112,7 +116,7 @@ class InspectorActions(QObject):
             self._toast(_("{path} is not a number, text or boolean").format(path=node.path))
 
     def copy_message(self) -> None:
-        """Put the whole message on the clipboard: JSON as it was sent, anything else as JSON."""
+        """Copy the whole message: JSON payloads unchanged, others converted to JSON."""
         message = self._shown()
         if message is None:
             return
@@ -123,7 +127,6 @@ class InspectorActions(QObject):
         self._copied(text, _("Copied the message of {topic}").format(topic=message.topic))
 
     def _chosen(self) -> TreeNode | None:
-        """The value that is chosen in the tree."""
         index = self._body.tree.currentIndex()
         return self._body.model.node(index) if index.isValid() else None
 

@@ -1,4 +1,4 @@
-"""What the inspector is made of: find bar, tree, bytes, empty states and foot, of which one page shows."""
+"""Layout of the inspector: find bar, pages (tree, table, bytes, empty states) and footer."""
 
 from __future__ import annotations
 
@@ -27,11 +27,11 @@ if TYPE_CHECKING:
 
 NOTHING, LARGE, TREE, RAW, TABLE = range(5)
 MODES = {TREE: "tree", TABLE: "table", RAW: "raw"}
-"""The pages that show a message, and their names."""
+"""Pages that show a message, with the names of their modes."""
 
 
 class CompareStrip(QWidget):
-    """A line above the tree while messages are compared: with what, how they differ, changes only."""
+    """Strip above the tree while messages are compared: reference, summary, filter for changes."""
 
     only_changed = Signal(bool)
 
@@ -49,14 +49,19 @@ class CompareStrip(QWidget):
         self.hide()
 
     def say(self, compared_with: str, counts: Counts, whole: bool) -> None:
-        """``Message before: 3 changed, 1 added``."""
+        """Show the summary, such as ``Previous message: 3 changed, 1 added``."""
         said = _("{compared_with}: {changes}")
         self.words.setText(said.format(compared_with=compared_with, changes=changes_words(counts, whole)))
         self.setAccessibleDescription(self.words.text())
 
 
 class InspectorBody(QWidget):
-    """The parts below the title."""
+    """Widgets below the title bar.
+
+    Args:
+        looked_through: Return the value and index that the find bar searches.
+        toast: Report a completed action.
+    """
 
     def __init__(
         self,
@@ -64,7 +69,6 @@ class InspectorBody(QWidget):
         looked_through: Callable[[], tuple[object, JsonIndex | None]],
         toast: Callable[[str], None],
     ) -> None:
-        """``looked_through`` gives what the find bar looks through, ``toast`` says what was just done."""
         super().__init__()
         self._waiting = ""
         self.model = TreeModel()
@@ -114,11 +118,11 @@ class InspectorBody(QWidget):
 
     @property
     def page(self) -> int:
-        """Which page shows."""
+        """Index of the current page."""
         return self.pages.currentIndex()
 
     def show_page(self, page: int, *, comparing: bool) -> None:
-        """Show a page with what belongs to it."""
+        """Show a page and the widgets that belong to it."""
         sentence = self.sentence.text() if page == RAW else ""
         self.sentence.setText(sentence)
         self.sentence.setVisible(bool(sentence))
@@ -132,7 +136,7 @@ class InspectorBody(QWidget):
             self.mode.set_value(MODES[page])
 
     def say_waiting(self, topic: str, published: bool, why: EmptyAction) -> None:
-        """There is no message of this topic yet, and perhaps nobody publishes it; ``why`` finds it out."""
+        """Show that no message has arrived yet; `why` opens the connection doctor."""
         if published:
             words = _("The next message on {topic} appears here.")
         else:
@@ -144,7 +148,7 @@ class InspectorBody(QWidget):
             self.empty.set_actions([why])
 
     def say_unread(self, topic: str, reason: str, why: EmptyAction) -> None:
-        """Messages of this topic can't be read, and why."""
+        """Show why messages of the topic can't be decoded."""
         words = _("{topic}: {reason}.").format(topic=topic, reason=reason)
         if words != self._waiting:
             self._waiting = words
@@ -152,7 +156,7 @@ class InspectorBody(QWidget):
             self.empty.set_actions([why])
 
     def say_nothing(self, topic: str, choose: Callable[[], object], why: EmptyAction) -> None:
-        """There is no message: of which topic, or that none is chosen."""
+        """Show the empty state of a topic without messages, or without a selected topic."""
         self._waiting = ""
         if topic:
             self.say_waiting(topic, published=True, why=why)
@@ -161,7 +165,7 @@ class InspectorBody(QWidget):
             self.empty.set_actions([EmptyAction(_("Choose a topic"), choose, "list")])
 
     def say_large(self, size_bytes: int, words: str, read: Callable[[], object] | None = None) -> None:
-        """There is a large message; ``read`` reads it when a person asks for it."""
+        """Show that the message is large; `read` decodes it on request."""
         self.large.say(_("Message of {size}").format(size=size_words(size_bytes)), words)
         if read is None:
             self.large.set_actions([])
@@ -170,7 +174,7 @@ class InspectorBody(QWidget):
             self.large.set_actions([action])
 
     def reveal(self, path: object) -> None:
-        """Choose a value in the tree, and scroll to it."""
+        """Select a value in the tree and scroll to it."""
         index = self.model.reveal(path)  # type: ignore[arg-type]
         self.tree.setCurrentIndex(index)
         self.tree.scrollTo(index)

@@ -1,4 +1,4 @@
-"""How two messages differ, level by level: what was changed, added or removed; lists by index."""
+"""Difference of two messages, level by level; lists are compared by index."""
 
 from __future__ import annotations
 
@@ -14,8 +14,8 @@ from nep.i18n import _, lazy, ngettext
 
 Mark = Literal["", "changed", "added", "removed"]
 Key = str | int
-MOST_CHILDREN = 5000  # of one value that are looked through for changes
-MOST_VALUES = 20_000  # of a message that are counted
+MOST_CHILDREN = 5000  # children of one value checked for changes
+MOST_VALUES = 20_000  # values of a message counted
 Part = tuple[Key, object, object, Mark]
 Counts = dict[Mark, int]
 MARK_WORDS: Mapping[Mark, str] = {
@@ -26,7 +26,7 @@ MARK_WORDS: Mapping[Mark, str] = {
 
 
 class _Nothing:
-    """Stands for "is not there", which is something else than null."""
+    """Sentinel for an absent value, distinct from null."""
 
     def __init__(self, words: str) -> None:
         self._words = words
@@ -42,7 +42,7 @@ MISSING: Final = _Nothing("missing")
 
 
 def differs(before: object, after: object) -> bool:
-    """Whether a value has changed. NaN has not; 1 and true are equal in Python, not in JSON."""
+    """Return True if a value changed. NaN equals NaN; 1 and true differ, as in JSON."""
     if before is after or (before != before and after != after):  # noqa: PLR0124
         return False
     if is_container(before) and is_container(after):
@@ -51,7 +51,7 @@ def differs(before: object, after: object) -> bool:
 
 
 def mark_of(value: object, base: object) -> Mark:
-    """How a value differs from the one at the same place before."""
+    """Return how a value differs from its counterpart in the base message."""
     if base is OFF:
         return ""
     if base is MISSING:
@@ -64,11 +64,11 @@ def mark_of(value: object, base: object) -> Mark:
 def parts_of(
     value: object, base: object, mark: Mark, count: int, *, changes_only: bool
 ) -> tuple[list[Part], int]:
-    """The first ``count`` children of a value, and how many there are.
+    """Return the first `count` children of a value, and the total number of children.
 
-    A child is its key, its value, the value before, and how they differ. What was removed stands after what
-    is there, with its old value. All below something added is added, all below something removed is removed
-    (``mark`` is the parent's). For ``changes_only`` the first `MOST_CHILDREN` are looked through.
+    A child is key, value, base value and mark. Removed children follow the present ones, with their old
+    values. All children of an added value are added, all of a removed one removed (`mark` is the parent's).
+    With `changes_only` the first `MOST_CHILDREN` are compared.
     """
     if mark in {"added", "removed"} or not is_container(base) or _kind(base) != _kind(value):
         whole: Mark = "removed" if mark == "removed" else "added"
@@ -81,10 +81,10 @@ def parts_of(
 
 
 def count_changes(value: object, base: object, most: int = MOST_VALUES) -> tuple[Counts, bool]:
-    """How many values were changed, added and removed, and whether these are all.
+    """Count changed, added and removed values; the bool is False if the count is incomplete.
 
-    Of something added or removed only its top counts. At most ``most`` values are looked at, and the first
-    ones of long lists.
+    Added or removed containers count once. At most `most` values are compared, and only the beginning of long
+    lists.
     """
     counts: Counts = {"changed": 0, "added": 0, "removed": 0}
     if base is OFF:
@@ -105,7 +105,7 @@ def count_changes(value: object, base: object, most: int = MOST_VALUES) -> tuple
 
 
 def changes_words(counts: Counts, whole: bool = True) -> str:
-    """``3 changed, 1 added``; ``no difference``; ``at least`` in front when not all was looked through."""
+    """Return ``3 changed, 1 added`` or ``no difference``; "at least" precedes an incomplete count."""
     said = ", ".join(_count_words(mark, count) for mark, count in counts.items() if count)
     if not said:
         return _("no difference") if whole else _("no difference at the start of long lists")
@@ -121,7 +121,7 @@ def _count_words(mark: Mark, count: int) -> str:
 
 
 def _compared(value: object, base: object) -> Iterator[Part]:
-    """The children of two containers of one kind, one after the other, as somebody asks for them."""
+    # Lazy: callers may need only the first children.
     if isinstance(value, Mapping) and isinstance(base, Mapping):
         before = {str(key): key for key in base}
         for key, below in value.items():
@@ -139,7 +139,6 @@ def _compared(value: object, base: object) -> Iterator[Part]:
 
 
 def _total(value: object, base: object) -> int:
-    """How many children two containers of one kind have together."""
     if isinstance(value, Mapping) and isinstance(base, Mapping):
         return len({str(key) for key in value} | {str(key) for key in base})
     return max(size_of(value), size_of(base))
@@ -150,17 +149,16 @@ def _kind(value: object) -> str:
 
 
 def _same(before: object, after: object) -> bool:
-    """Containers of one kind: equal at every depth; true is not 1, the order of keys does not matter.
-
-    Large ones that are not decoded are compared by their texts.
-    """
+    # Equal at every depth; true is not 1 and the order of keys is ignored. Lazy containers compare their JSON
+    # texts.
     if isinstance(before, (LazyList, LazyObject)) and isinstance(after, (LazyList, LazyObject)):
         return before == after
     return size_of(before) == size_of(after) and _written(before) == _written(after)
 
 
 def _written(value: object) -> object:
-    """A value in a form whose equality is that of JSON; as it is when it has none (bytes of msgpack)."""
+    # Equality of the serialized form is that of JSON; returns the value itself if it is not serializable
+    # (bytes in msgpack).
     try:
         return orjson.dumps(value, option=orjson.OPT_SORT_KEYS | orjson.OPT_NON_STR_KEYS)
     except (TypeError, RecursionError):

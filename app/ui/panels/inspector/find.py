@@ -1,4 +1,4 @@
-"""Finding a key or a value in a message: the field, how many there are, next and previous."""
+"""Find bar of the inspector: field, number of matches, next and previous."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ Path = tuple[str | int, ...]
 
 
 def find_in_text(index: JsonIndex, words: str, most: int = MOST) -> list[int]:
-    """The places in a large JSON text where these words are (any case of the letters a to z)."""
+    """Return the offsets of `words` in a large JSON text; ASCII letters match in any case."""
     text, wanted = bytes(index.data).lower(), words.encode().lower()
     found: list[int] = []
     at = text.find(wanted) if wanted else -1
@@ -35,7 +35,7 @@ def find_in_text(index: JsonIndex, words: str, most: int = MOST) -> list[int]:
 
 
 class FindField(SearchField):
-    """Return goes to the next one, Shift+Return to the one before, Esc clears, Down goes into the tree."""
+    """Find field. Return: next match, Shift+Return: previous, Esc: clear, Down: focus the tree."""
 
     step_wanted = Signal(int)
     leave = Signal()
@@ -46,11 +46,11 @@ class FindField(SearchField):
 
     @property
     def count(self) -> str:
-        """What stands at its right end: ``2 of 111``."""
+        """Text at the right end of the field, such as ``2 of 111``."""
         return self._count
 
     def show_count(self, words: str) -> None:
-        """Say how many there are, inside the field."""
+        """Show the number of matches within the field."""
         if words != self._count:
             self._count = words
             room = round(paint.width_of(self._theme.font("small"), words)) + 6 if words else 0
@@ -80,18 +80,17 @@ class FindField(SearchField):
 
 
 class FindBar(QWidget):
-    """The field with its count and arrows; `found` with the path of what was found.
+    """Find field with count and arrows. Emits `found` with the path of a match.
 
-    What is found belongs to the message that was looked through: `forget` when another one is shown, then the
-    next step looks anew and goes on where it was.
+    Matches belong to one message: call `forget` for a new message; the next step then searches again and
+    continues at the same position. `source` returns the message shown, with the index of a large one.
     """
 
     found = Signal(object)
     queried = Signal(str)
-    """What was typed begins with ``$``: it is a query; "" when it is none any more."""
+    """Query (text that begins with ``$``), or "" when it is no longer a query."""
 
     def __init__(self, theme: Theme, source: Callable[[], tuple[object, JsonIndex | None]]) -> None:
-        """``source`` gives the message that is shown, and the index of a large one."""
         super().__init__()
         self._source = source
         self._matches: list[Path] | list[int] | None = None
@@ -116,11 +115,11 @@ class FindBar(QWidget):
 
     @property
     def matches(self) -> list[Path] | list[int]:
-        """Where the words are, as far as the message was looked through: paths, or places in a large text."""
+        """Matches so far: paths, or offsets in a large text."""
         return self._matches or []
 
     def look(self, words: str) -> None:
-        """Look for these words and go to the first place; what begins with ``$`` is a query."""
+        """Search for words and go to the first match; text that begins with ``$`` is a query."""
         self._place = -1
         self._matches = []
         is_query = self.is_query
@@ -138,16 +137,16 @@ class FindBar(QWidget):
             self.step(1)
 
     def forget(self) -> None:
-        """Another message is shown."""
+        """Discard the matches because another message is shown."""
         self._matches = None
 
     @property
     def is_query(self) -> bool:
-        """Whether what is typed is a query."""
+        """True if the text is a query."""
         return self.field.text().startswith("$")
 
     def step(self, by: int) -> None:
-        """Go on to the next one, or back."""
+        """Go to the next match (1) or the previous one (-1)."""
         words = self.field.text()
         if not words or self.is_query:
             return
@@ -183,7 +182,7 @@ class FindBar(QWidget):
         self.mark(wrong=wrong)
 
     def mark(self, *, wrong: bool) -> None:
-        """Show whether what is typed leads to nothing."""
+        """Mark the field as having no match or an invalid query."""
         self.field.setProperty("wrong", "true" if wrong else "false")
         self.field.style().unpolish(self.field)
         self.field.style().polish(self.field)

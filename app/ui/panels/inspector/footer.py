@@ -1,4 +1,4 @@
-"""The foot of the inspector: the path of the chosen value, the facts of the message, the legend."""
+"""Footer of the inspector: path of the selected value, facts of the message, legend."""
 
 from __future__ import annotations
 
@@ -22,19 +22,20 @@ if TYPE_CHECKING:
     from nep.messages.message import Message
 
 _SHOWN_S = 0.0001
-"""Less than the last digit is not shown as nothing."""
+"""Latencies below the last displayed digit are not shown as zero."""
 
 
 def message_facts(
     message: Message, since_ns: int = 0, network: NetworkKind | None = None, *, recorded: bool = False
 ) -> str:
-    """``seq 18 204   412 B   latency 0.6 ms``, just when it came; what is not known is left out.
+    """Return the facts of a message, such as ``seq 18 204   412 B   latency 0.6 ms``.
 
-    Of another computer's message ``latency 3.2 ms ± 0.4 ms``, corrected by how the clocks differ. Another
-    ``network`` than Studio's own is named when it does not tell what is missing.
+    Facts are those of the time of arrival; unknown ones are omitted. The latency of messages from other
+    computers is corrected by the clock offset and has an uncertainty (``3.2 ms ± 0.4 ms``). Figures that a
+    foreign `network` does not report are named.
 
-    A latched message from before ``since_ns``, when somebody began to look, took no time on its way: it says
-    how long ago it was sent. One of a recording has the time of day when it was.
+    A latched message sent before `since_ns`, the start of the subscription, shows its age instead of a
+    latency, and a recorded message its time of day.
     """
     facts = [size_words(message.size_bytes)]
     if message.seq is not None:
@@ -67,7 +68,6 @@ def _latency_facts(message: Message) -> list[str]:
 
 
 def _untold(message: Message, network: str) -> Iterator[str]:
-    """What can't be known of a message, because its network does not tell it."""
     if message.seq is None and message.stamp_ns is None:
         yield _("{network} does not report sequence numbers or latency").format(network=network)
     elif message.seq is None:
@@ -77,7 +77,7 @@ def _untold(message: Message, network: str) -> Iterator[str]:
 
 
 class Legend(QWidget):
-    """Says what the bar at a row's left means."""
+    """Legend of the bar at the left of changed rows."""
 
     WORDS = lazy("changed")
 
@@ -102,7 +102,7 @@ class Legend(QWidget):
 
 
 class Footer(QWidget):
-    """The path of the chosen value with its copy buttons; below, the message's facts."""
+    """Path of the selected value with copy buttons; below it, the facts of the message."""
 
     def __init__(self, theme: Theme) -> None:
         super().__init__()
@@ -128,16 +128,16 @@ class Footer(QWidget):
             rows.addLayout(row)
 
     def show_path(self, path: str) -> None:
-        """The path of the chosen value; empty when none is."""
+        """Show the path of the selected value; "" for no selection."""
         self.path.setText(path)
         self.path.setToolTip(plain.tip(path))
         for button in (self.copy_value, self.copy_path, self.plot):
             button.setEnabled(bool(path))
 
     def clear(self) -> None:
-        """Another topic is shown from now on."""
+        """Clear the path before another topic is shown."""
         self.show_path("")
 
     def show_facts(self, facts: str) -> None:
-        """The facts of the message that is shown from now on."""
+        """Show the facts of a message."""
         self.facts.setText(facts)

@@ -1,4 +1,4 @@
-"""Raw bytes: offset, sixteen bytes, and the text in them; only the lines that can be seen are made."""
+"""Hex view: offset, bytes and printable text; only visible lines are formatted."""
 
 from __future__ import annotations
 
@@ -14,14 +14,14 @@ EDGE = 12
 
 
 def hex_line(data: memoryview, offset: int, count: int) -> tuple[str, str, str]:
-    """One line: ``0010``, ``7b 22 …`` and the printable signs with dots for the others."""
+    """Return offset, hex bytes and text of one line, with dots for unprintable bytes."""
     part = bytes(data[offset : offset + count])
     text = "".join(chr(byte) if 32 <= byte < 127 else "·" for byte in part)
     return f"{offset:04x}", part.hex(" "), text
 
 
 class HexView(QAbstractScrollArea):
-    """Shows bytes; sixteen in a line, or eight when it is narrow."""
+    """Hex view with sixteen bytes per line, or eight in a narrow panel."""
 
     def __init__(self, theme: Theme) -> None:
         super().__init__()
@@ -33,20 +33,20 @@ class HexView(QAbstractScrollArea):
         self.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
 
     def show_bytes(self, data: memoryview | bytes) -> None:
-        """Show these; the scroll position stays."""
+        """Show these bytes and keep the scroll position."""
         self._data = memoryview(data)
         self._arrange()
         self.viewport().update()
 
     def text(self) -> str:
-        """All of it as lines."""
+        """Return all lines as text."""
         count = self.per_line()
         return "\n".join(
             "  ".join(hex_line(self._data, at, count)) for at in range(0, len(self._data), count)
         )
 
     def per_line(self) -> int:
-        """Bytes in a line at this width."""
+        """Return the number of bytes per line at the current width."""
         sign = QFontMetricsF(self._theme.font("code")).horizontalAdvance("0")
         return WIDE if self.viewport().width() >= (6 + WIDE * 4 + 3) * sign + 2 * EDGE else NARROW
 

@@ -1,4 +1,4 @@
-"""The strip with which a person goes back through the messages of a topic."""
+"""History strip of the inspector, to go back through the messages of a topic."""
 
 from __future__ import annotations
 
@@ -16,13 +16,13 @@ from nep.i18n import _
 from nep.messages.message import Message
 
 SAYS_EVERY = 6
-"""Refreshes of 30 a second: figures that nobody waits for."""
+"""Refreshes (at 30 Hz) between updates of the figures."""
 
 
 class HistoryStrip(QWidget):
-    """Keeps what comes on a topic, and which of it is shown: the newest, or one that a person went to.
+    """Collects the messages of a topic, and selects the newest or an earlier one.
 
-    `moved` when a person went to another message; `at` is its number then, None for the newest.
+    `moved` is emitted when the person selects another message; `at` is its number, None for the newest.
     """
 
     moved = Signal()
@@ -56,7 +56,7 @@ class HistoryStrip(QWidget):
         self.hide()
 
     def begin(self, feed: SeriesFeed, topic: str) -> None:
-        """Keep what comes on this topic; of another one than before begin anew."""
+        """Start to collect messages of a topic; a different topic clears the history."""
         self.pause()
         if topic != self._topic:
             self.kept.rewind()
@@ -66,13 +66,13 @@ class HistoryStrip(QWidget):
             feed.join(topic, self.kept, deep=False)
 
     def pause(self) -> None:
-        """Keep nothing more, until `begin`; what is kept stays."""
+        """Stop collecting until the next `begin`; collected messages stay."""
         if self._feed is not None:
             self._feed.leave(self._topic, self.kept)
             self._feed = None
 
     def forget(self) -> None:
-        """Another source is shown: nothing that was kept is of it."""
+        """Stop and clear the history because the source changed."""
         self.pause()
         self._topic = ""
         self.kept.rewind()
@@ -80,34 +80,34 @@ class HistoryStrip(QWidget):
         self.say(at_once=True)
 
     def shown(self) -> Message | None:
-        """The message that a person went to; None while the newest is shown, or it has left meanwhile."""
+        """Return the selected message; None for the newest, or if it has been evicted."""
         return self.kept.at(self.at) if self.at is not None else None
 
     def before(self) -> Message | None:
-        """The message before the one that a person went to, as far as it is kept."""
+        """Return the message before the selected one, if available."""
         return self.kept.at(self.at - 1) if self.at is not None else None
 
     def step(self, by: int) -> None:
-        """Go on by so many messages; beyond the last one the newest is followed again."""
+        """Move the selection by a number of messages; past the end, follow the newest again."""
         if not len(self.kept):
             return
         wanted = (self.at if self.at is not None else self.kept.end - 1) + by
         self.go(None if wanted >= self.kept.end else self.kept.nearest(wanted))
 
     def go(self, number: int | None) -> None:
-        """Show the message of this number, None: the newest, from now on."""
+        """Select a message by number; None follows the newest."""
         if number != self.at:
             self.at = number
             self.say(at_once=True)
             self.moved.emit()
 
     def follow(self) -> None:
-        """Leave a message that is to come once more: the source is at another time now."""
+        """Deselect a message that lies in the future after the source has seeked back."""
         if self.at is not None and self.at >= self.kept.end:
             self.at = None
 
     def say(self, *, at_once: bool = False, beside: bool = False) -> None:
-        """Show where it is among what is kept; call it with every refresh, ``beside`` if more is painted."""
+        """Update the strip; call on every refresh. `beside` is True if other parts are repainted anyway."""
         self._ticks += 1
         self.follow()
         kept = self.kept

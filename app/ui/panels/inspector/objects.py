@@ -1,4 +1,4 @@
-"""Lists of objects as a table: one row an object, one column a key, sorted, copied as CSV."""
+"""Table of a list of objects: one row per object, one column per key, sortable, with CSV export."""
 
 from __future__ import annotations
 
@@ -36,16 +36,16 @@ from nep.i18n import _, ngettext
 from nep.messages.fields import path_text
 
 SORT_S = 1.0
-"""Rows that are sorted by what changes stay where they are for so long: nobody can read what jumps."""
+"""Interval of re-sorting, so that rows with changing values stay readable."""
 LETTER, LEAST, MOST = 8, 56, 220
-"""Pixels of a letter, and of a column."""
+"""Width of a character, and limits of a column's width, in px."""
 SMALL_ROOM = 24
 
 
 class ObjectsView(QWidget):
-    """The table with a line above it: which list, how many rows, the choice of another list, the copy.
+    """Table with a line above it: path of the list, number of rows, choice of another list, copy.
 
-    `revealed` with the steps of an object that a person wants to see in the tree.
+    `revealed` is emitted with the path of an object to show in the tree.
     """
 
     revealed = Signal(object)
@@ -85,26 +85,26 @@ class ObjectsView(QWidget):
 
     @property
     def rows(self) -> list[ObjectRow]:
-        """The rows that are shown, in their order."""
+        """Rows in display order."""
         return self._model.rows() if self.table is not None else []
 
     def set_row_height(self, height: int) -> None:
-        """The height of all rows."""
+        """Set the height of all rows."""
         self._row_height = height
         if self.table is not None:
             self.table.set_row_height(height, large=False)
 
     def begin_anew(self) -> None:
-        """Another topic is shown."""
+        """Reset the table for another topic."""
         self._wanted, self._steps, self._value = (), None, None
         self._drop_table()
 
     def want(self, steps: Steps) -> None:
-        """Show the list that is there or, nearest above it, that it is in, as soon as the message has one."""
+        """Show the list at this path, or the nearest list above it, in this and later messages."""
         self._wanted = steps
 
     def show_message(self, value: object, now: float) -> None:
-        """Show the wanted list of a decoded message, or the first that there is; ``now`` is monotonic."""
+        """Show the wanted list of a message, else its first list; `now` is monotonic time in s."""
         self._value = value
         steps = self._find(value)
         if steps != self._steps:
@@ -115,7 +115,7 @@ class ObjectsView(QWidget):
         self.choose.setVisible(True)
 
     def show_found(self, found: Iterable[tuple[str, object]], now: float) -> None:
-        """Show the objects that a query found."""
+        """Show the objects that a query matched."""
         self._value, self._steps = None, None
         rows = rows_found(found)
         self._show(rows, len(rows), "", now)
@@ -150,7 +150,7 @@ class ObjectsView(QWidget):
         self.words.setText(f"{path}   {words}" if path else words)
 
     def _put(self, rows: list[ObjectRow], now: float) -> None:
-        """Show the rows in the order of before, sorted anew once a second."""
+        # Keeps the previous order; re-sorts once a second.
         table = self.table
         if table is None:
             return
@@ -195,7 +195,7 @@ class ObjectsView(QWidget):
             self.table, self._columns = None, ()
 
     def copy_csv(self) -> None:
-        """Put the rows that are shown on the clipboard, in their order."""
+        """Copy the table as CSV in display order."""
         if self.table is not None:
             QGuiApplication.clipboard().setText(table_csv("#", self._columns, self._model.rows()))
             count = len(self._model.rows())
@@ -209,7 +209,7 @@ class ObjectsView(QWidget):
             action.setCheckable(True)
             action.setChecked(steps == self._steps)
             action.triggered.connect(lambda _on=False, steps=steps: self._choose(steps))
-        if menu.isEmpty():  # Qt shows no empty menu, and would keep it
+        if menu.isEmpty():  # Qt shows no empty menu, and would never delete it
             menu.deleteLater()
             return
         menu.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
@@ -231,14 +231,14 @@ class ObjectsView(QWidget):
 
 
 class _ObjectModel(TableModel[ObjectRow]):
-    """Gives its rows back, in their order."""
+    """Table model that returns its rows in display order."""
 
     def rows(self) -> list[ObjectRow]:
         return list(self._rows.shown)
 
 
 def _place_column(rows: Sequence[ObjectRow]) -> Column[ObjectRow]:
-    """Where each object stands among the others."""
+    # Index of the object in the list.
     width = _width("#", [row.name for row in rows])
     return Column("#", "#", width, _name_cell, lambda row: row.place, verbatim=True)
 
@@ -276,6 +276,6 @@ def _role(value: object) -> str:
 
 
 def _width(head: str, words: Sequence[str]) -> int:
-    """Wide enough for the head with its arrow and for the first rows, within bounds."""
+    # From the header with its sort arrow and the first rows.
     letters = max([len(head) + 2, *(len(each) for each in words[:20])])
     return min(MOST, max(LEAST, letters * LETTER + SMALL_ROOM))

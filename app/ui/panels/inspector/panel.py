@@ -1,4 +1,4 @@
-"""Inspector: the newest message of one topic as a tree, or its bytes; found, compared, copied."""
+"""Inspector panel: newest message of one topic, with find, compare and copy."""
 
 from __future__ import annotations
 
@@ -37,12 +37,12 @@ if TYPE_CHECKING:
     from nep.messages.message import Message
 
 FIRST_ROWS = 24
-FADES_HZ = 7.0  # slower than messages are shown, which paint the marks too
+FADES_HZ = 7.0  # slower than message updates, which paint the marks too
 BEFORE, PINNED = lazy("Previous message"), lazy("Pinned message")
 
 
 class InspectorPanel(PanelWidget):
-    """Shows one topic: Tree or Raw, what changed, the path of the chosen value, and the message's facts."""
+    """Message of one topic as tree, table or bytes, with changes, path and facts."""
 
     def __init__(self, context: PanelContext) -> None:
         super().__init__(context, _("Inspector"))
@@ -50,14 +50,14 @@ class InspectorPanel(PanelWidget):
         self._topic = ""
         self._watch: Watch | None = None
         self._shown: Message | None = None
-        self._allowed: Message | None = None  # a large message that a person wants to read
-        self._reading: Reading | None = None  # what the tree shows
+        self._allowed: Message | None = None  # large message that the person asked to decode
+        self._reading: Reading | None = None  # source of the tree's contents
         self._raw_wanted = self._table_wanted = False
-        self._since_ns = 0  # when the panel began to look
+        self._since_ns = 0  # start of the subscription
         self._pace, self._fades = ReadingPace(), ReadingPace(burst=1, hz=FADES_HZ)
         self._facts_of: tuple[Message | None, str] = (None, "")
         self._value: object = None
-        self._before: object = OFF  # what stood here before, of the same topic
+        self._before: object = OFF  # previous value of the same topic
         self._pinned: object = OFF
         self._pinned_words = ""
         self.reader = Reader()
@@ -66,7 +66,7 @@ class InspectorPanel(PanelWidget):
         self._make_body()
         self._say_nothing()
 
-    # -- its parts ----------------------------------------------------------------------------------------
+    # -- construction -------------------------------------------------------------------------------------
 
     def _make_header(self) -> None:
         theme = self.theme
@@ -105,10 +105,10 @@ class InspectorPanel(PanelWidget):
         column.setContentsMargins(0, 0, 0, 0)
         column.addWidget(body)
 
-    # -- what it shows ------------------------------------------------------------------------------------
+    # -- display ------------------------------------------------------------------------------------------
 
     def show_topic(self, name: str) -> None:
-        """Look at another topic."""
+        """Switch to another topic."""
         if name == self._topic:
             return
         self._leave()
@@ -163,7 +163,7 @@ class InspectorPanel(PanelWidget):
         self._show_fading(taken=taken)
 
     def _show_fading(self, *, taken: bool) -> None:
-        """Marks of what changed fade; a message that was just taken has them painted already."""
+        # A message just shown has painted its marks already.
         if taken:
             self._fades.spend(self.clock())
         elif self.body.page == TREE and self.tree.fading() and self._fades.may(self.clock()):
@@ -174,7 +174,7 @@ class InspectorPanel(PanelWidget):
         self.refresh()
 
     def _show_none_yet(self) -> None:
-        """The playhead is before the topic's first message."""
+        # For a playhead before the topic's first message.
         self.reader.forget()
         self._shown = self._allowed = self._reading = None
         self._value, self._before = None, OFF
@@ -203,8 +203,8 @@ class InspectorPanel(PanelWidget):
             self._show_read(read_at_once(message))
 
     def _read_elsewhere(self, message: Message) -> None:
-        """Let the reader's thread look into it; until then what was there stays."""
-        if self.history.at is not None:  # a person waits for just this one
+        # Decodes in the reader's thread; the old contents stay until then.
+        if self.history.at is not None:  # the person waits for exactly this message
             self.reader.ask(message)
         elif not self.reader.ask_at_leisure(message, self.clock()):
             return
@@ -213,7 +213,6 @@ class InspectorPanel(PanelWidget):
             self._page(LARGE)
 
     def _show_read(self, done: Reading) -> None:
-        """Show it as a tree, or as bytes with the sentence why it can't be read."""
         message = done.message
         if done.error is not None:
             self._show_raw(message, done.error)
@@ -235,7 +234,7 @@ class InspectorPanel(PanelWidget):
         self._page(TABLE if self._table_wanted else TREE)
 
     def _facts(self, message: Message) -> str:
-        """What is said of a message stays as it was when it came, however long it is looked at."""
+        # Cached per message: latency and age are those of its arrival.
         if message is not self._facts_of[0]:
             kind = kind_named(split_key(self._topic)[0])
             recorded = self.session.replay is not None
@@ -243,7 +242,6 @@ class InspectorPanel(PanelWidget):
         return self._facts_of[1]
 
     def _show_value(self) -> None:
-        """Put the message into the tree, compared or not."""
         if self._shown is None or self._value is None:
             return
         if self.query.asking:
@@ -267,7 +265,6 @@ class InspectorPanel(PanelWidget):
             self.tree.expand_small(FIRST_ROWS)
 
     def _show_found(self, answer: QueryAnswer) -> None:
-        """Put what the query found into the tree or the table, in place of the message."""
         if self._table_wanted:
             self.body.objects.show_found(answer.found.items(), self.clock())
             return
@@ -291,7 +288,7 @@ class InspectorPanel(PanelWidget):
         self._page(LARGE)
 
     def _read_large(self) -> None:
-        """Read the message that is shown, and hold it: the next one would hide it again."""
+        # Also freezes the panel: the next message would replace this one.
         if self._shown is not None:
             self._allowed = self._shown
             self.freeze.setChecked(True)
@@ -311,21 +308,21 @@ class InspectorPanel(PanelWidget):
             button.setVisible(bool(self._topic))
         self._page(NOTHING)
 
-    # -- what a person does -------------------------------------------------------------------------------
+    # -- user actions -------------------------------------------------------------------------------------
 
     @property
     def frozen(self) -> bool:
-        """Whether this panel holds its message."""
+        """True if the panel is frozen."""
         return self.freeze.isChecked()
 
     @property
     def holds(self) -> bool:
-        """Whether it shows a message that a person chose, whatever comes."""
+        """True if a fixed message is shown: frozen, or selected in the history."""
         return self.frozen or self.history.at is not None
 
     @property
     def comparing(self) -> bool:
-        """Whether the tree shows how the message differs from another one."""
+        """True if the tree shows differences to another message."""
         return (self.compare.isChecked() or self.pin.isChecked()) and not self.query.asking
 
     def waits_for(self) -> str:
@@ -335,7 +332,6 @@ class InspectorPanel(PanelWidget):
         return [paused_hindrance(self.title(), self._go_on)] if self.holds else []
 
     def _go_on(self) -> None:
-        """Show the newest message again, and those that follow."""
         self.history.go(None)
         self.freeze.setChecked(False)
 
@@ -349,7 +345,6 @@ class InspectorPanel(PanelWidget):
         self._show_value()
 
     def _moved(self) -> None:
-        """A person went to another message of the history, or back to the newest."""
         self.reader.forget()
         message = self.history.shown()
         if message is not None:
@@ -359,11 +354,11 @@ class InspectorPanel(PanelWidget):
             self._refresh_now()
 
     def _queried(self, text: str) -> None:
-        """A query was typed, or ("") there is none any more: the tree begins anew."""
+        # "" ends the query.
         if not text and not self.query.asking:
             return
         self.finder.mark(wrong=not self.query.set_query(text))
-        self.compare.setVisible(not text)  # parts of messages are not compared, and a query is long
+        self.compare.setVisible(not text)  # parts of messages can't be compared, and the query needs the room
         self.model.clear()
         self._show_value()
 
@@ -384,20 +379,18 @@ class InspectorPanel(PanelWidget):
         self.foot.show_path(self.model.node(index).path if index.isValid() else "")
 
     def _reveal(self, steps: object) -> None:
-        """Show in the tree what a person chose in the table."""
         self.mode.set_value("tree")
         self._set_mode("tree")
         self.body.reveal(steps)
         self.tree.setFocus(Qt.FocusReason.OtherFocusReason)
 
     def _drag(self, node: TreeNode) -> None:
-        """A value leaves the tree in a person's hand."""
         path = field_of(node)
         if path:
             drag_field(self.tree, self._topic, path, press=lambda key: self.context.run(f"key:{key}"))
 
     def _whole(self) -> object:
-        """The whole message, also while a query or a table shows parts of it."""
+        # A query or the table may show only parts of it.
         shows_parts = self.query.asking or self._table_wanted
         return self._value if shows_parts else self.model.value()
 
@@ -482,7 +475,7 @@ class InspectorPanel(PanelWidget):
 def chip_words(
     topic: Topic | None, frozen: bool, *, recorded: bool = False, earlier: bool = False
 ) -> tuple[str, str, str]:
-    """The words, status and icon of the chip that says whether what is shown is still coming."""
+    """Return text, status and icon of the chip for the state of the topic and the panel."""
     if frozen:
         return pgettext("message", "frozen"), "off", "snowflake"
     if earlier:
@@ -491,7 +484,8 @@ def chip_words(
         return pgettext("message", "recorded"), "info", ""
     if topic is None:
         return pgettext("topic", "gone"), "off", ""
-    if topic.stale and not (topic.counted is not None and topic.counted[0] > 0):  # nothing comes any more
+    # no messages arrive any more
+    if topic.stale and not (topic.counted is not None and topic.counted[0] > 0):
         return pgettext("topic", "no answer"), "warn", ""
     if topic.gone_s is not None:
         return _("gone {seconds} s").format(seconds=int(topic.gone_s)), "off", ""

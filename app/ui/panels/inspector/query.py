@@ -1,4 +1,4 @@
-"""The strip above what a query found: how much, or why not; asks each message in a thread of its own."""
+"""Query strip of the inspector; queries are evaluated in a background thread."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from app.ui.widgets.paint import show_when
 from nep.i18n import ngettext
 
 SHARE = 4
-"""A query that takes a while is asked again after so many times that while: a quarter of a core at most."""
+"""Inverse of the maximum load: after a slow query, wait so that it uses at most a quarter of a core."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -38,7 +38,7 @@ def _answer(asked: _Asked) -> _Answered:
 
 
 class QueryStrip(QWidget):
-    """Says ``12 found``, or the sentence why a query can't be asked; hidden while nothing is asked."""
+    """Shows ``12 found`` or the syntax error; hidden without a query."""
 
     def __init__(self) -> None:
         super().__init__()
@@ -57,11 +57,11 @@ class QueryStrip(QWidget):
 
     @property
     def asking(self) -> bool:
-        """Whether a query was typed, also one that can't be understood."""
+        """True if a query was entered, even an invalid one."""
         return bool(self._typed)
 
     def set_query(self, text: str) -> bool:
-        """Ask this from now on, "" for nothing; whether it was understood."""
+        """Set the query, "" for none; return False if its syntax is invalid."""
         self._typed, self._query = text, None
         self._worker.forget()
         self._not_before = 0.0
@@ -75,11 +75,11 @@ class QueryStrip(QWidget):
         return not sentence
 
     def ask(self, value: object) -> None:
-        """Ask this message as soon as there is time for it; `take` has the answer then."""
+        """Queue a message for evaluation; `take` returns the answer."""
         self._value, self._due = value, True
 
     def take(self, now: float) -> QueryAnswer | None:
-        """A new answer, once; call it with every refresh at ``now`` (monotonic)."""
+        """Return a new answer once, or None; call on every refresh with monotonic time."""
         done = self._worker.take()
         if done is not None:
             self._not_before = now + (SHARE - 1) * done.took_s
@@ -90,18 +90,18 @@ class QueryStrip(QWidget):
         return done.answer if done is not None else None
 
     def forget(self) -> None:
-        """Another topic is shown: what was asked of the one before is of no use."""
+        """Discard pending work because another topic is shown."""
         self._worker.forget()
         self._value, self._due = None, False
         self._say("", wrong=False)
 
     def show_on(self, *, tree: bool) -> None:
-        """Show it where the tree is shown, and there is something to say."""
+        """Show the strip if the tree is visible and there is text."""
         self._on_tree = tree
         show_when(self, tree and bool(self.words.text()))
 
     def close_worker(self) -> None:
-        """End its thread."""
+        """Stop the background thread."""
         self._worker.close()
 
     def _say(self, words: str, *, wrong: bool) -> None:
@@ -111,7 +111,7 @@ class QueryStrip(QWidget):
 
 
 def found_words(answer: QueryAnswer) -> str:
-    """``12 found``, and why these are not all."""
+    """Return ``12 found``, and the reason if the result is incomplete."""
     count = len(answer.found)
     said = ngettext("{count} found.", "{count} found.", count).format(count=count)
     return f"{said} {answer.cut}".rstrip()

@@ -1,7 +1,7 @@
-"""A lazy tree over one decoded message: nodes are made when they are seen, and stay when the next one comes.
+"""Lazy tree model of a decoded message: nodes are created when visible and reused for later messages.
 
-So what is expanded stays expanded, the scroll position stays, and a value that differs from the one before is
-marked with the time of its change. It may be compared with another message: then every node has its mark.
+Expanded nodes and scroll position therefore persist, and changed values are marked with the time of the
+change. With a base message, every node is marked by its difference.
 """
 
 from __future__ import annotations
@@ -26,10 +26,10 @@ _ROOT = QModelIndex()
 
 @dataclass(slots=True, eq=False)
 class TreeNode:
-    """One value of the message: ``children`` is None until somebody looked into it.
+    """Value of the message. `children` is None until loaded.
 
-    ``base`` is the value that it is compared with (`OFF`: nothing is compared), ``mark`` how they differ;
-    ``total`` is how many children there are, once they were looked at.
+    `base` is the value to compare with (`OFF`: none), `mark` the difference, and `total` the number of
+    children once they were loaded.
     """
 
     key: str | int
@@ -45,12 +45,12 @@ class TreeNode:
 
     @property
     def is_container(self) -> bool:
-        """Whether it can have children."""
+        """True for objects and lists."""
         return is_container(self.value)
 
     @property
     def path(self) -> str:
-        """Where it is in the message: ``people[0].name``."""
+        """Field path, such as ``people[0].name``."""
         if self.parent is None:
             return ""
         above = self.parent.path
@@ -60,14 +60,14 @@ class TreeNode:
 
 
 def field_of(node: TreeNode) -> str:
-    """The field path of a value that can be plotted, of a list of numbers all elements'; else ""."""
+    """Return the field path for a plot (for a list of numbers, of all elements), or ""."""
     kind = kind_of_value(node.value)
     every: tuple[Step, ...] = (ALL,) if kind == "list" else ()
     return str(FieldPath((*steps_of(node), *every))) if kind is not None else ""
 
 
 def steps_of(node: TreeNode) -> tuple[str | int, ...]:
-    """The keys and places that lead from the message to a value; also to what a query found."""
+    """Return the keys and indices from the message to a value, also for results of a query."""
     steps: list[str | int] = []
     above: TreeNode | None = node
     while above is not None and above.parent is not None:
@@ -77,17 +77,16 @@ def steps_of(node: TreeNode) -> tuple[str | int, ...]:
 
 
 class TreeModel(QAbstractItemModel):
-    """The newest message as rows of one column; `set_value` puts the next message into the same rows."""
+    """Tree model with one column; `set_value` updates existing rows with the next message."""
 
     def __init__(self) -> None:
-        """Nothing is shown yet."""
         super().__init__()
         self._root = TreeNode("", {}, None, depth=-1, children=[])
         self.changed_at_s: float | None = None
         self._changing = False
         self._changes_only = False
 
-    # -- Qt's questions ---------------------------------------------------------------------------------
+    # -- QAbstractItemModel -------------------------------------------------------------------------------
 
     def index(self, row: int, column: int, parent: Index = _ROOT) -> QModelIndex:
         above = self.node(parent)
@@ -113,7 +112,7 @@ class TreeModel(QAbstractItemModel):
 
     def canFetchMore(self, parent: Index) -> bool:
         node = self.node(parent)
-        # While rows are being changed a view may ask; it gets more when the change is complete.
+        # A view may ask while rows are being changed; it asks again afterwards.
         return parent.column() <= 0 and not self._changing and len(node.children or ()) < self._size(node)
 
     def fetchMore(self, parent: Index) -> None:
@@ -138,34 +137,33 @@ class TreeModel(QAbstractItemModel):
             return ", ".join(part for part in said if part)
         return None
 
-    # -- what the inspector asks and says ---------------------------------------------------------------
+    # -- access by the inspector --------------------------------------------------------------------------
 
     def node(self, index: Index) -> TreeNode:
-        """The node of an index; the invisible root for an invalid one."""
+        """Return the node of an index; the root for an invalid index."""
         inside = index.internalPointer() if index.isValid() else None
         return inside if isinstance(inside, TreeNode) else self._root
 
     def index_of(self, node: TreeNode) -> QModelIndex:
-        """The index of a node."""
+        """Return the index of a node."""
         return QModelIndex() if node is self._root else self.createIndex(node.row, 0, node)
 
     def value(self) -> object:
-        """The whole message that is shown."""
+        """Return the whole message."""
         return self._root.value
 
     def clear(self) -> None:
-        """Show nothing; the next message begins anew."""
+        """Remove all rows; the next message is treated as the first."""
         self.beginResetModel()
         self._root = TreeNode("", {}, None, depth=-1, children=[])
         self.changed_at_s = None
         self.endResetModel()
 
     def set_value(self, value: object, now: float, base: object = OFF, *, changes_only: bool = False) -> None:
-        """Show the next message; values that differ are marked as changed at ``now`` (monotonic s).
+        """Show the next message; changed values are marked with `now` (monotonic time in s).
 
-        A message that is no container is shown as one row called ``value``. The first message marks nothing.
-        With a ``base`` every node is marked by how it differs from that message, and ``changes_only`` leaves
-        out what does not.
+        A message that is not a container becomes one row called ``value``. The first message marks nothing.
+        With a `base`, every node is marked by its difference, and `changes_only` omits equal ones.
         """
         first = not self._root.children
         shown = _as_container(value)
@@ -179,13 +177,12 @@ class TreeModel(QAbstractItemModel):
             self._changing = False
 
     def _size(self, node: TreeNode) -> int:
-        """How many children a node has, or (compared, and not looked at yet) whether it has any."""
+        # In a comparison, an unloaded node returns only zero or nonzero.
         if node.base is OFF:
             return size_of(node.value)
         return node.total if node.children is not None else size_of(node.value) or size_of(node.base)
 
     def _parts(self, node: TreeNode, count: int) -> list[Part]:
-        """The first ``count`` children as they are to be shown."""
         if node.base is OFF:
             pairs = zip(keys_of(node.value, count), values_of(node.value, count), strict=False)
             return [(key, value, OFF, "") for key, value in pairs]
@@ -225,7 +222,6 @@ class TreeModel(QAbstractItemModel):
             self.dataChanged.emit(self.index_of(first), self.index_of(last), roles)
 
     def _load(self, node: TreeNode, count: int) -> None:
-        """Have ``count`` children, or as many as there are."""
         parts = self._parts(node, count)
         if node.children is None:
             node.children = []
@@ -233,14 +229,14 @@ class TreeModel(QAbstractItemModel):
         if len(parts) <= first:
             return
         fresh = [_made(node, row, parts[row]) for row in range(first, len(parts))]
-        before, self._changing = self._changing, True  # who is told now must not fetch the same rows
+        before, self._changing = self._changing, True  # receivers of the signals must not fetch the same rows
         self.beginInsertRows(self.index_of(node), first, len(parts) - 1)
         node.children.extend(fresh)
         self._changing = before
         self.endInsertRows()
 
     def _fit(self, node: TreeNode, loaded: list[TreeNode], parts: Sequence[Part]) -> None:
-        """Children came, went or changed places: those that stay keep what is expanded in them."""
+        # Nodes that stay keep their expanded state.
         wanted = [part[0] for part in parts]
         keep = set(wanted)
         for row in range(len(loaded) - 1, -1, -1):
@@ -270,7 +266,7 @@ class TreeModel(QAbstractItemModel):
         self.layoutChanged.emit()
 
     def reveal(self, path: Sequence[str | int]) -> QModelIndex:
-        """The index of a value, loading what leads to it; invalid when it is not there."""
+        """Return the index of a value, loading its parents; invalid if it is not there."""
         node = self._root
         for key in path:
             keys: list[str | int] = keys_of(node.value, size_of(node.value))
@@ -279,7 +275,7 @@ class TreeModel(QAbstractItemModel):
             self._load(node, max(keys.index(key) + 1, min(PAGE, len(keys))))
             below = next((child for child in node.children or () if child.key == key), None)
             if below is None:
-                return QModelIndex()  # it is left out as it has not changed
+                return QModelIndex()  # omitted because it is unchanged
             node = below
         return self.index_of(node)
 
@@ -290,7 +286,6 @@ def _made(parent: TreeNode, row: int, part: Part) -> TreeNode:
 
 
 def _as_container(value: object) -> object:
-    """A message that is no container gets one row, ``value``."""
     return value if value is OFF or value is MISSING or is_container(value) else {"value": value}
 
 

@@ -1,4 +1,4 @@
-"""How the inspector's tree looks: key left, value right, what changed with a bar and a tint that fade."""
+"""Tree view of the inspector: keys, values, and fading marks of changes."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ LEFT = Qt.AlignmentFlag.AlignLeft | Qt.AlignmentFlag.AlignVCenter
 
 
 def mixed(under: QColor, over: QColor, share: float) -> QColor:
-    """``share`` (0 to 1) of ``over`` upon ``under``."""
+    """Blend `over` onto `under` with opacity `share` (0 to 1)."""
     keep = 1.0 - share
     return QColor.fromRgbF(
         under.redF() * keep + over.redF() * share,
@@ -44,7 +44,7 @@ def mixed(under: QColor, over: QColor, share: float) -> QColor:
 
 
 class _Height(QStyledItemDelegate):
-    """Rows of one height; everything else is painted by the view."""
+    """Delegate for the row height; the view paints everything else."""
 
     def __init__(self, view: TreeView) -> None:
         super().__init__(view)
@@ -55,12 +55,14 @@ class _Height(QStyledItemDelegate):
 
 
 class TreeView(QTreeView):
-    """The tree of one message; `dragged` when a person begins to drag a value out of it."""
+    """Tree of one message; `dragged` is emitted when a value is dragged.
+
+    `clock` is that of the change times.
+    """
 
     dragged = Signal(object)
 
     def __init__(self, theme: Theme, model: TreeModel, clock: Callable[[], float] = time.monotonic) -> None:
-        """Show ``model``; ``clock`` is that of the changes' times."""
         super().__init__()
         self.theme = theme
         self._clock = clock
@@ -81,24 +83,24 @@ class TreeView(QTreeView):
         self.setMouseTracking(True)
 
     def share_changed(self, node: TreeNode) -> float:
-        """How strongly a node is marked now: 1 just changed, 0 long ago."""
+        """Return the intensity of a node's change mark: 1 for a fresh change, 0 after the fade."""
         if node.mark:
             return 1.0
         if node.changed_s is None or node.base is not OFF:
             return 0.0
         fade_s = self.theme.duration("changedFade") / 1000
         age = self._clock() - node.changed_s
-        if fade_s <= 0:  # reduced motion: no fade, shown for a second
+        if fade_s <= 0:  # reduced motion: shown for a second instead of fading
             return 1.0 if age < 1.0 else 0.0
         return max(0.0, 1.0 - age / fade_s)
 
     def fading(self) -> bool:
-        """Whether any mark may still be fading: then the view wants to be painted again."""
+        """Return True if a mark may still be fading, so that the view must be repainted."""
         changed = self._tree.changed_at_s
         return changed is not None and self._clock() - changed < 1.2
 
     def expand_small(self, rows: int) -> None:
-        """Open the small parts of a message, upper levels first, while at most ``rows`` rows are shown."""
+        """Expand small containers, upper levels first, while at most `rows` rows are visible."""
         waiting, shown = [QModelIndex()], self._tree.rowCount()
         while waiting:
             above = waiting.pop(0)
@@ -194,7 +196,6 @@ class TreeView(QTreeView):
     def _paint_before(
         self, painter: QPainter, rect: QRect, node: TreeNode, right: float, left: float
     ) -> None:
-        """The value that a compared one had before, where there is room for it."""
         if node.mark != "changed" or is_container(node.base):
             return
         text = f"{words_of(node.base)} \u2192"
@@ -217,7 +218,7 @@ class TreeView(QTreeView):
         super().mousePressEvent(event)
 
     def mouseMoveEvent(self, event: QMouseEvent) -> None:
-        """The left button held and moved far enough drags what was pressed."""
+        # Starts a drag after the platform's drag distance.
         if self._pressed_at is not None and event.buttons() & Qt.MouseButton.LeftButton:
             began, node = self._pressed_at
             far = (event.position().toPoint() - began).manhattanLength()

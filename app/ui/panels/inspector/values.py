@@ -1,4 +1,4 @@
-"""Decoded values as the inspector shows them: keys, words, where a word is found, and what is copied."""
+"""Decoded values for the inspector: keys, one-line texts, search and clipboard."""
 
 from __future__ import annotations
 
@@ -21,14 +21,14 @@ SEARCH_LIMIT = 20_000
 
 
 def is_container(value: object) -> bool:
-    """Objects and lists; text and bytes are values."""
+    """Return True for objects and lists, False for text and bytes."""
     if isinstance(value, Mapping):
         return True
     return isinstance(value, Sequence) and not isinstance(value, (str, bytes, bytearray, memoryview))
 
 
 def keys_of(value: object, count: int) -> list[str | int]:
-    """The first ``count`` keys of a container."""
+    """Return the first `count` keys of a container."""
     if isinstance(value, Mapping):
         return [key if isinstance(key, str) else str(key) for key in islice(value, count)]
     if is_container(value):
@@ -37,19 +37,19 @@ def keys_of(value: object, count: int) -> list[str | int]:
 
 
 def values_of(value: object, count: int) -> list[object]:
-    """The first ``count`` values of a container."""
+    """Return the first `count` values of a container."""
     if isinstance(value, Mapping):
         return list(islice(value.values(), count))
     return list(islice(value, count)) if is_container(value) else []  # type: ignore[call-overload]
 
 
 def size_of(value: object) -> int:
-    """How many children a value has."""
+    """Return the number of children."""
     return len(value) if is_container(value) else 0  # type: ignore[arg-type]
 
 
 def words_of(value: object) -> str:
-    """A value in one line: text in quotes, containers by their count, bytes by their first ones."""
+    """Return a value as one line: quoted text, size of containers, first bytes of binary data."""
     if value is None:
         return "null"
     if isinstance(value, bool):
@@ -69,7 +69,10 @@ def words_of(value: object) -> str:
 
 
 def search(value: object, words: str, limit: int = SEARCH_LIMIT) -> Iterator[tuple[str | int, ...]]:
-    """Where a key or a value has these words (any case), in the tree's order, among ``limit`` values."""
+    """Yield the paths of keys and values that contain `words` (any case), in tree order.
+
+    At most `limit` values are checked.
+    """
     wanted = words.casefold()
     waiting: list[tuple[tuple[str | int, ...], object]] = [((), value)]
     for _each in range(limit):
@@ -86,7 +89,7 @@ def search(value: object, words: str, limit: int = SEARCH_LIMIT) -> Iterator[tup
 
 
 def plain_words(value: object) -> str:
-    """A value for the clipboard: text as it is, everything else as JSON."""
+    """Return a value for the clipboard: text unchanged, others as JSON."""
     if isinstance(value, str):
         return value
     if isinstance(value, (bytes, bytearray, memoryview)):
@@ -97,7 +100,7 @@ def plain_words(value: object) -> str:
 
 
 def read_at_once(message: Message) -> Reading:
-    """A small message, or what is worth reading of a picture; in the window's thread."""
+    """Decode a small message, or the summary of an image, on the GUI thread."""
     if message.codec != "image":
         return read(message)
     try:
@@ -107,7 +110,7 @@ def read_at_once(message: Message) -> Reading:
 
 
 def payload_or(message: Message, otherwise: object) -> object:
-    """A message's decoded value; ``otherwise`` for what can't be read or is too large to be read here."""
+    """Return the decoded payload, or `otherwise` if it is invalid or too large to decode here."""
     if message.size_bytes > LARGE_BYTES or message.codec == "image":
         return otherwise
     found = read(message)
@@ -115,7 +118,7 @@ def payload_or(message: Message, otherwise: object) -> object:
 
 
 def image_summary(message: Message) -> Mapping[str, object]:
-    """What is worth reading of a picture: how it is coded, its shape, its bytes; never its pixels."""
+    """Return encoding, shape and size of an image, without pixels."""
     shape = message.extension.get("shape")
     if shape is None:
         shape = list(getattr(message.payload, "shape", ()))
