@@ -1,6 +1,6 @@
-"""Nodes: the programs that are there, with what they publish and subscribe.
+"""Nodes panel: nodes with their topics, parameters and figures.
 
-`rows` has its columns and words.
+`rows` has the columns and texts.
 """
 
 from app.ui.panels.nodes.panel import PANEL as PANEL

@@ -1,4 +1,4 @@
-"""Nodes: the programs that are there, natives and originals, with what they publish and subscribe."""
+"""Nodes panel: native and original nodes with their publishers and subscribers."""
 
 from __future__ import annotations
 
@@ -37,12 +37,12 @@ WORDS = TableWords(
     clear_the_filter=lazy("Clear the filter to see all nodes."),
     not_recorded=lazy("Recordings don't contain programs"),
 )
-SORT_EVERY = 30  # refreshes of 30 a second: what moves is sorted once a second
+SORT_EVERY = 30  # refreshes at 30 Hz: changing columns are re-sorted once a second
 LIVELY = frozenset({"cpu"})
 
 
 class NodesPanel(NetworkTable[NodeRow]):
-    """The table of nodes, a filter in the title, what is known of the chosen one below."""
+    """Table of nodes, with facts and parameters of the selected node below."""
 
     def __init__(self, context: PanelContext) -> None:
         super().__init__(context, WORDS, "network")
@@ -82,7 +82,6 @@ class NodesPanel(NetworkTable[NodeRow]):
         return table
 
     def _own(self, node: NodeEntry) -> bool:
-        """Whether it is Studio, or a virtual robot that Studio itself started."""
         if node.network:
             return own_everywhere([node.name])
         return node.name in {NODE_NAME, *self.session.launcher.virtual_robots}
@@ -163,7 +162,7 @@ class NodesPanel(NetworkTable[NodeRow]):
         if row is None:
             return ()
         if row.is_pattern and self.session.topic(row.topic_key) is None:
-            return (copies(self.context, row.topic),)  # it stands for many topics
+            return (copies(self.context, row.topic),)  # a pattern stands for many topics
         if row.topic:
             return topic_actions(self.context, row.topic_key)
         shows = RowAction(_("Show topics"), "list-tree", lambda: self.open_row(key))
@@ -193,7 +192,7 @@ class NodesPanel(NetworkTable[NodeRow]):
 
 
 class _NodeTable(TableView[NodeRow]):
-    """Right opens the chosen node, Left closes it."""
+    """Table of nodes; Right expands the selected node, Left collapses it."""
 
     fold_wanted = Signal(str, bool)
 

@@ -1,4 +1,4 @@
-"""The parameters of the chosen node, below the table of nodes: live, and each can be given another value."""
+"""Parameters of the selected node: live values, each of which can be changed."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ LINE, CHOICE = range(2)
 
 
 def allowed_words(parameter: ShownParameter) -> str:
-    """What it may be: "0 to 2", "walk, run or crawl", "read only"; empty when nothing is said."""
+    """Return the allowed values, such as "0 to 2", "walk, run or crawl", "read only"; "" for any value."""
     if parameter.read_only:
         return _("read only")
     if parameter.choices:
@@ -47,7 +47,7 @@ def allowed_words(parameter: ShownParameter) -> str:
 
 
 class ParametersPart(QWidget):
-    """A table of the parameters, and below it the chosen one with a field to change it."""
+    """Table of parameters, with an editor of the selected one below."""
 
     def __init__(self, theme: Theme, parameters: NodeParameters) -> None:
         super().__init__()
@@ -123,10 +123,10 @@ class ParametersPart(QWidget):
             return Cell(words, role="changed", mono=True, tint="changedTint")
         return Cell(words, role=self._ink("text"), mono=True)
 
-    # -- what it shows ------------------------------------------------------------------------------------
+    # -- display ------------------------------------------------------------------------------------------
 
     def refresh(self) -> None:
-        """Show what is known now; called with every refresh of the panel."""
+        """Show the current parameters; called on every refresh of the panel."""
         parameters = self.parameters
         parameters.refresh(self.clock())
         node = parameters.node
@@ -142,7 +142,7 @@ class ParametersPart(QWidget):
             self.model.set_rows(parameters.all)
             self._show_chosen()
             self._fades_until = self.clock() + 2 * CHANGED_S
-        if self.clock() < self._fades_until:  # what has changed is marked, and soon no more
+        if self.clock() < self._fades_until:  # repaint while marks of changes fade
             self.table.tell_visible_changed()
 
     def _title(self) -> str:
@@ -156,7 +156,7 @@ class ParametersPart(QWidget):
 
     @property
     def chosen(self) -> ShownParameter | None:
-        """The parameter that is chosen."""
+        """Selected parameter, or None."""
         row = self.model.row_at(self.table.currentIndex())
         return self.parameters.find(row.name) if row is not None else None
 
@@ -224,7 +224,7 @@ class ParametersPart(QWidget):
             if role == "error":
                 paint.announce(self.sentence, words)
 
-    # -- what a person does -------------------------------------------------------------------------------
+    # -- user actions -------------------------------------------------------------------------------------
 
     def _note_edit(self, _text: str) -> None:
         self._edited = True
@@ -235,7 +235,6 @@ class ParametersPart(QWidget):
             editor.setFocus(Qt.FocusReason.ShortcutFocusReason)
 
     def _leave(self) -> None:
-        """Leave the value as it is."""
         self._edited = False
         self.parameters.refusal = ""
         self._show_chosen()
@@ -247,13 +246,13 @@ class ParametersPart(QWidget):
             return
         by_choice = self.editors.currentIndex() == CHOICE
         self.parameters.set(parameter.name, self.choice.value if by_choice else self.field.text())
-        self._edited = True  # what was typed stays until the node has taken it
+        self._edited = True  # keep the typed text until the node has confirmed it
         self._waits = bool(self.parameters.setting)
         self._show_chosen()
 
 
 class ValueField(QLineEdit):
-    """A value; Return sets it, Esc leaves it as it was."""
+    """Field of a value. Return sets it, Esc restores the current value."""
 
     def __init__(self, theme: Theme, take: Callable[[], object], leave: Callable[[], object]) -> None:
         super().__init__()
@@ -263,7 +262,7 @@ class ValueField(QLineEdit):
         EditMenu(theme, self)
 
     def mark(self, *, wrong: bool) -> None:
-        """Give it the edge of a wrong value, or take it away."""
+        """Show or remove the outline of an invalid value."""
         if (self.property("wrong") == "true") is not wrong:
             self.setProperty("wrong", "true" if wrong else "false")
             self.style().unpolish(self)

@@ -1,4 +1,4 @@
-"""The rows of the table of nodes: a node, and when it is opened what it publishes and subscribes."""
+"""Rows of the table of nodes: nodes and, when expanded, their topics."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ VERSIONS = {"A": lazy("original NEP up to 0.5.4.5"), "B": lazy("original NEP 0.5
 
 @dataclass(frozen=True, slots=True)
 class NodeRow:
-    """A node, or below it one of its topics. ``rate`` is the topic's, in words."""
+    """Row of a node, or of one of its topics. `rate` returns a topic's rate as text."""
 
     node: NodeEntry
     opened: bool = False
@@ -50,17 +50,17 @@ class NodeRow:
 
     @property
     def key(self) -> str:
-        """Names the row for ever."""
+        """Stable key of the row."""
         return f"{self.node.key} {self.way} {self.topic}"
 
     @property
     def is_pattern(self) -> bool:
-        """Whether the node subscribes all topics that match, rather than one of this name."""
+        """True if the node subscribes to a pattern instead of a single topic."""
         return self.way == SUBSCRIBES and is_pattern(self.topic)
 
     @property
     def topic_key(self) -> str:
-        """The topic's name among those of all networks."""
+        """Key of the topic among those of all networks."""
         return key_of(self.node.network, self.topic)
 
 
@@ -70,7 +70,7 @@ def rows_of(
     order: Order[NodeRow],
     rate: Callable[[str], str],
 ) -> list[NodeRow]:
-    """The nodes in their order; below each of those ``opened`` (their keys) its topics."""
+    """Return the nodes in sort order, each followed by its topics if its key is in `opened`."""
     rows: list[NodeRow] = []
     for head in order.sort([NodeRow(node, node.key in opened) for node in nodes]):
         rows.append(head)
@@ -82,9 +82,9 @@ def rows_of(
 
 
 def limits_of(node: NodeEntry) -> str:
-    """What an original program can't do, what a bridge does, or what can't be known on its network.
+    """Return the limits of an original program or foreign network, or the purpose of a bridge.
 
-    Empty for any other.
+    Empty for native nodes.
     """
     kind = kind_named(node.network)
     if kind is not None:
@@ -99,7 +99,7 @@ def limits_of(node: NodeEntry) -> str:
 
 
 def lack_of_parameters(node: NodeEntry) -> str:
-    """Why there are no parameters to see, and what gives a node some; empty when it has some."""
+    """Return why a node has no parameters; "" if it has some."""
     if node.has_parameters or node.is_original or node.gone_s is not None:
         return ""
     kind = kind_named(node.network)
@@ -111,7 +111,7 @@ def lack_of_parameters(node: NodeEntry) -> str:
 
 
 def facts_of(node: NodeEntry) -> str:
-    """Where it runs and since when, in one line: what a narrow table has no column for."""
+    """Return place and start of a node in one line, for tables too narrow for those columns."""
     parts = [node.name]
     if node.host:
         here = node.host == platform.node()
@@ -131,7 +131,7 @@ def _ink(row: NodeRow, role: str) -> str:
 
 
 def name_cell(row: NodeRow) -> Cell:
-    """The node's name with its arrow, bold while new; or a topic further in."""
+    """Return the node's name with its arrow, bold while new; topics are indented."""
     gone = row.node.gone_s is not None
     if row.topic:
         return Cell(row.topic, role=_ink(row, "text"), mono=True, struck=gone, indent=INDENT, middle=True)
@@ -141,7 +141,7 @@ def name_cell(row: NodeRow) -> Cell:
 
 
 def generation_cell(row: NodeRow) -> Cell:
-    """Native, original or a bridge; of a topic what the node does with it, and how often."""
+    """Return the node's kind (native, original, bridge); for a topic, its direction and rate."""
     if row.topic:
         rate = row.rate(row.topic_key) if row.rate is not None and row.way == PUBLISHES else ""
         said = _("publishes {rate}/s").format(rate=rate) if rate else _(row.way)
@@ -157,7 +157,7 @@ def generation_cell(row: NodeRow) -> Cell:
 
 
 def cpu_cell(row: NodeRow) -> Cell:
-    """The share of a core, since when it is gone, or that its network does not tell."""
+    """Return the CPU share, the time since the node left, or "not reported" for its network."""
     kind = kind_named(row.node.network)
     if row.topic or row.node.gone_s is not None or kind is None or kind.tells_figures:
         return _of_node(_cpu)(row)
@@ -249,7 +249,7 @@ COLUMNS: tuple[Column[NodeRow], ...] = (
 
 
 def columns(own: Callable[[NodeEntry], bool]) -> tuple[Column[NodeRow], ...]:
-    """The columns; what is Studio's ``own`` is no news."""
+    """Return the columns; nodes for which `own` returns True are never marked as new."""
 
     def named(row: NodeRow) -> Cell:
         cell = name_cell(row)
