@@ -1,7 +1,7 @@
-"""Plot: numbers and states of messages over their own time; what is calculated from them; one over another.
+"""Plot panel: numbers and states over time, expressions of them, and one curve against another.
 
-`canvas` draws the curves, `lanes` the states, `legend` is the table below, `tools` the row above.
-Nothing but this is loaded before somebody opens a plot: pyqtgraph and numpy take a fifth of a second.
+`canvas` draws curves, `lanes` states, `legend` is the table below and `tools` the toolbar. Everything else is
+imported when the first plot opens, because pyqtgraph and numpy take 200 ms.
 """
 
 from __future__ import annotations
@@ -11,7 +11,7 @@ from nep.i18n import lazy
 
 
 def _make(context: PanelContext) -> PanelWidget:
-    from app.ui.panels.plot.panel import PlotPanel  # noqa: PLC0415  loads pyqtgraph and numpy
+    from app.ui.panels.plot.panel import PlotPanel  # noqa: PLC0415  imports pyqtgraph and numpy
 
     return PlotPanel(context)
 

@@ -1,4 +1,4 @@
-"""The line above a plot's table: why nothing of a curve can be drawn, and the way to find out more."""
+"""Line above the legend with the reason why a curve has no data."""
 
 from __future__ import annotations
 
@@ -17,13 +17,12 @@ from nep.i18n import _
 
 
 class PlotAdvice(QWidget):
-    """Hidden while something can be drawn of every curve."""
+    """Line with a hint; hidden while all curves have data. `ask` opens the connection doctor for a topic."""
 
     def __init__(self, theme: Theme, ask: Callable[[str], object]) -> None:
-        """``ask`` asks the connection doctor about a topic."""
         super().__init__()
         self.topic = ""
-        """The topic of which nothing comes; "" while something does."""
+        """Topic without data, or ""."""
         self._words = label("", "small", role="warn", wrap=True)
         self._words.setMinimumWidth(0)
         self.why = LinkButton(theme, _("Why do I see nothing?"))
@@ -36,11 +35,11 @@ class PlotAdvice(QWidget):
         row.addWidget(self.why, 0, Qt.AlignmentFlag.AlignTop)
 
     def text(self) -> str:
-        """What it says; "" when there is nothing to say."""
+        """Return the hint, or ""."""
         return self._words.text()
 
     def show_for(self, curves: Curves, shown: Sequence[ShownCurve]) -> None:
-        """Say what is wrong with these curves of a plot, if something is."""
+        """Show the hint for these curves, if there is one."""
         said = next(filter(None, (curves.advice(each.curve) for each in shown)), "")
         empty = [each for each in shown if not said and not _has_any(each)]
         topics = sorted(topics_of(empty[0].curve.source)) if shown and len(empty) == len(shown) else []

@@ -1,8 +1,8 @@
-"""The curves over time: axes and lines by pyqtgraph, the two cursors and their marks on top.
+"""Canvas of curves over time: pyqtgraph for axes and lines, cursors painted on top.
 
-The horizontal axis counts seconds from a moment at its right (`TimeView.anchor_s`): while a plot follows what
-comes, that moment moves and the axis does not, so it is not painted again. The mouse belongs to us: the wheel
-zooms time, with Ctrl values, a drag moves, a double click shows all.
+The time axis counts seconds relative to its right end (`TimeView.anchor_s`). While the plot follows live data
+the anchor moves but the axis stays, so it isn't repainted. pyqtgraph's mouse handling is replaced: wheel
+zooms time, Ctrl+wheel values, dragging pans, a double click shows everything.
 """
 
 from __future__ import annotations
@@ -41,23 +41,23 @@ from nep.i18n import _, number
 
 AXIS_WIDTH, AXIS_HEIGHT = 54, 24
 FLAG = QSize(22, 19)
-ABOVE = 24  # px for the cursors' flags
+ABOVE = 24  # px, space for the flags of the cursors
 ZOOM_STEP = 1.2
 LEAST_WINDOW_S, MOST_WINDOW_S = 1e-4, 1e9
 SMOOTH_POINTS = 3000
-"""Above so many points smooth edges are not seen, and cost more than all else."""
+"""Number of points above which antialiasing is invisible and expensive."""
 SIGNS, BUSY = 5, 5.0
-TICK_APART, TICK_ABOVE = 84, 34  # px between ticks
+TICK_APART, TICK_ABOVE = 84, 34  # minimum distance of ticks in px
 BESIDE = 60
 FARTHEST = 1e300
-"""Values beyond are drawn at the edge: what axes are calculated with would overflow."""
+"""Limit of drawn values; larger ones would overflow in the axis calculations."""
 NEAR = 10  # px
 BETWEEN = 0.045
 
 
 @dataclass(slots=True)
 class ValueRange:
-    """The values that an axis shows; ``held`` when a person chose them, ``is_new`` until values were seen."""
+    """Range of a value axis; `held` after a zoom by the person, `is_new` until the first values."""
 
     low: float = 0.0
     high: float = 1.0
@@ -65,7 +65,7 @@ class ValueRange:
     is_new: bool = True
 
     def fit(self, low: float, high: float) -> bool:
-        """Show these, with some room; it stays as long as they fit well. Whether it changed."""
+        """Fit the range with margins, unless it already fits well; return True if it changed."""
         if self.held or not (math.isfinite(low) and math.isfinite(high)):
             return False
         span = high - low
@@ -78,15 +78,15 @@ class ValueRange:
         return True
 
 
-class TimeAxis(pg.AxisItem):  # type: ignore[misc]  # pyqtgraph tells no types
-    """Seconds before the moment at the right, whose clock stands there."""
+class TimeAxis(pg.AxisItem):  # type: ignore[misc]  # pyqtgraph is untyped
+    """Seconds before the time at the right end, whose clock time is shown there."""
 
     def __init__(self) -> None:
         super().__init__("bottom")
         self.clock = ""
 
     def boundingRect(self) -> QRectF:
-        """A word at the very edge, as the clock is, needs room beside it, else it is left out."""
+        # pyqtgraph omits labels that exceed the bounding rectangle, such as the clock at the edge.
         return QRectF(super().boundingRect()).adjusted(-BESIDE, 0, BESIDE, 0)
 
     def tickSpacing(self, least: float, most: float, size: float) -> list[tuple[float, float]]:
@@ -97,7 +97,7 @@ class TimeAxis(pg.AxisItem):  # type: ignore[misc]  # pyqtgraph tells no types
 
 
 class ValueAxis(pg.AxisItem):  # type: ignore[misc]
-    """Numbers with as many digits as their distance needs."""
+    """Axis of numbers with as many digits as the tick spacing requires."""
 
     def tickSpacing(self, least: float, most: float, size: float) -> list[tuple[float, float]]:
         apart = TICK_ABOVE if self.orientation in {"left", "right"} else TICK_APART
@@ -110,13 +110,13 @@ class ValueAxis(pg.AxisItem):  # type: ignore[misc]
 def readable(
     levels: list[tuple[float, float]], span: float, size: float, apart: float
 ) -> list[tuple[float, float]]:
-    """Of pyqtgraph's levels of ticks the finest whose words are so many px ``apart``."""
+    """Return the finest of pyqtgraph's tick levels whose labels are at least `apart` px apart."""
     fitting = [level for level in levels if span > 0 and level[0] / span * size >= apart]
     return fitting[-1:] or levels[:1]
 
 
 def time_words(value_s: float, spacing_s: float) -> str:
-    """A tick of the time axis: seconds or minutes before (or after) the moment at its right."""
+    """Return the label of a time tick, in s or min relative to the right end."""
     if spacing_s >= 60:
         words = _("{minutes} min").format(minutes=number(round(abs(value_s) / 60, 3)))
     else:
@@ -126,7 +126,7 @@ def time_words(value_s: float, spacing_s: float) -> str:
 
 
 def axis_words(value: float, spacing: float) -> str:
-    """A tick of a value axis."""
+    """Return the label of a value tick."""
     if value and not 1e-4 <= abs(spacing) < 1e6:
         return number(value, ".3g").replace("-", MINUS)
     digits = max(0, math.ceil(-math.log10(abs(spacing)) - 1e-9)) if spacing else 0
@@ -134,14 +134,14 @@ def axis_words(value: float, spacing: float) -> str:
 
 
 class PlotCanvas(pg.GraphicsView):  # type: ignore[misc]
-    """Draws what it is given; says what a person does with the mouse.
+    """Canvas of curves and cursors; emits signals for mouse actions.
 
-    ``begin_s`` and ``end_s`` are what it shows, in the seconds of all series, ``anchor_s`` where the axis
-    counts from.
+    `begin_s` and `end_s` are the visible range in the time base of all series; `anchor_s` is the origin of
+    the axis.
     """
 
-    zoomed = Signal(float, float)  # factor of the time, at which second
-    moved = Signal(float)  # seconds
+    zoomed = Signal(float, float)  # factor, time at the mouse in s
+    moved = Signal(float)  # shift in s
     values_changed = Signal()
     all_wanted = Signal()
     cursor_moved = Signal(str, float)
@@ -154,8 +154,9 @@ class PlotCanvas(pg.GraphicsView):  # type: ignore[misc]
         self.cursors: dict[str, float] = {}
         self.marks: list[tuple[ShownCurve, float, float]] = []  # curve, time, value
         self.mouse_s: float | None = None
-        self.painted_s = 0.0  # processor time of all its paintings
-        self.signs: list[tuple[ShownCurve, float, float]] = []  # the same, where a line has no dashes
+        self.painted_s = 0.0  # accumulated processor time of painting
+        # like `marks`, on dense lines, which have no dashes
+        self.signs: list[tuple[ShownCurve, float, float]] = []
         self._lines: dict[str, pg.PlotCurveItem] = {}
         self._held: tuple[str, QPointF] | None = None
         self.ranges = {"left": ValueRange(), "right": ValueRange()}
@@ -196,11 +197,11 @@ class PlotCanvas(pg.GraphicsView):  # type: ignore[misc]
         self.right_view.linkedViewChanged(self.view, pg.ViewBox.XAxis)
 
     def axis_font(self) -> QFont:
-        """The font of the figures at the axes."""
+        """Return the font of the axis labels."""
         return self.theme.font("caption")
 
     def restyle(self) -> None:
-        """Take over the theme's colours, fonts and sizes."""
+        """Apply the theme's colours, fonts and sizes."""
         theme = self.theme
         grid = theme.colour("controlBorder" if theme.high_contrast else "grid")
         for name in ("bottom", "left", "right"):
@@ -217,36 +218,36 @@ class PlotCanvas(pg.GraphicsView):  # type: ignore[misc]
         self.plot.getAxis("right").setGrid(False)
         self.viewport().update()
 
-    # -- what is shown ---------------------------------------------------------------------------------------
+    # -- display ------------------------------------------------------------------------------------------
 
     @property
     def area(self) -> QRectF:
-        """Where the curves are, in this widget."""
+        """Rectangle of the curves in widget coordinates."""
         return QRectF(self.view.sceneBoundingRect())
 
     @property
     def columns(self) -> int:
-        """How many pixels the curves have from left to right."""
+        """Width of the curves in px."""
         return max(16, round(self.area.width()))
 
     def x_of(self, time_s: float, area: QRectF | None = None) -> float:
-        """Where a time is, in this widget; ``area`` when it is known already."""
+        """Return the x coordinate of a time; pass `area` to avoid computing it again."""
         area = area or self.area
         return area.left() + (time_s - self.begin_s) / (self.end_s - self.begin_s) * area.width()
 
     def time_at(self, x: float) -> float:
-        """The time at a place in this widget."""
+        """Return the time at an x coordinate."""
         area = self.area
         share = (x - area.left()) / max(1.0, area.width())
         return self.begin_s + share * (self.end_s - self.begin_s)
 
     def y_of(self, value: float, *, right: bool, area: QRectF | None = None) -> float:
-        """Where a value is, in this widget."""
+        """Return the y coordinate of a value."""
         area, shown = area or self.area, self.ranges["right" if right else "left"]
         return area.bottom() - (value - shown.low) / (shown.high - shown.low) * area.height()
 
     def show_lines(self, lines: Sequence[tuple[ShownCurve, Line]], clock_s: float) -> None:
-        """Draw these curves; ``clock_s`` is what time of day (s since 1970) it is at the anchor."""
+        """Draw these curves; `clock_s` is the time of day at the anchor, in s since 1970."""
         shown = {curve.name for curve, _line in lines}
         for name in [name for name in self._lines if name not in shown]:
             item = self._lines.pop(name)
@@ -271,7 +272,7 @@ class PlotCanvas(pg.GraphicsView):  # type: ignore[misc]
         elif item.getViewBox() is not view:
             item.getViewBox().removeItem(item)
             view.addItem(item, ignoreBounds=True)
-        # what is so dense that dashes and smooth edges are not seen would take most of the time for them
+        # dashes and antialiasing of dense lines are invisible but would dominate the cost
         dense = self._is_dense(line, right=curve.right)
         item.setData(
             line.times - self.anchor_s,
@@ -281,7 +282,7 @@ class PlotCanvas(pg.GraphicsView):  # type: ignore[misc]
         )
 
     def _is_dense(self, line: Line, *, right: bool) -> bool:
-        """Whether a line has so many points, or goes up and down so much, that dashes in it are noise."""
+        # Many points, or steep oscillations.
         if len(line.times) > SMOOTH_POINTS or not line.is_whole:
             return True
         shown = self.ranges["right" if right else "left"]
@@ -290,7 +291,7 @@ class PlotCanvas(pg.GraphicsView):  # type: ignore[misc]
         return not travelled * self.area.height() < BUSY * self.area.width()
 
     def _add_signs(self, curve: ShownCurve, shift: float) -> None:
-        """A dense line has no dashes: its mark stands on it here and there, at the same times always."""
+        # Dense lines have no dashes; marks at fixed times identify them instead.
         step_s = (self.end_s - self.begin_s) / SIGNS
         first = math.floor(self.begin_s / step_s) + shift
         for place in range(SIGNS + 1):
@@ -319,7 +320,7 @@ class PlotCanvas(pg.GraphicsView):  # type: ignore[misc]
 
     def _show_clock(self, clock_s: float) -> None:
         try:
-            words = f"{datetime.fromtimestamp(clock_s):%H:%M:%S}"  # noqa: DTZ006  as people's clocks show it
+            words = f"{datetime.fromtimestamp(clock_s):%H:%M:%S}"  # noqa: DTZ006  local time, as on the person's clock
         except (OverflowError, ValueError, OSError):
             words = "0 s"
         if words != self.time_axis.clock:
@@ -328,7 +329,7 @@ class PlotCanvas(pg.GraphicsView):  # type: ignore[misc]
             self.time_axis.update()
 
     def hold_values(self, factor: float = 1.0, shift: float = 0.0) -> None:
-        """Zoom the values, or move them by a share of what is shown; they stay so until `release_values`."""
+        """Zoom the value axes by `factor` or shift them by a share of their range, until `release_values`."""
         for shown in self.ranges.values():
             middle, half = (shown.low + shown.high) / 2, (shown.high - shown.low) / 2 * factor
             middle += shift * 2 * half
@@ -337,12 +338,12 @@ class PlotCanvas(pg.GraphicsView):  # type: ignore[misc]
         self.values_changed.emit()
 
     def release_values(self) -> None:
-        """Show all values again."""
+        """Return to automatic value ranges."""
         for shown in self.ranges.values():
             shown.held, shown.is_new = False, True
         self.values_changed.emit()
 
-    # -- the cursors -----------------------------------------------------------------------------------------
+    # -- cursors ------------------------------------------------------------------------------------------
 
     def paintEvent(self, event: QPaintEvent) -> None:
         began = time.thread_time()
@@ -353,7 +354,7 @@ class PlotCanvas(pg.GraphicsView):  # type: ignore[misc]
         self.painted_s += time.thread_time() - began
 
     def paint_cursors(self, painter: QPainter) -> None:
-        """Paint A and B over the curves."""
+        """Paint cursors A and B over the curves."""
         area, theme = self.area, self.theme
         places = {name: self.x_of(time_s, area) for name, time_s in self.cursors.items()}
         inside = {name: x for name, x in places.items() if area.left() - 1 <= x <= area.right() + 1}
@@ -399,7 +400,7 @@ class PlotCanvas(pg.GraphicsView):  # type: ignore[misc]
             paint.words(painter, box, words, font, self.theme.colour("text"), paint.CENTRE)
 
     def _cursor_at(self, place: QPointF) -> str | None:
-        """The cursor under the mouse: its flag, or its line."""
+        # Hit test of flags and lines.
         for name, time_s in reversed(self.cursors.items()):
             x = self.x_of(time_s)
             if self._flag(x).adjusted(-4, -4, 4, 4).contains(place):
@@ -408,7 +409,7 @@ class PlotCanvas(pg.GraphicsView):  # type: ignore[misc]
                 return name
         return None
 
-    # -- the mouse -------------------------------------------------------------------------------------------
+    # -- mouse --------------------------------------------------------------------------------------------
 
     def mousePressEvent(self, event: QMouseEvent) -> None:
         self.setFocus(Qt.FocusReason.MouseFocusReason)
@@ -461,7 +462,7 @@ class PlotCanvas(pg.GraphicsView):  # type: ignore[misc]
         if event is not None:
             self.values_changed.emit()
 
-    # -- a field that is dropped -----------------------------------------------------------------------------
+    # -- drag and drop of fields --------------------------------------------------------------------------
 
     def dragEnterEvent(self, event: QDragEnterEvent) -> None:
         if dropped_field(event.mimeData()) is not None:
@@ -478,7 +479,7 @@ class PlotCanvas(pg.GraphicsView):  # type: ignore[misc]
 
 
 def distance_words(distance_s: float) -> str:
-    """How far A and B are apart: 12 ms, 7.5 s, 3 min."""
+    """Format the distance of A and B, such as "12 ms", "7.5 s" or "3 min"."""
     if distance_s < 1:
         return f"{number(distance_s * 1000, '.3g')} ms"
     return (

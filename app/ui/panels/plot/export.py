@@ -1,4 +1,4 @@
-"""A plot as a file: its numbers as CSV, written in a thread; what it shows as PNG or SVG."""
+"""Export of a plot: values as CSV in a background thread, or an image as PNG or SVG."""
 
 from __future__ import annotations
 
@@ -34,10 +34,9 @@ LEGEND_ROW = 22
 
 
 class CsvWriter:
-    """Writes one CSV file in a thread of its own; `take` says how it ended."""
+    """Background thread that writes one CSV file; `columns` must not be modified meanwhile."""
 
     def __init__(self, path: Path, columns: Sequence[CsvColumn], origin_ns: int) -> None:
-        """Begin at once; ``columns`` are never changed by anybody."""
         self.path = path
         self._done: str | None = None
         self._given_up = threading.Event()
@@ -63,18 +62,21 @@ class CsvWriter:
             yield lines.encode()
 
     def take(self) -> str | None:
-        """None while it writes, "" when it is written, else why not."""
+        """Return None while writing, "" on success, else the reason of the failure."""
         return self._done
 
     def close(self) -> None:
-        """Wait until it is written, some seconds at most; then it is given up, and no part of it stays."""
+        """Wait some seconds for completion, then abort and remove the partial file."""
         self._thread.join(WAITS_S)
         self._given_up.set()
         self._thread.join(WAITS_S)
 
 
 class PlotPicture:
-    """What a plot shows, painted anywhere: the canvas, what stands below it, and the names of the curves."""
+    """Image of a plot: canvas, lanes and the names of the curves.
+
+    `parts` are size and painter, from the top.
+    """
 
     def __init__(
         self,
@@ -82,7 +84,6 @@ class PlotPicture:
         parts: Iterable[Part],
         curves: Sequence[ShownCurve],
     ) -> None:
-        """``parts`` from above: how large each is, and what paints it."""
         self._theme, self._parts, self._curves = (
             theme,
             list(parts),
@@ -91,13 +92,13 @@ class PlotPicture:
 
     @property
     def size(self) -> QSize:
-        """How large it is, in px."""
+        """Size in px."""
         row = round(self._theme.scaled(LEGEND_ROW))
         high = sum(size.height() for size, _paint in self._parts) + row * len(self._curves) + 8
         return QSize(max(size.width() for size, _paint in self._parts), high)
 
     def paint(self, painter: QPainter) -> None:
-        """Paint all of it at the left upper corner."""
+        """Paint the image with its top left corner at the origin."""
         painter.fillRect(QRect(0, 0, self.size.width(), self.size.height()), self._theme.colour("panel"))
         top = 0.0
         for size, painted in self._parts:
@@ -115,7 +116,7 @@ class PlotPicture:
             top += row
 
     def png(self) -> bytes:
-        """As PNG, twice as fine as on the screen."""
+        """Return the image as PNG with twice the screen resolution."""
         image = QImage(self.size * RATIO, QImage.Format.Format_RGB32)
         if image.isNull():
             raise OSError(errno.ENOMEM, _("not enough memory"))
@@ -131,7 +132,7 @@ class PlotPicture:
         return bytes(buffer.data().data())
 
     def svg(self) -> bytes:
-        """As SVG."""
+        """Return the image as SVG."""
         buffer = QBuffer()
         buffer.open(QIODevice.OpenModeFlag.WriteOnly)
         made = QSvgGenerator()
@@ -146,7 +147,10 @@ class PlotPicture:
 
 
 class PlotExport:
-    """Asks where, writes what a plot shows, and tells by a toast that it is done, or why not."""
+    """Asks for a file, exports the plot and reports the result in a toast.
+
+    `parts` returns the parts of the image, `shown` the visible range in s.
+    """
 
     def __init__(
         self,
@@ -155,12 +159,11 @@ class PlotExport:
         curves: Callable[[], Sequence[ShownCurve]],
         shown: Callable[[], tuple[float, float]],
     ) -> None:
-        """``parts`` are those of its picture, ``shown`` is from when to when (s)."""
         self._context, self._parts, self._curves, self._shown = context, parts, curves, shown
         self._writer: CsvWriter | None = None
 
     def menu(self, parent: QWidget) -> Menu:
-        """As what it can be written."""
+        """Return the menu of formats."""
         menu = Menu(self._context.theme, parent)
         menu.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
         for kind in (CSV, PNG, SVG):
@@ -169,13 +172,13 @@ class PlotExport:
         return menu
 
     def ask_where(self, kind: FileKind) -> None:
-        """Ask for a file, and write what is shown then."""
+        """Ask for a file and export the plot in a format."""
         suggestion = Path.home() / f"{_('Plot')}{kind.ending}"
         kinds = [kind, *(each for each in (CSV, PNG, SVG) if each is not kind)]
         self._context.files.save_as(_("Export the plot"), suggestion, kinds, self.write)
 
     def write(self, path: Path, kind: FileKind) -> None:
-        """Write it as this kind; numbers in a thread."""
+        """Export the plot to a file; CSV is written in a background thread."""
         if kind != CSV:
             picture = PlotPicture(self._context.theme, self._parts(), self._curves())
             try:
@@ -193,7 +196,7 @@ class PlotExport:
         self._writer = CsvWriter(path, columns_of(curves, *self._shown()), origin_ns)
 
     def follow(self) -> None:
-        """Tell when it is written; call it with every tick."""
+        """Report a finished export; call on every tick."""
         if self._writer is not None and (failed := self._writer.take()) is not None:
             self._tell(self._writer.path, failed)
             self._writer = None
@@ -206,6 +209,6 @@ class PlotExport:
         self._context.toast(said)
 
     def close(self) -> None:
-        """Wait until what is being written is done."""
+        """Wait for a running export."""
         if self._writer is not None:
             self._writer.close()

@@ -1,4 +1,4 @@
-"""States over time: a lane for each field that is a text, or yes or no, in line with the curves."""
+"""Lanes of states (text or boolean fields) over time, aligned with the curves."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ LEAST_BOX = 2.0
 
 
 class StateLanes(QWidget):
-    """Paints the states of some curves over the time that the canvas shows."""
+    """Lanes of states over the time range of the canvas."""
 
     def __init__(self, theme: Theme, canvas: PlotCanvas) -> None:
         super().__init__()
@@ -34,7 +34,7 @@ class StateLanes(QWidget):
         theme.changed.connect(self.updateGeometry)
 
     def show_curves(self, curves: Sequence[ShownCurve]) -> None:
-        """Show these, eight at most; more are in the table only."""
+        """Show the states of these curves, eight at most; the legend lists all."""
         count = len(self.curves)
         self.curves = curves[:MOST_LANES]
         if len(self.curves) != count:
@@ -52,7 +52,7 @@ class StateLanes(QWidget):
         return QSize(60, self.sizeHint().height())
 
     def boxes(self) -> Iterator[tuple[ShownCurve, StateRun, QRectF]]:
-        """What is painted: each run that can be seen, and where. Of yes or no only true."""
+        """Yield curve, run and rectangle of each visible run; for booleans only those that are true."""
         canvas, area = self._canvas, self._canvas.area
         for row, curve in enumerate(self.curves):
             states = curve.curve.states
@@ -62,7 +62,7 @@ class StateLanes(QWidget):
             is_yes_or_no = states.words(canvas.begin_s, canvas.end_s) <= {"true", "false"}
             without = ("false",) if is_yes_or_no else ()
             pixel_s = (canvas.end_s - canvas.begin_s) / canvas.columns
-            painted = -1.0  # up to here: of what changes within a pixel one is enough
+            painted = -1.0  # right edge painted so far: one box per pixel is enough
             for run in states.runs(canvas.begin_s, canvas.end_s, step_s=pixel_s / 2, without=without):
                 left = max(area.left(), canvas.x_of(run.begin_s))
                 right = min(area.right(), canvas.x_of(run.end_s))
@@ -76,7 +76,7 @@ class StateLanes(QWidget):
         painter.end()
 
     def paint_lanes(self, painter: QPainter) -> None:
-        """Paint all lanes at the left upper corner."""
+        """Paint all lanes with their top left corner at the origin."""
         theme, area = self._theme, self._canvas.area
         font = theme.font("code")
         painter.setRenderHint(QPainter.RenderHint.Antialiasing)
@@ -117,5 +117,5 @@ class StateLanes(QWidget):
 
 
 def short_name(name: str) -> str:
-    """The last word of a field's path: "emotion" of "/blackboard.robots.Pepper.emotion"."""
+    """Return the last part of a field path, such as "emotion" of "/blackboard.robots.Pepper.emotion"."""
     return name.rpartition(".")[2] or name

@@ -1,4 +1,4 @@
-"""The table below the curves: look, axis and figures of each; the eye hides, the stroke has a menu."""
+"""Legend below the curves: visibility, style, axis and statistics of each curve."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from nep.i18n import _, lazy, ngettext, pgettext
 
 
 class LegendFigures:
-    """The figures of each curve in the range that the table is about; asked for while they are seen."""
+    """Statistics of curves within a time range, computed on demand."""
 
     def __init__(self) -> None:
         self.begin_s = self.end_s = 0.0
@@ -29,19 +29,19 @@ class LegendFigures:
         self._kept: dict[str, Figures] = {}
 
     def look_at(self, begin_s: float, end_s: float, cursors: tuple[float, float] | None) -> None:
-        """The range from now on, and A and B."""
+        """Set the time range and the times of cursors A and B."""
         self.begin_s, self.end_s, self.cursors = begin_s, end_s, cursors
         self._kept.clear()
 
     def of(self, shown: ShownCurve) -> Figures:
-        """The least, greatest and mean."""
+        """Return minimum, maximum and mean."""
         found = self._kept.get(shown.name)
         if found is None:
             found = self._kept[shown.name] = shown.curve.samples.figures(self.begin_s, self.end_s)
         return found
 
     def at_cursor(self, shown: ShownCurve, which: int) -> float | str | None:
-        """The value at A (0) or B (1)."""
+        """Return the value at cursor A (0) or B (1)."""
         if self.cursors is None:
             return None
         time_s = self.cursors[which]
@@ -52,7 +52,7 @@ class LegendFigures:
 
 
 class _Cells:
-    """What each column shows."""
+    """Cells of each column."""
 
     def __init__(self, figures: LegendFigures, is_gone: Callable[[ShownCurve], bool]) -> None:
         self.figures, self._is_gone = figures, is_gone
@@ -125,7 +125,7 @@ class _Cells:
 def columns(
     figures: LegendFigures, has_cursors: Callable[[], bool], is_gone: Callable[[ShownCurve], bool]
 ) -> tuple[Column[ShownCurve], ...]:
-    """The columns of the table; those of A and B only while there are cursors."""
+    """Return the columns of the legend; those of A and B are shown only with cursors."""
     cells = _Cells(figures, is_gone)
     between = {"figures": True, "when": has_cursors}
     return (
@@ -144,7 +144,7 @@ def columns(
 
 
 class LegendTable(TableView[ShownCurve]):
-    """The curves of a plot; `changed` when a person hid one, or changed its axis or look."""
+    """Table of a plot's curves; `changed` is emitted when visibility, axis or style of a curve change."""
 
     changed = Signal()
     removed = Signal(str)
@@ -169,7 +169,7 @@ class LegendTable(TableView[ShownCurve]):
             self._popup(shown, self.visualRect(index).bottomLeft())
 
     def _enter(self, key: str) -> None:
-        """Enter on a row opens its menu; a click opens only from the stroke."""
+        # Enter opens the menu; a click does so only on the stroke.
         if self.keyboard:
             index = self._model.index_of(key)
             shown = self._model.row_at(index)
@@ -177,7 +177,7 @@ class LegendTable(TableView[ShownCurve]):
                 self._popup(shown, self.visualRect(index).bottomLeft())
 
     def hide_or_show(self, shown: ShownCurve) -> None:
-        """Hide a curve, or show it again."""
+        """Toggle the visibility of a curve."""
         shown.hidden = not shown.hidden
         self.changed.emit()
 
@@ -188,7 +188,7 @@ class LegendTable(TableView[ShownCurve]):
         elif shown is not None and event.key() == Qt.Key.Key_H and not event.modifiers():
             self.hide_or_show(shown)
         elif event.text().isprintable() and event.text().strip() != "/" and event.text():
-            event.ignore()  # the plot's keys
+            event.ignore()  # keys of the plot panel
         else:
             super().keyPressEvent(event)
 
@@ -204,7 +204,7 @@ class LegendTable(TableView[ShownCurve]):
         menu.popup(self.viewport().mapToGlobal(at))
 
     def menu_of(self, shown: ShownCurve) -> Menu:
-        """What can be done with a curve."""
+        """Return the context menu of a curve."""
         menu = Menu(self.theme, self)
         if not shown.curve.is_state:
             for right, words in ((False, _("Left axis")), (True, _("Right axis"))):
@@ -239,7 +239,7 @@ class LegendTable(TableView[ShownCurve]):
 
 
 def next_look(there: Sequence[ShownCurve]) -> CurveLook:
-    """A look that none of these has, as long as there is one."""
+    """Return a style that no other curve has, as long as one is free."""
     colours = [shown.look.colour % len(COLOURS) for shown in there]
     patterns = [shown.look.pattern % 4 for shown in there]
     colour = min(range(len(COLOURS)), key=lambda each: (colours.count(each), each))
@@ -248,7 +248,7 @@ def next_look(there: Sequence[ShownCurve]) -> CurveLook:
 
 
 def foot_words(curves: Curves, *, has_cursors: bool, distance: float | None) -> str:
-    """What the figures are about, how far A and B are apart, and what is not there."""
+    """Return the caption of the legend: range of the statistics, distance of A and B, missing data."""
     about = _("Min, max and mean between A and B")
     parts = [about if has_cursors else _("Min, max and mean of the visible range")]
     if distance is not None:

@@ -1,4 +1,4 @@
-"""How curves differ: by colour, by dash and by the shape of their marks, never by colour alone."""
+"""Styles of curves, which differ in colour, dash and mark, so that colour is never the only distinction."""
 
 from __future__ import annotations
 
@@ -13,25 +13,25 @@ from nep.i18n import lazy
 
 WIDTH = 1.75
 COLOURS = (lazy("Blue"), lazy("Orange"), lazy("Green"), lazy("Pink"), lazy("Yellow"), lazy("Violet"))
-"""The names of the theme's curve colours, in their order."""
+"""Names of the theme's curve colours, in their order."""
 DASHES: tuple[tuple[float, ...], ...] = ((), (6, 4), (2, 4), (12, 4))
-"""Pixels drawn and left out; the first is a whole line."""
+"""Dash patterns in px; the first one is solid."""
 LANE_FILL, LANE_EDGE = 0.20, 0.55
 
 
 @dataclass(frozen=True, slots=True)
 class CurveLook:
-    """A colour of the theme, and a pattern: which dash and which mark."""
+    """Style: index of a theme colour and of a pattern (dash and mark)."""
 
     colour: int
     pattern: int
 
     def ink(self, theme: Theme) -> QColor:
-        """The colour of the line."""
+        """Return the line colour."""
         return theme.series(self.colour)
 
     def pen(self, theme: Theme, *, is_dense: bool = False) -> QPen:
-        """The pen of the line; that of a dense one has no dashes, and is thin: quickly painted."""
+        """Return the line's pen; for dense lines it is solid and thin, which is faster to paint."""
         pen = QPen(self.ink(theme), 1.0 if is_dense else WIDTH)
         pen.setCosmetic(True)
         dash = DASHES[self.pattern % len(DASHES)]
@@ -41,7 +41,7 @@ class CurveLook:
         return pen
 
     def paint_mark(self, painter: QPainter, theme: Theme, centre: QPointF, size: float = 8.0) -> None:
-        """Its mark: disc, square, triangle or diamond, with an edge that parts it from the line."""
+        """Paint the mark (disc, square, triangle or diamond) with an outline."""
         half = size / 2
         painter.setPen(QPen(theme.colour("panel"), 1))
         painter.setBrush(self.ink(theme))
@@ -62,14 +62,14 @@ class CurveLook:
 
 @dataclass(frozen=True, slots=True)
 class Stroke:
-    """A curve's line with its mark as a cell of the table shows it, or the box of a state."""
+    """Sample of a curve's line and mark for a table cell, or the box of a state."""
 
     look: CurveLook
     is_state: bool
     hidden: bool
 
     def paint(self, painter: QPainter, box: QRectF, theme: Theme) -> None:
-        """Paint it in the middle of a cell's height."""
+        """Paint the sample, vertically centred in the cell."""
         painter.setRenderHint(QPainter.RenderHint.Antialiasing)
         painter.setOpacity(0.35 if self.hidden else 1.0)
         middle = box.center().y()
@@ -84,7 +84,7 @@ class Stroke:
 
 
 def paint_state(painter: QPainter, theme: Theme, box: QRectF, look: CurveLook) -> None:
-    """The box of a state."""
+    """Paint the box of a state."""
     fill, edge = look.ink(theme), look.ink(theme)
     fill.setAlphaF(LANE_FILL)
     edge.setAlphaF(1.0 if theme.high_contrast else LANE_EDGE)

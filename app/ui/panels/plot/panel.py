@@ -1,4 +1,4 @@
-"""Plot: curves of numbers over the messages' own time, states in lanes, a table of figures, A and B."""
+"""Plot panel: curves over time, states in lanes, a legend with statistics, and cursors A and B."""
 
 from __future__ import annotations
 
@@ -50,13 +50,13 @@ if TYPE_CHECKING:
     from PySide6.QtGui import QDragEnterEvent, QDropEvent
 
 
-FIGURES_EVERY = 10  # refreshes of 30 a second; nobody reads figures that change quicker
+FIGURES_EVERY = 10  # refreshes at 30 Hz; faster changes would be illegible
 SOON = 2 * FIGURES_EVERY
 MOST_ROWS, TABLE_SHARE = 6, 0.32
 
 
 class PlotPanel(PanelWidget):
-    """One plot. It takes the messages of what it plots also while nobody sees it."""
+    """One plot. It continues to collect data while hidden."""
 
     def __init__(self, context: PanelContext) -> None:
         super().__init__(context, _("Plot"))
@@ -79,7 +79,7 @@ class PlotPanel(PanelWidget):
         self.setAcceptDrops(True)
         self._changed()
 
-    # -- its parts ----------------------------------------------------------------------------------------
+    # -- construction -------------------------------------------------------------------------------------
 
     def _make_header(self) -> None:
         self.paused = Chip(self.theme, "", "off", "pause")
@@ -132,7 +132,7 @@ class PlotPanel(PanelWidget):
         self.setFocusProxy(self.canvas)
 
     def _make_lower(self) -> QWidget:
-        """Everything below the tools, for when there are curves."""
+        # The part below the toolbar, shown with at least one curve.
         self.drawings = QStackedWidget()
         self.drawings.addWidget(self.canvas)
         self.drawings.addWidget(self.xy)
@@ -168,7 +168,7 @@ class PlotPanel(PanelWidget):
         self.canvas.field_dropped.connect(self.plot_field)
 
     def source_changed(self) -> None:
-        """Plot the same of the other source."""
+        """Plot the same fields of the new source."""
         kept = self.save_state()
         self.tools.add.shut()
         self.curves.close()
@@ -185,7 +185,7 @@ class PlotPanel(PanelWidget):
     # -- curves -------------------------------------------------------------------------------------------
 
     def plot_field(self, topic: str, path: str) -> None:
-        """Add a field of a topic; without a path a person is asked for it."""
+        """Add a field of a topic; with an empty path, ask for the field."""
         if not path:
             self.add.ask(f"{topic}.")
             return
@@ -195,7 +195,7 @@ class PlotPanel(PanelWidget):
             self.context.toast(_sentence(error))
 
     def show_topic(self, name: str) -> None:
-        """Ask which field of a topic."""
+        """Ask for a field of a topic."""
         self.plot_field(name, "")
 
     def _add_typed(self, text: str, right: bool) -> None:
@@ -218,7 +218,7 @@ class PlotPanel(PanelWidget):
         self._changed()
 
     def remove(self, name: str) -> None:
-        """Take a curve away; it can be brought back."""
+        """Remove a curve; the toast offers to undo it."""
         found = next((each for each in self.shown if each.name == name), None)
         if found is None:
             return
@@ -246,7 +246,7 @@ class PlotPanel(PanelWidget):
                 return True
         return False
 
-    # -- the tick -----------------------------------------------------------------------------------------
+    # -- updates ------------------------------------------------------------------------------------------
 
     def refresh(self) -> None:
         self._ticks += 1
@@ -261,11 +261,11 @@ class PlotPanel(PanelWidget):
             with self._pace.drawing(self.canvas):
                 self._draw()
         self._since_figures += 1
-        if self._since_figures >= (FIGURES_EVERY if drawn else SOON):  # painted together
+        if self._since_figures >= (FIGURES_EVERY if drawn else SOON):  # in the same repaint as the curves
             self._show_figures()
 
     def _soon(self) -> None:
-        """Draw at the next tick, also while it is paused."""
+        # Also redraws while paused.
         self._due = True
 
     def _range(self) -> tuple[float, float]:
@@ -301,7 +301,7 @@ class PlotPanel(PanelWidget):
 
     @property
     def is_across(self) -> bool:
-        """Whether curves are drawn over each other rather than over time."""
+        """True if curves are drawn against each other instead of over time."""
         return self.across.isChecked() and self._numbers() > 1
 
     def _pairs(self) -> list[tuple[ShownCurve, ShownCurve]]:
@@ -333,7 +333,6 @@ class PlotPanel(PanelWidget):
         self.advice.show_for(self.curves, self.shown)
 
     def _changed(self) -> None:
-        """Curves came or went, or look otherwise."""
         there = bool(self.shown)
         self.pages.setCurrentIndex(1 if there else 0)
         show_when(self.freeze, there)
@@ -353,7 +352,7 @@ class PlotPanel(PanelWidget):
         self.table.setFixedHeight(self.table.row_height * rows + self.table.horizontalHeader().height() + 2)
         self.table.fit_columns()
 
-    # -- time ---------------------------------------------------------------------------------------------
+    # -- time range ---------------------------------------------------------------------------------------
 
     def _pause(self, paused: bool) -> None:
         if paused:
@@ -392,7 +391,7 @@ class PlotPanel(PanelWidget):
         else:
             self.span.choose_none()
 
-    # -- A and B ------------------------------------------------------------------------------------------
+    # -- cursors ------------------------------------------------------------------------------------------
 
     def _show_cursors(self, shown: bool) -> None:
         if not shown:
@@ -416,7 +415,7 @@ class PlotPanel(PanelWidget):
         self._show_figures()
 
     def _step_cursor(self, steps: int) -> bool:
-        """Move the cursor that was moved last by so many numbers of the first curve that is shown."""
+        # In samples of the first visible curve.
         time_s = self.canvas.cursors.get(self._last_cursor)
         first = next((each for each in self.shown if not each.hidden and len(each.curve.samples)), None)
         if time_s is None or first is None:
@@ -426,7 +425,7 @@ class PlotPanel(PanelWidget):
             self._put_cursor(self._last_cursor, beside)
         return True
 
-    # -- the keyboard and drops ---------------------------------------------------------------------------
+    # -- keys and drops -----------------------------------------------------------------------------------
 
     def keyPressEvent(self, event: QKeyEvent) -> None:
         if not self._key(event):
@@ -436,7 +435,7 @@ class PlotPanel(PanelWidget):
         if event.modifiers() & ~(Qt.KeyboardModifier.ShiftModifier | Qt.KeyboardModifier.KeypadModifier):
             return False
         far = 10 if event.modifiers() & Qt.KeyboardModifier.ShiftModifier else 1
-        replay = self.session.replay  # while a recording shows, Space plays that
+        replay = self.session.replay  # Space controls an open recording
         does: dict[int, Callable[[], object]] = {
             Qt.Key.Key_C: self.focus_filter,
             Qt.Key.Key_M: self.cursors.toggle,
@@ -459,7 +458,7 @@ class PlotPanel(PanelWidget):
         return (self.canvas.begin_s + self.canvas.end_s) / 2
 
     def _arrow(self, steps: int) -> None:
-        """Move a cursor; where there is none, the time."""
+        # Moves the cursor or, without one, the time range.
         if not self._step_cursor(steps):
             self._move(steps * (self.canvas.end_s - self.canvas.begin_s) / 20)
 
@@ -468,7 +467,7 @@ class PlotPanel(PanelWidget):
         self._choose_span("all")
 
     def _put_here(self, name: str) -> None:
-        """Place a cursor under the mouse, or in the middle when the mouse is elsewhere."""
+        # Under the mouse, or in the middle if the mouse is elsewhere.
         here = self.canvas.mouse_s
         self._put_cursor(name, self._middle_s() if here is None else here)
 
@@ -519,7 +518,7 @@ class PlotPanel(PanelWidget):
     _listed: Sequence[QAction] = ()
 
     def _picture_parts(self) -> list[tuple[QSize, Callable[[QPainter, QRectF], object]]]:
-        """What a picture of the plot has, from above."""
+        # From the top.
         self._draw()
         canvas, xy, lanes = self.canvas, self.xy, self.lanes
 
@@ -536,7 +535,7 @@ class PlotPanel(PanelWidget):
             parts.append((lanes.size(), lambda painter, _box: lanes.paint_lanes(painter)))
         return parts
 
-    # -- kept between starts ------------------------------------------------------------------------------
+    # -- saved state --------------------------------------------------------------------------------------
 
     def save_state(self) -> dict[str, object]:
         return {

@@ -1,4 +1,4 @@
-"""A curve as a plot shows it: its axis, its look, whether it is hidden; and how its values are written."""
+"""Curve as displayed (axis, style, visibility) and formatting of its values."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ MINUS = "\u2212"
 
 @dataclass(slots=True, eq=False)
 class ShownCurve:
-    """One curve: ``right`` axis or left, and whether a person hid it."""
+    """Displayed curve; `right` selects the right axis."""
 
     curve: Curve
     look: CurveLook
@@ -27,11 +27,11 @@ class ShownCurve:
 
     @property
     def name(self) -> str:
-        """As it is typed; also its key."""
+        """Expression as typed; also the key of the curve."""
         return self.curve.text
 
     def saved(self) -> dict[str, object]:
-        """What a layout keeps of it."""
+        """Return the state for the layout."""
         source = self.curve.source
         kept: dict[str, object] = {
             "text": self.name,
@@ -46,7 +46,7 @@ class ShownCurve:
 
 
 def look_of(saved: Mapping[str, object], otherwise: CurveLook) -> CurveLook:
-    """The look that a layout kept; what does not fit is as it would be for a new curve."""
+    """Return the style from a layout; invalid values are replaced by those of `otherwise`."""
     colour, pattern = saved.get("colour"), saved.get("pattern")
     return CurveLook(
         colour % 6 if isinstance(colour, int) else otherwise.colour,
@@ -55,7 +55,7 @@ def look_of(saved: Mapping[str, object], otherwise: CurveLook) -> CurveLook:
 
 
 def value_words(value: object) -> str:
-    """A value for the table: four digits, a true minus; a state's word; blank for nothing."""
+    """Format a value for the legend; "" for a missing one."""
     if value is MISSING or value is None:
         return ""
     if isinstance(value, bool):
@@ -70,7 +70,7 @@ def value_words(value: object) -> str:
 
 
 def number_words(value: float) -> str:
-    """0.0042, 1.284, 128.4, 12840, 2.1e+09; 0 is exactly that."""
+    """Format a number, such as 0.0042, 1.284, 128.4, 12840 or 2.1e+09."""
     if not isfinite(value):
         return {"inf": "∞", "-inf": f"{MINUS}∞"}.get(str(value), "NaN")
     size = abs(value)

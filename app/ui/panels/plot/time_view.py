@@ -1,4 +1,4 @@
-"""Which time a plot shows: the newest so many seconds, everything, or what a person holds."""
+"""Visible time range of a plot: latest seconds, everything, or a held range."""
 
 from __future__ import annotations
 
@@ -6,12 +6,12 @@ from dataclasses import dataclass
 
 LEAST_S, MOST_S = 1e-4, 1e8
 SPANS: tuple[tuple[str, float], ...] = (("12", 12.0), ("60", 60.0), ("300", 300.0), ("all", 0.0))
-"""What the segments offer, by their values in s; 0 is everything."""
+"""Choices of the range in s; 0 is everything."""
 
 
 @dataclass(slots=True)
 class TimeView:
-    """``span_s`` seconds up to the newest message, all of it while ``is_all``, or up to ``held_s``."""
+    """Range of `span_s` seconds that ends at the newest message or at `held_s`; everything if `is_all`."""
 
     span_s: float = 60.0
     is_all: bool = False
@@ -19,32 +19,32 @@ class TimeView:
 
     @property
     def follows(self) -> bool:
-        """Whether it goes on with what comes."""
+        """True if the range follows new data."""
         return self.held_s is None
 
     def shown(self, oldest_s: float, newest_s: float) -> tuple[float, float]:
-        """From when to when, for numbers between these."""
+        """Return the visible range for data in a range."""
         end_s = newest_s if self.held_s is None else self.held_s
         if self.is_all:
             return min(oldest_s, end_s - LEAST_S), end_s
         return end_s - self.span_s, end_s
 
     def hold(self, shown: tuple[float, float]) -> None:
-        """Stay with what is shown; the data go on."""
+        """Hold a range while data continues to arrive."""
         self.span_s, self.is_all, self.held_s = _bounded(shown[1] - shown[0]), False, shown[1]
 
     def go_on(self) -> None:
-        """Follow what comes again, as much of it as is shown now."""
+        """Follow new data with the current length of the range."""
         self.held_s = None
 
     def choose(self, span_s: float) -> None:
-        """Show so many seconds, 0 for everything; what is held stays at its end."""
+        """Set the length in s, 0 for everything; a held range keeps its end."""
         self.is_all = span_s <= 0
         if span_s > 0:
             self.span_s = span_s
 
     def zoom(self, factor: float, at_s: float, shown: tuple[float, float]) -> None:
-        """Show ``factor`` times as much; what was at ``at_s`` stays there, or the end while it follows."""
+        """Scale the range by `factor` around `at_s`, or around its end while it follows new data."""
         span_s = _bounded((shown[1] - shown[0]) * factor)
         share = (shown[1] - at_s) / max(LEAST_S, shown[1] - shown[0])
         self.span_s, self.is_all = span_s, False
@@ -52,11 +52,11 @@ class TimeView:
             self.held_s = at_s + share * span_s
 
     def move(self, by_s: float, shown: tuple[float, float]) -> None:
-        """Show later (or, below 0, earlier) times, and stay there."""
+        """Shift the range by seconds and hold it."""
         self.hold((shown[0] + by_s, shown[1] + by_s))
 
     def chosen(self) -> str:
-        """The segment that says what is shown; "" for none."""
+        """Return the choice that equals the current range, or ""."""
         if self.is_all:
             return "all"
         return next((value for value, span_s in SPANS if span_s == self.span_s), "")

@@ -1,7 +1,7 @@
-"""The row above the curves, first of all the field that adds one: Tab completes, Enter takes what fits.
+"""Toolbar of the plot with the field to add curves: Tab completes, Enter adds.
 
-While it is open it looks at the topics that may be meant (no pictures, no streams of megabytes), so that
-their fields can be offered with the values that they have now.
+While the field has the focus, topics are subscribed to (except images and those with a high data rate), so
+that it can offer their fields with current values.
 """
 
 from __future__ import annotations
@@ -41,20 +41,20 @@ EXAMPLES = ("difference({})", "derivative({})", "integral({})", "mean({}, 2 s)")
 
 
 class FieldOffers:
-    """The fields of the topics that are looked at while somebody adds a curve."""
+    """Fields of topics, subscribed to while the person adds a curve."""
 
     def __init__(self, session: Session) -> None:
         self._session = session
         self._watches: dict[str, Watch] = {}
 
     def open(self) -> None:
-        """Look at the topics that can be plotted."""
+        """Subscribe to the topics that can be plotted."""
         for topic in self._some():
             if topic.key not in self._watches:
                 self._watches[topic.key] = self._session.watch_shown(topic.key)
 
     def close(self) -> None:
-        """Look no more."""
+        """Unsubscribe from all topics."""
         for watch in self._watches.values():
             watch.close()
         self._watches.clear()
@@ -69,11 +69,11 @@ class FieldOffers:
         return fitting[:MOST_TOPICS]
 
     def names(self) -> list[str]:
-        """The topics that there are, by their names among all networks."""
+        """Return the keys of all topics."""
         return [topic.key for topic in (*self._session.topics.live(), *self._session.networks.topics)]
 
     def fields(self) -> Iterable[tuple[str, FieldFound]]:
-        """Everything that can be plotted now: (as it is typed, what it is)."""
+        """Yield the fields that can be plotted, each with the expression to type."""
         told = 0
         for key in self._watches:
             topic = self._session.topic(key)
@@ -89,7 +89,7 @@ class FieldOffers:
 
 
 class _Matches(QWidget):
-    """What fits, below the field, over everything else of the window."""
+    """Popup list of matches below the field, as an overlay of the window."""
 
     def __init__(self, theme: Theme, parent: QWidget) -> None:
         super().__init__(parent)
@@ -112,14 +112,16 @@ class _Matches(QWidget):
 
 
 class AddCurve(SearchField):
-    """The field; `wanted` with what was typed or chosen, and whether it is for the right axis."""
+    """Field to add a curve; emits `wanted` with the expression and True for the right axis.
+
+    `plotted` returns the existing curves, which can be used in expressions.
+    """
 
     icon_name = "plus"
     wanted = Signal(str, bool)
     left = Signal()
 
     def __init__(self, theme: Theme, session: Session, plotted: Callable[[], Iterable[str]]) -> None:
-        """``plotted`` tells the curves that there are already: they may be calculated with."""
         super().__init__(theme, _("Add a curve"), "C")
         self.setMinimumWidth(round(theme.scaled(150)))
         self._plotted = plotted
@@ -132,11 +134,11 @@ class AddCurve(SearchField):
         self._timer.timeout.connect(self._renew)
         self.textEdited.connect(self._search)
 
-    # -- opening and closing ---------------------------------------------------------------------------------
+    # -- opening and closing ------------------------------------------------------------------------------
 
     @property
     def matches(self) -> _Matches:
-        """The list below."""
+        """Popup list, created on first use."""
         window = self.window()
         if self._matches is None or self._matches.parentWidget() is not window:
             self._drop_matches()
@@ -165,7 +167,7 @@ class AddCurve(SearchField):
         self.shut()
 
     def shut(self) -> None:
-        """Look at no topics any more, and hide the list."""
+        """Unsubscribe from topics and hide the list."""
         self._timer.stop()
         self.offers.close()
         self._known.clear()
@@ -173,25 +175,25 @@ class AddCurve(SearchField):
             self._matches.hide()
 
     def ask(self, text: str) -> None:
-        """Get the keyboard, with this typed already; what a person types goes on from there."""
+        """Focus the field with this text, ready to be continued."""
         self.setText(text)
         self.setFocus(Qt.FocusReason.ShortcutFocusReason)
         if text.endswith("."):
-            self.end(False)  # the focus has selected all, which the first letter would take away
+            self.end(False)  # the focus selected everything; typing would replace it
         self._search()
 
     def complain(self, sentence: str) -> None:
-        """Say why what was typed is no curve; it stays as it was typed."""
+        """Show why the text is not a valid curve; the text stays."""
         self.sentence = sentence
         self.setProperty("wrong", "true" if sentence else "false")
         self.style().unpolish(self)
         self.style().polish(self)
         self._show_foot(0)
 
-    # -- what fits -------------------------------------------------------------------------------------------
+    # -- matches ------------------------------------------------------------------------------------------
 
     def _renew(self) -> None:
-        """Fields and values as they are now."""
+        # Refreshes fields and values.
         self.offers.open()
         before = len(self._known)
         self._read()
@@ -268,10 +270,10 @@ class AddCurve(SearchField):
         matches.show()
         matches.raise_()
 
-    # -- keys ------------------------------------------------------------------------------------------------
+    # -- keys ---------------------------------------------------------------------------------------------
 
     def event(self, event: QEvent) -> bool:
-        """Tab completes while there is something to complete; else it goes on as ever."""
+        # Tab completes; without a completion it moves the focus as usual.
         if (
             isinstance(event, QKeyEvent)
             and event.type() == QEvent.Type.KeyPress
@@ -316,7 +318,7 @@ class AddCurve(SearchField):
             super().keyPressEvent(event)
 
     def _take(self, *, right: bool) -> None:
-        """What was typed, when it is a whole curve; else what is chosen in the list."""
+        # A complete expression takes precedence over the selected match.
         typed = self.text().strip()
         entry = self._matches.list.entry if self._matches is not None and self._matches.isVisible() else None
         is_whole = typed in self._known or any(sign in typed for sign in "(+*") or " " in typed
@@ -335,10 +337,9 @@ SPAN_WORDS = {"12": lazy("12 s"), "60": lazy("1 min"), "300": lazy("5 min"), "al
 
 
 class PlotTools(QWidget):
-    """The row; in narrow places it becomes several."""
+    """Toolbar; wraps in a narrow panel. `plotted` returns the existing curves."""
 
     def __init__(self, theme: Theme, session: Session, plotted: Callable[[], Iterable[str]]) -> None:
-        """``plotted`` tells the curves that there are."""
         super().__init__()
         self.add = AddCurve(theme, session, plotted)
         self.span = Segments(
@@ -364,7 +365,7 @@ class PlotTools(QWidget):
             row.addWidget(widget)
 
     def fit(self, curves: int, numbers: int) -> None:
-        """Show what makes sense for so many curves, of which so many are of numbers."""
+        """Show the tools that apply to this number of curves, `numbers` of them numeric."""
         for widget in self._when_there:
             paint.show_when(widget, curves > 0)
         paint.show_when(self.states, curves > numbers)

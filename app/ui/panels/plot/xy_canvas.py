@@ -1,4 +1,4 @@
-"""One curve over another: equal scales, what is older is fainter, an arrow is now."""
+"""XY plot of one curve against another: equal scales, older parts fade, an arrow marks the newest point."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ Path = tuple[ShownCurve, ShownCurve, Floats, Floats, Floats]
 def path_of(
     across: ShownCurve, up: ShownCurve, begin_s: float, end_s: float
 ) -> tuple[Floats, Floats, Floats]:
-    """Times, x and y of one curve over another in a range: at the times of the first, 4 000 at most."""
+    """Return times, x and y of two curves at the times of the first one, at most `MOST_POINTS` points."""
     samples = across.curve.samples
     first, end = samples.places(begin_s, end_s)
     step = max(1, math.ceil((end - first) / MOST_POINTS))
@@ -42,8 +42,8 @@ def path_of(
     return times, xs, ys
 
 
-class XYCanvas(pg.GraphicsView):  # type: ignore[misc]  # pyqtgraph tells no types
-    """Draws pairs of curves: the first across and the second up, the third and the fourth, ..."""
+class XYCanvas(pg.GraphicsView):  # type: ignore[misc]  # pyqtgraph is untyped
+    """XY plot of pairs of curves: the first against the second, the third against the fourth, and so on."""
 
     def __init__(self, theme: Theme) -> None:
         super().__init__(background=None)
@@ -68,7 +68,7 @@ class XYCanvas(pg.GraphicsView):  # type: ignore[misc]  # pyqtgraph tells no typ
         theme.changed.connect(self.restyle)
 
     def restyle(self) -> None:
-        """Take over the theme's colours, fonts and sizes."""
+        """Apply the theme's colours, fonts and sizes."""
         theme = self.theme
         for name in ("bottom", "left"):
             axis = self.plot.getAxis(name)
@@ -87,7 +87,7 @@ class XYCanvas(pg.GraphicsView):  # type: ignore[misc]  # pyqtgraph tells no typ
     def show_pairs(
         self, pairs: Sequence[tuple[ShownCurve, ShownCurve]], begin_s: float, end_s: float
     ) -> None:
-        """Draw these over a range of time."""
+        """Draw the pairs over a time range."""
         self._paths = [(across, up, *path_of(across, up, begin_s, end_s)) for across, up in pairs]
         used = 0
         for _across, up, times, xs, ys in self._paths:
@@ -121,11 +121,11 @@ class XYCanvas(pg.GraphicsView):  # type: ignore[misc]  # pyqtgraph tells no typ
         self.view.setRange(QRectF(left, low, right - left, high - low), padding=0.08)
 
     def place_of(self, x: float, y: float) -> QPointF:
-        """Where a point is, in this widget."""
+        """Return the widget coordinates of a point."""
         return QPointF(self.view.mapViewToScene(QPointF(x, y)))
 
     def distance(self) -> float | None:
-        """How far A and B are apart on the first path; None when that is not known."""
+        """Return the distance of cursors A and B on the first path, or None."""
         if len(self.cursors) < 2 or not self._paths:
             return None
         points = [self._point_at(self._paths[0], time_s) for time_s in self.cursors.values()]
@@ -145,7 +145,7 @@ class XYCanvas(pg.GraphicsView):  # type: ignore[misc]  # pyqtgraph tells no typ
         painter.end()
 
     def paint_marks(self, painter: QPainter) -> None:
-        """Paint the arrows and the cursors over the curves."""
+        """Paint arrows and cursors over the curves."""
         painter.setRenderHint(QPainter.RenderHint.Antialiasing)
         for path in self._paths:
             self._paint_arrow(painter, path)
