@@ -1,6 +1,6 @@
-"""Publish: messages that a person keeps, changes and sends, once or again and again.
+"""Publish panel: saved messages that can be edited and sent once or repeatedly.
 
-`shelf_list` has the list of them, `message_form` the chosen one, `value_fields` what stands in its places.
+`shelf_list` lists them, `message_form` edits one, `value_fields` has the fields of its placeholders.
 """
 
 from app.ui.panels.publish.panel import PANEL as PANEL

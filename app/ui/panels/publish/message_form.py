@@ -1,4 +1,4 @@
-"""The chosen message: its name, topic and values, its JSON with what is wrong in it, and what sends it."""
+"""Form of a message: name, topic, type, placeholders, JSON with error checking, and send buttons."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ MOST_OFFERED = 500
 
 
 class TopicEdit(QLineEdit):
-    """The name of a topic; what exists is offered while one types."""
+    """Field of a topic's name with completion."""
 
     def __init__(self, theme: Theme) -> None:
         super().__init__()
@@ -56,26 +56,28 @@ class TopicEdit(QLineEdit):
         popup = completer.popup()
         if popup is not None:
             popup.setProperty("offers", "true")
-            popup.setItemDelegate(QStyledItemDelegate(popup))  # which the style sheet can give room
+            popup.setItemDelegate(QStyledItemDelegate(popup))  # lets the style sheet set the padding of items
         self.setCompleter(completer)
 
     def offer(self, names: Sequence[str]) -> None:
-        """These exist now."""
+        """Set the completions."""
         some = list(names[:MOST_OFFERED])
         if some != self._offered.stringList():
             self._offered.setStringList(some)
 
 
 class MessageForm(QWidget):
-    """Shows a message; `changed` tells what a person made of it, the other signals what they want."""
+    """Form of a message; `changed` has the edited message, the other signals are requests.
 
-    changed = Signal(object)  # a KeptMessage
+    `type_of` returns the type of an existing topic, else "".
+    """
+
+    changed = Signal(object)  # KeptMessage
     send_wanted = Signal()
     repeat_wanted = Signal()
     template_wanted = Signal()
 
     def __init__(self, theme: Theme, type_of: Callable[[str], str]) -> None:
-        """``type_of`` gives the type of a topic that is there, "" of others."""
         super().__init__()
         self._theme, self._type_of = theme, type_of
         self.message: KeptMessage | None = None
@@ -86,7 +88,7 @@ class MessageForm(QWidget):
         self._make_buttons()
         self._arrange()
 
-    # -- its parts ----------------------------------------------------------------------------------------
+    # -- construction -------------------------------------------------------------------------------------
 
     def _make_fields(self) -> None:
         theme = self._theme
@@ -197,10 +199,10 @@ class MessageForm(QWidget):
         rows.addWidget(self.rate_hint)
         return rows
 
-    # -- what it shows ------------------------------------------------------------------------------------
+    # -- display ------------------------------------------------------------------------------------------
 
     def show_message(self, message: KeptMessage) -> None:
-        """Show this one; where a person types nothing is changed that says the same."""
+        """Show a message; fields with an equivalent value keep their text while the person types."""
         other = self.message is None or self.message.id != message.id
         if message == self.message:
             return
@@ -220,7 +222,7 @@ class MessageForm(QWidget):
         self._judge()
 
     def _judge(self) -> None:
-        """Say what is wrong in the text, and which values it wants."""
+        # Checks the text and shows its placeholders.
         message = self.message
         if message is None:
             return
@@ -235,7 +237,7 @@ class MessageForm(QWidget):
             widget.setVisible(bool(self.read.to_fill))
 
     def say_problem(self, problem: str) -> None:
-        """Why it can't be sent; empty when it can."""
+        """Show why the message can't be sent; "" if it can."""
         fault = self.read.fault
         words = _("{problem} It can't be sent yet.").format(problem=problem) if problem else ""
         if words != self.sentence.text():
@@ -244,7 +246,7 @@ class MessageForm(QWidget):
         self.sentence.setVisible(bool(problem))
         self.mend.setVisible(fault is not None and fault.fix is not None)
 
-    # -- what a person does -------------------------------------------------------------------------------
+    # -- user actions -------------------------------------------------------------------------------------
 
     def _edit(self, **changes: object) -> None:
         if self.message is None or self._is_showing:
@@ -276,23 +278,23 @@ class MessageForm(QWidget):
             self._edit(text=text[: MOST_LETTERS + 1])
 
     def set_type(self, msg_type: str) -> None:
-        """The topic has another type than was typed."""
+        """Set the message type."""
         self.kind.setText(msg_type)
         self._edit(msg_type=msg_type)
 
     def put_text(self, text: str) -> None:
-        """Another text in the place of all; Undo gives the old one back."""
+        """Replace the whole text; can be undone."""
         self.edit.replace(0, len(self.edit.text()), text)
 
     def make_tidy(self) -> None:
-        """One line for each field, as long as there are no places to be filled."""
+        """Format the JSON; not possible while it has placeholders."""
         try:
             self.put_text(pretty(self.read.filled({})))
         except NepError as error:
             self.say_problem(str(error))
 
     def put_right(self) -> None:
-        """Do what mends the first fault."""
+        """Apply the fix of the first error."""
         fault: JsonFault | None = self.read.fault
         if fault is not None and fault.fix is not None:
             self.edit.replace(fault.fix.start, fault.fix.end, fault.fix.text)

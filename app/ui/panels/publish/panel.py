@@ -1,4 +1,4 @@
-"""Publish: the shelf of messages, the switch above it, the chosen message beside."""
+"""Publish panel: list of saved messages, arming switch, and the form of the selected message."""
 
 from __future__ import annotations
 
@@ -31,11 +31,11 @@ from nep.errors import NepError
 from nep.i18n import _, lazy, ngettext
 
 LIST_PX, SIDE_BY_SIDE_PX, LIST_HIGH_PX = 236, 520, 130
-STATES_EVERY = 6  # refreshes of 30 a second
+STATES_EVERY = 6  # refreshes at 30 Hz
 
 
 class PublishPanel(PanelWidget):
-    """The list at the left, or above where there is little room; the chosen message."""
+    """Panel with the list at the left (at the top in a narrow panel) and the form."""
 
     def __init__(self, context: PanelContext) -> None:
         super().__init__(context, _("Publish"))
@@ -88,7 +88,7 @@ class PublishPanel(PanelWidget):
         scroll.setFocusPolicy(Qt.FocusPolicy.NoFocus)
         scroll.column.insertWidget(0, self.form)
         scroll.column.setStretchFactor(self.form, 1)
-        scroll.column.setStretch(scroll.column.count() - 1, 0)  # nothing is left for its end
+        scroll.column.setStretch(scroll.column.count() - 1, 0)  # the form takes all remaining height
         self._sides = ListBeside(
             self.theme,
             (self.filter, self.list, scroll),
@@ -105,7 +105,7 @@ class PublishPanel(PanelWidget):
         column.addWidget(self.strip)
         column.addWidget(self.pages, 1)
 
-    # -- what it shows ------------------------------------------------------------------------------------
+    # -- display ------------------------------------------------------------------------------------------
 
     def refresh(self) -> None:
         self._ticks += 1
@@ -136,7 +136,7 @@ class PublishPanel(PanelWidget):
         ]
         chosen = self._wanted or self.list.chosen_key() or ""
         model = self.list.model()
-        model.set_rows(rows)  # type: ignore[attr-defined]  # it is a TableModel
+        model.set_rows(rows)  # type: ignore[attr-defined]  # always a TableModel
         if rows:
             known = {each.id for each in rows}
             wanted = chosen if chosen in known else rows[0].id
@@ -151,7 +151,7 @@ class PublishPanel(PanelWidget):
 
     @property
     def message(self) -> KeptMessage | None:
-        """The chosen one."""
+        """Selected message, or None."""
         return self.acting.shelf.get(self.list.chosen_key() or "")
 
     def _show_chosen(self) -> None:
@@ -164,7 +164,7 @@ class PublishPanel(PanelWidget):
             self._say_sending()
 
     def _say_sending(self) -> None:
-        """What the buttons do, and what came of it."""
+        # Texts of the buttons, and the result of sending.
         message, form, acting = self.message, self.form, self.acting
         if message is None:
             return
@@ -205,10 +205,10 @@ class PublishPanel(PanelWidget):
         going = len(self.acting.outbox.all_repeated)
         return (str(going), "warn") if going else None
 
-    # -- what a person does -------------------------------------------------------------------------------
+    # -- user actions -------------------------------------------------------------------------------------
 
     def begin(self, key: str) -> None:
-        """A message for this topic: one that is kept, or a new one with the topic's last message."""
+        """Select a saved message for a topic, or create one from the topic's last message."""
         _network, topic = split_key(key)
         kept = [each for each in self.acting.shelf.messages if topic and each.topic == topic]
         msg_type = self._type_of(topic) or "json"
@@ -226,7 +226,7 @@ class PublishPanel(PanelWidget):
         field.setFocus(Qt.FocusReason.OtherFocusReason)
 
     def take_template(self) -> None:
-        """Take the topic's last message as it comes, or at once what its type has where nobody publishes."""
+        """Insert the topic's next message or, without a publisher, the fields of its type."""
         message = self.message
         if message is None:
             return
@@ -267,17 +267,17 @@ class PublishPanel(PanelWidget):
         if isinstance(message, KeptMessage):
             self.acting.shelf.put(message)
             if self.acting.outbox.is_going(message.id):
-                self.acting.end(message.id)  # what is sent is what stands there
+                self.acting.end(message.id)  # repeated sending must not continue with outdated values
             self._say_sending()
 
     def send(self) -> None:
-        """Send the chosen message once."""
+        """Send the selected message once."""
         message = self.message
         if message is not None:
             self._tell(self.acting.send(message))
 
     def repeat(self) -> None:
-        """Send the chosen message again and again, or no longer."""
+        """Start or stop repeated sending of the selected message."""
         message = self.message
         if message is None:
             return
@@ -293,14 +293,14 @@ class PublishPanel(PanelWidget):
         self.refresh()
 
     def copy(self, id: str) -> None:
-        """One more message like this one."""
+        """Duplicate a message."""
         made = self.acting.shelf.copy(id)
         if made is not None:
             self._wanted = made.id
             self._rebuild()
 
     def delete(self, id: str) -> None:
-        """Take a message off the shelf."""
+        """Delete a message; the toast offers to undo it."""
         self.acting.end(id)
         removed = self.acting.shelf.remove(id)
         if removed is not None:
@@ -315,7 +315,7 @@ class PublishPanel(PanelWidget):
             self._rebuild()
 
     def menu_of(self, id: str) -> Menu:
-        """What can be done with a message of the list."""
+        """Return the context menu of a message."""
         is_going = self.acting.outbox.is_going(id)
         words = _("Stop sending") if is_going else _("Start sending")
         actions = [
@@ -331,7 +331,7 @@ class PublishPanel(PanelWidget):
         menu.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
         menu.popup(at)
 
-    # -- what every panel has -----------------------------------------------------------------------------
+    # -- overrides ----------------------------------------------------------------------------------------
 
     def more_actions(self) -> Sequence[QAction]:
         return (self._minutes.entry(),)

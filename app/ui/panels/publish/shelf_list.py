@@ -1,4 +1,4 @@
-"""The kept messages as a list: each with its topic, and whether it is sent, can't be, or is not armed."""
+"""List of saved messages with topic and state (sending, invalid, not armed)."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ from nep.i18n import _, lazy
 
 
 def state_cell(message: KeptMessage, acting: SessionActing) -> Cell:
-    """How it is with a message, in a word."""
+    """Return the state of a message as a short text with icon."""
     if acting.outbox.is_going(message.id):
         return Cell(_("{rate}/s").format(rate=rate_words(message.rate_hz)), "dot", "warn")
     fault = None if is_plain(message.msg_type) else read_json(message.text).fault
@@ -36,7 +36,10 @@ def state_cell(message: KeptMessage, acting: SessionActing) -> Cell:
 
 
 class ShelfList(TableView[KeptMessage]):
-    """A click chooses. `chosen` tells the id, also when arrows lead there; keys send, copy and delete."""
+    """List of messages; a click selects.
+
+    `chosen` has the id, also on keyboard selection; keys send, copy, delete.
+    """
 
     chosen = Signal(str)
     send_wanted = Signal(str)
@@ -66,11 +69,12 @@ class ShelfList(TableView[KeptMessage]):
         self.fit_rows()
 
     def fit_rows(self) -> None:
-        """Rows grow with the text."""
+        """Scale the row height with the text size."""
         self.set_row_height(round(self.theme.scaled(ROW_PX)), large=False)
 
     def _open(self, index: QModelIndex) -> None:
-        """A click only chooses."""
+        # A click only selects.
+        ...
 
     def _tell_chosen(self) -> None:
         self.chosen.emit(self.chosen_key() or "")

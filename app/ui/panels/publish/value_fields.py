@@ -1,4 +1,4 @@
-"""The fields for what stands in the places of a message: ``{yaw}`` is filled here."""
+"""Fields for the placeholders of a message, such as ``{yaw}``."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ FIELD_PX = 120
 
 
 class ValueFields(QWidget):
-    """One field for each place, by its name; `typed` tells (name, text)."""
+    """One field per placeholder; `typed` has name and text."""
 
     typed = Signal(str, str)
 
@@ -34,7 +34,7 @@ class ValueFields(QWidget):
         column.addWidget(self._place)
 
     def show_places(self, names: Sequence[str], values: Mapping[str, str]) -> None:
-        """Show fields for these places; those that stay keep what is typed and the keyboard."""
+        """Show fields for these placeholders; existing fields keep their text and focus."""
         if list(names) != list(self.fields):
             self._rebuild(names)
         for name, field in self.fields.items():
