@@ -1,7 +1,7 @@
-"""Recordings: the files of the folder, with what is in each.
+"""Recordings panel: files of the recordings folder with their contents.
 
-`columns` says how one is shown, `table` lets a person open, rename and delete them, `details` has what can be
-done with the chosen one.
+`columns` renders the rows, `table` handles opening, renaming and deleting, `details` has the actions on the
+selected recording.
 """
 
 from app.ui.panels.recordings.panel import PANEL as PANEL

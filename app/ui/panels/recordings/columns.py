@@ -1,4 +1,4 @@
-"""How a recording is shown in the table: its picture, name and note, and its figures."""
+"""Columns of the table of recordings: thumbnail, name, note and figures."""
 
 from __future__ import annotations
 
@@ -27,11 +27,11 @@ BADGES = {
     "repaired": (lazy("repaired"), "info", "wrench"),
     "kept": (lazy("last seconds"), "off", "history"),
 }
-"""What is special about a recording: words, status, icon."""
+"""Badges: text, status, icon."""
 
 
 def badge_of(facts: RecordingFacts, being_written: bool) -> str:
-    """Which of `BADGES` it has; "" for none."""
+    """Return the key of the badge in `BADGES`, or ""."""
     if being_written:
         return "recording"
     if facts.problem:
@@ -47,7 +47,7 @@ def badge_of(facts: RecordingFacts, being_written: bool) -> str:
 
 @dataclass(frozen=True)
 class RecordingMark:
-    """Picture, name with its badge, and a line below. A picture is told from others by its number."""
+    """Cell content: thumbnail, name with badge, note. Thumbnails are compared by their id."""
 
     name: str
     note: str
@@ -56,7 +56,6 @@ class RecordingMark:
     picture: QImage | None = field(compare=False)
 
     def paint(self, painter: QPainter, box: QRectF, theme: Theme) -> None:
-        """See `CellMark`."""
         side = theme.scaled(1.0)
         place = QRectF(box.left(), 0, PICTURE.width() * side, PICTURE.height() * side)
         place.moveCenter(QPointF(place.center().x(), box.center().y()))
@@ -111,7 +110,7 @@ class RecordingMark:
 
 
 def cropped(image: QImage) -> QImage:
-    """The middle of a picture in the shape in which it is shown, twice as large for fine screens."""
+    """Crop an image to the aspect ratio of thumbnails, at twice the size for high-DPI screens."""
     wide, high = image.width(), image.height()
     if not wide or not high:
         return image
@@ -123,7 +122,7 @@ def cropped(image: QImage) -> QImage:
 
 
 def note_of(facts: RecordingFacts) -> str:
-    """The line below the name: why it can't be read, the note, else its first topics."""
+    """Return the line below the name: error, note, or the first topics."""
     return facts.problem or facts.not_scanned or facts.note or ", ".join(facts.topics[:3])
 
 
@@ -132,7 +131,7 @@ def columns(
     is_written: Callable[[RecordingFacts], bool],
     now: Callable[[], dt.datetime],
 ) -> tuple[Column[RecordingFacts], ...]:
-    """``picture`` gives what is known of it now, ``is_written`` whether it is being made."""
+    """Return the columns; `picture` returns the thumbnail if loaded, `is_written` True during recording."""
 
     def name(facts: RecordingFacts) -> Cell:
         image = picture(facts)

@@ -1,4 +1,4 @@
-"""What can be done with the chosen recording: open, rename, show the file, export all or a part of it."""
+"""Details of the selected recording: open, rename, show the file, export all or a part."""
 
 from __future__ import annotations
 
@@ -40,11 +40,11 @@ FORMAT_WORDS = {
     "csv": lazy("CSV"), "parquet": lazy("Parquet"), "pictures": lazy("Images"), "mp4": lazy("MP4"),
     "mcap": lazy("MCAP"),
 }  # fmt: skip
-"""As what a recording is exported, by the names of `nep.recordings.export`."""
+"""Names of export formats, by the keys of `nep.recordings.export`."""
 
 
 class RecordingDetails(QWidget):
-    """Below the table. `wants_export` tells the format of one, `cancelled` that it is given up."""
+    """Details below the table; emits `wants_export` with the format, and `cancelled`."""
 
     wants_export = Signal(str)
     cancelled = Signal()
@@ -73,7 +73,7 @@ class RecordingDetails(QWidget):
         self.show_strip(None)
 
     def _make_part(self) -> None:
-        """What of it is exported, and where to."""
+        # Time range, topics and folder of the export.
         theme = self._theme
         self.strip = FilmStrip(theme)
         self.strip.changed.connect(self._show_part)
@@ -95,7 +95,7 @@ class RecordingDetails(QWidget):
         self.format.changed.connect(lambda _kind: self._show_part())
         self._recording: Path | None = None
         self.folder: Path | None = None
-        """Where a person wants it to be; None: beside the recording."""
+        """Target folder chosen by the person; None for the recording's own folder."""
         self.into = ElidedLabel("body", "text", least=60)
         self.files = label("", "small", role="textSecondary")
         self.choose = Button(theme, _("Choose"), "folder-open", size="small")
@@ -121,7 +121,7 @@ class RecordingDetails(QWidget):
         column.addLayout(inside)
 
     def _form(self) -> QGridLayout:
-        """How it is exported, row by row; what does not fit into a row goes on below."""
+        # One row per choice; rows wrap in a narrow panel.
         kinds, topics, times, places = (Flow(gap=8, row_gap=6) for _row in range(4))
         kinds.addWidget(self.format)
         topics.add_elastic(self.topics, greedy=True)
@@ -147,7 +147,7 @@ class RecordingDetails(QWidget):
         return form
 
     def show_facts(self, facts: RecordingFacts, being_written: bool) -> None:
-        """Say this of the recording, and let be done what can be."""
+        """Show a recording and enable the available actions."""
         self.name.setText(facts.path.stem)
         self._recording = facts.path
         self._say_place()
@@ -167,7 +167,7 @@ class RecordingDetails(QWidget):
         self.delete.setEnabled(not being_written)
 
     def show_strip(self, look: FilmStripLook | None, images: Sequence[QImage | None] = ()) -> None:
-        """Show another recording's time, all of it chosen; None while it is not known."""
+        """Show the time line of another recording, completely selected; None while it is loading."""
         self.strip.show_look(look, images)
         self.topics.show_patterns((), ())
         self._is_none_chosen = False
@@ -175,12 +175,12 @@ class RecordingDetails(QWidget):
         self._show_part()
 
     def set_folder(self, folder: Path | None) -> None:
-        """In which folder the one of the files is made; None: beside the recording."""
+        """Set the target folder; None for the recording's own folder."""
         self.folder = folder
         self._say_place()
 
     def place(self) -> Path | None:
-        """The folder that is made for the files, or one with a number behind it; None without a recording."""
+        """Return the path of the export (a suffix is added if it exists); None without a recording."""
         if self._recording is None:
             return None
         strip, name = self.strip, self._recording.stem
@@ -201,7 +201,7 @@ class RecordingDetails(QWidget):
         self._show_part()
 
     def part(self) -> Part | None:
-        """What is to be exported; None when no topic fits, or a pattern can be none."""
+        """Return the part to export; None if no topic matches or a pattern is invalid."""
         look = self.strip.look
         if look is None:
             return ALL_OF_IT
@@ -219,7 +219,7 @@ class RecordingDetails(QWidget):
         self._show_part()
 
     def _choose_topics(self, names: Sequence[str]) -> None:
-        """A person checked or unchecked topics in the list."""
+        # Called when topics are checked or unchecked in the list.
         look = self.strip.look
         self._is_none_chosen = not names
         if look is not None and names:
@@ -227,7 +227,7 @@ class RecordingDetails(QWidget):
         self._show_part()
 
     def _show_part(self) -> None:
-        """Say which part of the time, and how many of the topics."""
+        # Time range, number of topics and size.
         look, part = self.strip.look, self.part()
         if look is not None and not self.list.isHidden():
             chosen = [each.name for each in look.topics] if part is not None and part.topics is None else ()
@@ -253,7 +253,7 @@ class RecordingDetails(QWidget):
         self.part_words.setText(words)
 
     def _say_size(self, look: FilmStripLook | None, part: Part | None) -> None:
-        """About how much that is, of the topics that the format takes."""
+        # An estimate, for topics that the format supports.
         words, count = "", 0
         if look is not None and part is not None:
             names = {
@@ -279,7 +279,7 @@ class RecordingDetails(QWidget):
         return words.format(messages=messages, size=size_words(size))
 
     def show_export(self, job: RecordingExport | None) -> None:
-        """How far an export is; None while none goes on."""
+        """Show the progress of an export; None if none is running."""
         self._is_exporting = job is not None
         self.export.set_word(_("Cancel") if job is not None else _("Export"), "x" if job else "download")
         for field in (self.format, self.strip, self.topics, self.choose, self.times, self.pick, self.list):

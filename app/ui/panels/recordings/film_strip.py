@@ -1,4 +1,4 @@
-"""The film strip: a recording's time with some of its pictures, and two handles that choose a part of it."""
+"""Film strip: time line of a recording with images and two handles to select a part."""
 
 from __future__ import annotations
 
@@ -20,7 +20,10 @@ FAINT = 0.35
 
 
 class StripHandle(QWidget):
-    """One end of the part. Arrows move it by a second, with Shift by ten; `moved` tells by how much."""
+    """Handle at one end of the selection.
+
+    Arrow keys move it by 1 s, with Shift by 10 s; `moved` has the shift.
+    """
 
     moved = Signal(object)
     dragged = Signal(float)
@@ -63,7 +66,7 @@ class StripHandle(QWidget):
 
 
 class FilmStrip(QWidget):
-    """One recording's; `changed` when another part of it is chosen."""
+    """Film strip of one recording; `changed` is emitted when another part is selected."""
 
     changed = Signal()
 
@@ -74,7 +77,7 @@ class FilmStrip(QWidget):
         self._images: Sequence[QImage | None] = ()
         self.begin_ns = self.end_ns = 0
         self.by_clock = False
-        """Whether times are those of the clock here, not from the recording's start."""
+        """True: times are clock times; False: relative to the start of the recording."""
         self.begin = StripHandle(theme, self, _("Start of the part"))
         self.end = StripHandle(theme, self, _("End of the part"))
         self.begin.moved.connect(lambda by_ns: self.set_part(self.begin_ns + by_ns, self.end_ns))
@@ -86,21 +89,21 @@ class FilmStrip(QWidget):
         self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Fixed)
         theme.changed.connect(self._arrange)
 
-    # ---- what it shows
+    # -- display ------------------------------------------------------------------------------------------
 
     def show_look(self, look: FilmStripLook | None, images: Sequence[QImage | None] = ()) -> None:
-        """Show a recording, all of it chosen."""
+        """Show a recording, completely selected."""
         self.look, self._images = look, images
         self.choose_all()
         self.setVisible(look is not None)
 
     def choose_all(self) -> None:
-        """Choose all of it."""
+        """Select the whole recording."""
         if self.look is not None:
             self.set_part(self.look.start_ns, self.look.end_ns)
 
     def set_part(self, begin_ns: int, end_ns: int) -> None:
-        """Choose a part; one that is none, or beyond the recording, becomes the nearest that can be."""
+        """Select a part; the times are clamped to the recording and to each other."""
         look = self.look
         if look is None:
             return
@@ -115,24 +118,24 @@ class FilmStrip(QWidget):
         self.changed.emit()
 
     def time_words(self, at_ns: int, *, digits: int) -> str:
-        """A time of the recording: from its start ("6:40.0") or by the clock here ("15:08:40.0")."""
+        """Format a time, relative to the start ("6:40.0") or as clock time ("15:08:40.0")."""
         if self.by_clock:
             return clock_words(at_ns, digits=digits)
         return span_words(at_ns - (self.look.start_ns if self.look is not None else 0), digits=digits)
 
     def show_clock(self, by_clock: bool) -> None:
-        """Tell times by the clock, or from the start."""
+        """Switch between clock times and times relative to the start."""
         self.by_clock = by_clock
         self.set_part(self.begin_ns, self.end_ns)
         self.update()
 
     @property
     def is_whole(self) -> bool:
-        """Whether all of it is chosen."""
+        """True if the whole recording is selected."""
         look = self.look
         return look is None or (self.begin_ns, self.end_ns) == (look.start_ns, look.end_ns)
 
-    # ---- where things are
+    # -- geometry -----------------------------------------------------------------------------------------
 
     def sizeHint(self) -> QSize:
         return QSize(360, round(self._theme.scaled(HIGH) + self._theme.scaled(LABELS)))
@@ -141,7 +144,7 @@ class FilmStrip(QWidget):
         return QSize(120, self.sizeHint().height())
 
     def _film(self) -> QRectF:
-        """The pictures: between the two handles when all is chosen."""
+        # Leaves room for the handles at both ends.
         high = self._theme.scaled(HIGH)
         return QRectF(HANDLE, 0, max(1.0, self.width() - 2 * HANDLE), high)
 
@@ -172,7 +175,7 @@ class FilmStrip(QWidget):
         self._arrange()
 
     def mousePressEvent(self, event: QMouseEvent) -> None:
-        """The nearer handle comes there."""
+        # Moves the nearer handle.
         if self.look is None or event.button() != Qt.MouseButton.LeftButton:
             return
         x = event.position().x()
@@ -186,7 +189,7 @@ class FilmStrip(QWidget):
         if event.type() == QEvent.Type.EnabledChange:
             self.update()
 
-    # ---- painting
+    # -- painting -----------------------------------------------------------------------------------------
 
     def paintEvent(self, _event: QPaintEvent) -> None:
         look, theme = self.look, self._theme
@@ -235,7 +238,7 @@ class FilmStrip(QWidget):
             )
 
     def _paint_labels(self, painter: QPainter, film: QRectF, look: FilmStripLook) -> None:
-        """The ends, and where the part begins and ends, as far as they do not lie over each other."""
+        # Labels of the ends and of the selection, as far as they don't overlap.
         theme, font = self._theme, self._theme.font("small")
         high = theme.scaled(LABELS)
         taken: list[tuple[float, float]] = []

@@ -1,4 +1,4 @@
-"""Recordings: a browser of the folder, which is read in another thread."""
+"""Recordings panel: browser of the recordings folder, which is scanned in a background thread."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ WORDS = TableWords(
     clear_the_filter=lazy("Clear the filter to see all recordings."),
 )
 ROW = 56
-LOOK_EVERY = 30  # refreshes of 30 a second
+LOOK_EVERY = 30  # refreshes at 30 Hz
 FIRST_LOOK = 1
 PICTURES_KEPT = 300
 STRIP_PICTURES, STRIP_BARS, STRIP_SIZE = 8, 120, (240, 142)
@@ -50,7 +50,7 @@ SIDECAR = ".bookmarks.json"
 
 
 class RecordingsPanel(TablePanel[RecordingFacts]):
-    """The table, and below it what can be done with the chosen recording."""
+    """Table of recordings with the details of the selected one below."""
 
     def __init__(self, context: PanelContext) -> None:
         self._recordings = context.session.recordings
@@ -103,7 +103,7 @@ class RecordingsPanel(TablePanel[RecordingFacts]):
     def make_table(self, model: TableModel[RecordingFacts]) -> RecordingTable:
         return RecordingTable(self.theme, model)
 
-    # ---- what it shows
+    # -- display ------------------------------------------------------------------------------------------
 
     def refresh(self) -> None:
         self._ticks += 1
@@ -141,7 +141,7 @@ class RecordingsPanel(TablePanel[RecordingFacts]):
         self._show_details()
 
     def _now(self, facts: RecordingFacts) -> RecordingFacts:
-        """The one that is being written, as its recorder tells."""
+        # Figures of a recording in progress come from the recorder.
         if not self._is_written(facts):
             return facts
         state = self._recordings.client.state
@@ -209,10 +209,10 @@ class RecordingsPanel(TablePanel[RecordingFacts]):
     def _chosen(self) -> RecordingFacts | None:
         return self.model.row_at(self.table.currentIndex())
 
-    # ---- pictures
+    # -- pictures -----------------------------------------------------------------------------------------
 
     def _picture(self, facts: RecordingFacts) -> QImage | None:
-        """What is known now; the rest is asked for, in another thread."""
+        # Missing thumbnails are requested from a background thread.
         if not facts.is_read or facts.problem or facts.not_scanned:
             return None
         mark = (facts.path, facts.changed_s, facts.size_bytes)
@@ -237,10 +237,10 @@ class RecordingsPanel(TablePanel[RecordingFacts]):
             self._pictures.popitem(last=False)
         return is_any
 
-    # ---- the strip
+    # -- film strip ---------------------------------------------------------------------------------------
 
     def _want_strip(self, facts: RecordingFacts | None) -> None:
-        """Look at the chosen recording's time, in another thread."""
+        # Loads the film strip in a background thread.
         can_read = facts is not None and facts.is_read and not facts.problem and not self._is_written(facts)
         mark = (facts.path, facts.changed_s, facts.size_bytes) if facts is not None and can_read else None
         if mark == self._strip_of:
@@ -252,7 +252,7 @@ class RecordingsPanel(TablePanel[RecordingFacts]):
             self._strips.ask("strip", lambda: _strip(path, self._opener))
 
     def _follow_strip(self) -> None:
-        """Take over what is ready; a loop in the time line is the part that is exported."""
+        # Shows a loaded film strip; a loop on the timeline becomes the selected part.
         made = self._strips.take("strip")
         if made is not None:
             look, images = made
@@ -269,7 +269,7 @@ class RecordingsPanel(TablePanel[RecordingFacts]):
             if loop is not None:
                 self.details.strip.set_part(*loop)
 
-    # ---- what a person does
+    # -- user actions -------------------------------------------------------------------------------------
 
     def _of_chosen(self, do: Callable[[str], object]) -> None:
         facts = self._chosen()
@@ -288,7 +288,7 @@ class RecordingsPanel(TablePanel[RecordingFacts]):
         )
 
     def choose_file(self, path: Path) -> None:
-        """Show this one as the chosen one, as soon as it is listed."""
+        """Select a recording as soon as it is listed."""
         self.filter.clear()
         self._wanted = str(path)
         self._ticks = 0
@@ -336,7 +336,7 @@ class RecordingsPanel(TablePanel[RecordingFacts]):
         return True
 
     def _put(self, path: Path, new: Path | None) -> None:
-        """Show at once what a person did; the next look finds the same."""
+        # Shown at once; the next scan confirms it.
         files = [
             replace(each, path=new) if each.path == path and new is not None else each
             for each in self._look.files
@@ -383,7 +383,7 @@ class RecordingsPanel(TablePanel[RecordingFacts]):
         if not open_outside(QUrl.fromLocalFile(str(path.parent))):
             self.context.toast(_("File: {path}").format(path=path))
 
-    # ---- export
+    # -- export -------------------------------------------------------------------------------------------
 
     def _export(self, kind: str) -> None:
         facts, part = self._chosen(), self.details.part()
@@ -421,10 +421,11 @@ class RecordingsPanel(TablePanel[RecordingFacts]):
         else:
             self.context.toast(job.words())
 
-    # ---- what every panel has
+    # -- overrides ----------------------------------------------------------------------------------------
 
     def event(self, event: QEvent) -> bool:
-        """Wherever the keyboard is in here, F2 renames the chosen recording, not the behaviour."""
+        # Within the panel, F2 renames the recording; otherwise the window's shortcut would rename the
+        # behaviour.
         if isinstance(event, QKeyEvent) and event.key() == Qt.Key.Key_F2 and is_plain(event):
             if event.type() == QEvent.Type.ShortcutOverride:
                 event.accept()
@@ -446,7 +447,7 @@ class RecordingsPanel(TablePanel[RecordingFacts]):
         self._fit_head()
 
     def _fit_head(self) -> None:
-        """The head is no higher than in other tables."""
+        # Same header height as in other tables, despite the taller rows.
         self.table.horizontalHeader().setFixedHeight(super().row_height() + 1)
 
     def more_actions(self) -> list[QAction]:
@@ -464,7 +465,7 @@ class RecordingsPanel(TablePanel[RecordingFacts]):
 
 
 def _drawn(path: Path, opener: RecordingOpener) -> QImage | None:
-    """The small picture of a recording; asked in another thread."""
+    # Runs in a background thread.
     found = picture_in(path, (2 * PICTURE.width(), 2 * PICTURE.height()), opener)
     return cropped(_image(found)).copy() if found is not None else None
 
@@ -476,7 +477,7 @@ def _image(picture: Picture) -> QImage:
 
 
 def _strip(path: Path, opener: RecordingOpener) -> tuple[FilmStripLook | None, Sequence[QImage | None]]:
-    """What is along the time of a recording; asked in another thread."""
+    # Runs in a background thread.
     look = film_strip(path, STRIP_PICTURES, STRIP_BARS, STRIP_SIZE, opener)
     if look is None:
         return None, ()

@@ -1,4 +1,4 @@
-"""The table of recordings: Enter or a double click opens, F2 renames in the row, Delete deletes."""
+"""Table of recordings: Enter or a double click opens, F2 renames in place, Delete deletes."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from nep.i18n import _
 
 
 class RecordingTable(TableView[RecordingFacts]):
-    """A click chooses a row. `chosen` tells its key, also when arrows lead there."""
+    """Table in which a click selects; `chosen` has the key of the row, also on keyboard selection."""
 
     chosen = Signal(str)
     rename_wanted = Signal(str)
@@ -33,7 +33,8 @@ class RecordingTable(TableView[RecordingFacts]):
         self.selectionModel().currentRowChanged.connect(lambda _new, _old: self._tell_chosen())
 
     def _open(self, index: QModelIndex) -> None:
-        """A click only chooses: what a recording opens takes the place of what shows."""
+        # A click only selects, because opening a recording replaces the source of all panels.
+        ...
 
     def _open_row(self, index: QModelIndex) -> None:
         super()._open(index)
@@ -55,7 +56,7 @@ class RecordingTable(TableView[RecordingFacts]):
             super().keyPressEvent(event)
 
     def rename(self, key: str, name: str, take: Callable[[str], bool]) -> None:
-        """Let a person type another name into the row."""
+        """Rename a recording in its row."""
         self.choose(key)
         index = self.currentIndex()
         self.scrollTo(index)

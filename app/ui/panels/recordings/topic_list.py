@@ -1,4 +1,4 @@
-"""Which topics of a recording are exported, from a list with checks: filtered, all, none."""
+"""Checklist of topics to export."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ ROWS_HIGH = 150
 
 
 class TopicList(QWidget):
-    """`chosen` with the names of all that are checked, when a person checks or unchecks some."""
+    """Checklist of topics; `chosen` has the names of all checked topics after a change."""
 
     chosen = Signal(list)
 
@@ -90,7 +90,7 @@ class TopicList(QWidget):
         chosen: Collection[str],
         size_of: Callable[[RecordedTopic], float | None],
     ) -> None:
-        """Show these, which of them are checked, and how many bytes each has (None: not known)."""
+        """Show the topics with their check marks; `size_of` returns a topic's size in bytes, if known."""
         self._names, self._size_of = frozenset(chosen), size_of
         if topics is not self._topics:
             self._topics = topics
@@ -117,7 +117,7 @@ class TopicList(QWidget):
         self._choose(self._names ^ {name})
 
     def _choose_shown(self, *, wanted: bool) -> None:
-        """All or none of those that the filter leaves."""
+        # Only topics that match the filter.
         shown = {topic.name for topic in self._shown()}
         self._choose(self._names | shown if wanted else self._names - shown)
 
@@ -130,7 +130,7 @@ class TopicList(QWidget):
 def shortest_choice(
     topics: Sequence[RecordedTopic], names: Collection[str]
 ) -> tuple[tuple[str, ...], tuple[str, ...]]:
-    """(wanted, left out): these topics in as few words as possible; all of them need none."""
+    """Return (included, excluded) topic names, whichever list is shorter; empty for all topics."""
     wanted = tuple(topic.name for topic in topics if topic.name in names)
     unwanted = tuple(topic.name for topic in topics if topic.name not in names)
     return ((), unwanted) if len(unwanted) < len(wanted) else (wanted, ())
