@@ -1,6 +1,6 @@
-"""Robot: the virtual robots in their room, to be touched, moved and spoken to.
+"""Robot panel: virtual robots in their room, which can be touched, moved and spoken to.
 
-`room_view` is the drawing under the mouse, `say_bar` what a person says or lets happen.
+`room_view` is the interactive drawing, `say_bar` the speech field and the menu of simulated events.
 """
 
 from app.ui.panels.robot.panel import PANEL as PANEL

@@ -1,4 +1,4 @@
-"""The room over the middle of the window, below the run bar: Stop stays in sight and works."""
+"""Enlarged room over the middle of the window; the run bar with Stop stays accessible above it."""
 
 from __future__ import annotations
 
@@ -14,15 +14,17 @@ from nep.i18n import _
 
 
 class LargeRoom(QWidget):
-    """Covers the panels of the window and holds the stage, until Esc, its button or a double click."""
+    """Overlay of the window's panels with the room; closed by Esc, its button or a double click.
+
+    Args:
+        panel: Panel within the area to cover.
+        stage: Widget to show.
+        tools: Copies of the buttons in the panel's title bar.
+    """
 
     closed = Signal()
 
     def __init__(self, theme: Theme, panel: QWidget, stage: QWidget, tools: Sequence[QWidget] = ()) -> None:
-        """``panel`` is in the window whose middle is covered; ``stage`` is what is shown.
-
-        ``tools`` are the buttons of the panel's title that have a twin here, beside those of the size.
-        """
         over = _middle_of(panel)
         super().__init__(over)
         self._theme, self._over = theme, over
@@ -45,7 +47,7 @@ class LargeRoom(QWidget):
         column.addLayout(row)
         column.addWidget(stage, 1)
         over.installEventFilter(self)
-        self._top = over.window()  # Esc comes there from the run bar, too, when nobody else wanted it
+        self._top = over.window()  # receives Esc while the run bar has the focus
         self._top.installEventFilter(self)
         application = QApplication.instance()
         if isinstance(application, QApplication):
@@ -59,20 +61,21 @@ class LargeRoom(QWidget):
         self.setFocus(Qt.FocusReason.OtherFocusReason)
 
     def _keep_keys(self, _old: QWidget | None, now: QWidget | None) -> None:
-        """Nothing that it covers gets the keys: Esc would end there, and the editor would change unseen."""
+        # Covered widgets must not get the focus: Esc would not reach this widget, and the editor would change
+        # unseen.
         covered = now is not None and self._over.isAncestorOf(now) and not self.isAncestorOf(now)
         if covered and now is not self and self.isVisible():
             self.setFocus(Qt.FocusReason.OtherFocusReason)
 
     def fill_screen(self) -> None:
-        """Let the whole window fill the screen, or not any more."""
+        """Toggle full screen mode of the window."""
         window = self.window()
         self.filled = not self.filled
         window.setWindowState(window.windowState() ^ Qt.WindowState.WindowFullScreen)
         self.screen_button.set_word(_("Leave full screen") if self.filled else _("Full screen"))
 
     def shut(self) -> None:
-        """Give the stage back; the window is as it was."""
+        """Close the overlay, leave full screen mode and hand the stage back."""
         if self.filled:
             self.fill_screen()
         self._over.removeEventFilter(self)
@@ -104,7 +107,7 @@ class LargeRoom(QWidget):
 
 
 def _middle_of(panel: QWidget) -> QWidget:
-    """The workbench around a panel, else the window that it is in."""
+    # Falls back to the window if the panel is not within the workbench.
     around = panel.parentWidget()
     while around is not None and not isinstance(around, QMainWindow):
         around = around.parentWidget()

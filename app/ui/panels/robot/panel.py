@@ -1,4 +1,4 @@
-"""The panel of virtual robots: which one it is about, its room, and what a person says to it."""
+"""Robot panel: a virtual robot in its room, with speech and simulated events."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ if TYPE_CHECKING:
     from app.core.robots.robot_link import RobotLink
 
 STALE_AFTER_S = 2.0
-"""A virtual robot tells how it is many times a second, also when it does nothing."""
+"""Silence after which the drawing is stale; virtual robots report their state many times a second."""
 
 
 ADDED = {
@@ -46,7 +46,7 @@ ADDED = {
 
 
 def things_of(room: Room) -> tuple[Thing, ...]:
-    """The things of a room as they are drawn."""
+    """Return the drawable things of a room."""
     return tuple(
         Thing(
             kind_of(thing), thing.x, thing.y, thing.name,
@@ -59,12 +59,12 @@ def things_of(room: Room) -> tuple[Thing, ...]:
 
 
 def radius_of(robot: RobotState) -> float:
-    """How much place a robot takes, in m."""
+    """Return the radius of a robot's footprint in m."""
     return 0.17 if robot.figure == "turtle" else 0.27
 
 
 class RobotPanel(OneRobotPanel):
-    """The first virtual robot; its name is the title."""
+    """Panel of a virtual robot; the title is its name."""
 
     def __init__(self, context: PanelContext) -> None:
         super().__init__(context, _("Robot"))
@@ -93,7 +93,7 @@ class RobotPanel(OneRobotPanel):
         self.pages = self.show_one_of(self.empty, self.stage)
 
     def _room_tools(self, size: int) -> tuple[IconButton, IconButton]:
-        """The buttons that add to the room and put it back: in the title, and once more in the large room."""
+        # One set for the title bar, another for the enlarged room.
         add = IconButton(self.theme, "plus", _("Add something to the room"), size=size)
         add.clicked.connect(lambda: self._show_room_menu("", None, add))
         reset = IconButton(self.theme, "rotate-cw", _("Reset the robot and its room"), size=size)
@@ -101,7 +101,7 @@ class RobotPanel(OneRobotPanel):
         return add, reset
 
     def _make_stage(self) -> None:
-        """The drawing and what is below it."""
+        # The drawing and the bar below it.
         self.view = RoomView(self.theme)
         view = self.view
         view.touched.connect(lambda name, part, down: self._change({"touch": part, "down": down}, name))
@@ -142,7 +142,7 @@ class RobotPanel(OneRobotPanel):
             return
         self._show_sound()
         if self._large is not None:
-            self._large.raise_()  # a panel that comes to the front of its tabs would lie over it
+            self._large.raise_()  # a panel raised in its tab group would cover it
         self.chip.set(link.chip, ROBOT_STATUS[link.state])
         if link.drawing is not None:
             now = time.monotonic()
@@ -190,7 +190,7 @@ class RobotPanel(OneRobotPanel):
             self.empty.set_actions([show])
 
     def _awaited(self, event: Event, name: str) -> Sequence[str]:
-        """What the open behaviours wait for, that which shows first."""
+        # Values from the active behaviour come first.
         link, shown = self.session.fleet.link(self._robot), self.session.document
         if link is None:
             return ()
@@ -198,13 +198,13 @@ class RobotPanel(OneRobotPanel):
         return awaited_values((each.workspace for each in documents), link.robot, event, name)
 
     def _switch_sound(self) -> None:
-        """Robots are heard from now on, or not any more; their words stand in their bubbles all the same."""
+        # Speech bubbles are shown in any case.
         with suppress(SettingsError):
             self.session.voices.switch(on=not self.session.voices.on)
         self._show_sound()
 
     def _show_sound(self) -> None:
-        """Whether robots are heard, and why they are not though a person wants it."""
+        # Shows the reason if speech is on but not working.
         on, problem = self.session.voices.on, self.session.voices.problem
         if (on, problem) == self._sound_shown:
             return
@@ -216,10 +216,10 @@ class RobotPanel(OneRobotPanel):
         if on and problem:
             self.sound.setToolTip(plain.tip(f"{words}\n{problem}"))
 
-    # -- the room -----------------------------------------------------------------------------------
+    # -- room ---------------------------------------------------------------------------------------------
 
     def _show_room(self, link: RobotLink) -> None:
-        """Draw the robot, the others in its room, and the room's things."""
+        # The robot, others in the same room, and things.
         drawing = link.drawing or {}
         if not RobotState.parse(drawing).shared:
             self.view.show_state(drawing)
@@ -235,7 +235,7 @@ class RobotPanel(OneRobotPanel):
         self.view.show_state(drawing, others, self._things[1])
 
     def _heard_beside(self) -> str:
-        """What is heard now and stands in no bubble any more, with who says it; else what a robot heard."""
+        # Speech still playing after its bubble disappeared, or what a robot heard.
         said = self.session.voices.saying
         robots = [(self._robot, self.view.state), *self.view.others]
         if said is not None and said.words not in {state.speech for _name, state in robots}:
@@ -244,7 +244,7 @@ class RobotPanel(OneRobotPanel):
         return _("{robot} heard “{words}”").format(robot=heard[0][0], words=heard[0][1]) if heard else ""
 
     def _others(self, link: RobotLink) -> list[RobotLink]:
-        """The other virtual robots that are there; each is watched while the panel shows."""
+        # Each of the other virtual robots is watched while the panel is visible.
         fleet = self.session.fleet
         there = [each for each in fleet.connected if each.virtual and each.name != link.name]
         names = {each.name for each in there}
@@ -263,13 +263,13 @@ class RobotPanel(OneRobotPanel):
             self._change({"move": name, "x": round(x, 3), "y": round(y, 3)})
 
     def _put_back(self) -> None:
-        """The robots and everything in their room are where they were at first."""
+        # Resets robots and room.
         self.session.room.put_back()
         for name in ("", *(name for name, _state in self.view.others)):
             self._change({"reset": True}, name)
 
     def _show_room_menu(self, thing: str, place: QPoint | None, button: QWidget | None = None) -> None:
-        """What a person adds to the room, or takes away; at a place, else below a button."""
+        # At a position (context menu), else below a button.
         menu = Menu(self.theme, self)
         if thing:
             words = plain.entry(_("Remove {thing}").format(thing=thing))
@@ -293,7 +293,7 @@ class RobotPanel(OneRobotPanel):
             menu.popup(place)
 
     def _add(self, kind: str) -> None:
-        """Put one more thing where there is place, in front of the first robot."""
+        # At a free place in front of the first robot.
         state = self.view.state
         room = self.session.room.room
         radius = {"ball": 0.3, "person": 0.4, "marker": 0.3}.get(kind, 0.8)
@@ -304,20 +304,20 @@ class RobotPanel(OneRobotPanel):
         else:
             self.view.chosen = name
 
-    # -- a larger room ----------------------------------------------------------------------------
+    # -- enlarged room ------------------------------------------------------------------------------------
 
     def enlarge(self) -> None:
-        """Show the room over the middle of the window, or in its place again."""
+        """Toggle the enlarged room."""
         if self._large is not None:
             self._large.shut()
             return
         self._large = LargeRoom(self.theme, self, self.stage, self._room_tools(size=26))
         self._large.closed.connect(self._give_back)
-        self.context.keys_to_question()  # which lies above the room
+        self.context.keys_to_question()  # the question lies above the room
         self.large.set_icon("minimize-2")
 
     def fill_screen(self) -> None:
-        """Show the room as large as the screen, with the run bar above it; or in its place again."""
+        """Toggle the room in full screen mode, with the run bar above it."""
         if self._large is not None and self._large.filled:
             self._large.shut()
             return
@@ -349,12 +349,12 @@ class RobotPanel(OneRobotPanel):
 
     def wake(self) -> None:
         if self._watch is not None and self._watch.resting:
-            self._told_s = time.monotonic()  # it is not to blame that nobody looked
+            self._told_s = time.monotonic()  # the watch was suspended, so the state is not stale
         super().wake()
 
 
 def _where_to_look(link: RobotLink) -> str:
-    """What shows how a robot is that is not drawn; only what it has is named."""
+    # Mentions only what the robot has.
     images = [sensor.is_image for sensor in link.robot.sensors]
     if True in images and False in images:
         return _("Its camera and sensors show its state.")

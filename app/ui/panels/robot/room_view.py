@@ -1,4 +1,4 @@
-"""The drawing of the robots in their room, under the mouse and the keyboard."""
+"""Interactive drawing of robots in their room."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ from nep.i18n import _
 
 TOUCHABLE = ("head", "left_hand", "right_hand")
 BODY = "body"
-"""The part by which a robot is taken up."""
+"""Part by which a robot is picked up."""
 STALE = QColor(90, 90, 90, 150)
 KEYS = {Qt.Key.Key_H: "head", Qt.Key.Key_L: "left_hand", Qt.Key.Key_R: "right_hand"}
 ARROWS = {
@@ -43,26 +43,25 @@ DRAG_FROM_PX = 4
 
 
 def split(part: str) -> tuple[str, str]:
-    """The robot's name (empty for the one the picture is about) and its part: ``Turtle/body``."""
+    """Split a part such as ``Turtle/body`` into robot (empty for the main robot) and part."""
     name, _slash, of = part.rpartition("/")
     return name, of
 
 
 class RoomView(QWidget):
-    """The drawing. A press on head or hands touches them; robots and things are dragged over the floor.
+    """Drawing of a room. Head and hands react to presses; robots and things are dragged over the floor.
 
-    A tap on a robot with a bumper presses it. With the keyboard Tab goes from one to the next, arrows move
-    it, Space presses a bumper or touches a head as long as it is held, H, L, R touch head and hands, Delete
-    takes a thing away.
+    A click on a robot with a bumper presses it. Keys: Tab selects the next item, arrows move it, Space
+    presses a bumper or touches a head while held, H, L and R touch head and hands, Delete removes a thing.
     """
 
-    touched = Signal(str, str, bool)  # robot (empty: the shown one), part, down
+    touched = Signal(str, str, bool)  # robot ("": main robot), part, pressed
     moved = Signal(str, float, float)  # thing, x, y in m
     carried = Signal(str, float, float)  # robot, x, y in m
-    held = Signal(str, bool)  # robot, taken up or put down
-    bumped = Signal(str, str)  # robot, the side on which a hand presses its bumper
+    held = Signal(str, bool)  # robot, picked up
+    bumped = Signal(str, str)  # robot, side of the bumper
     removed = Signal(str)  # thing
-    menu_wanted = Signal(str, QPoint)  # thing or empty, where on the screen
+    menu_wanted = Signal(str, QPoint)  # thing or "", position on the screen
     enlarged = Signal()
 
     def __init__(self, theme: Theme) -> None:
@@ -81,8 +80,8 @@ class RoomView(QWidget):
         self._hovered: str | None = None
         self.chosen: str | None = None
         self.robot_name = ""
-        """Of the robot that the picture is about."""
-        self._keys: dict[int, tuple[str, str]] = {}  # what each key that is held down touches
+        """State of the main robot."""
+        self._keys: dict[int, tuple[str, str]] = {}  # part touched by each pressed key
         self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Expanding)
         self.setMinimumSize(160, 120)
         self.setAttribute(Qt.WidgetAttribute.WA_OpaquePaintEvent)
@@ -97,7 +96,7 @@ class RoomView(QWidget):
         self.setToolTip(plain.tip(words))
         theme.changed.connect(self.update)
 
-    # -- what it shows ----------------------------------------------------------------------------
+    # -- display ------------------------------------------------------------------------------------------
 
     def show_state(
         self,
@@ -105,15 +104,15 @@ class RoomView(QWidget):
         others: Sequence[tuple[str, Mapping[str, object]]] = (),
         things: tuple[Thing, ...] | None = None,
     ) -> None:
-        """Draw this state, other robots, and the room's things (None: those of the state).
+        """Draw the state of the main robot, other robots, and things (None: those of the state).
 
-        The same again costs nothing.
+        Repeated calls with the same objects are cheap.
         """
         told = (id(data), [(name, id(each)) for name, each in others], things)
         if told == self._data:
             return
         self._data = told
-        self._kept = (data, others)  # so that no other message gets their identity
+        self._kept = (data, others)  # keeps the objects alive, so that their ids are not reused
         state = RobotState.parse(data)
         if things is not None:
             state = replace(state, objects=things)
@@ -124,14 +123,14 @@ class RoomView(QWidget):
             self.update()
 
     def set_stale(self, stale: bool) -> None:
-        """Whether it has not told for a while how it is: grey, and what it said is not said any more."""
+        """Mark the robot as stale: drawn grey, without speech."""
         if stale != self.stale:
             self.stale = stale
             self.setAccessibleDescription(self._described())
             self.update()
 
     def show_heard(self, words: str) -> None:
-        """What is heard and stands in no bubble, below the picture; "" for nothing."""
+        """Show a caption below the drawing for heard words; "" for none."""
         if words != self.heard:
             self.heard = words
             self.update()
@@ -143,7 +142,7 @@ class RoomView(QWidget):
         return QSize(382, 286)
 
     def place_of(self, part: str) -> QPointF | None:
-        """Where a part is in the view; for tests and tools."""
+        """Return the position of a part in the view, for tests and tools."""
         return self._drawing.place_of(part, QRectF(self.rect()), self.state, self.others)
 
     def paintEvent(self, _event: QPaintEvent) -> None:
@@ -159,7 +158,7 @@ class RoomView(QWidget):
             paint_heard(painter, area, self.heard, self._theme.font("label"))
         painter.end()
 
-    # -- what is where ----------------------------------------------------------------------------
+    # -- geometry -----------------------------------------------------------------------------------------
 
     def _at(self, position: QPointF) -> str | None:
         return self._drawing.part_at(position, QRectF(self.rect()), self.state, self.others)
@@ -169,12 +168,12 @@ class RoomView(QWidget):
         return next(found, None) if part else None
 
     def _robot(self, part: str | None) -> RobotState | None:
-        """The robot whose body a part is."""
+        # The robot that has this part as its body.
         name, of = split(part or "")
         return ({"": self.state} | dict(self.others)).get(name) if of == BODY else None
 
     def _where(self, part: str | None) -> tuple[float, float] | None:
-        """The place (m) of what can be moved."""
+        # Position in m of a movable item.
         found = self._robot(part) or self._thing(part)
         movable = found is not None and (isinstance(found, RobotState) or self._movable(found))
         return (found.x, found.y) if found is not None and movable else None
@@ -183,11 +182,11 @@ class RoomView(QWidget):
         return self.state.shared or thing.kind in {"ball", "person"}
 
     def choices(self) -> list[str]:
-        """What the keyboard goes through: the robots, then the things."""
+        """Return the items for keyboard selection: robots, then things."""
         robots = [BODY, *(f"{name}/{BODY}" for name, _state in self.others)]
         return [*robots, *(thing.name for thing in self.state.objects if thing.name and self._movable(thing))]
 
-    # -- the mouse --------------------------------------------------------------------------------
+    # -- mouse --------------------------------------------------------------------------------------------
 
     def mousePressEvent(self, event: QMouseEvent) -> None:
         self._pressed = self._at(event.position()) if event.button() == Qt.MouseButton.LeftButton else None
@@ -247,7 +246,7 @@ class RoomView(QWidget):
         self._hover(self._at(event.position()))
 
     def _bump(self, part: str, position: QPointF) -> bool:
-        """A tap on a robot with a bumper presses it; whether it has one."""
+        # Returns False for robots without a bumper.
         area = QRectF(self.rect())
         side = self._drawing.side_at(position, area, part, self.state, self.others)
         if side is not None:
@@ -261,7 +260,7 @@ class RoomView(QWidget):
     def mouseDoubleClickEvent(self, event: QMouseEvent) -> None:
         part = self._at(event.position())
         if part is not None and (split(part)[1] in TOUCHABLE or self._has_bumper(part)):
-            self.mousePressEvent(event)  # two quick taps
+            self.mousePressEvent(event)  # two fast clicks
         elif event.button() == Qt.MouseButton.LeftButton:
             self.enlarged.emit()
 
@@ -278,7 +277,7 @@ class RoomView(QWidget):
         thing = self._thing(part)
         self.menu_wanted.emit(thing.name if thing is not None and self._movable(thing) else "", place)
 
-    # -- the keyboard -----------------------------------------------------------------------------
+    # -- keyboard -----------------------------------------------------------------------------------------
 
     def focusNextPrevChild(self, forward: bool) -> bool:
         choices = self.choices()
@@ -311,7 +310,7 @@ class RoomView(QWidget):
             self._touch_by(event, key)
 
     def _pressed_by_keys(self) -> str:
-        """What Space presses: what is chosen, else the robot that the picture is about."""
+        # Space acts on the selected item, else on the main robot.
         return self.chosen or BODY
 
     def _touch_by(self, event: QKeyEvent, key: Qt.Key) -> None:
@@ -334,7 +333,7 @@ class RoomView(QWidget):
             self.touched.emit(*held, False)
 
     def focusOutEvent(self, event: QFocusEvent) -> None:
-        """The release of a key goes to who has the keyboard then: nothing stays touched."""
+        # The key release goes to the newly focused widget, so end all touches here.
         while self._keys:
             self.touched.emit(*self._keys.popitem()[1], False)
         super().focusOutEvent(event)

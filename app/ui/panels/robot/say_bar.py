@@ -1,4 +1,4 @@
-"""What a person says to a virtual robot, and what they let happen to it: a field, its words, a menu."""
+"""Bar to speak to a virtual robot and to simulate events."""
 
 from __future__ import annotations
 
@@ -18,16 +18,16 @@ from app.ui.widgets.menus import Menu, drop_below
 from nep.i18n import _
 
 HEARS = "heard"
-"""The event of a robot that hears what is said to it."""
+"""Event of a robot that hears speech."""
 MOST_ENTRIES = 24
 MOST_WIDTH = 720
-"""Wider, the field in the large room would be a line from edge to edge."""
+"""Maximum width in px, for the enlarged room."""
 Awaited: TypeAlias = Callable[[Event, str], Sequence[str]]
 Happening: TypeAlias = dict[str, object]
 
 
 class SayField(SearchField):
-    """A field for words: Return says them (`said`), Down offers some (`asked`)."""
+    """Speech field: Return emits `said`, Down emits `asked` for suggestions."""
 
     said = Signal(str)
     asked = Signal()
@@ -44,7 +44,7 @@ class SayField(SearchField):
         return QSize(120, super().sizeHint().height())
 
     def say(self, words: str) -> None:
-        """These words are said; the field is free for the next ones."""
+        """Emit `said` with these words and clear the field."""
         if words.strip():
             self._last = words.strip()
             self.clear()
@@ -63,13 +63,15 @@ class SayField(SearchField):
 
 
 class SayBar(QWidget):
-    """The field with the words that programs wait for, and a menu of other things that may happen."""
+    """Speech field with suggestions, and the menu of simulated events.
+
+    `awaited` returns the values of an event's field that programs are waiting for.
+    """
 
     said = Signal(str)
-    happened = Signal(object)  # a Happening, as a virtual robot's world takes it
+    happened = Signal(object)  # a Happening in the format of a virtual robot's world
 
     def __init__(self, theme: Theme, awaited: Awaited) -> None:
-        """``awaited`` gives the values that programs wait for in a datum of an event."""
         super().__init__()
         self._theme, self._awaited = theme, awaited
         self._robot: Robot | None = None
@@ -92,11 +94,11 @@ class SayBar(QWidget):
         self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Fixed)
 
     def add(self, button: QWidget) -> None:
-        """A further button, at the right."""
+        """Add a button at the right."""
         self._row.insertWidget(self._row.count() - 1, button)
 
     def show_robot(self, robot: Robot) -> None:
-        """Speak to this robot from now on."""
+        """Switch to this robot."""
         self._robot = robot
         hears = robot.event(HEARS) is not None
         words = _("Say something to {robot}").format(robot=robot.name)
@@ -107,15 +109,15 @@ class SayBar(QWidget):
         self.events.setVisible(any(True for _entry in self.happenings()))
         self.setVisible(robot.virtual and (hears or self.events.isVisibleTo(self)))
 
-    # -- words ------------------------------------------------------------------------------------
+    # -- speech -------------------------------------------------------------------------------------------
 
     def choices(self) -> Sequence[str]:
-        """The words that programs wait for now."""
+        """Return the words that programs are waiting for."""
         event = self._robot.event(HEARS) if self._robot is not None else None
         return self._awaited(event, event.filters[0]) if event is not None and event.filters else ()
 
     def show_words(self) -> None:
-        """Offer the words that programs wait for; a choice says it at once."""
+        """Show a menu of awaited words; a choice is spoken at once."""
         menu = Menu(self._theme, self)
         for word in self.choices():
             menu.addAction(plain.entry(word)).triggered.connect(
@@ -125,17 +127,17 @@ class SayBar(QWidget):
             menu.addAction(_("No program is waiting for words")).setEnabled(False)
         self._pop_up(menu, self.words)
 
-    # -- what else may happen ---------------------------------------------------------------------
+    # -- simulated events ---------------------------------------------------------------------------------
 
     def happenings(self) -> Iterator[tuple[str, str, Happening]]:
-        """What may happen to the robot: its words, its icon, and what its world is told."""
+        """Yield text, icon and data of each event that can be simulated."""
         for event in self._robot.events if self._robot is not None else ():
-            if event.name in {HEARS, "released"}:  # who taps lets go
+            if event.name in {HEARS, "released"}:  # a tap includes the release
                 continue
             yield from _entries(event, self._awaited)
 
     def show_events(self) -> None:
-        """Offer what may happen."""
+        """Show the menu of events."""
         menu = Menu(self._theme, self)
         for words, icon, happening in list(self.happenings())[:MOST_ENTRIES]:
             action = menu.addAction(self._theme.icon(icon), plain.entry(words))
@@ -148,7 +150,7 @@ class SayBar(QWidget):
 
 
 def _entries(event: Event, awaited: Awaited) -> Iterator[tuple[str, str, Happening]]:
-    """An event once for each value that it may have; "head is touched", "left hand is touched"."""
+    # One entry per value, such as "head is touched" and "left hand is touched".
     if not event.filters:
         yield _sentence(event, {}), event.icon, {"happen": event.name}
         return
@@ -163,7 +165,7 @@ def _entries(event: Event, awaited: Awaited) -> Iterator[tuple[str, str, Happeni
 
 
 def _sentence(event: Event, values: dict[str, str]) -> str:
-    """What a block says of an event, without the robot: "Sees something red"."""
+    # The text of the block without the robot, such as "Sees something red".
     words = event.text.partition("%robot")[2].strip() or event.title
     for name, title in values.items():
         words = words.replace(f"%{name}", title)
