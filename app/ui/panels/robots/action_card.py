@@ -1,4 +1,4 @@
-"""A card for one action of a robot: its form, Try, what it does now, how it ended."""
+"""Card of a robot's action: form, Try button, progress and result."""
 
 from __future__ import annotations
 
@@ -28,7 +28,10 @@ RISKS = {"moves": MOVES, "locomotes": MOVES}
 
 
 class ActionCard(Card):
-    """`tried` with the form's input, `cancelled` when a person ends it early."""
+    """Card of an action; emits `tried` with the input and `cancelled`.
+
+    `title_of` returns the title of another action by its name.
+    """
 
     tried = Signal(dict)
     cancelled = Signal()
@@ -43,7 +46,6 @@ class ActionCard(Card):
         pictures: Pictures | None = None,
         title_of: Callable[[str], str] = str,
     ) -> None:
-        """``title_of`` gives the words for the name of another action of the robot."""
         super().__init__(theme)
         self.action = action
         self._title_of = title_of
@@ -110,7 +112,7 @@ class ActionCard(Card):
         self.summary.setVisible(self._folded)
 
     def set_first(self, first: bool) -> None:
-        """Whether this card has the focus: its border, and its Try is the filled one."""
+        """Highlight the card with the focus: accent border and filled Try button."""
         border = "accent" if first else "border"
         if border != self.border:
             self.border = border
@@ -136,24 +138,24 @@ class ActionCard(Card):
         self.tries.setVisible(on)
 
     def _take_back(self, given: Mapping[str, object]) -> None:
-        """Put the values of an earlier try into the form."""
+        # Restores the input of an earlier try.
         self.set_folded(False)
         self.form.set_input(given)
         self.form.show_problems(())
 
     def show_problems(self, problems: Sequence[InputProblem]) -> None:
-        """The input was refused."""
+        """Show why the input was rejected."""
         if problems and self._folded:
             self.set_folded(False)
         self.form.show_problems(problems)
 
     def show_tries(self, tries: Sequence[Invocation]) -> None:
-        """The robot's last tries; those of this action are listed behind the button with the clock."""
+        """Show the latest tries of this action in the history."""
         self.tries.show_tries(tries)
         self.past.setVisible(bool(self.tries.rows))
 
     def show_invocation(self, invocation: Invocation | None, *, may_move: bool = False) -> None:
-        """What became of the newest try; ``may_move``: its robot is not proven to stand still."""
+        """Show the state of the latest try; `may_move` is True if the robot may not have stopped."""
         self._running = invocation is not None and invocation.running
         can_cancel = self._running and (
             self.action.cancellable or (invocation is not None and invocation.state in ("sent", "accepted"))

@@ -1,4 +1,4 @@
-"""A form for an action of a robot, made from its typed parameters; it gives the input to try it with."""
+"""Form of a robot's action, generated from its parameters."""
 
 from __future__ import annotations
 
@@ -22,11 +22,15 @@ from nep.i18n import _
 
 LABEL_WIDTH = 92
 ROW_GAP = 10
-TALL_ROW = 60  # a row with a drawing: its name stands in the middle
+TALL_ROW = 60  # px; in taller rows the label is centred
 
 
 class ActionForm(QWidget):
-    """One row for each parameter; the advanced ones come with "More". `changed` when a person changed one."""
+    """One row per parameter; advanced ones are shown by "More". Emits `changed` on user changes.
+
+    `options` returns the values that a property of the robot currently offers; `pictures` is the source of
+    images.
+    """
 
     changed = Signal()
 
@@ -37,7 +41,6 @@ class ActionForm(QWidget):
         options: Callable[[str], Sequence[str]] = lambda _property: (),
         pictures: Pictures | None = None,
     ) -> None:
-        """``options`` gives the words that a property of the robot offers now, ``pictures`` cameras."""
         super().__init__()
         self.action = action
         self.controls: dict[str, Control] = {}
@@ -71,7 +74,7 @@ class ActionForm(QWidget):
 
     def _add(self, parameter: Parameter, options: Sequence[str]) -> None:
         control = control_for(self._theme, parameter, options, self._pictures)
-        # with a buddy, an & would underline the next letter
+        # not plain text: with a buddy, "&" would define a mnemonic
         words = plain.entry(sentence_case(parameter.title))
         name = label(words, "bodyLarge", role="textSecondary", wrap=True)
         name.setBuddy(control.widget)
@@ -92,10 +95,10 @@ class ActionForm(QWidget):
         control.changed(self._told)
         control.finished(lambda: self._left(parameter))
 
-    # -- its rows ---------------------------------------------------------------------------------
+    # -- layout -------------------------------------------------------------------------------------------
 
     def _fit(self) -> None:
-        """Names beside their controls where every control has its room there, else above them."""
+        # Labels are beside the controls if all controls fit, else above them.
         beside = round(self._theme.scaled(LABEL_WIDTH))
         stacked = self.width() < beside + self._grid.horizontalSpacing() + self._control_width()
         self._grid.setColumnMinimumWidth(0, 0 if stacked else beside)
@@ -105,7 +108,7 @@ class ActionForm(QWidget):
                 self._put(2 * place, name, cell)
 
     def _control_width(self) -> int:
-        """The room that the widest control wants; those that can have several rows want one."""
+        # Wrapping controls count with their width in one row.
         each = [one.widget for one in self.controls.values()]
         in_one_row = (one.sizeHint().width() for one in each if isinstance(one, Segments | ColourChoice))
         return max((*in_one_row, *(one.minimumSizeHint().width() for one in each)), default=0)
@@ -126,7 +129,7 @@ class ActionForm(QWidget):
         self._fit()
 
     def minimumSizeHint(self) -> QSize:
-        """As wide as the widest control alone: names can stand above."""
+        # Labels can be placed above the controls.
         least = max((cell.minimumSizeHint().width() for _name, cell in self._rows.values()), default=0)
         return QSize(least, super().minimumSizeHint().height())
 
@@ -135,7 +138,7 @@ class ActionForm(QWidget):
         self.changed.emit()
 
     def _left(self, parameter: Parameter) -> None:
-        """A person has left a field: what is wrong with it stands below it, before anything is tried."""
+        # Validates when the focus leaves a field, before a try.
         value = self.controls[parameter.name].value()
         wrong = None if value is None else wrong_value(parameter, value)
         said = [] if wrong is None else [wrong]
@@ -152,7 +155,7 @@ class ActionForm(QWidget):
                     widget.setVisible(on)
 
     def input(self) -> dict[str, object]:
-        """What the form says now, as the action's input; what is left empty is left out."""
+        """Return the input of the action; empty fields are omitted."""
         given = {name: control.value() for name, control in self.controls.items()}
         return {name: value for name, value in given.items() if value is not None}
 
@@ -163,7 +166,7 @@ class ActionForm(QWidget):
                 self.controls[name].show_value(value)
 
     def show_problems(self, problems: Sequence[InputProblem]) -> None:
-        """Put each sentence below the row of its parameter; those of none stand at the end."""
+        """Show each error below its parameter, others at the end of the form."""
         for parameter in self.action.parameters:
             self._judge(parameter, [each.sentence for each in problems if each.parameter == parameter.name])
         rows = {parameter.name for parameter in self.action.parameters}
@@ -191,11 +194,11 @@ class ActionForm(QWidget):
                 field.style().polish(field)
 
     def summary(self) -> str:
-        """The values in a few words: "happy, for 2 s"."""
+        """Return a short description of the values, such as "happy, for 2 s"."""
         given = {name: control.value() for name, control in self.controls.items()}
         return input_words(self.action, given, texts=False)
 
     def shut(self) -> None:
-        """The form goes: its controls look at nothing any more."""
+        """Release the resources of all controls."""
         for control in self.controls.values():
             control.close()

@@ -1,4 +1,4 @@
-"""An action's input in a few words: "happy, for 2 s", "“Hello”"."""
+"""Short descriptions of an action's input, such as "happy, for 2 s" or "“Hello”"."""
 
 from __future__ import annotations
 
@@ -13,13 +13,13 @@ LONGEST_TEXT = 32
 
 
 def input_words(action: Action, given: Mapping[str, object], *, texts: bool = True) -> str:
-    """The values that say most, in the order of the action's parameters; `texts` also quotes texts."""
+    """Return the most important values in the order of the parameters; `texts` includes quoted texts."""
     found = (_words(parameter, given.get(parameter.name), texts=texts) for parameter in action.parameters)
     return ", ".join(words for words in found if words)
 
 
 def is_unit(title: str, unit: str | None) -> bool:
-    """Whether a title only names its unit, as "seconds" does: such a value says how long."""
+    """Return True if the title is just the name of its unit, such as "seconds"."""
     english = UNITS.get(unit or "")
     return english is not None and title in {english, translate("robot", english)}
 

@@ -1,4 +1,4 @@
-"""The robots at the left of the Robots panel, each a row, and what to do when one is not among them."""
+"""List of robots at the left of the Robots panel, with help for a missing robot."""
 
 from __future__ import annotations
 
@@ -31,13 +31,13 @@ LIST_WIDTH = 300
 
 
 def seen_words(seen_s: float, now: dt.datetime | None = None) -> str:
-    """Say "seen today, 8:12", "seen yesterday, 16:20", "seen 17 November, 16:20"."""
+    """Return "seen today, 8:12", "seen yesterday, 16:20" or "seen 17 November, 16:20"."""
     now = now or dt.datetime.now().astimezone()
     return dates.seen_words(dt.datetime.fromtimestamp(seen_s, tz=now.tzinfo), now)
 
 
 class RobotItem(PaintedButton):
-    """One robot in the list at the left; `menu_wanted` tells where on the screen its menu is wanted."""
+    """Row of a robot; `menu_wanted` has the screen position of a context menu."""
 
     menu_wanted = Signal(QPoint)
 
@@ -55,14 +55,14 @@ class RobotItem(PaintedButton):
         row.addWidget(self.chip)
 
     def show_link(self, link: RobotLink, seen: str = "") -> None:
-        """Its state now; ``seen`` says when it was last seen, for one that is away."""
+        """Show the robot's state; `seen` replaces the description of a disconnected robot."""
         where = _("virtual, this computer") if link.virtual else link.robot.title
         away = not link.connected
         self._show(link.state, seen if away and seen else where, away=away)
         self.may_be_forgotten = self._away and not link.virtual
 
     def show_away(self, seen: str) -> None:
-        """It was here at another start, and is not now: a press opens its menu."""
+        """Show a robot of an earlier session that is not connected; a click opens its menu."""
         self.setAutoExclusive(False)
         self.setCheckable(False)
         self._show("away", seen, away=True)
@@ -104,13 +104,15 @@ class RobotItem(PaintedButton):
 
 
 class RobotList(QWidget):
-    """One row for each robot; `chosen` and `forgotten` tell the name of one."""
+    """List of robots; `chosen` and `forgotten` have a robot's name.
+
+    `run` executes a command by its id.
+    """
 
     chosen = Signal(str)
     forgotten = Signal(str)
 
     def __init__(self, theme: Theme, run: Callable[[str], object]) -> None:
-        """``run`` does a command by its name."""
         super().__init__()
         self._theme = theme
         self._run = run
@@ -137,17 +139,17 @@ class RobotList(QWidget):
         self.turtle = Button(self._theme, _("Use a virtual Turtle"), "bot", kind="ghost", size="small")
         self.turtle.setAccessibleName(_("Use the virtual Turtle"))
         self.turtle.clicked.connect(lambda: run("robots.turtle"))
-        for button in (self.why, self.turtle):  # below each other: large text needs the width
+        for button in (self.why, self.turtle):  # in a column, because large text needs the width
             column.addWidget(button, 0, Qt.AlignmentFlag.AlignLeft)
         return card
 
     @property
     def count(self) -> int:
-        """How many robots are in the list."""
+        """Number of rows."""
         return len(self.items) + len(self.away)
 
     def show_fleet(self, fleet: Fleet) -> list[str]:
-        """Show the robots of this start, then those that were here at another one; the names of the first."""
+        """Show the robots of this session, then those of earlier ones; return the names of the former."""
         self._known = {robot.name: robot for robot in fleet.known.robots}
         links = [link for link in fleet.links if link.connected or link.virtual or link.name in self._known]
         names = [link.name for link in links]
@@ -155,7 +157,7 @@ class RobotList(QWidget):
         return names
 
     def seen(self, name: str) -> str:
-        """When a real robot was seen last, in words."""
+        """Return when a real robot was last seen, or ""."""
         return seen_words(self._known[name].seen_s) if name in self._known else ""
 
     def _show(self, links: Sequence[RobotLink], away: Sequence[KnownRobot]) -> None:
@@ -188,7 +190,7 @@ class RobotList(QWidget):
         item.hide()
         item.deleteLater()
 
-    # -- the menu of one that is away ---------------------------------------------------------------------
+    # -- context menu of disconnected robots --------------------------------------------------------------
 
     def _open_below(self, item: RobotItem) -> None:
         self._open_menu(item, item.mapToGlobal(item.rect().bottomLeft()))
@@ -199,7 +201,7 @@ class RobotList(QWidget):
             menu.popup(at)
 
     def menu_of(self, item: RobotItem) -> Menu | None:
-        """What can be done about a robot that is away; None for one that is here, or virtual."""
+        """Return the context menu of a disconnected robot; None for connected and virtual ones."""
         if not item.may_be_forgotten:
             return None
         menu = Menu(self._theme, self)

@@ -1,4 +1,4 @@
-"""Robots: what each robot can do, as forms that can be tried at once."""
+"""Robots panel: actions of each robot as forms that can be tried."""
 
 from __future__ import annotations
 
@@ -47,7 +47,7 @@ PICTURE_CODEC = "image"
 
 
 class RobotHead(QWidget):
-    """The head of the chosen robot: its name, how it is, and its own Stop; the panel fills it."""
+    """Header of the selected robot: name, state and its Stop button."""
 
     def __init__(self, theme: Theme) -> None:
         super().__init__()
@@ -70,7 +70,7 @@ class RobotHead(QWidget):
 
 
 class SessionPictures:
-    """The picture topics and streams of the session, and picture files, for forms that want a picture."""
+    """Image topics and files of the session for forms."""
 
     def __init__(self, session: Session, files: FileDialogs) -> None:
         self._session, self._files = session, files
@@ -78,33 +78,33 @@ class SessionPictures:
 
     @property
     def streams(self) -> Sequence[ImageStream]:
-        """Those that are open now."""
+        """Open streams."""
         self._opened = [stream for stream in self._opened if not stream.closed]
         return self._opened
 
     def topics(self) -> Sequence[str]:
-        """The picture topics that there are now."""
+        """Return the names of available image topics."""
         return sorted(
             t.name for t in self._session.live.topics if t.codec == PICTURE_CODEC and t.gone_s is None
         )
 
     def stream(self, topic: str) -> ImageStream:
-        """Look at one until it is closed."""
+        """Subscribe to a topic's images until the stream is closed."""
         made = self._session.live.images.stream(topic)
         self._opened = [*self.streams, made]
         return made
 
     def ask_file(self, folder: str, take: Callable[[Path], None]) -> None:
-        """Ask a person for a picture file."""
+        """Ask for an image file."""
         self._files.open_picture(folder, take)
 
 
 class RobotsPanel(OneRobotPanel):
-    """The list of robots, and the actions of the chosen one."""
+    """List of robots with the actions of the selected one."""
 
     def __init__(self, context: PanelContext) -> None:
         super().__init__(context, _("Robots"))
-        self._names: list[str] = []  # of the robots in the list
+        self._names: list[str] = []  # robots in the list
         self.cards: dict[str, ActionCard] = {}
         self._cards_of = ""
         self._pictures = SessionPictures(self.session, self.context.files)
@@ -115,7 +115,7 @@ class RobotsPanel(OneRobotPanel):
         if isinstance(application, QApplication):
             application.focusChanged.connect(self._focus_moved)
 
-    # -- its parts ----------------------------------------------------------------------------------------
+    # -- construction -------------------------------------------------------------------------------------
 
     def _lay_out(self) -> None:
         theme = self.theme
@@ -164,7 +164,7 @@ class RobotsPanel(OneRobotPanel):
         self._card_column.insertWidget(0, self.none)
         return scroll
 
-    # -- what it shows ------------------------------------------------------------------------------------
+    # -- display ------------------------------------------------------------------------------------------
 
     def fleet_changed(self) -> None:
         self._names = self.list.show_fleet(self.session.fleet)
@@ -172,7 +172,7 @@ class RobotsPanel(OneRobotPanel):
         self._fit()
 
     def wanted_robot(self) -> RobotLink | None:
-        """The one that was chosen here, while it is in the list."""
+        """Return the robot selected here as long as it is listed, else the shown or the first one."""
         fleet, names = self.session.fleet, self._names
         if self._robot in names:
             return fleet.link(self._robot)
@@ -190,20 +190,20 @@ class RobotsPanel(OneRobotPanel):
             self._no_robot.tell(self.session.coming)
 
     def _new(self, what: str, *now: object) -> bool:
-        """Whether this differs from what was shown."""
+        # True if the value differs from the one shown last.
         changed = self._seen.get(what) != now
         self._seen[what] = now
         return changed
 
     def forget(self, name: str) -> None:
-        """A person does not want to see a robot that is away; it is there again when it comes."""
+        """Remove a disconnected robot from the list until it connects again."""
         self.session.fleet.known.forget(name)
         self._seen.pop(name, None)
         self._revision = -1
         self.refresh()
 
     def choose(self, name: str) -> None:
-        """A person chose another robot: its actions show here, and the panels of one robot show it too."""
+        """Select a robot, here and in all panels of one robot."""
         self.session.fleet.choose(name)
         link = self.session.fleet.link(name)
         if link is not None:
@@ -250,7 +250,7 @@ class RobotsPanel(OneRobotPanel):
         self._filter()
 
     def _made_for(self, link: RobotLink) -> bool:
-        """Whether the cards are this robot's: what was typed into them is kept then."""
+        # True: the typed input of the cards is kept.
         return self._cards_of == link.name
 
     def _drop_cards(self) -> None:
@@ -262,7 +262,7 @@ class RobotsPanel(OneRobotPanel):
         self._seen = {what: seen for what, seen in self._seen.items() if not what.startswith("card ")}
 
     def _offered(self, link: RobotLink) -> tuple[object, ...]:
-        """What the robot's properties offer to choose from now: another offer makes other forms."""
+        # A change of the offered values rebuilds the forms.
         named = {one.options_from for action in link.robot.actions for one in action.parameters}
         return tuple((name, tuple(self._options(name))) for name in sorted(filter(None, named)))
 
@@ -279,12 +279,12 @@ class RobotsPanel(OneRobotPanel):
                 card.show_tries(tuple(link.tried))
 
     def _options(self, name: str) -> Sequence[str]:
-        """What a property of the robot offers to choose from now."""
+        # Values offered by a property of the robot.
         link = self.session.fleet.link(self._robot)
         value = link.values.get(name) if link is not None else None
         if isinstance(value, (list, tuple)):
             self._told[self._robot, name] = [str(item) for item in value]
-        return self._told.get((self._robot, name), [])  # also while nobody looked and nothing came again yet
+        return self._told.get((self._robot, name), [])  # the last known values while the watch is suspended
 
     def _filter(self) -> None:
         words = self.finder.text().casefold().split()
@@ -296,17 +296,17 @@ class RobotsPanel(OneRobotPanel):
             shown += fits
         self.none.setVisible(bool(self.cards) and not shown)
 
-    # -- what a person does -------------------------------------------------------------------------------
+    # -- user actions -------------------------------------------------------------------------------------
 
     def attempt(self, action: str, given: Mapping[str, object]) -> None:
-        """Ask the robot to do it; what is wrong with the values stands below them."""
+        """Invoke an action; input errors are shown in its card."""
         card = self.cards[action]
         try:
             self.session.fleet.invoke(self._robot, action, given)
         except RobotInputError as error:
             card.show_problems(error.problems)
         except MayNotMoveError:
-            card.show_problems(())  # the question stands over the window
+            card.show_problems(())  # the confirmation is shown by the window
         except AppError as error:
             card.show_problems((InputProblem("", str(error)),))
         else:
@@ -331,7 +331,7 @@ class RobotsPanel(OneRobotPanel):
         self._fit()
 
     def _fit(self) -> None:
-        """Large text and narrow places: the actions first, then the list, then what is known of the robot."""
+        # When space is short, the description is hidden first, then the list.
         width = self.width() / self.theme.scaled(1.0)
         count = self.list.count
         wide = count > 1 or (count == 1 and width >= LIST_FROM_WIDTH)

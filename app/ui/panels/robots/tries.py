@@ -1,4 +1,4 @@
-"""Tries of an action: what became of one, in words, and the list of the last ones."""
+"""Tries of an action: description of their state, and the list of the latest ones."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ SHOWN = 5
 
 
 def field_words(fields: Sequence[DataField], told: Mapping[str, object]) -> str:
-    """The fields that a description names, with their values: "0.3 m to go", "moved 0.5 m"."""
+    """Describe the values of fields, such as "0.3 m to go, moved 0.5 m"."""
     parts = []
     for field in fields:
         value = told.get(field.name)
@@ -53,18 +53,18 @@ def field_words(fields: Sequence[DataField], told: Mapping[str, object]) -> str:
 
 
 def feedback_words(action: Action, feedback: Mapping[str, object]) -> str:
-    """What the robot says meanwhile: "0.3 m to go"; the fields that its description names."""
+    """Describe the feedback of a running action, such as "0.3 m to go"."""
     return field_words(action.feedback, feedback)
 
 
 def output_words(action: Action, output: Mapping[str, object]) -> str:
-    """What the robot answered; how long it took is said by the result itself."""
+    """Describe the output of an action without its duration, which the result contains."""
     told = [field for field in action.output if not is_unit(field.title, field.unit)]
     return field_words(told, output)
 
 
 def progress_of(action: Action, given: Mapping[str, object], feedback: Mapping[str, object]) -> float | None:
-    """How much is done, 0 to 1: what the robot calls progress, or what of the asked is done or left to do."""
+    """Return the progress from 0 to 1, as reported or derived from requested and remaining amounts."""
     for name in SHARES:
         share = _number(feedback.get(name))
         if share is not None:
@@ -90,7 +90,7 @@ def progress_of(action: Action, given: Mapping[str, object], feedback: Mapping[s
 
 
 def now_words(action: Action, made: Invocation, title_of: Callable[[str], str]) -> str:
-    """What a try that has not ended does now."""
+    """Describe the present state of a running try."""
     if made.state == "sent":
         return _("sent")
     if made.state == "accepted":
@@ -106,7 +106,7 @@ def now_words(action: Action, made: Invocation, title_of: Callable[[str], str]) 
 
 
 def left_words(made: Invocation) -> str:
-    """How long it may still take; empty when there is no limit."""
+    """Return the remaining time; "" without a limit."""
     left_s = made.left_s
     if left_s is None or not made.running:
         return ""
@@ -114,9 +114,9 @@ def left_words(made: Invocation) -> str:
 
 
 def end_words(made: Invocation, *, may_move: bool = False) -> tuple[str, str, str]:
-    """How a try ended: the words of its chip, the chip's status, and a sentence when there is one to say.
+    """Return text and status of the chip of an ended try, and a sentence or "".
 
-    ``may_move``: the robot is not proven to stand still, so nothing is called stopped.
+    With `may_move` the robot may still be moving, so the text doesn't say "stopped".
     """
     took = seconds_words(made.elapsed_s)
     if made.state == "succeeded":
@@ -142,7 +142,7 @@ def _within(share: float) -> float:
 
 
 class TryRow(PaintedButton):
-    """One try that has ended."""
+    """Row of an ended try."""
 
     def __init__(self, theme: Theme, action: Action, made: Invocation) -> None:
         super().__init__(theme)
@@ -188,7 +188,7 @@ class TryRow(PaintedButton):
 
 
 class TryList(QWidget):
-    """The newest tries of one action, the newest at the top."""
+    """List of the latest tries of one action, newest first."""
 
     chosen = Signal(dict)
 
@@ -203,7 +203,7 @@ class TryList(QWidget):
         self._column.setSpacing(0)
 
     def show_tries(self, tries: Sequence[Invocation]) -> None:
-        """Show the last of these that have ended."""
+        """Show the latest tries that have ended."""
         ended = [made for made in tries if made.action == self._action.name and not made.running][-SHOWN:]
         ids = tuple(made.id for made in ended)
         if ids == self._shown:

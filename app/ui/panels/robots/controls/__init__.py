@@ -1,4 +1,4 @@
-"""The controls of a form: one module for each kind of parameter; `chooser` takes the one that fits.
+"""Controls of a form, one module per kind of parameter; `chooser` selects the control.
 
-`base` is what each of them promises to the form.
+`base` has the interface used by the form.
 """

@@ -1,4 +1,4 @@
-"""An angle as a drawing that can be turned: where the robot looks now, and how far it will turn."""
+"""Dial for an angle of a robot."""
 
 from __future__ import annotations
 
@@ -18,10 +18,10 @@ WHEEL_NOTCH = 120
 
 
 class AngleDial(QWidget):
-    """Drag, wheel (with the focus), arrow keys, Page, Home and End turn it; a double click is the default.
+    """Dial for an angle: drag, wheel (with focus), arrow keys, Page, Home and End.
 
-    Seen from above: straight up is ahead, positive angles go to the left. An ``upright`` one is seen from the
-    robot's left side: ahead is to the left, positive angles go down.
+    A double click sets the default. Seen from above: up is forward, positive angles turn left. With `upright`
+    seen from the robot's left side: forward is left, positive angles point down.
     """
 
     changed = Signal(float)
@@ -52,11 +52,11 @@ class AngleDial(QWidget):
 
     @property
     def value(self) -> float:
-        """The angle now, in degrees."""
+        """Angle in degrees."""
         return self._value
 
     def set_value(self, value: float) -> None:
-        """Show an angle without telling."""
+        """Show an angle without emitting `changed`."""
         self._value = value
         self.setAccessibleDescription(f"{number(value)}°")
         self.update()
@@ -66,7 +66,7 @@ class AngleDial(QWidget):
         return QSize(side, side)
 
     def direction(self, angle_deg: float) -> QPointF:
-        """The unit vector on the screen in which an angle points."""
+        """Return the unit vector on the screen of an angle."""
         turned = math.radians(angle_deg)
         if self._upright:
             return QPointF(-math.cos(turned), math.sin(turned))
@@ -86,7 +86,7 @@ class AngleDial(QWidget):
             self.set_value(wanted)
             self.changed.emit(wanted)
 
-    # -- hands ------------------------------------------------------------------------------------
+    # -- input --------------------------------------------------------------------------------------------
 
     def mousePressEvent(self, event: QMouseEvent) -> None:
         if event.button() == Qt.MouseButton.LeftButton:
@@ -98,7 +98,7 @@ class AngleDial(QWidget):
             self._turn_to(self._angle_at(event.position()))
 
     def _turn_to(self, pointed: float) -> None:
-        """The angle of that direction which is nearest to the hand's last one: whole turns add up."""
+        # Takes the equivalent angle nearest to the last one, so that full turns accumulate.
         last = self._grip if self._grip is not None else self._value
         self._grip = pointed + 360.0 * round((last - pointed) / 360.0)
         self._grip = min(max(self._grip, self._minimum - 90.0), self._maximum + 90.0)
@@ -135,7 +135,7 @@ class AngleDial(QWidget):
         else:
             self._choose(self._value + by)
 
-    # -- the drawing ------------------------------------------------------------------------------
+    # -- painting -----------------------------------------------------------------------------------------
 
     def paintEvent(self, _event: QPaintEvent) -> None:
         theme, painter = self._theme, QPainter(self)
@@ -163,7 +163,7 @@ class AngleDial(QWidget):
         painter.end()
 
     def _paint_sector(self, painter: QPainter, disc: QRectF) -> None:
-        """From ahead to the angle, in the accent's tint; a whole turn and more fills the disc."""
+        # Sector from forward to the angle; the whole disc from 360°.
         tint = self._theme.colour("selected")
         painter.setPen(Qt.PenStyle.NoPen)
         painter.setBrush(tint)
@@ -172,7 +172,7 @@ class AngleDial(QWidget):
         if turn >= 360.0:
             painter.drawEllipse(inner)
             return
-        # Qt counts sixteenths of a degree, anticlockwise from three o'clock.
+        # Qt: 1/16 degree, counterclockwise from three o'clock
         start, sense = (180.0, 1.0) if self._upright else (90.0, 1.0)
         sweep = math.copysign(turn, self._value) * sense
         painter.drawPie(inner, round(start * 16), round(sweep * 16))

@@ -1,4 +1,4 @@
-"""What a form needs of one parameter's control, and what the controls share."""
+"""Interface of a parameter's control, and helpers shared by controls."""
 
 from __future__ import annotations
 
@@ -17,10 +17,16 @@ Tell = Callable[[], None]
 
 
 class Control:
-    """One parameter's control, made from functions.
+    """Control of one parameter, composed of functions.
 
-    ``sentence`` is what the control itself says about what was typed, empty when it is fine: then a form need
-    not say it again. ``finished`` is told when a person has left a field, ``changed`` with every change.
+    Args:
+        widget: Widget of the control.
+        value: Return the value.
+        show: Show a value.
+        changed: Connect a callback to every change.
+        finished: Connect a callback to the end of editing.
+        sentence: Return the control's own error message, "" if the value is valid.
+        close: Release resources.
     """
 
     def __init__(
@@ -40,38 +46,38 @@ class Control:
         self._finished, self._sentence, self._close = finished, sentence, close
 
     def value(self) -> object:
-        """The value as the robot wants it, or what was typed when it is none; None leaves it out."""
+        """Return the value, the typed text if it is invalid, or None to omit the parameter."""
         return self._value()
 
     def show_value(self, value: object) -> None:
-        """Show a value; one that does not fit changes nothing."""
+        """Show a value; invalid values are ignored."""
         self._show(value)
 
     def finished(self, tell: Tell) -> None:
-        """Call `tell` when a person has finished with the control for now."""
+        """Call `tell` when the person has finished editing."""
         if self._finished is not None:
             self._finished(tell)
 
     @property
     def sentence(self) -> str:
-        """What the control itself says about a wrong value."""
+        """Error message shown by the control itself, "" if the value is valid."""
         return "" if self._sentence is None else self._sentence()
 
     def close(self) -> None:
-        """The form goes: let go of what the control watches."""
+        """Release resources before the form is deleted."""
         if self._close is not None:
             self._close()
 
 
 def connect(signal: object, tell: Tell) -> None:
-    """Call `tell` with any signal, without what it carries."""
+    """Connect `tell` to a signal, ignoring its arguments."""
     signal.connect(lambda *_values: tell())  # type: ignore[attr-defined]  # any Qt signal
 
 
 def line_field(theme: Theme, parameter: Parameter) -> QLineEdit:
-    """A field of one line with our editing menu and the parameter's name.
+    """Return a line edit with context menu and accessible name.
 
-    It takes more than the parameter allows: what a person typed or pasted is kept, the check says why not.
+    It accepts any text, so that invalid input is kept and explained by validation.
     """
     field = QLineEdit()
     EditMenu(theme, field)
@@ -83,5 +89,5 @@ def line_field(theme: Theme, parameter: Parameter) -> QLineEdit:
 
 
 def sentence_case(words: str) -> str:
-    """The words with a capital at their beginning."""
+    """Return the text with a capital first letter."""
     return words[:1].upper() + words[1:]

@@ -1,4 +1,4 @@
-"""The control for one typed parameter of an action: slider, dial, segments, switch, swatches, field."""
+"""Selection of the control for a parameter of an action."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ SEGMENT_LETTERS = 44
 def control_for(
     theme: Theme, parameter: Parameter, options: Sequence[str] = (), pictures: Pictures | None = None
 ) -> Control:
-    """The control of a parameter; ``options`` are the words that the robot offers for it now."""
+    """Return the control of a parameter; `options` are values that the robot currently offers for it."""
     if parameter.choices or options:
         return _choice(theme, parameter, options)
     if parameter.kind in NUMBERS:
@@ -73,7 +73,7 @@ def _choice(theme: Theme, parameter: Parameter, options: Sequence[str]) -> Contr
 
 
 def _chosen(values: dict[str, object], key: str) -> object:
-    """The value behind a word; 0 is a value, no word is none."""
+    # 0 is a valid value; "" stands for none.
     return values.get(key, key) if key else None
 
 

@@ -1,4 +1,4 @@
-"""A colour: swatches with names, and any other one from a strip or by its number."""
+"""Controls of a colour: named swatches, a hue strip, and a hexadecimal field."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from app.ui.widgets.flow_layout import Flow
 from nep.i18n import _, lazy
 
 _HEX = re.compile(r"#?([0-9a-fA-F]{6})")
-# What a robot's lamps show, not how Studio looks: values of the action, so they are no tokens.
+# Colours of robots' LEDs, thus no theme tokens.
 LAMP_COLOURS: tuple[tuple[str, str], ...] = (
     ("#ffffff", lazy("white")),
     ("#3ab7ff", lazy("sky blue")),
@@ -55,7 +55,7 @@ class _Swatch(PaintedButton):
 
 
 class ColourSwatches(QWidget):
-    """Colours to choose from with the name of the chosen one beside them."""
+    """Swatches with the name of the selected colour."""
 
     changed = Signal(str)
 
@@ -87,11 +87,11 @@ class ColourSwatches(QWidget):
 
     @property
     def value(self) -> str:
-        """The chosen colour, ``#rrggbb``."""
+        """Selected colour as ``#rrggbb``."""
         return self._value
 
     def set_value(self, value: str) -> None:
-        """Show a colour without telling; text that is no colour changes nothing."""
+        """Show a colour without emitting `changed`; invalid text is ignored."""
         colour = QColor(value)
         if not colour.isValid():
             return
@@ -109,7 +109,7 @@ class ColourSwatches(QWidget):
 
 
 class HueStrip(QWidget):
-    """All hues from left to right, pale above and dark below; press, drag or arrow keys choose."""
+    """Strip of hues with lightness decreasing downwards; press, drag or use arrow keys."""
 
     changed = Signal(str)
 
@@ -128,7 +128,7 @@ class HueStrip(QWidget):
         return STRIP
 
     def show_colour(self, colour: QColor) -> None:
-        """Put the mark where this colour is, about."""
+        """Move the marker to the nearest colour of the strip."""
         if colour.hslHueF() >= 0:
             self._hue = colour.hslHueF()
         self._light = min(PALEST, max(DARKEST, colour.lightnessF()))
@@ -192,7 +192,7 @@ class HueStrip(QWidget):
 
 
 class ColourChoice(QWidget):
-    """Swatches; "Other" opens the strip and a field for its number, where a wrong one stays as typed."""
+    """Swatches with "Other" for the hue strip and a hexadecimal field; invalid text stays in the field."""
 
     changed = Signal()
     finished = Signal()
@@ -238,11 +238,11 @@ class ColourChoice(QWidget):
         self._wrong.hide()
 
     def value(self) -> str:
-        """The colour, ``#rrggbb``, or what was typed when it is none."""
+        """Return the colour as ``#rrggbb``, or the typed text if it is invalid."""
         return self.field.text() if self.sentence else self.swatches.value
 
     def set_value(self, value: object) -> None:
-        """Show a colour without telling; what is none changes nothing."""
+        """Show a colour without emitting `changed`; invalid values are ignored."""
         if isinstance(value, str) and _HEX.fullmatch(value):
             self.swatches.set_value(value)
             self._show_number()
@@ -289,7 +289,7 @@ class ColourChoice(QWidget):
 
 
 def colour_control(theme: Theme, parameter: Parameter) -> Control:
-    """The control of a colour."""
+    """Return the control of a colour parameter."""
     choice = ColourChoice(theme, parameter)
     return Control(
         choice,

@@ -1,4 +1,4 @@
-"""Numbers: a slider with its field between two limits, else a field alone; angles with a drawing."""
+"""Controls of numbers: slider with field for a limited range, else a field; angles have a dial as well."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ PAGE_STEPS = 10
 
 
 def number_control(theme: Theme, parameter: Parameter) -> Control:
-    """The control of a number, a whole number or an angle."""
+    """Return the control of a number, integer or angle."""
     low, high = parameter.minimum, parameter.maximum
     if low is None or high is None or high <= low:
         return _open_number(theme, parameter)
@@ -61,7 +61,7 @@ def number_control(theme: Theme, parameter: Parameter) -> Control:
 
 
 def _value_of(slider: SliderWithUnit, parameter: Parameter) -> object:
-    """What the slider says, or what was typed beside it, also when that is wrong."""
+    # The typed text if it differs from the slider, even if it is invalid.
     whole = parameter.kind == "integer"
     typed = slider.field.text()
     if typed != slider.field.written(slider.value):
@@ -70,7 +70,7 @@ def _value_of(slider: SliderWithUnit, parameter: Parameter) -> object:
 
 
 def step_of(parameter: Parameter) -> float:
-    """The step of its description, else one that suits its range."""
+    """Return the step of the description, else one that suits the range."""
     if parameter.step is not None and parameter.step > 0:
         return parameter.step
     span = (parameter.maximum or 0.0) - (parameter.minimum or 0.0)
@@ -80,13 +80,13 @@ def step_of(parameter: Parameter) -> float:
 
 
 def read_number(typed: str, *, whole: bool) -> object:
-    """Return the number that was typed, None for nothing, or the text itself when it is no number."""
+    """Parse a typed number; return None for empty text and the text itself if it is invalid."""
     if not typed.strip():
         return None
     try:
         number = parse_number(typed)
     except ValueError:
-        return typed  # the check of the action says what is wrong with it
+        return typed  # validation of the action explains the error
     return int(number) if whole and number.is_integer() else number
 
 
@@ -122,7 +122,7 @@ def _beside(dial: AngleDial, slider: SliderWithUnit, name: str) -> QWidget:
 
 
 class OpenNumber(NumberEdit):
-    """A number without limits on both sides: arrow keys step, Page by ten; empty is allowed."""
+    """Field of a number without limits: arrow keys step, Page steps by ten; may be empty."""
 
     def __init__(self, theme: Theme, parameter: Parameter) -> None:
         self._parameter = parameter

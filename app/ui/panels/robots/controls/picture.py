@@ -1,7 +1,7 @@
-"""A picture for a robot: a file, the newest picture of a topic, or an address; its thumbnail beside it.
+"""Control of an image: a file, the newest image of a topic, or an address, with a thumbnail.
 
-An address that was typed is sent as it is, a picture as `app.ui.panels.robots.controls.picture_file.encoded`
-makes it.
+Typed addresses are sent unchanged, images in the encoding of
+`app.ui.panels.robots.controls.picture_file.encoded`.
 """
 
 from __future__ import annotations
@@ -36,35 +36,35 @@ THUMBNAIL = QSize(72, 54)
 
 
 class Pictures(Protocol):
-    """Where pictures come from: the topics of the session."""
+    """Source of images: topics of the session and files."""
 
     def topics(self) -> Sequence[str]:
-        """The picture topics that there are now."""
+        """Return the names of available image topics."""
 
     def stream(self, topic: str) -> ImageStream:
-        """Look at one until it is closed."""
+        """Subscribe to a topic's images until the stream is closed."""
 
     def ask_file(self, folder: str, take: Callable[[Path], None]) -> None:
-        """Ask a person for a picture file; "" for the folder where this computer keeps pictures."""
+        """Ask for an image file; an empty `folder` stands for the user's pictures folder."""
 
 
 class NoPictures:
-    """No session, no topics, nobody to ask."""
+    """Source without topics and files."""
 
     def topics(self) -> Sequence[str]:
-        """None."""
+        """Return no topics."""
         return ()
 
     def stream(self, topic: str) -> ImageStream:
-        """There is none to look at: KeyError."""
+        """Raise KeyError."""
         raise KeyError(topic)
 
     def ask_file(self, folder: str, take: Callable[[Path], None]) -> None:
-        """Nobody is asked."""
+        """Do nothing."""
 
 
 class Thumbnail(QWidget):
-    """A small picture, or an icon while there is none."""
+    """Thumbnail of an image, or an icon."""
 
     def __init__(self, theme: Theme) -> None:
         super().__init__()
@@ -75,11 +75,11 @@ class Thumbnail(QWidget):
 
     @property
     def image(self) -> QImage | None:
-        """What it shows."""
+        """Displayed image, or None."""
         return self._image
 
     def show_image(self, image: QImage | None) -> None:
-        """Show another picture, or none."""
+        """Show an image, or the icon."""
         self._image = image
         self.update()
 
@@ -109,7 +109,7 @@ class Thumbnail(QWidget):
 
 
 class PictureChoice(QWidget):
-    """Thumbnail, name or address, and the buttons for a file and for a camera; files can be dropped on it."""
+    """Thumbnail, file name or address, buttons for file and camera; accepts dropped files."""
 
     changed = Signal()
 
@@ -152,20 +152,20 @@ class PictureChoice(QWidget):
         column.addLayout(row)
         column.addWidget(self._wrong)
 
-    # -- what it gives ------------------------------------------------------------------------------------
+    # -- value --------------------------------------------------------------------------------------------
 
     def value(self) -> str | None:
-        """The picture as the robot wants it, or the address that was typed; None while there is none."""
+        """Return the encoded image or the typed address; None without an image."""
         if self._stream is not None:
             self._look()
             if self._stream.awaits_picture:
-                return None  # the last picture may be from before its panel was hidden
+                return None  # the last image may predate the suspension of the stream
         if self._image is not None:
             return encoded(self._image, bare=self._parameter.bare)
         return None if self._stream is not None else self.field.text().strip() or None
 
     def set_value(self, value: object) -> None:
-        """Show an address or a file."""
+        """Show an address or file."""
         self.close_stream()
         self._show_none()
         text = "" if value is None else str(value)
@@ -177,17 +177,17 @@ class PictureChoice(QWidget):
             self._typed(text)
             self.field.setText(text)
 
-    # -- a file -------------------------------------------------------------------------------------------
+    # -- file ---------------------------------------------------------------------------------------------
 
     def _ask(self) -> None:
         self._pictures.ask_file(str(self._file.parent) if self._file is not None else "", self._take_file)
 
     def _take_file(self, path: Path) -> None:
-        if isValid(self):  # the form may have gone while the person chose
+        if isValid(self):  # the form may have been deleted while the dialog was open
             self.use_file(path)
 
     def use_file(self, path: Path) -> None:
-        """Take a picture file; one that can't be read is named and says why."""
+        """Load an image file; an error is shown with its reason."""
         self.close_stream()
         self._file = path
         self._image, said = read_picture(path)
@@ -218,7 +218,7 @@ class PictureChoice(QWidget):
             self.use_file(Path(files[0]))
             event.acceptProposedAction()
 
-    # -- a camera -----------------------------------------------------------------------------------------
+    # -- camera -------------------------------------------------------------------------------------------
 
     def _offer(self) -> None:
         menu = Menu(self._theme, self)
@@ -233,7 +233,7 @@ class PictureChoice(QWidget):
         drop_below(menu, self.camera)
 
     def use_topic(self, topic: str) -> None:
-        """Show a topic's pictures; the newest one at the moment of Try is sent."""
+        """Show the images of a topic; Try sends the newest one."""
         self.close_stream()
         self._show_none()
         self._stream = self._pictures.stream(topic)
@@ -256,7 +256,7 @@ class PictureChoice(QWidget):
         self._judge(f"{stream.error}." if stream.error else "")
 
     def close_stream(self) -> None:
-        """Look at no topic any more."""
+        """Close the stream of the topic, if any."""
         self._timer.stop()
         if self._stream is not None:
             self._stream.close()
@@ -275,7 +275,7 @@ class PictureChoice(QWidget):
 
 
 def _image_in(address: str) -> QImage | None:
-    """The picture that stands in a ``data:`` address; None when none can be read."""
+    # From a ``data:`` URL.
     try:
         return image_of(base64.b64decode(address.partition(",")[2]))
     except (ValueError, DecodeError):
@@ -283,7 +283,7 @@ def _image_in(address: str) -> QImage | None:
 
 
 def picture_control(theme: Theme, parameter: Parameter, pictures: Pictures) -> Control:
-    """The control of a picture."""
+    """Return the control of an image parameter."""
     choice = PictureChoice(theme, parameter, pictures)
     show: Callable[[object], None] = choice.set_value
     show(parameter.default)

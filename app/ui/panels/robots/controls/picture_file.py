@@ -1,10 +1,9 @@
-"""A picture file as it is sent to a robot: read with care, and made small enough.
+"""Loading and encoding of image files for robots.
 
-What Qt may decode is decided by `nep.messages.image_files`, as for every other picture: by the bytes, JPEG
-or PNG.
+`nep.messages.image_files` decides by the content which files Qt may decode (JPEG and PNG).
 
-It is sent as NEP's pictures in JSON are: ``data:image/jpeg;base64,…``, or the bare base64 text where the
-description asks for that (``contentEncoding`` and no ``format``).
+Images are sent as in NEP's JSON messages: ``data:image/jpeg;base64,…``, or plain base64 where the description
+asks for it (``contentEncoding`` without ``format``).
 """
 
 from __future__ import annotations
@@ -24,7 +23,7 @@ MOST_FILE_BYTES = 40_000_000
 
 
 def read_picture(path: Path) -> tuple[QImage | None, str]:
-    """A picture file, turned as its camera says, or the sentence that says why it can't be used."""
+    """Load an image file with its EXIF orientation; return it, or None and the reason as a sentence."""
     try:
         if not path.is_file() and path.exists():
             return None, _("“{file}” is not a file.").format(file=path.name)
@@ -43,9 +42,14 @@ def read_picture(path: Path) -> tuple[QImage | None, str]:
 
 
 def image_of(data: bytes) -> QImage:
-    """The picture in a file's bytes, upright and no larger than Qt may hold. Raises DecodeError."""
+    """Decode an image within the allocation limit, upright.
+
+    Raises:
+        DecodeError: The data is not a supported image.
+    """
     file = examine(data)
-    QImageReader.setAllocationLimit(MOST_BYTES // 1_000_000)  # else 256 MB, less than we have let through
+    # Qt's default of 256 MB is less than the limit checked before
+    QImageReader.setAllocationLimit(MOST_BYTES // 1_000_000)
     buffer = QBuffer()
     buffer.setData(bytes(file.data))
     buffer.open(QIODevice.OpenModeFlag.ReadOnly)
@@ -58,7 +62,7 @@ def image_of(data: bytes) -> QImage:
 
 
 def upright(image: QImage, file: ImageFile) -> QImage:
-    """The picture turned as the file's orientation says, which Qt reads from a JPEG alone."""
+    """Apply the EXIF orientation, which Qt reads from JPEG only."""
     if file.orientation >= 5:
         image = image.transformed(QTransform(0, 1, 1, 0, 0, 0))
     if file.orientation in (2, 3, 6, 7):
@@ -67,7 +71,7 @@ def upright(image: QImage, file: ImageFile) -> QImage:
 
 
 def encoded(image: QImage, *, bare: bool = False) -> str:
-    """A picture as JPEG in text, at most 1280 pixels at its longer side."""
+    """Return an image as base64 JPEG, scaled to at most 1280 px on its longer side."""
     if max(image.width(), image.height()) > LONGEST_SIDE:
         keep, smooth = Qt.AspectRatioMode.KeepAspectRatio, Qt.TransformationMode.SmoothTransformation
         image = image.scaled(LONGEST_SIDE, LONGEST_SIDE, keep, smooth)

@@ -1,4 +1,4 @@
-"""Texts and lists of words."""
+"""Controls of texts and lists."""
 
 from __future__ import annotations
 
@@ -12,13 +12,13 @@ from app.ui.widgets.inputs.fields import LongText
 from nep.i18n import _
 
 LONG_FROM = 200
-"""A text that may have as many characters gets several lines."""
+"""Maximum length from which a text gets several lines."""
 
 
 def text_control(theme: Theme, parameter: Parameter) -> Control:
-    """One line, or several for a text that may be long; a list is words with commas between them.
+    """Return a field of one or several lines; lists are typed with commas.
 
-    An object, and a list of lists or objects, is written as JSON.
+    Objects, and lists of lists or objects, are typed as JSON.
     """
     if parameter.kind in ("list", "object"):
         return _list(theme, parameter)
@@ -71,7 +71,7 @@ def _list(theme: Theme, parameter: Parameter) -> Control:
 
 
 def _given(parameter: Parameter, text: str) -> str | None:
-    """What is left empty is left out, unless the robot must have it: then the check says so."""
+    # Empty text omits an optional parameter; for a required one validation reports it.
     return text if text or parameter.required else None
 
 
