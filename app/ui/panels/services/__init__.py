@@ -1,6 +1,6 @@
-"""Services: those of the live network, a form for the chosen one, its answer, and what was called before.
+"""Services panel: services of the live network, request form, reply, and earlier calls.
 
-`service_list` has the list of them, `request_form` makes fields of a request, `answer` shows what came back.
+`service_list` has the list, `request_form` the fields of a request, `answer` the reply.
 """
 
 from app.ui.panels.services.panel import PANEL as PANEL

@@ -1,4 +1,4 @@
-"""What a service answered: field by field, or as JSON; or why there is none."""
+"""Reply of a service as table or JSON, or the reason why there is none."""
 
 from __future__ import annotations
 
@@ -27,12 +27,13 @@ MOST_ROWS = 500
 DEEPEST = 12
 TEXT_LETTERS = 200
 INDENT_PX = 14
-LEAST_PX, BESIDE_PX = 200, 420  # at 100 % text: of the whole, and with its head in one row
+# px at 100 % text size: minimum width, and width from which the header is one row
+LEAST_PX, BESIDE_PX = 200, 420
 
 
 @dataclass(frozen=True, slots=True)
 class AnswerRow:
-    """One value of an answer: where it is, how deep, its name, and itself in words ("{2}" has two parts)."""
+    """Row of a reply: path, depth, name and text (such as "{2}" for an object with two fields)."""
 
     path: str
     depth: int
@@ -41,7 +42,7 @@ class AnswerRow:
 
 
 def answer_rows(answer: object) -> list[AnswerRow]:
-    """An answer as rows, those of a part below it; at most 500."""
+    """Return a reply as rows, children below their parents; at most `MOST_ROWS`."""
     found: list[AnswerRow] = []
     for row in (
         _rows("", 0, "", answer) if _has_parts(answer) else [AnswerRow("", 0, _("reply"), _words(answer))]
@@ -79,7 +80,7 @@ def _words(value: object) -> str:
 
 
 def took_cell(record: CallRecord) -> Cell:
-    """How a call ended, in the table of calls."""
+    """Return state and duration of a call."""
     match record.state:
         case "waiting":
             return Cell(_("waiting"), "circle-dashed", "textSecondary")
@@ -92,13 +93,13 @@ def took_cell(record: CallRecord) -> Cell:
 
 
 def clock_of(record: CallRecord) -> str:
-    """When it was called: "8:41:50"."""
+    """Return the time of a call, such as "8:41:50"."""
     then = dt.datetime.fromtimestamp(record.at_s, tz=dt.timezone.utc).astimezone()
     return then.strftime("%H:%M:%S").lstrip("0")
 
 
 class AnswerView(QWidget):
-    """Shows one call: the newest of the chosen service, or the one that was chosen among the older ones."""
+    """View of one call: the latest of the selected service, or an earlier one selected in the table."""
 
     def __init__(self, theme: Theme, toast: ShowToast) -> None:
         super().__init__()
@@ -142,7 +143,7 @@ class AnswerView(QWidget):
         self.show_record(None)
 
     def _make_head(self) -> QBoxLayout:
-        """Its title and how the call ended, beside or in a narrow panel above how the answer is shown."""
+        # In a narrow panel the header wraps into two rows.
         ended, shown = QHBoxLayout(), QHBoxLayout()
         for row in (ended, shown):
             row.setSpacing(8)
@@ -160,7 +161,7 @@ class AnswerView(QWidget):
         return self._head
 
     def minimumSizeHint(self) -> QSize:
-        """What is wider than the panel would be cut off with the values of the answer."""
+        # A wider minimum would clip the values of the reply.
         return QSize(round(self._theme.scaled(LEAST_PX)), super().minimumSizeHint().height())
 
     def resizeEvent(self, event: QResizeEvent) -> None:
@@ -171,7 +172,7 @@ class AnswerView(QWidget):
             self._head.setDirection(way)
 
     def show_record(self, record: CallRecord | None, waited_s: float = 0.0) -> None:
-        """Show this call, or none."""
+        """Show a call, or None."""
         if record is not None and record.state == "waiting":
             self.chip.set(_("waiting {time}").format(time=seconds_words(waited_s)), "info", "circle-dashed")
         if record == self.record and record is not None:

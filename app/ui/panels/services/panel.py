@@ -1,4 +1,4 @@
-"""Services: what can be called, the request, the answer, and the calls before."""
+"""Services panel: list of services, request, reply and earlier calls."""
 
 from __future__ import annotations
 
@@ -47,7 +47,7 @@ EMPTY_REQUEST = "{}"
 
 
 class ServicesPanel(PanelWidget):
-    """The list at the left, or above where there is little room; the chosen service beside it."""
+    """Panel with the list at the left (at the top in a narrow panel) and the selected service."""
 
     def __init__(self, context: PanelContext) -> None:
         super().__init__(context, _("Services"))
@@ -188,10 +188,10 @@ class ServicesPanel(PanelWidget):
         ):
             scroll.column.insertWidget(place, widget)
             scroll.column.setStretch(place, stretch)
-        scroll.column.setStretch(scroll.column.count() - 1, 0)  # nothing is left for its end
+        scroll.column.setStretch(scroll.column.count() - 1, 0)  # the reply takes all remaining height
         return scroll
 
-    # -- what it shows ------------------------------------------------------------------------------------
+    # -- display ------------------------------------------------------------------------------------------
 
     def refresh(self) -> None:
         self.strip.refresh()
@@ -223,7 +223,7 @@ class ServicesPanel(PanelWidget):
             or all(word in f"{each.name} {each.said}".casefold() for word in words)
         ]
         chosen = self._wanted or self.list.chosen_key() or self._shown
-        self.list.model().set_rows(rows)  # type: ignore[attr-defined]  # it is a TableModel
+        self.list.model().set_rows(rows)  # type: ignore[attr-defined]  # always a TableModel
         names = [each.name for each in rows]
         if names:
             wanted = chosen if chosen in names else names[0]
@@ -251,7 +251,7 @@ class ServicesPanel(PanelWidget):
 
     @property
     def service(self) -> str:
-        """The chosen one."""
+        """Name of the selected service, or ""."""
         return self.list.chosen_key() or ""
 
     def _show_chosen(self) -> None:
@@ -274,11 +274,11 @@ class ServicesPanel(PanelWidget):
 
     @property
     def text(self) -> str:
-        """The request, as JSON."""
+        """Request as JSON text."""
         return self._texts.get(self._shown, EMPTY_REQUEST)
 
     def _put_text(self, text: str) -> None:
-        """The request is another: both ways show it."""
+        # Updates both form and JSON editor.
         self._texts[self._shown] = text
         self._is_showing = True
         self.edit.set_text(text)
@@ -305,7 +305,7 @@ class ServicesPanel(PanelWidget):
         return read_json(self.text)
 
     def _problem(self) -> str:
-        """Why the request can't be sent though it is JSON."""
+        # Reason why valid JSON can't be sent.
         if self.way.value == "form" and self.form.problems:
             return next(iter(self.form.problems.values()))
         read = self._read()
@@ -336,10 +336,10 @@ class ServicesPanel(PanelWidget):
             (each for each in records if str(each.number) == chosen), records[-1] if records else None
         )
 
-    # -- what a person does -------------------------------------------------------------------------------
+    # -- user actions -------------------------------------------------------------------------------------
 
     def begin(self, service: str) -> None:
-        """Show this service, to be called."""
+        """Select a service and focus the Call button."""
         self._wanted = service
         self.filter.clear()
         self._rebuild()
@@ -347,7 +347,7 @@ class ServicesPanel(PanelWidget):
 
     def _turn(self, way: str) -> None:
         if way == "form" and not self._fits_a_form():
-            way = "json"  # what stands there has no fields
+            way = "json"  # the request can't be shown as fields
         self.way.set_value(way)
         self.requests.setCurrentIndex(1 if way == "json" else 0)
         self._judge()
@@ -370,7 +370,7 @@ class ServicesPanel(PanelWidget):
             self.edit.replace(fault.fix.start, fault.fix.end, fault.fix.text)
 
     def call(self) -> None:
-        """Call the chosen service."""
+        """Call the selected service."""
         if not self.call_button.isEnabled():
             return
         self.calls.clearSelection()
@@ -397,7 +397,7 @@ class ServicesPanel(PanelWidget):
         menu.popup(at)
 
     def service_menu(self, service: str) -> list[RowAction]:
-        """What can be done with a service of the list."""
+        """Return the actions of a service."""
         return [RowAction(_("Call"), "play", self.call), copies(self.context, service)]
 
     def _show_call_menu(self, key: str, at: QPoint) -> None:
@@ -416,7 +416,7 @@ class ServicesPanel(PanelWidget):
         QGuiApplication.clipboard().setText(text)
         self.context.toast(_("Copied the request"))
 
-    # -- what every panel has -----------------------------------------------------------------------------
+    # -- overrides ----------------------------------------------------------------------------------------
 
     def more_actions(self) -> Sequence[QAction]:
         self._clear.setEnabled(bool(self.acting.calls.records))
@@ -443,7 +443,7 @@ class ServicesPanel(PanelWidget):
 
 
 def _request_cell(record: CallRecord) -> Cell:
-    """The request in one line: "name Aiko, pictures 12"."""
+    # One line, such as "name Aiko, pictures 12".
     try:
         asked = read_json(record.request).filled({})
     except NepError:

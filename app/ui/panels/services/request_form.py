@@ -1,4 +1,4 @@
-"""A request as fields: made from the request that is there, one row for each of its names."""
+"""Form of a service request, generated from the keys and values of the current request."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ NEEDS = {
 
 
 def kind_of(value: object) -> str:
-    """What a field takes: "bool", "int", "float", "str", or any "json"."""
+    """Return the kind of a value: "bool", "int", "float", "str" or "json"."""
     if isinstance(value, bool):
         return "bool"
     if isinstance(value, (int, float)):
@@ -37,7 +37,7 @@ def kind_of(value: object) -> str:
 
 
 class RequestForm(QWidget):
-    """Fields for a map. `typed` tells the request that a person made of it."""
+    """One field per key of the request; `typed` has the edited request."""
 
     typed = Signal(object)  # a dict
 
@@ -48,7 +48,7 @@ class RequestForm(QWidget):
         self._kinds: dict[str, str] = {}
         self.fields: dict[str, QLineEdit | Switch] = {}
         self.problems: dict[str, str] = {}
-        """By name why what stands in a field can't be taken."""
+        """Error messages by field name."""
         self.nothing = label("", "small", role="textSecondary", wrap=True)
         self.nothing.setMinimumWidth(0)
         self._grid = QGridLayout()
@@ -65,11 +65,11 @@ class RequestForm(QWidget):
         column.addStretch(1)
 
     def forget(self) -> None:
-        """What comes next is the request of another service."""
+        """Discard the field kinds before the request of another service is shown."""
         self._kinds, self._request = {}, {}
 
     def show_request(self, request: object) -> None:
-        """Show these values; what is no map has no fields."""
+        """Show a request; only objects have fields."""
         given = dict(request) if isinstance(request, Mapping) else {}
         if given == self._request and self._kinds and not self.problems:
             return
@@ -90,7 +90,7 @@ class RequestForm(QWidget):
         self.nothing.setVisible(not given or len(given) > MOST_FIELDS)
 
     def _kind(self, name: str, value: object) -> str:
-        """What a field takes: one for decimals stays one when a whole number is typed, one for JSON too."""
+        # A float field stays one when an integer is typed, and a JSON field stays one for any value.
         kind, before = kind_of(value), self._kinds.get(name)
         return before if (before is not None and (before, kind) in WIDER) or before == "json" else kind
 
@@ -101,7 +101,7 @@ class RequestForm(QWidget):
             field.setChecked(value is True)
             return
         words = value if isinstance(value, str) and kind == "str" else json.dumps(value, ensure_ascii=False)
-        # 12 and 12.0 are one number to who types it
+        # don't replace "12" by "12.0" while the person types
         if field.text() != words and not (field.hasFocus() and self._meant(name, field.text()) == (value,)):
             field.setText(words)
         self._mark(field, wrong=False)
@@ -150,13 +150,13 @@ class RequestForm(QWidget):
             self._put(name, meant[0])
 
     def _meant(self, name: str, text: str) -> tuple[object] | None:
-        """What a text means for a field; None when it can't be that."""
+        # A tuple with the value; None if the text is invalid.
         kind = self._kinds[name]
         if kind == "str":
             return (text,)
         value = value_typed(text)
         if isinstance(value, str) and value == text:
-            return None  # no JSON
+            return None  # invalid JSON
         if kind == "json":
             return (value,)
         is_number = isinstance(value, (int, float)) and not isinstance(value, bool)

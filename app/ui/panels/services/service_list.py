@@ -1,4 +1,4 @@
-"""The services that somebody offers, with who does."""
+"""List of available services with the nodes that offer them."""
 
 from __future__ import annotations
 
@@ -20,19 +20,19 @@ from nep.protocol.service_wire import SURVEY
 
 @dataclass(frozen=True, slots=True)
 class OfferedService:
-    """A service and the names of the nodes that offer it, the one that is called first."""
+    """Service with the names of its servers; the first one receives the calls."""
 
     name: str
     nodes: tuple[str, ...]
 
     @property
     def said(self) -> str:
-        """Who offers it: "of face_tracker"."""
+        """Text of the servers, such as "face_tracker"."""
         return listed(list(self.nodes))
 
 
 def offered(view: GraphView | None) -> list[OfferedService]:
-    """By name, but for what nep itself makes (parameters) and surveys, which have many answers."""
+    """Return services sorted by name, without parameter services and surveys."""
     if view is None:
         return []
     found = []
@@ -44,7 +44,7 @@ def offered(view: GraphView | None) -> list[OfferedService]:
 
 
 def count_words(services: Sequence[OfferedService]) -> str:
-    """How many there are: "6 services of 3 nodes"."""
+    """Return a summary, such as "6 services of 3 nodes"."""
     if not services:
         return ""
     nodes = len({name for each in services for name in each.nodes})
@@ -54,7 +54,10 @@ def count_words(services: Sequence[OfferedService]) -> str:
 
 
 class ServiceList(TableView[OfferedService]):
-    """A click chooses. `chosen` tells the name, also when arrows lead there; Ctrl+Enter calls."""
+    """List of services; a click selects, Ctrl+Enter calls.
+
+    `chosen` has the name, also on keyboard selection.
+    """
 
     chosen = Signal(str)
     call_wanted = Signal()
@@ -79,11 +82,12 @@ class ServiceList(TableView[OfferedService]):
         self.fit_rows()
 
     def fit_rows(self) -> None:
-        """Rows grow with the text."""
+        """Scale the row height with the text size."""
         self.set_row_height(round(self.theme.scaled(ROW_PX)), large=False)
 
     def _open(self, index: QModelIndex) -> None:
-        """A click only chooses."""
+        # A click only selects.
+        ...
 
     def _tell_chosen(self) -> None:
         self.chosen.emit(self.chosen_key() or "")
