@@ -1,6 +1,6 @@
-"""Timeline: where in an open recording one is, what is in it, and how it is played.
+"""Timeline panel: contents of an open recording and control of its replay.
 
-`transport` is the row with the buttons, `canvas` the ruler and the lanes.
+`transport` is the row of controls, `canvas` has the ruler and lanes.
 """
 
 from __future__ import annotations

@@ -1,6 +1,6 @@
-"""The ruler and the lanes of a recording: what happened, and for each topic how much came and was lost.
+"""Ruler and lanes of a recording: events, and message density and losses of each topic.
 
-The lanes are painted once into a picture; while it plays only the playhead moves over that.
+The lanes are cached in a pixmap; during replay only the playhead is repainted.
 """
 
 from __future__ import annotations
@@ -45,7 +45,7 @@ RULER, MARKS, ROW = 26, 24, 22
 DENSITY, TICK = 10, 2
 FAINT, FULL = 0.14, 0.76
 RARE = 8
-"""Where fewer than one of so many pixels has messages they are ticks."""
+"""Average px per message above which messages are drawn as ticks."""
 MARK_PX = 78
 MOST_BUCKETS = 4000
 GRIP = 6
@@ -55,10 +55,10 @@ WHEEL = 1.0015
 
 
 class TimelineCanvas(QAbstractScrollArea):
-    """One replay's time. `chosen` names a topic that was pressed, `opened` one that was pressed twice.
+    """Timeline of one replay.
 
-    `rename_wanted` tells a bookmark that was pressed twice, `menu_wanted` one whose menu is asked for, and
-    the place on the screen.
+    Signals: `chosen` (topic clicked), `opened` (topic double-clicked), `rename_wanted` (bookmark
+    double-clicked), `menu_wanted` (bookmark and screen position of a context menu).
     """
 
     chosen = Signal(str)
@@ -76,7 +76,7 @@ class TimelineCanvas(QAbstractScrollArea):
         self._lanes: QPixmap | None = None
         self._marks: list[LaneMark] = []
         self.field: RenameField | None = None
-        self._held = ""  # what the mouse moves: "playhead", "start", "end"
+        self._held = ""  # dragged part: "playhead", "start" or "end"
         self._position_ns = 0
         self._loop: tuple[int, int] | None = None
         self._follows = True
@@ -88,10 +88,10 @@ class TimelineCanvas(QAbstractScrollArea):
         self.viewport().setMouseTracking(True)
         theme.changed.connect(self._restyle)
 
-    # -- what it shows ---------------------------------------------------------------------------------------
+    # -- display ------------------------------------------------------------------------------------------
 
     def show_replay(self, replay: Replay | None) -> None:
-        """Show another recording, all of it."""
+        """Show another recording completely; None for none."""
         if self.field is not None:
             self.field.leave()
         self._replay = replay
@@ -102,7 +102,7 @@ class TimelineCanvas(QAbstractScrollArea):
         self.fit()
 
     def move_to(self, position_ns: int, loop: tuple[int, int] | None) -> None:
-        """The playhead is there now; where it left what is shown, that follows."""
+        """Move the playhead; the view follows unless the person scrolled away from it."""
         if (position_ns, loop) == (self._position_ns, self._loop):
             return
         self._position_ns, self._loop = position_ns, loop
@@ -111,45 +111,45 @@ class TimelineCanvas(QAbstractScrollArea):
         self.viewport().update()
 
     def set_scale(self, scale: TimeScale) -> None:
-        """Show another part."""
+        """Show another time range."""
         if scale != self.scale:
             self.scale = scale
             self.renew()
 
     def zoom(self, factor: float, at_ns: int | None = None) -> None:
-        """More time, or less, around a time, or the playhead."""
+        """Scale the time range by `factor` around a time, by default the playhead."""
         if self.scale is not None:
             self.set_scale(self.scale.zoomed(factor, self._position_ns if at_ns is None else at_ns))
 
     def show_all(self) -> None:
-        """Show all of it."""
+        """Show the whole recording."""
         if self.scale is not None:
             self.set_scale(TimeScale.whole(self.scale.first_ns, self.scale.last_ns))
 
     def renew(self) -> None:
-        """Paint the lanes anew; what they need is asked for."""
+        """Repaint the lanes and request their figures."""
         self._lanes = None
         self.want()
         self.viewport().update()
 
     def want(self) -> None:
-        """Ask for the figures of the part that is shown."""
+        """Request the figures of the visible range from the background thread."""
         replay, scale = self._replay, self.scale
         if replay is not None and replay.densities is not None and scale is not None:
             buckets = max(1, min(MOST_BUCKETS, round(self._plot().width())))
             replay.densities.want(scale.begin_ns, scale.end_ns + 1, buckets)
 
-    # -- where things are ------------------------------------------------------------------------------------
+    # -- geometry -----------------------------------------------------------------------------------------
 
     def _row(self) -> float:
         return max(float(ROW), self._theme.scaled(ROW))
 
     def _top(self) -> float:
-        """Where the lanes of topics begin."""
+        # Top of the topic lanes.
         return self._theme.scaled(RULER) + self._theme.scaled(MARKS) * len(shown_lanes(self._replay))
 
     def _plot(self) -> QRectF:
-        """Where time is, below and including the ruler."""
+        # Area of the time axis, including the ruler.
         view = self.viewport()
         narrow = view.width() < self._theme.scaled(NARROW)
         left = self._theme.scaled(NARROW_NAMES if narrow else NAMES)
@@ -157,11 +157,11 @@ class TimelineCanvas(QAbstractScrollArea):
         return QRectF(left, 0, max(20.0, view.width() - left - right), view.height())
 
     def x_of(self, at_ns: int) -> float:
-        """Where a time is."""
+        """Return the x coordinate of a time."""
         return self._places(self._plot())(at_ns)
 
     def _places(self, plot: QRectF) -> Callable[[int], float]:
-        """Tells where times are: thousands are asked for each picture of the lanes."""
+        # Returned as a closure for speed: each rendering maps thousands of times.
         scale, left, wide = self.scale, plot.left(), plot.width()
         if scale is None:
             return lambda _at_ns: left
@@ -169,19 +169,19 @@ class TimelineCanvas(QAbstractScrollArea):
         return lambda at_ns: left + max(-1.0, min(2.0, share(at_ns))) * wide
 
     def time_at(self, x: float) -> int:
-        """The time there."""
+        """Return the time at an x coordinate."""
         plot = self._plot()
         return self.scale.time((x - plot.left()) / plot.width()) if self.scale is not None else 0
 
     def topic_at(self, y: float) -> str:
-        """The topic whose lane is there; "" where there is none."""
+        """Return the topic of the lane at a y coordinate, or ""."""
         if y < self._top():
             return ""
         place = int((y - self._top() + self.verticalScrollBar().value()) / self._row())
         return self._topics[place] if 0 <= place < len(self._topics) else ""
 
     def show_topic(self, topic: str) -> None:
-        """Scroll to a topic's lane."""
+        """Scroll to the lane of a topic."""
         if topic in self._topics:
             top, bar = round(self._topics.index(topic) * self._row()), self.verticalScrollBar()
             if not bar.value() <= top <= bar.value() + bar.pageStep() - self._row():
@@ -189,7 +189,7 @@ class TimelineCanvas(QAbstractScrollArea):
         self.renew()
 
     def fit(self) -> None:
-        """Make room for what there is now, and paint it."""
+        """Update the scroll range and repaint."""
         bar, room = self.verticalScrollBar(), self.viewport().height() - self._top()
         bar.setRange(0, max(0, round(len(self._topics) * self._row() - room)))
         bar.setPageStep(max(1, round(room)))
@@ -209,7 +209,7 @@ class TimelineCanvas(QAbstractScrollArea):
     def minimumSizeHint(self) -> QSize:
         return QSize(160, 60)
 
-    # -- painting --------------------------------------------------------------------------------------------
+    # -- painting -----------------------------------------------------------------------------------------
 
     def paintEvent(self, _event: QPaintEvent) -> None:
         painter = QPainter(self.viewport())
@@ -257,7 +257,7 @@ class TimelineCanvas(QAbstractScrollArea):
             painter.drawLine(QPointF(x, high - 6), QPointF(x, high))
             from_start = span_words(at_ns - scale.first_ns, digits=digits)
             words = clock_words(at_ns, digits=digits) if self.by_clock else from_start
-            if x + 3 + paint.width_of(font, words) <= plot.right():  # else it lies on what is beside
+            if x + 3 + paint.width_of(font, words) <= plot.right():  # otherwise it would overlap the figures
                 paint.words(painter, QRectF(x + 3, 0, theme.scaled(MARK_PX), high - 4), words, font, ink)
         paint.hairline(
             painter, QRectF(0, 0, self.viewport().width(), high), Qt.Edge.BottomEdge, theme.colour("border")
@@ -270,7 +270,7 @@ class TimelineCanvas(QAbstractScrollArea):
         paint.words(painter, right, _("Lost"), font, tertiary, paint.RIGHT)
 
     def _paint_lanes(self, painter: QPainter, plot: QRectF) -> None:
-        """Bookmarks, and the behaviours and alarms that there are."""
+        # Bookmarks, and runs and alarms if there are any.
         theme, replay = self._theme, self._replay
         self._marks = []
         if replay is None:
@@ -286,7 +286,7 @@ class TimelineCanvas(QAbstractScrollArea):
             paint.hairline(painter, whole, Qt.Edge.BottomEdge, theme.colour("border"))
 
     def _paint_run_now(self, painter: QPainter) -> None:
-        """The behaviour that runs at the playhead."""
+        # Highlights the run at the playhead.
         replay, theme, at_ns = self._replay, self._theme, self._position_ns
         lanes = shown_lanes(replay)
         if replay is None or replay.densities is None or RUNS not in lanes:
@@ -375,7 +375,7 @@ class TimelineCanvas(QAbstractScrollArea):
                 painter.drawPolygon(QPolygonF(notch))
 
     def _paint_alarms_of(self, painter: QPainter, plot: QRectF, top: float, topic: str) -> None:
-        """A frame where an alarm about this topic was on."""
+        # Outlines the time of alarms about this topic.
         replay = self._replay
         if replay is None or replay.densities is None:
             return
@@ -442,15 +442,15 @@ class TimelineCanvas(QAbstractScrollArea):
         paint.box(painter, flag, theme.radius("small"), theme.colour("tooltip"))
         paint.words(painter, flag, words, font, theme.colour("tooltipText"), paint.CENTRE)
 
-    # -- the mouse -------------------------------------------------------------------------------------------
+    # -- mouse --------------------------------------------------------------------------------------------
 
     def mark_at(self, at: QPointF) -> LaneMark | None:
-        """What can be pressed there: the smallest of those that lie over each other."""
+        """Return the mark at a position; of overlapping marks the narrowest."""
         found = [mark for mark in self._marks if mark.box.contains(at)]
         return min(found, key=lambda mark: mark.box.width(), default=None)
 
     def _grip(self, at: QPointF) -> str:
-        """What a press there would move."""
+        # The part that a press at this position would drag.
         plot = self._plot()
         if not plot.left() - GRIP <= at.x() <= plot.right() + GRIP or self.scale is None:
             return ""
@@ -502,7 +502,7 @@ class TimelineCanvas(QAbstractScrollArea):
             self.opened.emit(topic)
 
     def contextMenuEvent(self, event: QContextMenuEvent) -> None:
-        """Of a bookmark; by the keyboard of the one at the playhead."""
+        # For the bookmark under the mouse or, by keyboard, at the playhead.
         bookmark, place = None, event.globalPos()
         if event.reason() == QContextMenuEvent.Reason.Keyboard:
             bookmark = self._replay.bookmark_here() if self._replay is not None else None
@@ -516,7 +516,7 @@ class TimelineCanvas(QAbstractScrollArea):
             event.accept()
 
     def rename(self, bookmark: Bookmark, take: Callable[[str], bool]) -> None:
-        """Let a person type another name where the bookmark is; ``take`` says whether it can be."""
+        """Rename a bookmark in place; `take` returns False for an invalid name."""
         if self.field is not None:
             return
         if self.scale is not None:
@@ -535,11 +535,11 @@ class TimelineCanvas(QAbstractScrollArea):
             self.setFocus(Qt.FocusReason.OtherFocusReason)
 
     def keyPressEvent(self, event: QKeyEvent) -> None:
-        """All keys are the panel's; a scroll area would take the arrows."""
+        # Leave keys to the panel; a scroll area would consume the arrows.
         event.ignore()
 
     def wheelEvent(self, event: QWheelEvent) -> None:
-        """Over the time it zooms; over the names it scrolls."""
+        # Zooms above the time axis, scrolls above the names.
         x, delta = event.position().x(), event.angleDelta()
         if x < self._plot().left() or self.scale is None:
             super().wheelEvent(event)
@@ -557,7 +557,7 @@ class TimelineCanvas(QAbstractScrollArea):
         return super().viewportEvent(event)
 
     def _tip(self, at: QPointF) -> str:
-        """What a lane's mark, or a long name, is."""
+        # Of a mark, losses, or an elided name.
         replay, topic = self._replay, self.topic_at(at.y())
         if replay is None or self.scale is None:
             return ""
@@ -575,7 +575,7 @@ class TimelineCanvas(QAbstractScrollArea):
 
 
 def shades(counts: Sequence[int], peak: int, colour: QColor) -> QImage:
-    """A line of pixels, one for each part: the more came in it, the stronger the colour."""
+    """Return a one-line image with one pixel per bucket, more opaque for higher counts."""
     levels = []
     for level in range(256):
         alpha = 0.0 if level == 0 else FAINT + (FULL - FAINT) * level / 255
@@ -586,4 +586,4 @@ def shades(counts: Sequence[int], peak: int, colour: QColor) -> QImage:
     made = QImage(
         pixels.tobytes(), len(counts), 1, 4 * len(counts), QImage.Format.Format_ARGB32_Premultiplied
     )
-    return made.copy()  # the bytes are gone with this function
+    return made.copy()  # copied because QImage doesn't own the buffer

@@ -1,4 +1,4 @@
-"""The lanes above those of topics: bookmarks, behaviours that ran, alarms; what is there can be pressed."""
+"""Lanes above the topics: bookmarks, runs of behaviours, alarms; their marks can be clicked."""
 
 from __future__ import annotations
 
@@ -29,15 +29,15 @@ RESULTS = {
     "stopped": ("square", "textSecondary", lazy("stopped")),
     "failed": ("circle-x", "error", lazy("failed")),
 }
-"""Icon, colour and words of how a run ended."""
+"""Icon, colour and text of a run's result."""
 LEAST = 3.0
-"""However short it was, it can be seen."""
+"""Minimum width of a mark in px."""
 ICON, GAP, LEAST_WORDS, LONGEST_NAME, FLAG = 13, 4, 34, 160, 8
 
 
 @dataclass(frozen=True, slots=True)
 class LaneMark:
-    """Something that can be pressed: where it is painted, where it leads, what it is in words."""
+    """Clickable mark: rectangle, time to seek to, and description."""
 
     box: QRectF
     at_ns: int
@@ -46,7 +46,7 @@ class LaneMark:
 
 
 def shown_lanes(replay: Replay | None) -> tuple[str, ...]:
-    """Which lanes there are: that of bookmarks, and those that have something."""
+    """Return the visible lanes: bookmarks, and those that are not empty."""
     spans = replay.densities.spans if replay is not None and replay.densities is not None else None
     if spans is None:
         return (BOOKMARKS,)
@@ -54,14 +54,13 @@ def shown_lanes(replay: Replay | None) -> tuple[str, ...]:
 
 
 class EventLanes:
-    """Paints the lanes of one replay into a plot's part of the time."""
+    """Painter of a replay's event lanes within the visible time range. `x_of` maps a time to x."""
 
     def __init__(self, theme: Theme, painter: QPainter, plot: QRectF, x_of: Callable[[int], float]) -> None:
-        """``x_of`` tells where a time is."""
         self._theme, self._painter, self._plot, self._x_of = theme, painter, plot, x_of
 
     def paint(self, lane: str, replay: Replay, top: float, high: float) -> list[LaneMark]:
-        """One of `NAMES`, from ``top`` on; what can be pressed in it."""
+        """Paint a lane of `NAMES` and return its marks."""
         plot = self._plot
         box = QRectF(plot.left(), top, plot.width(), high)
         spans = replay.densities.spans if replay.densities is not None else None
@@ -79,7 +78,7 @@ class EventLanes:
         return made
 
     def seen(self, spans: Iterable[RecordedSpan]) -> Iterator[RecordedSpan]:
-        """Those that are in the plot; of very many only some: none that would hide in the one before it."""
+        """Yield the spans in the visible range, without those that would be hidden by the previous one."""
         plot, free = self._plot, -1.0
         for span in spans:
             left, right = self._x_of(span.start_ns), self._x_of(span.end_ns)
@@ -88,7 +87,7 @@ class EventLanes:
             free = max(right, left + LEAST) + 1
             yield span
 
-    # ---- bookmarks
+    # -- bookmarks ----------------------------------------------------------------------------------------
 
     def _bookmarks(self, replay: Replay, box: QRectF) -> list[LaneMark]:
         theme, painter, marks = self._theme, self._painter, replay.bookmarks
@@ -116,10 +115,10 @@ class EventLanes:
             made.append(LaneMark(pressed, mark.at_ns, mark.name or _("Bookmark"), mark))
         return made
 
-    # ---- behaviours
+    # -- behaviours ---------------------------------------------------------------------------------------
 
     def bar(self, span: RecordedSpan, top: float, high: float) -> QRectF:
-        """Where a run is."""
+        """Return the rectangle of a run."""
         left, right = self._x_of(span.start_ns), self._x_of(span.end_ns)
         return QRectF(left, top + 3, max(LEAST, right - left), high - 6)
 
@@ -129,7 +128,7 @@ class EventLanes:
         return LaneMark(bar, span.start_ns, run_words(span, start_ns))
 
     def paint_run(self, span: RecordedSpan, bar: QRectF, fill: str, edge: str) -> None:
-        """A run with its name at the left and its end at the right, as far as there is room."""
+        """Paint a run with its name at the left and its result at the right, if they fit."""
         theme, painter = self._theme, self._painter
         paint.box(painter, bar, theme.radius("small"), theme.colour(fill), theme.colour(edge))
         seen = bar.intersected(QRectF(self._plot.left(), bar.top(), self._plot.width(), bar.height()))
@@ -157,10 +156,10 @@ class EventLanes:
         square = QRectF(left, row.center().y() - side / 2, side, side)
         paint_icon(self._painter, square, name, self._theme.colour(role))
 
-    # ---- alarms
+    # -- alarms -------------------------------------------------------------------------------------------
 
     def _alarms(self, spans: list[RecordedSpan], box: QRectF, start_ns: int) -> list[LaneMark]:
-        """A bar each, and its words up to the next one."""
+        # Each bar has its text up to the next bar.
         made, theme = [], self._theme
         font, side = theme.font("small"), theme.scaled(ICON)
         for place, span in enumerate(spans):
@@ -184,7 +183,7 @@ class EventLanes:
 
 
 def alarm_words(span: RecordedSpan) -> str:
-    """What was wrong, and for how long where that is known: "/distance: range is 0.36, below 0.4, 1.2 s"."""
+    """Describe an alarm with its duration if known: "/distance: range is 0.36, below 0.4, 1.2 s"."""
     name = span.name.rstrip(".")
     name = f"{name[:1].upper()}{name[1:]}"
     if not span.is_over:
@@ -194,7 +193,7 @@ def alarm_words(span: RecordedSpan) -> str:
 
 
 def run_words(span: RecordedSpan, start_ns: int) -> str:
-    """The behaviour, how it ended, and when."""
+    """Describe a run: behaviour, result and times."""
     known = RESULTS.get(span.result)
     words = span.words or (_(known[2]) if known is not None else "")
     return _told(f"{span.name}: {words}" if words else span.name, span, start_ns)

@@ -1,6 +1,6 @@
-"""Timeline: the transport row, the ruler, and a lane for each topic of the recording that is open.
+"""Timeline panel: transport controls, ruler, and a lane per topic of the open recording.
 
-What is played can be sent on the live network (`sending`).
+Replayed messages can also be sent to the live network (`sending`).
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ ZOOM = 1.5
 
 
 class TimelinePanel(PanelWidget):
-    """One recording's time; without one it says how to open one."""
+    """Timeline of the open recording, or an empty state."""
 
     def __init__(self, context: PanelContext) -> None:
         super().__init__(context, _("Timeline"))
@@ -75,7 +75,7 @@ class TimelinePanel(PanelWidget):
         self.chooser.refused.connect(self.context.toast)
         self._say()
 
-    # -- what it shows ---------------------------------------------------------------------------------------
+    # -- display ------------------------------------------------------------------------------------------
 
     def refresh(self) -> None:
         replay = self.session.replay
@@ -104,7 +104,7 @@ class TimelinePanel(PanelWidget):
         self.canvas.move_to(player.position_ns, player.loop if player.is_looping else None)
 
     def _say(self) -> None:
-        """Say how far the opening is, why it failed, or how to open one."""
+        # Progress of opening, the error, or how to open a recording.
         replay = self.session.replay
         status = replay.status if replay is not None else None
         words: tuple[object, ...]
@@ -142,10 +142,10 @@ class TimelinePanel(PanelWidget):
     def theme_changed(self) -> None:
         self.canvas.renew()
 
-    # -- what a person does ----------------------------------------------------------------------------------
+    # -- user actions -------------------------------------------------------------------------------------
 
     def show_topic(self, name: str) -> None:
-        """Step through this topic's messages."""
+        """Select a topic; stepping moves through its messages."""
         self._choose(name)
         self.canvas.show_topic(name)
 
@@ -161,7 +161,7 @@ class TimelinePanel(PanelWidget):
         self.context.run("replay.bookmark")
 
     def event(self, event: QEvent) -> bool:
-        """Wherever the keyboard is in here, F2 and Delete are about the bookmark at the playhead."""
+        # Within the panel, F2 and Delete apply to the bookmark at the playhead.
         if isinstance(event, QKeyEvent) and event.key() in BOOKMARK_KEYS and is_plain(event):
             if event.type() == QEvent.Type.ShortcutOverride and self._shown is not None:
                 event.accept()
@@ -201,7 +201,7 @@ class TimelinePanel(PanelWidget):
             (NONE, Qt.Key.Key_Down): lambda: self._next_topic(1),
         }
         wanted = does.get((held, event.key()))
-        if wanted is None and event.text() in {"[", "]"}:  # with AltGr on many keyboards
+        if wanted is None and event.text() in {"[", "]"}:  # typed with AltGr on many keyboard layouts
             wanted = does[(NONE, Qt.Key.Key_BracketLeft if event.text() == "[" else Qt.Key.Key_BracketRight)]
         if wanted is None:
             return False
@@ -209,16 +209,16 @@ class TimelinePanel(PanelWidget):
         return True
 
     def _next_topic(self, by: int) -> None:
-        """Choose the topic above or below."""
+        # Selects the topic above or below.
         replay = self._shown
         if replay is not None and (topics := list(replay.recorded)):
             place = topics.index(replay.chosen) if replay.chosen in topics else 0
             self.show_topic(topics[max(0, min(len(topics) - 1, place + by))])
 
-    # -- what is sent ----------------------------------------------------------------------------------------
+    # -- sending ------------------------------------------------------------------------------------------
 
     def choose_sent(self) -> None:
-        """Let a person choose what is sent on the live network, and under which names."""
+        """Show the chooser of topics to send to the live network."""
         replay = self._shown
         if replay is not None and replay.sending is not None:
             counts = {name: topic.message_count for name, topic in replay.recorded.items()}
@@ -235,7 +235,7 @@ class TimelinePanel(PanelWidget):
         if self.session.is_replaying:
             self.session.acting.disarm()
 
-    # -- bookmarks -------------------------------------------------------------------------------------------
+    # -- bookmarks ----------------------------------------------------------------------------------------
 
     def _of_bookmark_here(self, do: Callable[[Bookmark], object]) -> None:
         mark = self._shown.bookmark_here() if self._shown is not None else None
@@ -245,7 +245,7 @@ class TimelinePanel(PanelWidget):
             self.context.toast(_("No bookmark at the playhead. Select one, or press B to add one"))
 
     def _show_menu(self, mark: Bookmark, place: QPoint) -> None:
-        """What can be done with a bookmark."""
+        # Context menu of a bookmark.
         menu = Menu(self.theme, self)
         menu.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
         actions = (
@@ -255,7 +255,7 @@ class TimelinePanel(PanelWidget):
         filled(menu, self.theme, actions).popup(place)
 
     def rename_bookmark(self, mark: Bookmark) -> None:
-        """Let a person type another name where it is."""
+        """Rename a bookmark in place."""
         replay = self._shown
         if replay is not None and not self._is_note(mark):
             self.canvas.rename(
@@ -263,7 +263,7 @@ class TimelinePanel(PanelWidget):
             )
 
     def delete_bookmark(self, mark: Bookmark) -> None:
-        """Take it away, with Undo."""
+        """Delete a bookmark; the toast offers to undo it."""
         replay = self._shown
         if replay is None or self._is_note(mark) or not self._try(lambda: replay.remove_bookmark(mark)):
             return
@@ -280,13 +280,13 @@ class TimelinePanel(PanelWidget):
         return mark.is_note
 
     def _try(self, change: Callable[[], object]) -> bool:
-        """Change a bookmark; why it can't be is said."""
+        # Errors are shown in a toast.
         try:
             change()
         except RecordingError as error:
             self.context.toast(_("Can't save the bookmark: {reason}").format(reason=error.reason))
             return False
-        except ValueError:  # it is gone already
+        except ValueError:  # already deleted
             return True
         return True
 

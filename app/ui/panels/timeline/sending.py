@@ -1,4 +1,4 @@
-"""What of a recording is sent on the live network: the strip that tells it, and where a person chooses it."""
+"""Sending of replayed topics to the live network: arming strip and chooser."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ NAME_PX = 240
 
 
 class ReplayStrip(ArmedStrip):
-    """Shows itself while something of the recording is armed, or a person is asked; `change_wanted`."""
+    """Arming strip, visible while topics are armed or a confirmation is pending; emits `change_wanted`."""
 
     for_replay = True
     change_wanted = Signal()
@@ -43,7 +43,7 @@ class ReplayStrip(ArmedStrip):
 
     @property
     def sending(self) -> ReplaySending | None:
-        """Of the recording that is open."""
+        """Sending of the open recording, or None."""
         replay = self._context.session.replay
         return replay.sending if replay is not None else None
 
@@ -71,7 +71,7 @@ class ReplayStrip(ArmedStrip):
 
 
 class SendRow(NamedTuple):
-    """A topic of the recording as it can be chosen; ``name`` is under which it is sent, None: it is not."""
+    """Row of a recorded topic; `name` is the topic to send to, None if it is not sent."""
 
     topic: str
     messages: int
@@ -80,11 +80,11 @@ class SendRow(NamedTuple):
 
 
 class SendChooser(QWidget):
-    """In the place of the lanes: which topics are sent, and under which names. `left` when it is done."""
+    """Chooser of topics and their target names, in place of the lanes; emits `left` when done."""
 
     left = Signal()
     refused = Signal(str)
-    """Why nothing could be armed, as a sentence."""
+    """Reason why the topics could not be armed."""
 
     def __init__(self, theme: Theme) -> None:
         super().__init__()
@@ -129,13 +129,13 @@ class SendChooser(QWidget):
         for place, widget in enumerate((self.words, self.table, self.problem, below)):
             scroll.column.insertWidget(place, widget)
         scroll.column.setStretchFactor(self.table, 1)
-        scroll.column.setStretch(scroll.column.count() - 1, 0)  # nothing is left for its end
+        scroll.column.setStretch(scroll.column.count() - 1, 0)  # the table takes all remaining height
         row = QHBoxLayout(self)
         row.setContentsMargins(0, 0, 0, 0)
         row.addWidget(scroll)
 
     def open(self, sending: ReplaySending, counts: dict[str, int], chosen: str) -> None:
-        """Let a person choose of these topics, which have so many messages."""
+        """Show the topics of a recording with their message counts."""
         self._sending, self._counts, self._seen = sending, counts, None
         sending.learn()
         self.problem.setText("")
@@ -145,7 +145,7 @@ class SendChooser(QWidget):
         self.table.setFocus(Qt.FocusReason.OtherFocusReason)
 
     def refresh(self) -> None:
-        """Show what has changed."""
+        """Update the chooser after a change."""
         sending = self._sending
         if sending is None or self._seen == (sending, sending.revision):
             return
@@ -176,7 +176,7 @@ class SendChooser(QWidget):
             self._show_name()
 
     def _show_name(self) -> None:
-        """The field is about the chosen row."""
+        # The name field edits the selected row.
         topic = self.table.chosen_key() or ""
         routes = self._sending.routes if self._sending is not None else {}
         name = routes.get(topic, "")
@@ -209,7 +209,7 @@ class SendChooser(QWidget):
         if event.key() == Qt.Key.Key_Escape:
             self.left.emit()
         elif event.key() not in {Qt.Key.Key_Tab, Qt.Key.Key_Backtab}:
-            event.accept()  # none of it is about the lanes, which are not there
+            event.accept()  # keys must not reach the panel while the lanes are hidden
 
 
 def _columns() -> tuple[Column[SendRow], ...]:

@@ -1,4 +1,4 @@
-"""The row above the time line: where it is, play and step, how fast, again and again, a bookmark."""
+"""Transport controls of a replay: position, play, step, speed, loop, bookmark."""
 
 from __future__ import annotations
 
@@ -20,11 +20,11 @@ from nep.recordings.player import SPEED_MAX, SPEED_MIN, PlayerStatus
 
 SPEED_STEPS = 40
 SLOW = 0.97
-"""Below this share of the speed that is asked for it is said."""
+"""Ratio of actual to requested speed below which the actual speed is shown."""
 
 
 class TransportRow(QWidget):
-    """Shows a replay's state and tells it what a person wants; the rest is the panel's."""
+    """Row that shows a replay's state and controls it."""
 
     bookmark_wanted = Signal()
     arm_wanted = Signal()
@@ -68,12 +68,12 @@ class TransportRow(QWidget):
         flow.addWidget(self.nothing)
 
     def show_armed(self, *, is_armed: bool) -> None:
-        """While it is armed the strip below has the switch."""
+        """Hide the switch while armed, because the strip below has it."""
         self.armed.setVisible(not is_armed)
         self.nothing.setVisible(not is_armed)
 
     def _ask_arming(self) -> None:
-        self.armed.setChecked(False)  # it is on once something is chosen
+        self.armed.setChecked(False)  # checked once topics are chosen
         self.arm_wanted.emit()
 
     def _connect(self) -> None:
@@ -95,7 +95,7 @@ class TransportRow(QWidget):
             what(self._replay)
 
     def show_replay(self, replay: Replay, player: PlayerStatus) -> None:
-        """Show where it is now."""
+        """Show the state of a replay."""
         if replay is not self._replay:
             self._replay = replay
             self.speed.blockSignals(True)
@@ -135,12 +135,12 @@ class TransportRow(QWidget):
 
 
 def speed_of(step: int) -> float:
-    """The speed of a step of the slider: 0.1 at its left end, 1 in the middle, 10 at its right end."""
+    """Return the speed of a slider step, from 0.1 at the left over 1 in the middle to 10."""
     return round(SPEED_MIN * exp(log(SPEED_MAX / SPEED_MIN) * step / SPEED_STEPS), 2)
 
 
 def step_of(speed: float) -> int:
-    """The step of the slider that is nearest to a speed."""
+    """Return the slider step nearest to a speed."""
     return round(
         log10(max(SPEED_MIN, min(SPEED_MAX, speed)) / SPEED_MIN) / log10(SPEED_MAX / SPEED_MIN) * SPEED_STEPS
     )
