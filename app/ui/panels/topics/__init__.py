@@ -1,6 +1,6 @@
-"""Topics: everything that is on the network, with its figures.
+"""Topics panel: all topics of the network with their figures.
 
-`columns` has its columns, cells and words.
+`columns` has the columns and cells.
 """
 
 from app.ui.panels.topics.panel import PANEL as PANEL

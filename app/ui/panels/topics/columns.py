@@ -1,4 +1,4 @@
-"""The columns of the table of topics."""
+"""Columns of the table of topics."""
 
 from __future__ import annotations
 
@@ -23,20 +23,20 @@ def _ink(topic: Topic, role: str) -> str:
 
 
 def untold(topic: Topic) -> NetworkKind | None:
-    """The network that does not tell figures of this topic; None where they are told."""
+    """Return the topic's network if it reports no figures, else None."""
     kind = kind_named(topic.network)
     return kind if kind is not None and not kind.tells_figures else None
 
 
 def name_cell(topic: Topic) -> Cell:
-    """The name: bold with a chip while new, struck through when it has vanished."""
+    """Return the name, bold with a chip while new, struck through when gone."""
     gone = topic.gone_s is not None
     chip = pgettext("topic", "new") if topic.new and not gone else None
     return Cell(topic.name, role=_ink(topic, "text"), mono=True, bold=bool(chip), struck=gone, chip=chip)
 
 
 def network_cell(topic: Topic) -> Cell:
-    """Which network it is on."""
+    """Return the network."""
     kind = kind_named(topic.network)
     if kind is None:
         return Cell("NEP", role=_ink(topic, "textTertiary"))
@@ -44,47 +44,47 @@ def network_cell(topic: Topic) -> Cell:
 
 
 def type_cell(topic: Topic) -> Cell:
-    """The type's icon and word; of "robot/answer" the last one, the tooltip has the whole."""
+    """Return icon and last part of the type; the tooltip has the full type."""
     icon = ICONS.get(topic.codec) or ICONS.get(topic.msg_type, "box")
     return Cell(topic.msg_type.rpartition("/")[2], icon, _ink(topic, "textTertiary"))
 
 
 def publishers_cell(topic: Topic) -> Cell:
-    """How many programs publish it."""
+    """Return the number of publishers."""
     return Cell(str(topic.publishers), role=_ink(topic, "text"))
 
 
 def subscribers_cell(topic: Topic) -> Cell:
-    """How many programs subscribe it."""
+    """Return the number of subscribers."""
     return Cell(str(topic.subscribers) if topic.gone_s is None else "", role=_ink(topic, "text"))
 
 
 def nodes_cell(topic: Topic) -> Cell:
-    """The names of the programs that publish it."""
+    """Return the names of the publishing nodes."""
     return Cell(", ".join(topic.publisher_nodes), role=_ink(topic, "textSecondary"))
 
 
 def curve_cell(topic: Topic) -> Cell:
-    """The rate of the last half minute."""
+    """Return the curve of the rate in the last 30 s."""
     if topic.rate_hz is None and untold(topic) is not None:
-        return Cell()  # what was counted while somebody looked
+        return Cell()  # measured while the topic was open
     return Cell(role=_ink(topic, "textSecondary"), curve=tuple(topic.rates))
 
 
 def rate_cell(topic: Topic) -> Cell:
-    """Messages a second."""
+    """Return the rate in messages per second."""
     return Cell(rate_words(topic.rate_hz), role=_ink(topic, "text"))
 
 
 def bandwidth_cell(topic: Topic) -> Cell:
-    """Bytes a second; unknown where nobody subscribes."""
+    """Return the bandwidth; unknown without subscribers."""
     if _is_unheard(topic):
         return Cell(bandwidth_words(None), role=_ink(topic, "textDisabled"))
     return Cell(bandwidth_words(topic.bandwidth_Bps), role=_ink(topic, "text"))
 
 
 def _is_unheard(topic: Topic) -> bool:
-    """Whether messages are published that nobody subscribes: they are not encoded, so have no size."""
+    # Without subscribers messages are not encoded, so their size is unknown.
     return bool(topic.rate_hz) and not topic.bandwidth_Bps and not topic.subscribers
 
 
@@ -95,16 +95,16 @@ def _bandwidth_tip(topic: Topic) -> str:
 
 
 def age_cell(topic: Topic) -> Cell:
-    """How old the newest message is, or since when the topic is gone."""
+    """Return the age of the newest message, or the time since the topic disappeared."""
     if topic.gone_s is not None:
         return Cell(_("gone {seconds} s").format(seconds=int(topic.gone_s)), role="textDisabled")
     return Cell(age_words(topic.age_s), role=_ink(topic, "text"))
 
 
 def loss_cell(topic: Topic) -> Cell:
-    """What was lost, with a warning when it is not nothing; blank when nobody knows.
+    """Return the loss ratio with a warning icon unless zero; blank if unknown.
 
-    Where a network tells no figures it says so, in the place of all of them.
+    For networks that report no figures, a note replaces all of them.
     """
     kind = untold(topic)
     if kind is not None and topic.gone_s is None and (topic.rate_hz, topic.age_s, topic.lost) == (None,) * 3:
@@ -117,7 +117,7 @@ def loss_cell(topic: Topic) -> Cell:
     return Cell(
         str(topic.lost)
         if share is None
-        else number(share, ".1%" if share < 0.0995 else ".0%").replace("%", " %"),  # whole, also at 100 %
+        else number(share, ".1%" if share < 0.0995 else ".0%").replace("%", " %"),  # no decimals at 100 %
         "triangle-alert",
         "warn",
     )
@@ -139,7 +139,7 @@ def _curve_tip(topic: Topic) -> str:
 
 
 def _shown_tip(topic: Topic) -> str:
-    """What reached the panels, where it is not everything."""
+    # Only if messages were dropped before they reached the panels.
     if not (topic.dropped or topic.missed):
         return ""
     shown, sent = topic.shown_of
@@ -156,7 +156,7 @@ def _network_tip(topic: Topic) -> str:
 
 
 def _not_told(topic: Topic) -> str:
-    """Why a figure is missing, or where it comes from; empty where publishers tell it."""
+    # Empty if publishers report the figure.
     kind = untold(topic)
     if kind is None:
         return ""
@@ -185,7 +185,7 @@ COLUMNS: tuple[Column[Topic], ...] = (
     Column(
         "topic",
         lazy("Topic"),
-        168,  # "/Pepper/description" whole
+        168,  # fits "/Pepper/description"
         name_cell,
         lambda t: t.name.casefold(),
         stretch=True,
@@ -233,7 +233,7 @@ COLUMNS: tuple[Column[Topic], ...] = (
 
 NETWORK = Column("network", lazy("Network"), 84, network_cell, lambda t: t.network, tip=_network_tip)
 INDENT, CHEVRON = 14, 19
-"""How far a level of the tree stands further in, and the room of a folder's arrow."""
+"""Indentation per level of the tree, and width of a folder's arrow, in px."""
 
 
 def _folder_name(folder: TopicFolder) -> Cell:
@@ -286,14 +286,14 @@ FOLDERS: dict[str, FolderColumn] = {
     ),
     "loss": (_folder_loss, lambda _f: None, _folder_loss_tip),
 }  # fmt: skip
-"""What a folder shows in a column, sorts by and says; in other columns it is blank."""
+"""Cell, sort key and tooltip of folders by column; other columns are blank."""
 
 
 BLANK: FolderColumn = (lambda _f: Cell(), lambda _f: None, None)
 
 
 def _with_folders(column: Column[Topic], of_folder: FolderColumn) -> Column[TreeRow]:
-    """The same column for the rows of a tree."""
+    # Adapts a column of topics to rows of the tree.
     cell, key, tip = of_folder
     of_topic, topic_key, topic_tip = column.cell, column.key, column.tip
 
@@ -319,15 +319,18 @@ def _with_folders(column: Column[Topic], of_folder: FolderColumn) -> Column[Tree
 
 
 OTHERS = tuple(_with_folders(column, FOLDERS.get(column.name, BLANK)) for column in COLUMNS[1:])
-"""The columns that are the same for every panel."""
+"""Columns without dependence on a panel."""
 
 
 def columns(
     own: Callable[[Topic], bool], several: Callable[[], bool], as_tree: Callable[[], bool]
 ) -> tuple[Column[TreeRow], ...]:
-    """The columns; what is Studio's ``own`` is no news. Networks are told while there are ``several``.
+    """Return the columns.
 
-    While the rows stand ``as_tree`` a topic shows the last part of its name below its folders.
+    Args:
+        own: Return True for Studio's own topics, which are never marked as new.
+        several: Return True to show the network column.
+        as_tree: Return True to show only the last part of names, below their folders.
     """
 
     def named(topic: Topic) -> Cell:

@@ -1,4 +1,4 @@
-"""Topics: everything that is on the network, with its figures as the publishers tell them."""
+"""Topics panel: all topics of the network with figures reported by their publishers."""
 
 from __future__ import annotations
 
@@ -43,22 +43,22 @@ WORDS = TableWords(
     clear_the_filter=lazy("Clear the filter to see all topics."),
     not_recorded=lazy("The recording has no topics yet"),
 )
-FIGURES_EVERY = 6  # refreshes of 30 a second: nobody reads figures that are others ten times a second
+FIGURES_EVERY = 6  # refreshes at 30 Hz; faster changes would be illegible
 SORT_EVERY = 30
 LIVELY = frozenset({"rate", "bandwidth", "age", "loss"})
 MOST_CLOSED = 1000
-"""Folders that a layout remembers as closed."""
+"""Maximum number of collapsed folders saved in a layout."""
 
 
 class TopicsTable(TableView[TreeRow]):
-    """Left and Right close and open the folders of a tree.
+    """Table in which Left and Right collapse and expand folders.
 
-    `fold_wanted` with the key of a row, and whether it is to be open (Right) or closed (Left).
+    `fold_wanted` has the key of a row, and True to expand or False to collapse it.
     """
 
     fold_wanted = Signal(str, bool)
     folds = False
-    """Whether there are folders: else these keys do what they do in any table."""
+    """True while folders are shown; otherwise the keys have their usual meaning."""
 
     def keyPressEvent(self, event: QKeyEvent) -> None:
         key = self.chosen_key() if self.folds and is_plain(event) else None
@@ -70,7 +70,7 @@ class TopicsTable(TableView[TreeRow]):
 
 
 class TopicsPanel(NetworkTable[TreeRow]):
-    """The table of topics, as a list or a tree, a filter in the title, a line about the figures below."""
+    """Table of topics as list or tree, with a filter and a note about the figures."""
 
     def __init__(self, context: PanelContext) -> None:
         self._closed: set[str] = set()
@@ -104,7 +104,7 @@ class TopicsPanel(NetworkTable[TreeRow]):
         return self.topics_table
 
     def _own(self, topic: Topic) -> bool:
-        """Whether only virtual robots that Studio itself started publish it, or Studio."""
+        # Published by Studio or by virtual robots that it started.
         if topic.network:
             return own_everywhere(topic.publisher_nodes)
         if not topic.publisher_nodes:
@@ -150,7 +150,7 @@ class TopicsPanel(NetworkTable[TreeRow]):
         self.line.setVisible(bool(rows))
 
     def _show_rows(self, topics: list[Topic], *, filtered: bool) -> None:
-        """As a list or as a tree; what a filter found is never in a closed folder."""
+        # Folders are never collapsed while a filter is active.
         was_tree = self._tree is not None
         self.topics_table.folds = self.as_tree.isChecked()
         if self.as_tree.isChecked():
@@ -160,7 +160,7 @@ class TopicsPanel(NetworkTable[TreeRow]):
             self._tree = None
             self.model.set_rows(self.table.order.sort([*topics]))
         if was_tree or self._tree is not None:
-            self.table.tell_visible_changed()  # the same topic is written otherwise, a folder has opened
+            self.table.tell_visible_changed()  # names of topics are formatted differently in a tree
 
     def _say_counts(self, known: int, found: int | None) -> None:
         nodes = len(self.session.networks.nodes)
@@ -205,7 +205,7 @@ class TopicsPanel(NetworkTable[TreeRow]):
         return self._tree[key] if self._tree is not None and key in self._tree else None
 
     def _fold(self, key: str, is_open: bool | None) -> None:
-        """Open or close a folder (None: whatever it is not); of a topic, or twice, go to the folder above."""
+        # None toggles. Left on a topic or a collapsed folder selects the parent folder.
         folder = self._folder(key)
         if folder is None or (is_open is False and not folder.is_open):
             if is_open is False:
@@ -253,7 +253,7 @@ class TopicsPanel(NetworkTable[TreeRow]):
             self._closed.difference_update(above)
             self._wanted = ""
             self.rebuild()
-        self._wanted = "" if self.model.index_of(name).isValid() else name  # its row may still come
+        self._wanted = "" if self.model.index_of(name).isValid() else name  # selected when its row appears
         self.table.choose(name)
 
     def save_state(self) -> dict[str, object]:
@@ -268,7 +268,7 @@ class TopicsPanel(NetworkTable[TreeRow]):
 
 
 def _foot(kinds: Sequence[NetworkKind]) -> str:
-    """Where the figures come from."""
+    # Source of the figures.
     untold = [kind.words for kind in kinds if not kind.tells_figures]
     if not untold:
         return _(FOOT)
