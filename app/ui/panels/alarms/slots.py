@@ -33,7 +33,7 @@ class AlarmSlot(PaintedButton):
         self._say(part)
 
     def show_part(self, part: PhrasePart) -> None:
-        """Show another word."""
+        """Show a part of the sentence."""
         if part != self.part:
             self.part = part
             self._say(part)
