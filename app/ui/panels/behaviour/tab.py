@@ -142,7 +142,7 @@ class BehaviourTab(PaintedButton):
             painter.setBrush(ink)
             painter.drawEllipse(slot.center(), 3.5, 3.5)
 
-    # -- mouse and keyboard -----------------------------------------------------------------------
+    # -- mouse and keyboard -------------------------------------------------------------------------------
 
     def mousePressEvent(self, event: QMouseEvent) -> None:
         if event.button() == Qt.MouseButton.LeftButton:

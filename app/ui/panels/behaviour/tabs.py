@@ -99,7 +99,7 @@ class BehaviourTabs(QWidget):
             entry.triggered.connect(lambda _on=False, key=each.key: self.chosen.emit(key))
         drop_below(menu, self.list)
 
-    # -- drops of blocks --------------------------------------------------------------------------
+    # -- drops of blocks ----------------------------------------------------------------------------------
 
     def target_at(self, place: QPoint) -> str:
         """Return the key of the tab at a screen position, `NEW` for "+", or ""."""
@@ -132,7 +132,7 @@ class BehaviourTabs(QWidget):
             tab.set_aimed(each == key)
         self.add.set_aimed(key == NEW)
 
-    # -- renaming ---------------------------------------------------------------------------------
+    # -- renaming -----------------------------------------------------------------------------------------
 
     def edit(self, key: str) -> None:
         """Edit the name of a tab in place."""
@@ -186,7 +186,7 @@ class BehaviourTabs(QWidget):
                     self.moved.emit(key, other)
                     return
 
-    # -- layout -----------------------------------------------------------------------------------
+    # -- layout -------------------------------------------------------------------------------------------
 
     def _restyle(self) -> None:
         self.updateGeometry()
