@@ -161,7 +161,7 @@ class FirstStepsPanel(PanelWidget):
         """Return the next step, or None when all are done."""
         return next((step for step in STEPS if step.id not in self.done), None)
 
-    # -- checking ---------------------------------------------------------------------------------
+    # -- checking -----------------------------------------------------------------------------------------
 
     def refresh(self) -> None:
         if self.following() is None:
@@ -229,7 +229,7 @@ class FirstStepsPanel(PanelWidget):
         except SettingsError as error:
             self.session.console.add("warn", "studio", str(error))
 
-    # -- user actions -----------------------------------------------------------------------------
+    # -- user actions -------------------------------------------------------------------------------------
 
     def show_me(self, step: Lesson) -> None:
         """Point at the block or button of the step."""
