@@ -1,5 +1,5 @@
-"""The panels of Studio: each module binds one ``PANEL``; a new one is one new file.
+"""Panels of Studio. Each module binds one ``PANEL``; a new panel is one new module.
 
-`base` is what a panel is. A panel is named as its module, for saved layouts hold that name; its own parts
-are in its folder, and it imports no other panel.
+`base` has the base class. A panel has the name of its module, because saved layouts contain it. Its parts are
+in its package, and it imports no other panel.
 """

@@ -1,4 +1,4 @@
-"""Health: how the robot that is shown is, what is to be looked at first, and what to do about it."""
+"""Health panel: state of a robot, its most important problem, and the next step."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ TEXT = {"compact": "body", "comfortable": "bodyLarge"}
 
 
 class HealthRow(QWidget):
-    """Icon, title and words; the words stand below the title where there is no room beside it."""
+    """Row with icon, title and text; the text is below the title in a narrow panel."""
 
     def __init__(self, theme: Theme, density: Density) -> None:
         super().__init__()
@@ -63,7 +63,7 @@ class HealthRow(QWidget):
         self._said.setSpacing(10 if beside else 0)
 
     def show_fact(self, fact: HealthFact) -> None:
-        """Show another fact, or other words of it."""
+        """Show a fact."""
         if fact == self.fact:
             return
         self.fact = fact
@@ -75,7 +75,7 @@ class HealthRow(QWidget):
 
 
 class HealthPanel(OneRobotPanel):
-    """The health of the robot that is shown."""
+    """Health of the robot shown."""
 
     def __init__(self, context: PanelContext) -> None:
         super().__init__(context, _("Health"))
@@ -111,7 +111,7 @@ class HealthPanel(OneRobotPanel):
         self.pages = self.show_one_of(self.empty, self._scroll)
         self.pages.setMinimumSize(1, 1)
 
-    # -- what it shows ------------------------------------------------------------------------------------
+    # -- display ------------------------------------------------------------------------------------------
 
     def fleet_changed(self) -> None:
         link = self.wanted_robot()
@@ -141,7 +141,7 @@ class HealthPanel(OneRobotPanel):
         self._below.setVisible(not link.connected or link.mute)
 
     def _make_rows(self, count: int) -> None:
-        """So many rows; the button stands below the first."""
+        # The button stays below the first row.
         while len(self.rows) > count:
             row = self.rows.pop()
             self._column.removeWidget(row)
@@ -158,7 +158,7 @@ class HealthPanel(OneRobotPanel):
 
     def set_density(self, density: Density) -> None:
         super().set_density(density)
-        self._make_rows(0)  # the next refresh makes them anew
+        self._make_rows(0)  # rebuilt by the next refresh
         self._facts = ()
 
     def theme_changed(self) -> None:
@@ -168,9 +168,8 @@ class HealthPanel(OneRobotPanel):
 
 
 def _whole_age(age_s: float) -> str:
-    """Nobody reads tenths of a second: 1 s, 14 s, 2 min."""
     return f"{max(1, int(age_s))} s" if age_s < 60 else age_words(age_s)
 
 
 PANEL = Panel("health", lazy("Health"), "heart", (), HealthPanel)
-"""How the robot is: what answers, what it tells of itself, how it stops."""
+"""Health panel: responses, reported state and way of stopping of a robot."""

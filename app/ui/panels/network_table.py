@@ -1,4 +1,4 @@
-"""NetworkTable: a table of what is on Studio's own network, and on others that a person chose."""
+"""Base class of tables with rows of Studio's own network and of other networks."""
 
 from __future__ import annotations
 
@@ -24,10 +24,9 @@ Row = TypeVar("Row")
 
 
 class NetworkTable(TablePanel[Row]):
-    """As `TablePanel`; `networks`, below the table, says which other networks do not answer."""
+    """Table panel whose line `networks`, below the table, reports unreachable networks."""
 
     def __init__(self, context: PanelContext, words: TableWords, icon: str) -> None:
-        """``icon`` is that of the empty state."""
         super().__init__(context, words, icon)
         self.networks = NetworkLine(self.theme, context.run)
         self._networks_seen = 0
@@ -35,11 +34,11 @@ class NetworkTable(TablePanel[Row]):
         self._others.triggered.connect(lambda _on=False: context.run(LOOK_COMMAND))
 
     def has_several(self) -> bool:
-        """Whether a person looks at other networks beside Studio's own."""
+        """Return True if other networks are shown as well."""
         return bool(self.session.networks.chosen)
 
     def show_networks(self) -> None:
-        """Show which networks do not answer, and the column that tells rows apart where there are several."""
+        """Report unreachable networks, and show the network column if there are several networks."""
         self.networks.say([lost_words(each) for each in self.session.networks.chosen])
         if self._networks_seen != len(self.session.networks.chosen):
             self._networks_seen = len(self.session.networks.chosen)
@@ -50,10 +49,9 @@ class NetworkTable(TablePanel[Row]):
 
 
 class NetworkLine(QWidget):
-    """Below the rows: which other networks do not answer and why, with the button that leads to them."""
+    """Line below the table with unreachable networks and a button to their settings."""
 
     def __init__(self, theme: Theme, run: Callable[[str], None]) -> None:
-        """``run`` does a command of the window by its name."""
         super().__init__()
         self.words = label("", "small", role="warn", wrap=True)
         self.words.setMinimumWidth(0)
@@ -73,14 +71,14 @@ class NetworkLine(QWidget):
         self.hide()
 
     def say(self, sentences: Sequence[str]) -> None:
-        """Show these, each in a line of its own; nothing when all are empty."""
+        """Show each sentence on a line of its own; hidden if all are empty."""
         said = "\n".join(filter(None, sentences))
         self.words.setText(said)
         show_when(self, bool(said))
 
 
 def own_everywhere(nodes: Iterable[str]) -> bool:
-    """Whether these are only Studio's own nodes on another network; ROS names them after the process."""
+    """Return True if all nodes are Studio's own on another network; ROS names them after the process."""
     process = f"{NODE_NAME}_{os.getpid()}_"
     names = [name.lstrip("/") for name in nodes]
     return bool(names) and all(name == NODE_NAME or name.startswith(process) for name in names)

@@ -1,4 +1,4 @@
-"""What a panel about robots says while there is none: that none is connected, or that one is coming."""
+"""Empty state of panels without a robot."""
 
 from __future__ import annotations
 
@@ -10,15 +10,14 @@ from nep.i18n import _
 
 
 class NoRobot:
-    """Keeps the words of an `EmptyState`: nobody reads that there is no robot just after starting one."""
+    """Switches an `EmptyState` between "no robot" and "robot is starting"."""
 
     def __init__(self, empty: EmptyState, title: str, text: str, actions: Sequence[EmptyAction] = ()) -> None:
-        """The words and the next steps while no robot is coming; the empty state has them already."""
         self._empty, self._title, self._text, self._actions = empty, title, text, tuple(actions)
         self._coming: tuple[str, ...] = ()
 
     def tell(self, coming: tuple[str, ...]) -> None:
-        """These robots are being started; call it with every refresh while there is none."""
+        """Report the robots being started; call on every refresh without a robot."""
         if coming == self._coming:
             return
         self._coming = coming

@@ -1,4 +1,4 @@
-"""Problems: what a person should mend in the behaviour before Run; checked while it is built."""
+"""Problems panel: errors and warnings of the behaviour, updated as it is edited."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ NOTHING = lazy("No problems.\nIf something needs fixing, it appears here.")
 
 
 class ProblemRow(QWidget):
-    """Icon, the block's tile, the sentence with its subject in bold, and what mends it."""
+    """Row of a problem: icon, block, sentence with its subject in bold, and buttons that fix it."""
 
     pressed = Signal(str)
     mend = Signal(str)
@@ -80,7 +80,7 @@ class ProblemRow(QWidget):
         return button
 
     def holds_focus(self) -> bool:
-        """Whether it, or one of its buttons, has the keyboard."""
+        """Return True if the row or one of its buttons has the focus."""
         return self.hasFocus() or any(button.hasFocus() for button in self.buttons)
 
     def sizeHint(self) -> QSize:
@@ -113,7 +113,7 @@ class ProblemRow(QWidget):
 
 
 class ProblemsPanel(PanelWidget):
-    """The problems of the behaviour that is open, and how many they are."""
+    """List of problems of the active behaviour, with their number."""
 
     def __init__(self, context: PanelContext) -> None:
         super().__init__(context, _("Problems"))
@@ -149,7 +149,7 @@ class ProblemsPanel(PanelWidget):
         self.checked.setText(_("Checked as you build"))
         found = listed(
             program.problems,
-            document.workspace if program.absent else {},  # parsed only when somebody is missing
+            document.workspace if program.absent else {},  # parsed only if robots are missing
             self._missing(document),
             [link.robot for link in self.session.fleet.connected],
             VIRTUAL_ROBOTS,
@@ -163,12 +163,12 @@ class ProblemsPanel(PanelWidget):
             self._show(found)
 
     def _missing(self, document: Document) -> list[Robot]:
-        """The robots that are not there, as the behaviour knows them, or else as they were seen last."""
+        # As described in the behaviour, else as last seen on the network.
         seen = {link.name: link.robot for link in self.session.fleet.links if not link.connected}
         return list({**seen, **{robot.name: robot for robot in document.absent}}.values())
 
     def _show(self, found: tuple[Listed, ...]) -> None:
-        """The rows of these problems; one that is there already stays, with its focus."""
+        # Existing rows are reused, so that they keep the focus.
         kept = {row.line: row for row in self.rows}
         held = False
         for line, row in kept.items():
@@ -185,7 +185,7 @@ class ProblemsPanel(PanelWidget):
         self.others.setText(said.format(count=more))
         paint.show_when(self.others, more > 0)
         self.pages.setCurrentIndex(1 if found else 0)
-        if held:  # a cured problem does not throw the keyboard out of the panel
+        if held:  # the focus stays in the panel when the focused problem is fixed
             (self.rows[0] if self.rows else self).setFocus(Qt.FocusReason.OtherFocusReason)
         self._count(found)
 
@@ -197,14 +197,13 @@ class ProblemsPanel(PanelWidget):
         return row
 
     def _step(self, row: ProblemRow, step: int) -> None:
-        """The arrow keys go from one problem to the next."""
         place = self.rows.index(row) + step
         if 0 <= place < len(self.rows):
             self.rows[place].setFocus(Qt.FocusReason.TabFocusReason)
             self._scroll.ensureWidgetVisible(self.rows[place])
 
     def badge(self) -> tuple[str, str] | None:
-        self.refresh()  # nobody else asks a panel that stands behind another one
+        self.refresh()  # hidden panels are not refreshed otherwise
         return (self.chip.text, self.chip.status) if self._found else None
 
     def _count(self, found: tuple[Listed, ...]) -> None:

@@ -1,4 +1,4 @@
-"""Sensors now: what the robot feels and sees, one row for each sensor."""
+"""Live sensors panel: one row per sensor of a robot."""
 
 from __future__ import annotations
 
@@ -26,13 +26,13 @@ if TYPE_CHECKING:
     from app.core.robots.robot_link import RobotLink
 
 ROW = {"compact": 26, "comfortable": 28}
-FIRST = ("touch", "distance", "battery")  # what people look for; the others keep their order
+FIRST = ("touch", "distance", "battery")  # listed first; other sensors keep their order
 TITLE_WIDTH, VALUE_WIDTH = 100, 96
 ICON = 18
 
 
 class SensorRow(QWidget):
-    """Icon, title, a bar or a few words, and the value in bold."""
+    """Row of a sensor: icon, title, bar or text, value."""
 
     def __init__(self, theme: Theme, sensor: Sensor) -> None:
         super().__init__()
@@ -45,7 +45,7 @@ class SensorRow(QWidget):
         self.setAccessibleName(self.title)
 
     def show_value(self, value: object, now: float) -> None:
-        """Show the newest value; nothing is painted when it says the same."""
+        """Show the newest value; repaints only if the text changes."""
         reading = reading_of(self.sensor, value)
         if value is True:
             self._yes_s = now
@@ -87,7 +87,7 @@ class SensorRow(QWidget):
 
 
 class SensorsPanel(OneRobotPanel):
-    """The sensors of the robot that is shown."""
+    """Sensors of the robot shown."""
 
     def __init__(self, context: PanelContext) -> None:
         super().__init__(context, _("Live sensors"))
@@ -112,7 +112,7 @@ class SensorsPanel(OneRobotPanel):
     def refresh_robot(self, link: RobotLink | None) -> None:
         if link is not None:
             now = time.monotonic()
-            there = link.connected  # what it felt before it went is not true now
+            there = link.connected  # values of a disconnected robot are outdated
             for row in self.rows:
                 row.show_value(link.values.get(row.sensor.name) if there else None, now)
         else:
@@ -133,7 +133,7 @@ class SensorsPanel(OneRobotPanel):
             self.empty.say(title, _("The robot's description has no sensors."))
 
     def _fit_rows(self) -> None:
-        """Leave the rest below the last whole row empty; the others are scrolled to, row by row."""
+        # Shows whole rows only; scrolling moves by rows.
         if not self.rows:
             return
         room = self.height() - self._column.contentsMargins().top()
@@ -141,7 +141,7 @@ class SensorsPanel(OneRobotPanel):
         fitting = max(1, room // height)
         below = room - fitting * height if fitting < len(self.rows) else 0
         self._frame.setContentsMargins(0, 0, 0, max(0, below))
-        self.pages.setMinimumHeight(height + self._column.contentsMargins().top())  # one whole row, always
+        self.pages.setMinimumHeight(height + self._column.contentsMargins().top())  # at least one whole row
         self._scroll.verticalScrollBar().setSingleStep(height)
 
     def resizeEvent(self, event: QResizeEvent) -> None:
@@ -160,7 +160,7 @@ class SensorsPanel(OneRobotPanel):
 
 
 def _shown(link: RobotLink) -> list[Sensor]:
-    """Everything that fits a row (no pictures), what people look for first."""
+    # All sensors but images; the most relevant ones first.
 
     def rank(sensor: Sensor) -> int:
         words = f"{sensor.name} {sensor.title}".casefold()

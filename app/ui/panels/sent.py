@@ -1,4 +1,4 @@
-"""Sent: what was published, called, replayed and clicked, newest first; who asked, and what came of it."""
+"""Sent panel: log of published messages, calls, replays and clicks, with their sender and result."""
 
 from __future__ import annotations
 
@@ -27,25 +27,25 @@ ASKERS = {
     "image": ("mouse-pointer-click", lazy("Image")),
     "switch": ("triangle-alert", lazy("Studio")),
 }
-"""Icon and words of who asked."""
+"""Icon and name of each sender."""
 TIP_LETTERS = 1000
-STATES_EVERY = 6  # refreshes of 30 a second
+STATES_EVERY = 6  # refreshes at 30 Hz
 
 
 def clock_words(record: SentRecord) -> str:
-    """When it was, for the last time."""
+    """Return the time of the last occurrence."""
     return time.strftime("%H:%M:%S", time.localtime(record.at_s))
 
 
 def line_of(record: SentRecord) -> str:
-    """An entry as text, for the clipboard."""
+    """Format an entry as a line for the clipboard."""
     asker = _(ASKERS[record.asker][1])
     often = f"{grouped(record.count)} \u00d7 " if record.count > 1 else ""
     return " ".join(filter(None, (clock_words(record), f"[{asker}]", record.name, often + record.words)))
 
 
 class SentPanel(PanelWidget):
-    """The table, what can be done with a row of it, and below it how much was sent."""
+    """Table of sent messages with context menu, and their number below."""
 
     def __init__(self, context: PanelContext) -> None:
         super().__init__(context, _("Sent"))
@@ -100,7 +100,7 @@ class SentPanel(PanelWidget):
         inside.addWidget(below)
         self.pages: QStackedWidget = self.show_one_of(self.empty, listed)
 
-    # -- what it shows ------------------------------------------------------------------------------------
+    # -- display ------------------------------------------------------------------------------------------
 
     def refresh(self) -> None:
         self._ticks += 1
@@ -137,7 +137,7 @@ class SentPanel(PanelWidget):
         return said.format(count=grouped(log.total), time=clock)
 
     def chosen(self) -> SentRecord | None:
-        """The entry of the chosen row."""
+        """Return the selected entry, or None."""
         key = self.table.chosen_key()
         return self.acting.sent.get(int(key)) if key else None
 
@@ -151,20 +151,20 @@ class SentPanel(PanelWidget):
         words = self.filter.text().strip()
         return [filter_hindrance(self.title(), words, self.filter.clear)] if words else []
 
-    # -- what a person does -------------------------------------------------------------------------------
+    # -- user actions -------------------------------------------------------------------------------------
 
     def repeat(self) -> None:
-        """Send or call the chosen one again, while that is armed."""
+        """Repeat the selected entry if its target is armed."""
         record = self.chosen()
         why_not = self.acting.repeat(record.number) if record is not None else ""
         if why_not:
             self.context.toast(why_not)
         if self.acting.question is not None:
-            self.context.run("panel:publish")  # where a person is asked
+            self.context.run("panel:publish")  # the panel that asks for confirmation
         self.refresh()
 
     def copy(self) -> None:
-        """Put the chosen line on the clipboard."""
+        """Copy the selected entry."""
         record = self.chosen()
         if record is not None:
             self._to_clipboard(line_of(record), _("Copied the line"))
@@ -174,12 +174,12 @@ class SentPanel(PanelWidget):
         self.context.toast(said)
 
     def clear(self) -> None:
-        """Forget what was sent."""
+        """Clear the log."""
         self.acting.sent.clear()
         self.refresh()
 
     def show_row(self, key: str) -> None:
-        """Show the messages of the topic of a row, or its service."""
+        """Show the messages of an entry's topic, or its service."""
         record = self.acting.sent.get(int(key))
         if record is None or not record.name:
             return
@@ -189,7 +189,7 @@ class SentPanel(PanelWidget):
             show_messages(self.context, record.name)
 
     def menu_of(self, key: str) -> Menu | None:
-        """What can be done with a row."""
+        """Return the context menu of an entry."""
         record = self.acting.sent.get(int(key))
         if record is None:
             return None
@@ -216,7 +216,7 @@ class SentPanel(PanelWidget):
             menu.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
             menu.popup(at)
 
-    # -- what every panel has -----------------------------------------------------------------------------
+    # -- overrides ----------------------------------------------------------------------------------------
 
     def more_actions(self) -> Sequence[QAction]:
         self._clear.setEnabled(bool(self.acting.sent.records))

@@ -1,4 +1,4 @@
-"""Variables: the names of the behaviour and what they hold, while it runs and when it has ended."""
+"""Variables panel: variables of the behaviour with their live or final values."""
 
 from __future__ import annotations
 
@@ -30,16 +30,16 @@ WORDS = TableWords(
     clear_the_filter=lazy("Clear the filter to see all variables."),
 )
 FRESH_S = 0.8
-"""How long a new value is marked."""
+"""Duration in s of the mark on new values."""
 INDENT = 19
 MANY = 8
-"""So few names are found without a filter."""
+"""Number of variables up to which the filter is hidden."""
 ICONS = {"number": "hash", "text": "quote", "boolean": "toggle-left", "list": "list", "other": "braces"}
 
 
 @dataclass(frozen=True, slots=True)
 class VariableRow:
-    """A variable, or below a list one of its items, counted from 1; no ``value`` before the first run."""
+    """Row of a variable, or of a list item (counted from 1); `value` is None before the first run."""
 
     variable: Variable
     value: VariableValue | None
@@ -50,12 +50,12 @@ class VariableRow:
 
     @property
     def key(self) -> str:
-        """Names the row for ever."""
+        """Stable key of the row."""
         return f"{self.variable.id} {self.item}"
 
     @property
     def words(self) -> str:
-        """What it holds, in short."""
+        """Value as short text."""
         if self.value is None:
             return ""
         if self.item:
@@ -67,7 +67,7 @@ class VariableRow:
 
 
 def name_cell(row: VariableRow) -> Cell:
-    """The variable's name with what kind of thing it holds; a list with its arrow."""
+    """Return the variable's name with the icon of its type; lists have an arrow."""
     if row.item:
         return Cell(str(row.item), role="textTertiary", indent=INDENT)
     kind = row.value.kind if row.value is not None else ""
@@ -79,7 +79,7 @@ def name_cell(row: VariableRow) -> Cell:
 
 
 def value_cell(row: VariableRow) -> Cell:
-    """What it holds, marked while that is new; grey when the behaviour has ended."""
+    """Return the value, marked while new and grey after the run has ended."""
     if row.fresh and not row.item:
         return Cell(row.words, role="changed", tint="changedTint")
     return Cell(row.words, role="textSecondary" if row.over else "text")
@@ -103,7 +103,7 @@ def rows_of(
     fresh: Collection[str] = (),
     over: bool = False,
 ) -> list[VariableRow]:
-    """The variables in their order, and below each list that is ``opened`` (ids) its first items."""
+    """Return the rows in sort order; each list in `opened` (ids) is followed by its first items."""
     rows: list[VariableRow] = []
     heads = [
         VariableRow(each, values.get(each.id), each.id in opened, fresh=each.id in fresh, over=over)
@@ -120,7 +120,7 @@ def rows_of(
 
 
 class VariablesPanel(TablePanel[VariableRow]):
-    """The table of variables; what is done with one is in its menu."""
+    """Table of variables; their context menu has the actions."""
 
     def __init__(self, context: PanelContext) -> None:
         super().__init__(context, WORDS, "variable")
@@ -129,7 +129,7 @@ class VariablesPanel(TablePanel[VariableRow]):
         self.add.clicked.connect(lambda: context.run("variable.new"))
         self.when = ElidedLabel("body", "textSecondary")
         self.header = [self.when, self.filter, self.add]
-        self.table.horizontalHeader().hide()  # a name and its value need no heading, and the panel is low
+        self.table.horizontalHeader().hide()  # not needed for name and value, and the panel is low
         self.table.setContextMenuPolicy(Qt.ContextMenuPolicy.CustomContextMenu)
         self.table.customContextMenuRequested.connect(self._show_menu)
         column = QVBoxLayout(self)
@@ -144,7 +144,7 @@ class VariablesPanel(TablePanel[VariableRow]):
         self._variables: tuple[Variable, ...] = ()
         self._seen: tuple[object, ...] = ()
         self._values: Mapping[str, VariableValue] = {}
-        self._fresh: dict[str, float] = {}  # variables whose value is new, and since when
+        self._fresh: dict[str, float] = {}  # time of the change, by variable
 
     def make_model(self) -> TableModel[VariableRow]:
         return TableModel(COLUMNS, lambda row: row.key)
@@ -156,7 +156,7 @@ class VariablesPanel(TablePanel[VariableRow]):
         table.delete_wanted.connect(lambda key: self._about("variable.delete", key))
         return table
 
-    # -- what it shows ------------------------------------------------------------------------------------
+    # -- display ------------------------------------------------------------------------------------------
 
     def refresh(self) -> None:
         runs, document = self.session.runs, self.session.document
@@ -199,7 +199,7 @@ class VariablesPanel(TablePanel[VariableRow]):
         if any_rows or filtered:
             super().show_table(any_rows, filtered)
             self.doctor.hide()
-        else:  # whether there is a master says nothing of variables
+        else:  # independent of the master
             self.pages.setCurrentIndex(1)
             self.say_empty()
 
@@ -212,7 +212,7 @@ class VariablesPanel(TablePanel[VariableRow]):
         new = EmptyAction(_("New variable"), lambda: self.context.run("variable.new"), "plus", primary=True)
         self.empty.set_actions([new])
 
-    # -- what a person does -------------------------------------------------------------------------------
+    # -- user actions -------------------------------------------------------------------------------------
 
     def open_row(self, key: str) -> None:
         row = self.model.row_at(self.model.index_of(key))
@@ -233,7 +233,7 @@ class VariablesPanel(TablePanel[VariableRow]):
             self.context.run(f"{command}:{row.variable.id}")
 
     def menu_of(self, key: str) -> Menu | None:
-        """What can be done with the variable of this row."""
+        """Return the context menu of a variable."""
         row = self.model.row_at(self.model.index_of(key))
         if row is None:
             return None
@@ -262,7 +262,7 @@ class VariablesPanel(TablePanel[VariableRow]):
 
 
 class _VariableTable(TableView[VariableRow]):
-    """Right opens a list, Left closes it; F2 renames, Delete deletes."""
+    """Table of variables: Right expands a list, Left collapses it, F2 renames, Delete deletes."""
 
     fold_wanted = Signal(str, bool)
     rename_wanted = Signal(str)
