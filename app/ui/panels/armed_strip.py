@@ -19,7 +19,7 @@ from app.ui.widgets.flow_layout import Flow
 from app.ui.widgets.menus import Menu
 from nep.i18n import _, ngettext
 
-MINUTES = (1, 5, 15, 60)
+ARMED_MINUTES = (1, 5, 15, 60)
 
 
 def left_words(seconds: float) -> str:
@@ -171,7 +171,7 @@ class ArmedMinutes(Menu):
         self.setIcon(theme.icon("clock"))
         self._choices: dict[int, QAction] = {}
         group = QActionGroup(self)
-        for count in MINUTES:
+        for count in ARMED_MINUTES:
             words = ngettext("{count} minute", "{count} minutes", count).format(count=count)
             action = self._choices[count] = self.addAction(words)
             action.setCheckable(True)

@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from app.core.network.watches import Suspendable
     from app.core.robots.robot_link import RobotLink
 
-LOOKS_EVERY_S = 0.1
+REFRESH_INTERVAL_S = 0.1
 """Refresh period of everything that doesn't arrive with a picture or detection, such as the rate."""
 
 
@@ -79,7 +79,7 @@ class CameraPanel(OneRobotPanel):
         self.chip.set(_("silent for {age}").format(age=age_words(silent_s)) if silent else "", "error")
         if self._stream.picture is not None:
             self.pages.setCurrentWidget(self.view)
-        self._seen, self._size, self._looks_s = seen, size, now + LOOKS_EVERY_S
+        self._seen, self._size, self._looks_s = seen, size, now + REFRESH_INTERVAL_S
 
     def _seen_now(self, link: RobotLink, silent_s: float | None) -> tuple[object, ...]:
         # Identity matters: unchanged items must be the same objects as in the last call.

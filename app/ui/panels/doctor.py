@@ -26,10 +26,10 @@ from nep.i18n import _, lazy, ngettext, number
 from nep.programs.doctor import Finding, in_order, report
 
 STATUS = {"error": "error", "warning": "warn", "info": "info", "ok": "ok"}
-BAD = frozenset({"error", "warning"})
-WAITS_S = 2.0
+BAD_SEVERITIES = frozenset({"error", "warning"})
+WAIT_REPORT_S = 2.0
 """Time after which a panel that waits for a topic is reported."""
-MOST_OFFERED = 500
+MAX_TOPICS = 500
 """Maximum number of topics in the list of missing topics."""
 
 
@@ -173,7 +173,7 @@ class DoctorPanel(PanelWidget):
         waiting = {(panel, topic) for panel in shown if (topic := panel.waits_for()) and topic != missed}
         self._waits = {each: self._waits.get(each, now) for each in waiting}
         for panel, topic in sorted(waiting, key=lambda each: (each[0].title(), each[1])):
-            if now - self._waits[panel, topic] >= WAITS_S:
+            if now - self._waits[panel, topic] >= WAIT_REPORT_S:
                 yield self._panel_waits(panel, topic)
 
     def _panel_waits(self, panel: PanelWidget, topic: str) -> Hindrance:
@@ -187,7 +187,7 @@ class DoctorPanel(PanelWidget):
         sentence = _("{panel} is waiting for {topic}, which has no publisher.").format(**names)
         if topic not in self._near:  # cached: comparing thousands of names takes long
             sent = [each.key for each in live.topics if each.publisher_nodes]
-            self._near = {topic: nearest(topic, sent[:MOST_OFFERED])}
+            self._near = {topic: nearest(topic, sent[:MAX_TOPICS])}
         near = self._near[topic]
         if near is None:
             return Hindrance(sentence, "", *ask)
@@ -221,7 +221,7 @@ class DoctorPanel(PanelWidget):
         names = [topic.key for topic in (*live.topics, *live.networks.topics)]
         self.missed.clear()
         self.missed.addItem(_("nothing specific"), "")
-        for name in sorted({*names[:MOST_OFFERED], missed} - {""}):
+        for name in sorted({*names[:MAX_TOPICS], missed} - {""}):
             self.missed.addItem(topic_words(name), name)
         self.missed.set_value(missed)
         command = f"nep doctor {missed}" if missed and not split_key(missed)[0] else "nep doctor"
@@ -234,7 +234,7 @@ class DoctorPanel(PanelWidget):
             self.looked.setText(_("Checking: {done} of {count}").format(done=done, count=count))
             return
         words = ngettext("{count} check done", "{count} checks done", doctor.looked_at)
-        if all(each.severity not in BAD for each in self.shown):
+        if all(each.severity not in BAD_SEVERITIES for each in self.shown):
             words = ngettext("{count} check passed", "All {count} checks passed", doctor.looked_at)
         self.looked.setText(words.format(count=done))
 
@@ -250,7 +250,7 @@ class DoctorPanel(PanelWidget):
             self.pages.put(place, row)
 
     def _show_chip(self, *, is_done: bool) -> None:
-        bad = [each.severity for each in self.shown if each.severity in BAD]
+        bad = [each.severity for each in self.shown if each.severity in BAD_SEVERITIES]
         if bad:
             self.chip.set(str(len(bad)), STATUS[bad[0]])
         elif is_done:
@@ -259,7 +259,7 @@ class DoctorPanel(PanelWidget):
             self.chip.set("", "info")
 
     def _row(self, finding: Finding, step: NextStep | None) -> AlertRow:
-        row = AlertRow(self.theme, framed=finding.severity in BAD)
+        row = AlertRow(self.theme, framed=finding.severity in BAD_SEVERITIES)
         row.say(
             STATUS[finding.severity],
             finding.sentence,
@@ -292,7 +292,9 @@ class DoctorPanel(PanelWidget):
             "topic:name": (_("Choose a topic"), "panel:topics"),
         }.get(finding.id)
         if run is not None:
-            return NextStep(run[0], lambda: self.context.run(run[1]), mends=finding.severity in BAD)
+            return NextStep(
+                run[0], lambda: self.context.run(run[1]), mends=finding.severity in BAD_SEVERITIES
+            )
         if finding.id == "master:none":
             return NextStep(_("Start the master"), self._start_master)
         if finding.command:

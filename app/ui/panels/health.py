@@ -23,9 +23,9 @@ if TYPE_CHECKING:
     from app.core.robots.robot_link import RobotLink
 
 TITLE_WIDTH = 96
-BESIDE_FROM = 300
-ROW = {"compact": 22, "comfortable": 28}
-TEXT = {"compact": "body", "comfortable": "bodyLarge"}
+TITLE_BESIDE_WIDTH = 300
+ROW_HEIGHTS = {"compact": 22, "comfortable": 28}
+TEXT_FONTS = {"compact": "body", "comfortable": "bodyLarge"}
 
 
 class HealthRow(QWidget):
@@ -35,10 +35,10 @@ class HealthRow(QWidget):
         super().__init__()
         self._theme = theme
         self.fact: HealthFact | None = None
-        self.title = label("", TEXT[density])
-        self.words = label("", TEXT[density], role="textSecondary", wrap=True)
-        line = paint.height_of(theme.font(TEXT[density]))
-        space = round(max(1.0, (theme.scaled(ROW[density]) - line) / 2))
+        self.title = label("", TEXT_FONTS[density])
+        self.words = label("", TEXT_FONTS[density], role="textSecondary", wrap=True)
+        line = paint.height_of(theme.font(TEXT_FONTS[density]))
+        space = round(max(1.0, (theme.scaled(ROW_HEIGHTS[density]) - line) / 2))
         self._space = space
         self.icon = StatusIcon(theme, height=round(line) + 2 * space)
         self._said = QBoxLayout(QBoxLayout.Direction.LeftToRight)
@@ -53,7 +53,7 @@ class HealthRow(QWidget):
 
     def resizeEvent(self, event: QResizeEvent) -> None:
         super().resizeEvent(event)
-        beside = self.width() >= self._theme.scaled(BESIDE_FROM)
+        beside = self.width() >= self._theme.scaled(TITLE_BESIDE_WIDTH)
         way = QBoxLayout.Direction.LeftToRight if beside else QBoxLayout.Direction.TopToBottom
         self.title.setMinimumWidth(round(self._theme.scaled(TITLE_WIDTH)) if beside else 0)
         space = self._space

@@ -35,8 +35,8 @@ if TYPE_CHECKING:
 
 STATUS = {"error": "error", "warning": "warn", "info": "info"}
 SEVERITIES = {"error": lazy("error"), "warning": lazy("warning"), "info": lazy("info")}
-MOST_ROWS = 60
-NOTHING = lazy("No problems.\nIf something needs fixing, it appears here.")
+MAX_ROWS = 60
+NO_PROBLEMS = lazy("No problems.\nIf something needs fixing, it appears here.")
 
 
 class ProblemRow(QWidget):
@@ -132,7 +132,7 @@ class ProblemsPanel(PanelWidget):
         self.others.setContentsMargins(14, 6, 8, 6)
         self.others.hide()
         self._column.insertWidget(0, self.others)
-        self.nothing = label(_(NOTHING), "bodyLarge", role="textSecondary", wrap=True)
+        self.nothing = label(_(NO_PROBLEMS), "bodyLarge", role="textSecondary", wrap=True)
         self.nothing.setAlignment(Qt.AlignmentFlag.AlignCenter)
         self.pages = self.show_one_of(Scrolled(self.nothing), self._scroll)
 
@@ -172,15 +172,15 @@ class ProblemsPanel(PanelWidget):
         kept = {row.line: row for row in self.rows}
         held = False
         for line, row in kept.items():
-            if line not in found[:MOST_ROWS]:
+            if line not in found[:MAX_ROWS]:
                 held = held or row.holds_focus()
                 self._column.removeWidget(row)
                 row.hide()
                 row.deleteLater()
-        self.rows = [kept.get(line) or self._row(line) for line in list(dict.fromkeys(found))[:MOST_ROWS]]
+        self.rows = [kept.get(line) or self._row(line) for line in list(dict.fromkeys(found))[:MAX_ROWS]]
         for place, row in enumerate(self.rows):
             self._column.insertWidget(place, row)
-        more = max(0, len(found) - MOST_ROWS)
+        more = max(0, len(found) - MAX_ROWS)
         said = ngettext("{count} more after these are fixed", "{count} more after these are fixed", more)
         self.others.setText(said.format(count=more))
         paint.show_when(self.others, more > 0)

@@ -25,8 +25,8 @@ from nep.i18n import _, lazy
 if TYPE_CHECKING:
     from app.core.robots.robot_link import RobotLink
 
-ROW = {"compact": 26, "comfortable": 28}
-FIRST = ("touch", "distance", "battery")  # listed first; other sensors keep their order
+ROW_HEIGHTS = {"compact": 26, "comfortable": 28}
+FIRST_WORDS = ("touch", "distance", "battery")  # listed first; other sensors keep their order
 TITLE_WIDTH, VALUE_WIDTH = 100, 96
 ICON = 18
 
@@ -59,7 +59,7 @@ class SensorRow(QWidget):
             self.update()
 
     def sizeHint(self) -> QSize:
-        least = ROW["comfortable" if self.large else "compact"]
+        least = ROW_HEIGHTS["comfortable" if self.large else "compact"]
         return QSize(260, max(least, round(self._theme.scaled(least))))
 
     def paintEvent(self, _event: QPaintEvent) -> None:
@@ -164,7 +164,7 @@ def _shown(link: RobotLink) -> list[Sensor]:
 
     def rank(sensor: Sensor) -> int:
         words = f"{sensor.name} {sensor.title}".casefold()
-        return next((place for place, word in enumerate(FIRST) if word in words), len(FIRST))
+        return next((place for place, word in enumerate(FIRST_WORDS) if word in words), len(FIRST_WORDS))
 
     return sorted((sensor for sensor in link.robot.sensors if not sensor.is_image), key=rank)
 

@@ -28,8 +28,8 @@ ASKERS = {
     "switch": ("triangle-alert", lazy("Studio")),
 }
 """Icon and name of each sender."""
-TIP_LETTERS = 1000
-STATES_EVERY = 6  # refreshes at 30 Hz
+MAX_TIP_CHARS = 1000
+STATE_UPDATE_TICKS = 6  # refreshes at 30 Hz
 
 
 def clock_words(record: SentRecord) -> str:
@@ -106,7 +106,7 @@ class SentPanel(PanelWidget):
         self._ticks += 1
         if self.acting.sent.revision != self._seen:
             self._rebuild()
-        elif self._ticks % STATES_EVERY == 0:
+        elif self._ticks % STATE_UPDATE_TICKS == 0:
             self._offer_again()
 
     def _rebuild(self) -> None:
@@ -259,7 +259,7 @@ def _columns() -> tuple[Column[SentRecord], ...]:
         return Cell(_(ASKERS[record.asker][1]), role="textSecondary")
 
     def tip(record: SentRecord) -> str:
-        return "\n".join(filter(None, (record.words, record.text[:TIP_LETTERS])))
+        return "\n".join(filter(None, (record.words, record.text[:MAX_TIP_CHARS])))
 
     return (
         Column("at", lazy("Time"), 92, lambda each: Cell(clock_words(each), mono=True, role="textSecondary")),

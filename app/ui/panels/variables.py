@@ -29,10 +29,10 @@ WORDS = TableWords(
     nothing_fits=lazy("No matching variables"),
     clear_the_filter=lazy("Clear the filter to see all variables."),
 )
-FRESH_S = 0.8
+CHANGE_MARK_S = 0.8
 """Duration in s of the mark on new values."""
 INDENT = 19
-MANY = 8
+MAX_WITHOUT_FILTER = 8
 """Number of variables up to which the filter is hidden."""
 ICONS = {"number": "hash", "text": "quote", "boolean": "toggle-left", "list": "list", "other": "braces"}
 
@@ -167,7 +167,7 @@ class VariablesPanel(TablePanel[VariableRow]):
         now = self.clock()
         values = runs.values if mine else {}
         seen = (document.key, program.variables, runs.values_revision if mine else -1, mine and runs.active)
-        faded = [id for id, since in self._fresh.items() if now - since >= FRESH_S]
+        faded = [id for id, since in self._fresh.items() if now - since >= CHANGE_MARK_S]
         for id in faded:
             del self._fresh[id]
         if seen == self._seen and not faded:
@@ -185,7 +185,7 @@ class VariablesPanel(TablePanel[VariableRow]):
         self.model.set_rows(
             rows_of(found, self._values, self._opened, self.table.order, fresh=self._fresh, over=over)
         )
-        self.filter.setVisible(len(self._variables) > MANY or bool(words))
+        self.filter.setVisible(len(self._variables) > MAX_WITHOUT_FILTER or bool(words))
         self.when.setText(self._when(over=over))
         self.table.tell_visible_changed()
         self.show_table(bool(found), bool(words))

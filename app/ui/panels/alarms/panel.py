@@ -55,12 +55,12 @@ from nep.programs.alarms.sentences import condition_words, time_words
 if TYPE_CHECKING:
     from app.core.network.watches import Watch
 
-STATES_EVERY = 6  # refreshes at 30 Hz: states are updated five times a second
+STATE_UPDATE_TICKS = 6  # refreshes at 30 Hz: states are updated five times a second
 SNOOZE_S = 600.0
 CALM_CHOICES_S = (0.5, 2.0, 10.0, 60.0)
 ICONS = {"image": "image", "json": "braces", "string": "type", "bytes": "binary", "msgpack": "braces"}
 CSV = FileKind(lazy("Comma-separated values"), ".csv")
-MOST_OFFERED = 500
+MAX_COMPLETIONS = 500
 
 
 class AlarmsPanel(PanelWidget):
@@ -168,13 +168,13 @@ class AlarmsPanel(PanelWidget):
             self._seen = facts
             self._show_rules()
             self._show_states()
-        elif self._ticks % STATES_EVERY == 0:
+        elif self._ticks % STATE_UPDATE_TICKS == 0:
             self._show_states()
         if self._history_seen != self.alarms.history.revision:
             self._show_history()
         elif self._ticks % 30 == 0:
             self.table.tell_visible_changed()
-        if self.field is not None and self._ticks % STATES_EVERY == 0:
+        if self.field is not None and self._ticks % STATE_UPDATE_TICKS == 0:
             self.field.offer(self._existing(self.field.slot.part, self._row_of(self.field.slot)))
 
     def _show_rules(self) -> None:
@@ -339,9 +339,9 @@ class AlarmsPanel(PanelWidget):
             return ()
         match part.role:
             case "subject" if rule.condition.is_about_node:
-                return sorted({node.name for node in self.session.live.nodes})[:MOST_OFFERED]
+                return sorted({node.name for node in self.session.live.nodes})[:MAX_COMPLETIONS]
             case "subject":
-                return sorted(topic.name for topic in self.session.live.topics.live())[:MOST_OFFERED]
+                return sorted(topic.name for topic in self.session.live.topics.live())[:MAX_COMPLETIONS]
             case "value":
                 return self._paths(rule.condition.name)
             case "time":
@@ -365,7 +365,7 @@ class AlarmsPanel(PanelWidget):
         if kind == "call":
             return sorted(self.session.live.graph.services) if self.session.live.graph is not None else []
         if kind == "send":
-            return sorted(topic.name for topic in self.session.live.topics.live())[:MOST_OFFERED]
+            return sorted(topic.name for topic in self.session.live.topics.live())[:MAX_COMPLETIONS]
         titles = [self.session.documents.title(document) for document in self.session.documents]
         return list(dict.fromkeys([*titles, *(file.name for file in self.session.settings.recent)]))
 

@@ -243,7 +243,7 @@ def taken(rule: AlarmRule, part: PhrasePart, text: str) -> AlarmRule | None:
             return replace(rule, condition=replace(condition, path=text))
         case "limit":
             limit = read_limit(condition, text)
-            return None if limit is _WRONG else replace(rule, condition=replace(condition, limit=limit))  # type: ignore[arg-type]
+            return None if limit is _INVALID else replace(rule, condition=replace(condition, limit=limit))  # type: ignore[arg-type]
         case "time":
             for_s = read_time(text)
             return None if for_s is None else replace(rule, condition=replace(condition, for_s=for_s))
@@ -259,7 +259,7 @@ def taken(rule: AlarmRule, part: PhrasePart, text: str) -> AlarmRule | None:
             return None
 
 
-_WRONG = object()
+_INVALID = object()
 
 
 def read_limit(condition: AlarmCondition, text: str) -> object:
@@ -267,11 +267,11 @@ def read_limit(condition: AlarmCondition, text: str) -> object:
     if condition.kind in NUMBER_KINDS:
         figures, *words = text.replace("%", " ").split() or [""]
         if any(each[0].isdigit() for each in words):
-            return _WRONG  # "1 234"
+            return _INVALID  # "1 234"
         try:
             number = parse_number(figures)
         except TypedNumberError:
-            return _WRONG
+            return _INVALID
         return int(number) if number.is_integer() and abs(number) < 2**53 else number
     try:
         value = json.loads(text)

@@ -17,7 +17,7 @@ from app.ui.widgets.buttons import PaintedButton
 from app.ui.widgets.keyboard import following, is_plain
 from app.ui.widgets.menus import EditMenu
 
-HEIGHT, PADDING, ICON, GAP, WIDEST = 24, 7, 14, 5, 300
+HEIGHT, PADDING, ICON, GAP, MAX_WIDTH = 24, 7, 14, 5, 300
 FIELD_WIDTH = 240
 
 
@@ -49,7 +49,7 @@ class AlarmSlot(PaintedButton):
         if self.part.icon:
             width += theme.scaled(ICON) + (GAP if self.text() else 0)
         height = max(HEIGHT, round(paint.height_of(self._font())) + 6)
-        return QSize(min(round(width) + 2, round(theme.scaled(WIDEST))), height)
+        return QSize(min(round(width) + 2, round(theme.scaled(MAX_WIDTH))), height)
 
     def minimumSizeHint(self) -> QSize:
         return QSize(min(self.sizeHint().width(), 40), self.sizeHint().height())

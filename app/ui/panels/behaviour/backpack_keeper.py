@@ -14,7 +14,7 @@ from app.ui.panels.base import PanelContext
 from nep.i18n import _, ngettext
 from nep.text import bounded_str
 
-LOOK_EVERY = 30  # refreshes at 30 Hz: changes of another Studio appear within a second
+POLL_TICKS = 30  # refreshes at 30 Hz: changes of another Studio appear within a second
 
 
 class Shows(Protocol):
@@ -42,7 +42,7 @@ class BackpackKeeper:
     def tick(self) -> None:
         """Poll for changes by another Studio; call on every refresh."""
         self._ticks += 1
-        if self._ticks % LOOK_EVERY == 0:
+        if self._ticks % POLL_TICKS == 0:
             self.look()
 
     def look(self) -> None:

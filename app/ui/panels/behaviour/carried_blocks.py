@@ -14,8 +14,8 @@ from app.ui.panels.base import PanelContext
 from app.ui.panels.behaviour.tabs import NEW, BehaviourTabs
 from nep.i18n import _, ngettext
 
-SCROLL_MS = 16
-OPENS_MS = 500  # like spring-loaded folders in file managers
+SCROLL_INTERVAL_MS = 16
+OPEN_DELAY_MS = 500  # like spring-loaded folders in file managers
 BESIDE = QPoint(14, 16)  # offset from the mouse, so that the tab under it stays readable
 OPACITY = 0.85
 
@@ -103,10 +103,10 @@ class CarriedBlocks:
         self._aimed = ""
         self._opening = QTimer(tabs)
         self._opening.setSingleShot(True)
-        self._opening.setInterval(OPENS_MS)
+        self._opening.setInterval(OPEN_DELAY_MS)
         self._opening.timeout.connect(self._open)
         self._scrolling = QTimer(tabs)
-        self._scrolling.setInterval(SCROLL_MS)
+        self._scrolling.setInterval(SCROLL_INTERVAL_MS)
         self._scrolling.timeout.connect(self._scroll)
         editor.block_carried.connect(self._carried)
         editor.carried_seen.connect(self._seen)

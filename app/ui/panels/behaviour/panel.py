@@ -38,14 +38,14 @@ if TYPE_CHECKING:
     from app.core.robots.robot_link import RobotLink
     from app.core.run.control import Runs
 
-LIVE_EVERY = 6  # refreshes at 30 Hz: values on sensor blocks are updated five times a second
-PINNED = "toolbox_pinned"
-ALARMS = frozenset({NOT_STOPPED, STOPPING, "silent"})
+LIVE_UPDATE_TICKS = 6  # refreshes at 30 Hz: values on sensor blocks are updated five times a second
+PINNED_SETTING = "toolbox_pinned"
+ALARM_STATES = frozenset({NOT_STOPPED, STOPPING, "silent"})
 WAIT_WORDS = lazy("Loading blocks.")
 WAIT_UNTIL_S = 0.5
-WANTED = {"robot": "robots.virtual", "examples": "help.examples"}
+START_COMMANDS = {"robot": "robots.virtual", "examples": "help.examples"}
 """Commands of the buttons on an empty canvas."""
-_GAP = re.compile(r"\([^()]*\)")  # placeholders in the help, such as "(robot) say (text)"
+_PLACEHOLDER = re.compile(r"\([^()]*\)")  # placeholders in the help, such as "(robot) say (text)"
 Json = Mapping[str, object]
 
 
@@ -192,7 +192,7 @@ class BehaviourPanel(PanelWidget):
         if self._new("values", (runs.values_revision, mine, self._watched)):
             values = runs.values if mine else {}
             editor.set_variable_values({id: values[id].to_json() for id in self._watched if id in values})
-        if self._ticks % LIVE_EVERY == 0:
+        if self._ticks % LIVE_UPDATE_TICKS == 0:
             self._show_live()
         if self._backpack is not None:
             self._backpack.tick()
@@ -250,7 +250,7 @@ class BehaviourPanel(PanelWidget):
         editor.sensors_offered.connect(self._offer)
         editor.command_wanted.connect(self.context.run)
         editor.values_watched.connect(self._watch_variables)
-        editor.wanted.connect(lambda what: self.context.run(WANTED[what]))
+        editor.wanted.connect(lambda what: self.context.run(START_COMMANDS[what]))
         editor.try_asked.connect(lambda stack: self.context.run(f"try:{stack}"))
         editor.toolbox_pinned.connect(self._keep_pinned)
         editor.blocks_deleted.connect(lambda count: self._deleted(editor, count))
@@ -259,7 +259,7 @@ class BehaviourPanel(PanelWidget):
         )
         backpack = Backpack(self.session.settings.path.parent)
         self._backpack = BackpackKeeper(self.context, backpack, editor)
-        pinned: object = self.session.settings.get(PINNED, None)
+        pinned: object = self.session.settings.get(PINNED_SETTING, None)
         editor.set_toolbox_pinned(pinned if isinstance(pinned, bool) else None)
         editor.set_theme(self.theme.blockly_tokens(), self.theme.dark)
         if isinstance(editor, QWidget):
@@ -319,7 +319,7 @@ class BehaviourPanel(PanelWidget):
     def _keep_pinned(self, keeps: bool) -> None:
         # Failed writes are shown by the status bar.
         with suppress(SettingsError):
-            self.session.settings.set(PINNED, keeps)
+            self.session.settings.set(PINNED_SETTING, keeps)
 
     def _deleted(self, editor: Editor, count: int) -> None:
         words = ngettext("Deleted {count} block", "Deleted {count} blocks", count).format(count=count)
@@ -413,7 +413,7 @@ class BehaviourPanel(PanelWidget):
         help_of = self.session.documents.definitions().get("help")
         found = help_of.get(block) if isinstance(help_of, Mapping) else None
         title = str(found.get("title", "")) if isinstance(found, Mapping) else ""
-        name = " ".join(_GAP.sub(" ", title).split())
+        name = " ".join(_PLACEHOLDER.sub(" ", title).split())
         begins = block.startswith("events_") or "_when_" in block
         then = _("Drag it onto the page") if begins else _("Drag it below the other blocks")
         self.editor.point_at(block, name, then)
@@ -492,7 +492,11 @@ class BlocksWait:
 
 def alarms_of(links: Iterable[RobotLink]) -> dict[str, tuple[str, str]]:
     """Return icon and text for the toolbox of robots that may be moving or don't answer."""
-    return {link.name: (ROBOT_STATUS[link.state], link.state_words) for link in links if link.state in ALARMS}
+    return {
+        link.name: (ROBOT_STATUS[link.state], link.state_words)
+        for link in links
+        if link.state in ALARM_STATES
+    }
 
 
 def tab_facts(documents: Iterable[Document], runs: Runs) -> list[TabFacts]:

@@ -23,12 +23,12 @@ from app.ui.widgets.buttons import PaintedButton
 from app.ui.widgets.menus import EditMenu
 from nep.i18n import _
 
-LONGEST_NAME = 220
-MOST_LETTERS = 200
-SAID_MS = 20_000
+MAX_NAME_WIDTH = 220
+MAX_NAME_LENGTH = 200
+PROBLEM_TIP_MS = 20_000
 PADDING = 12
 ICON = 16
-SLOT = 18  # place of the unsaved dot or, on hover, the close button
+SLOT_WIDTH = 18  # place of the unsaved dot or, on hover, the close button
 
 
 @dataclass(frozen=True)
@@ -85,10 +85,10 @@ class BehaviourTab(PaintedButton):
 
     def sizeHint(self) -> QSize:
         font = self._font(current=True)
-        name = min(self._theme.scaled(LONGEST_NAME), paint.width_of(font, self.facts.name) + 1)
+        name = min(self._theme.scaled(MAX_NAME_WIDTH), paint.width_of(font, self.facts.name) + 1)
         icon = self._icon() + 8 if self._has_icon() else 0
         height = max(28, round(paint.height_of(font)) + 6)
-        return QSize(round(PADDING + icon + name + SLOT + 4), height)
+        return QSize(round(PADDING + icon + name + SLOT_WIDTH + 4), height)
 
     def _font(self, *, current: bool) -> QFont:
         font = self._theme.font("label")
@@ -98,7 +98,7 @@ class BehaviourTab(PaintedButton):
     def close_rect(self) -> QRectF:
         """Return the rectangle of the close button."""
         rect = QRectF(self.rect())
-        return QRectF(rect.right() - SLOT - 1, rect.center().y() - 8, 16, 16)
+        return QRectF(rect.right() - SLOT_WIDTH - 1, rect.center().y() - 8, 16, 16)
 
     def paint_button(self, painter: QPainter, rect: QRectF) -> None:
         theme = self._theme
@@ -112,7 +112,7 @@ class BehaviourTab(PaintedButton):
             side = self._icon()
             self._paint_mark(painter, QRectF(left, rect.center().y() - side / 2, side, side))
             left += side + 8
-        words = rect.adjusted(left, 0, -SLOT - 2, 0)
+        words = rect.adjusted(left, 0, -SLOT_WIDTH - 2, 0)
         paint.words(painter, words, self.facts.name, self._font(current=current), ink)
         self._paint_slot(painter, over or self.hasFocus())
 
@@ -216,7 +216,7 @@ class NameField(QLineEdit):
         self._theme, self._why_not, self._ended = theme, why_not, False
         self.setAccessibleName(_("Behaviour name"))
         self.setProperty("focusRadius", theme.radius("small"))
-        self.setMaxLength(MOST_LETTERS)
+        self.setMaxLength(MAX_NAME_LENGTH)
         self.setFont(theme.font("label"))
         EditMenu(theme, self)
         self.textEdited.connect(lambda _text: self._mark(""))
@@ -266,6 +266,6 @@ class NameField(QLineEdit):
         if problem:
             paint.announce(self, problem)
             below = self.mapToGlobal(QPoint(0, self.height() + 2))
-            QToolTip.showText(below, plain.tip(problem), self, self.rect(), SAID_MS)
+            QToolTip.showText(below, plain.tip(problem), self, self.rect(), PROBLEM_TIP_MS)
         else:
             QToolTip.hideText()

@@ -15,10 +15,10 @@ from app.ui.widgets import Button, IconButton, Segments
 from app.ui.widgets.menus import Menu, drop_below
 from nep.i18n import _
 
-SHORTEST = 76
+MIN_TAB_WIDTH = 76
 GAP = 4
 NAME_WIDTH = 180  # width of the name field
-SCROLL_NEAR, SCROLL_STEP = 32, 8  # px
+SCROLL_MARGIN, SCROLL_STEP = 32, 8  # px
 NEW = "+"
 """Stands for the "+" button in place of a tab's key."""
 
@@ -117,7 +117,7 @@ class BehaviourTabs(QWidget):
         here, room = self.mapFromGlobal(place), self._room.geometry()
         if not self.isVisible() or not room.contains(here):
             return False
-        near = min(round(self._theme.scaled(SCROLL_NEAR)), room.width() // 3)
+        near = min(round(self._theme.scaled(SCROLL_MARGIN)), room.width() // 3)
         before = self._left
         if here.x() < room.left() + near:
             self._left -= SCROLL_STEP
@@ -196,7 +196,7 @@ class BehaviourTabs(QWidget):
         # The active tab keeps its full width up to the available room; the others shrink down to SHORTEST.
         wanted = [self.tabs[each.key].sizeHint().width() for each in self._facts]
         room = self._room_width(scrolls=False) - GAP * len(wanted)
-        least = round(self._theme.scaled(SHORTEST))
+        least = round(self._theme.scaled(MIN_TAB_WIDTH))
         keys = [each.key for each in self._facts]
         alone = max(least, self._room_width(scrolls=len(keys) > 1))
 
@@ -250,7 +250,7 @@ class BehaviourTabs(QWidget):
         return QSize(sum(size.width() + GAP for size in tabs) + self.add.sizeHint().width(), height)
 
     def minimumSizeHint(self) -> QSize:
-        width = round(self._theme.scaled(SHORTEST)) + GAP + self.add.sizeHint().width()
+        width = round(self._theme.scaled(MIN_TAB_WIDTH)) + GAP + self.add.sizeHint().width()
         if len(self._facts) > 1:
             width += GAP + self.list.sizeHint().width()
         return QSize(width, self.sizeHint().height())

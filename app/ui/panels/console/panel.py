@@ -30,19 +30,19 @@ from nep.i18n import _, lazy, ngettext
 if TYPE_CHECKING:
     from app.core.console import ConsoleRecord
 
-FROM = {
+LEVEL_WORDS = {
     "debug": lazy("All, including details"),
     "all": lazy("Everything"),
     "warn": lazy("Warnings and errors"),
     "error": lazy("Errors only"),
 }
-SHOWN = {
+SHOWN_LEVELS = {
     "debug": frozenset(LEVELS),
     "all": frozenset(LEVELS) - {"debug"},
     "warn": frozenset({"warn", "error", "critical"}),
     "error": frozenset({"error", "critical"}),
 }
-MOST_NODES = 20
+MAX_NODES = 20
 
 
 class ConsolePanel(PanelWidget):
@@ -138,7 +138,7 @@ class ConsolePanel(PanelWidget):
             self.list.scrollToTop()
 
     def _wanted(self) -> RecordFilter:
-        return RecordFilter(SHOWN[self.level], self.node, self.words.text())
+        return RecordFilter(SHOWN_LEVELS[self.level], self.node, self.words.text())
 
     def _scrolled(self, value: int) -> None:
         if value == 0:
@@ -169,7 +169,7 @@ class ConsolePanel(PanelWidget):
             self.empty.say(_("No matching lines"), _("Show all lines, or wait for a matching one."))
             self.empty.set_actions([EmptyAction(_("Show all lines"), self.show_all, "x")])
         else:
-            said = _("Choose “{everything}” to see all lines.").format(everything=_(FROM["all"]))
+            said = _("Choose “{everything}” to see all lines.").format(everything=_(LEVEL_WORDS["all"]))
             self.empty.say(_("No problems reported"), said)
             self.empty.set_actions([])
 
@@ -177,7 +177,7 @@ class ConsolePanel(PanelWidget):
         chosen = [
             self.words.text(),
             self.node,
-            _(FROM[self.level]) if self.level in {"warn", "error"} else "",
+            _(LEVEL_WORDS[self.level]) if self.level in {"warn", "error"} else "",
         ]
         words = ", ".join(filter(None, chosen))
         return [filter_hindrance(self.title(), words, self.show_all)] if words else []
@@ -186,7 +186,7 @@ class ConsolePanel(PanelWidget):
 
     def set_level(self, level: str) -> None:
         """Set the lowest level: "debug", "all" (without debug), "warn" or "error"."""
-        if level in SHOWN:
+        if level in SHOWN_LEVELS:
             self.level = level
             self._name_filter()
 
@@ -209,19 +209,19 @@ class ConsolePanel(PanelWidget):
 
     def _name_filter(self) -> None:
         said = _("Showing: {level} of {node}") if self.node else _("Showing: {level}")
-        self.filter.set_name(said.format(level=_(FROM[self.level]), node=self.node))
+        self.filter.set_name(said.format(level=_(LEVEL_WORDS[self.level]), node=self.node))
         self.filter.setProperty("chosen", self.level != "all" or bool(self.node))
         self.refresh()
 
     def _show_menu(self) -> None:
         menu = Menu(self.theme, self)
-        for level, words in FROM.items():
+        for level, words in LEVEL_WORDS.items():
             self._offer(menu, _(words), level == self.level, partial(self.set_level, level))
         nodes = sorted({record.origin for record in self.session.shown_console.records} | {self.node} - {""})
         if nodes:
             menu.addSeparator()
             self._offer(menu, _("From everyone"), not self.node, partial(self.set_node, ""))
-        for node in nodes[:MOST_NODES]:
+        for node in nodes[:MAX_NODES]:
             if node:
                 self._offer(menu, node, node == self.node, partial(self.set_node, node))
         menu.addSeparator()

@@ -22,9 +22,9 @@ from nep.i18n import _, lazy, pgettext
 
 KEPT = "first_steps"
 HINT_AFTER_S = 20.0
-MARK = 22
+MARK_SIZE = 22
 ALL_DONE = lazy("First steps done")
-LOOSE = lazy("Drag it up until it snaps below “{start}”.")
+LOOSE_HINT = lazy("Drag it up until it snaps below “{start}”.")
 WHAT_NEXT = lazy("You can now build, run and stop a behaviour. Open an example to learn more.")
 
 
@@ -38,7 +38,7 @@ class _Mark(QWidget):
         self.setSizePolicy(QSizePolicy.Policy.Fixed, QSizePolicy.Policy.Fixed)
 
     def sizeHint(self) -> QSize:
-        side = round(self._theme.scaled(MARK))
+        side = round(self._theme.scaled(MARK_SIZE))
         return QSize(side, side)
 
     def paintEvent(self, _event: QPaintEvent) -> None:
@@ -97,7 +97,7 @@ class StepRow(QWidget):
 
     def show_hint(self, *, loose: bool) -> None:
         """Show where to find the block or, if `loose`, that it must be attached to the script."""
-        self.hint.setText(spoken(LOOSE if loose else self.step.hint))
+        self.hint.setText(spoken(LOOSE_HINT if loose else self.step.hint))
 
     def paintEvent(self, _event: QPaintEvent) -> None:
         if self.mark.state == "next":

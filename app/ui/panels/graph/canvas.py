@@ -28,15 +28,15 @@ from app.ui.widgets import paint
 from app.ui.widgets.keyboard import is_plain, keyboard_leads
 from nep.i18n import _
 
-LEAST_SCALE, MOST_SCALE = 0.05, 3.0
-STEP = 1.2
+MIN_SCALE, MAX_SCALE = 0.05, 3.0
+ZOOM_STEP = 1.2
 MARGIN = 20.0
-PAN = 60.0
-CLICK = 4.0
+PAN_STEP = 60.0
+CLICK_TOLERANCE = 4.0
 """Maximum mouse movement of a click, in px."""
-AT_ONCE = 250
+MAX_UPDATES_PER_TICK = 250
 """Nodes and lines updated per tick."""
-MOST_AREAS = 60
+MAX_AREAS = 60
 """Above this number of changed areas, their bounding rectangle is repainted instead."""
 _ARROWS: dict[int, Arrow] = {
     Qt.Key.Key_Left: "left",
@@ -44,8 +44,8 @@ _ARROWS: dict[int, Arrow] = {
     Qt.Key.Key_Up: "up",
     Qt.Key.Key_Down: "down",
 }
-_WAYS = {"left": (1, 0), "right": (-1, 0), "up": (0, 1), "down": (0, -1)}
-LETTERS = {Qt.Key.Key_G: "g", Qt.Key.Key_H: "h", Qt.Key.Key_S: "s", Qt.Key.Key_Slash: "/"}
+_PAN_DIRECTIONS = {"left": (1, 0), "right": (-1, 0), "up": (0, 1), "down": (0, -1)}
+PANEL_KEYS = {Qt.Key.Key_G: "g", Qt.Key.Key_H: "h", Qt.Key.Key_S: "s", Qt.Key.Key_Slash: "/"}
 
 
 class GraphCanvas(QWidget):
@@ -123,7 +123,7 @@ class GraphCanvas(QWidget):
             self._waiting = self.scene.seen(self.visible())
 
     def renew(self, figures: FiguresOf) -> int:
-        """Update the figures of the next `AT_ONCE` visible items and repaint only changed areas.
+        """Update the figures of the next `MAX_UPDATES_PER_TICK` visible items and repaint only changed areas.
 
         Return the number of repainted areas. Called on every tick, so that no call takes long.
         """
@@ -133,12 +133,12 @@ class GraphCanvas(QWidget):
         if not scene.has_figures(self.scale):
             self._waiting = []  # updated when the person zooms in
             return 0
-        now, self._waiting = self._waiting[:AT_ONCE], self._waiting[AT_ONCE:]
+        now, self._waiting = self._waiting[:MAX_UPDATES_PER_TICK], self._waiting[MAX_UPDATES_PER_TICK:]
         has_words = scene.has_words(self.scale)
         changed = [scene.renew(item, figures, with_words=has_words) for item in now]
         seen = self.visible()
         areas = [area for area in changed if area is not None and area.intersects(seen)]
-        if len(areas) > MOST_AREAS:
+        if len(areas) > MAX_AREAS:
             self.update()
         else:
             for area in areas:
@@ -172,7 +172,7 @@ class GraphCanvas(QWidget):
             return
         whole = self.scene.bounds.adjusted(-MARGIN, -MARGIN, MARGIN, MARGIN)
         fits = min(self.width() / whole.width(), self.height() / whole.height(), 1.0)
-        self.scale = max(LEAST_SCALE, fits)
+        self.scale = max(MIN_SCALE, fits)
         self._offset = QPointF(self.width() / 2, self.height() / 2) - whole.center() * self.scale
         self.update()
         self.moved.emit()
@@ -184,7 +184,7 @@ class GraphCanvas(QWidget):
     def zoom_to(self, scale: float, at: QPointF | None = None) -> None:
         """Zoom to a scale (1.0 is 100 %) around a point of the widget, by default its centre."""
         at = at if at is not None else QPointF(self.width() / 2, self.height() / 2)
-        scale = min(MOST_SCALE, max(LEAST_SCALE, scale))
+        scale = min(MAX_SCALE, max(MIN_SCALE, scale))
         self._offset = at - (at - self._offset) * (scale / self.scale)
         self.scale = scale
         self._shows_all = False
@@ -297,7 +297,7 @@ class GraphCanvas(QWidget):
                 self.move_by(by.y() if sideways else by.x(), 0 if sideways else by.y())
                 event.accept()
                 return
-        self.zoom_by(STEP ** (event.angleDelta().y() / 120), event.position())
+        self.zoom_by(ZOOM_STEP ** (event.angleDelta().y() / 120), event.position())
         event.accept()
 
     def mousePressEvent(self, event: QMouseEvent) -> None:
@@ -307,7 +307,7 @@ class GraphCanvas(QWidget):
     def mouseMoveEvent(self, event: QMouseEvent) -> None:
         if self._pressed is not None:
             by = event.position() - self._pressed
-            if self._dragged or by.manhattanLength() > CLICK:
+            if self._dragged or by.manhattanLength() > CLICK_TOLERANCE:
                 self._dragged = True
                 self.move_by(by.x(), by.y())
                 self._pressed = event.position()
@@ -381,8 +381,8 @@ class GraphCanvas(QWidget):
         key = event.key()
         arrow = _ARROWS.get(key)
         if arrow is not None and event.modifiers() & Qt.KeyboardModifier.ShiftModifier:
-            across, down = _WAYS[arrow]
-            self.move_by(across * PAN, down * PAN)
+            across, down = _PAN_DIRECTIONS[arrow]
+            self.move_by(across * PAN_STEP, down * PAN_STEP)
         elif arrow is not None and is_plain(event):
             self._walk(arrow)
         elif key in {Qt.Key.Key_Return, Qt.Key.Key_Enter} and is_plain(event):
@@ -397,12 +397,12 @@ class GraphCanvas(QWidget):
         key = event.key()
         if held:
             return False
-        if key in LETTERS:
-            self.letter.emit(LETTERS[Qt.Key(key)])
+        if key in PANEL_KEYS:
+            self.letter.emit(PANEL_KEYS[Qt.Key(key)])
         elif event.text() in {"+", "="}:
-            self.zoom_by(STEP)
+            self.zoom_by(ZOOM_STEP)
         elif event.text() == "-":
-            self.zoom_by(1 / STEP)
+            self.zoom_by(1 / ZOOM_STEP)
         elif event.text() == "0":
             self.show_all()
         else:

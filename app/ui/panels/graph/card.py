@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from nep.protocol.graph_view import GraphView, ServiceInfo
 
 WIDTH = 316
-MOST_ROWS = 40
+MAX_ROWS = 40
 """Maximum number of listed publishers, subscribers or topics; the number of omitted ones is shown."""
 
 Row = tuple[str, str, tuple[str, ...]]
@@ -355,13 +355,13 @@ def _of_topic(topic: Topic, facts: CardFacts) -> CardContent:
             key_of(topic.network, each.node_id),
             (rate_words(known_figure(each.rate_hz)), grouped(each.last_seq)),
         )
-        for each in (info.publishers if info is not None else ())[:MOST_ROWS]
+        for each in (info.publishers if info is not None else ())[:MAX_ROWS]
     )
     subscribers = tuple(
         _row(facts, key_of(topic.network, each.node_id), _received(each.received, each.lost))
-        for each in (info.subscribers if info is not None else ())[:MOST_ROWS]
+        for each in (info.subscribers if info is not None else ())[:MAX_ROWS]
     )
-    more = max(0, topic.publishers - MOST_ROWS) + max(0, topic.subscribers - MOST_ROWS)
+    more = max(0, topic.publishers - MAX_ROWS) + max(0, topic.subscribers - MAX_ROWS)
     tables = (
         CardTable(_("Publisher"), (_("Rate /s"), _("Seq")), publishers),
         CardTable(_("Subscribers"), (_("Received"), _("Lost")), subscribers),
@@ -413,11 +413,11 @@ def _of_service(service: ServiceInfo, facts: CardFacts) -> CardContent:
     )
     servers = tuple(
         _row(facts, each.node_id, (grouped(each.calls), grouped(each.errors)))
-        for each in service.servers[:MOST_ROWS]
+        for each in service.servers[:MAX_ROWS]
     )
     clients = tuple(
         _row(facts, each.node_id, _received(each.answered, each.failed))
-        for each in service.clients[:MOST_ROWS]
+        for each in service.clients[:MAX_ROWS]
     )
     tables = (
         CardTable(_("Servers"), (_("Answered"), _("Errors")), servers),
@@ -468,13 +468,13 @@ def node_card(node: DrawnNode, services: Sequence[tuple[str, bool]], facts: Card
 def _topics_of(title: str, network: str, names: Sequence[str], facts: CardFacts) -> CardTable:
     rows: list[Row] = []
     names = [name for name in names if facts.shows(name)]
-    for name in names[:MOST_ROWS]:
+    for name in names[:MAX_ROWS]:
         key = key_of(network, name)
         topic = facts.topic_of(key)
         rate = "" if topic is None else rate_words(known_figure(topic.rate_hz))
         rows.append((key if topic is not None else "", split_key(key)[1], (rate,)))
-    if len(names) > MOST_ROWS:
-        rows.append(("", _more(len(names) - MOST_ROWS), ("",)))
+    if len(names) > MAX_ROWS:
+        rows.append(("", _more(len(names) - MAX_ROWS), ("",)))
     return CardTable(title, (_("Rate /s"),), tuple(rows), "topic")
 
 

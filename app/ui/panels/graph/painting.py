@@ -12,8 +12,8 @@ from app.ui.theme.icons import paint_icon
 from app.ui.widgets import paint
 
 CHOSEN_WIDTH = 2.25
-DIM = 0.3
-LEAST_TEXT_PX = 6.0
+DIM_OPACITY = 0.3
+MIN_TEXT_PX = 6.0
 """Text below this size is not painted, because it would be illegible."""
 
 
@@ -46,7 +46,7 @@ class _Painting:
     ) -> None:
         self.scene, self.theme, self.painter = scene, scene.theme, painter
         self.clip, self.scale, self.rings = clip, scale, rings
-        self.has_text = scale * scene.name_font.pixelSize() >= LEAST_TEXT_PX
+        self.has_text = scale * scene.name_font.pixelSize() >= MIN_TEXT_PX
         self.has_small = scene.has_words(scale)
         self.is_tiny = not scene.has_figures(scale)
         painter.setRenderHint(QPainter.RenderHint.Antialiasing, not self.is_tiny)
@@ -64,16 +64,16 @@ class _Painting:
         shown = [item for item in self.scene.lines if item.bounds.intersects(clip)]
         above = [item for item in shown if item.line is self.line]
         for item in [*(each for each in shown if each.line is not self.line), *above]:
-            painter.setOpacity(DIM if item.is_dim else 1.0)
+            painter.setOpacity(DIM_OPACITY if item.is_dim else 1.0)
             self._line(item)
         if self.has_small:
             for item in self.scene.lines:
                 if item.label is not None and item.label.intersects(clip):
-                    painter.setOpacity(DIM if item.is_dim else 1.0)
+                    painter.setOpacity(DIM_OPACITY if item.is_dim else 1.0)
                     self._label(item, item.label)
         for box in self.scene.nodes.values():
             if box.rect.adjusted(-6, -6, 6, 6).intersects(clip):
-                painter.setOpacity(DIM if box.is_dim else 1.0)
+                painter.setOpacity(DIM_OPACITY if box.is_dim else 1.0)
                 self._node(box)
         painter.setOpacity(1.0)
         for item in above:

@@ -69,11 +69,11 @@ SVG = FileKind(lazy("An image that stays sharp at any size"), ".svg")
 DOT = FileKind(lazy("Graph for other programs"), ".dot")
 MOST_AT_ONCE = 500
 """Lines above which building and first painting of a scene are spread over two ticks."""
-BESIDE_FROM = 700
+CARD_BESIDE_WIDTH = 700
 """Minimum width in px (at 100 % text size) for the card at the side; below it, the card is at the bottom."""
-QUIET_EVERY = 30
+QUIET_UPDATE_TICKS = 30
 """Refreshes at 30 Hz: quiet nodes are determined once a second."""
-MOST_IN_MENU = 20
+MAX_MENU_TOPICS = 20
 """Maximum number of topics in a line's menu; the cards of its nodes list all."""
 GROUPS: tuple[GroupBy, ...] = ("computer", "robot", "nothing")
 
@@ -182,7 +182,7 @@ class GraphPanel(PanelWidget):
 
     def refresh(self) -> None:
         self._ticks += 1
-        if self._ticks % QUIET_EVERY == 1:
+        if self._ticks % QUIET_UPDATE_TICKS == 1:
             self._look_who_is_quiet()
         facts = self._facts()
         if facts != self._seen:
@@ -190,7 +190,7 @@ class GraphPanel(PanelWidget):
             self._rebuild()
         self._take_layout()
         values = (self.session.topics.values_revision, self.session.networks.values_revision)
-        if values != self._values or (self._has_gone() and self._ticks % QUIET_EVERY == 0):
+        if values != self._values or (self._has_gone() and self._ticks % QUIET_UPDATE_TICKS == 0):
             self._values = values
             self.canvas.renew_soon()
             self._say_card()
@@ -366,7 +366,7 @@ class GraphPanel(PanelWidget):
         topics = line.topics if line is not None else (choice.key,)
         if len(topics) == 1:
             return filled(menu, self.theme, self._topic_actions(topics[0]))
-        for topic in sorted(topics, key=lambda each: each != choice.key)[:MOST_IN_MENU]:
+        for topic in sorted(topics, key=lambda each: each != choice.key)[:MAX_MENU_TOPICS]:
             part = Menu(self.theme, menu, plain.entry(split_key(topic)[1]))
             menu.addMenu(filled(part, self.theme, self._topic_actions(topic)))
         return menu
@@ -540,7 +540,7 @@ class GraphPanel(PanelWidget):
         self._fit()
 
     def _fit(self) -> None:
-        is_wide = self.width() >= self.theme.scaled(BESIDE_FROM)
+        is_wide = self.width() >= self.theme.scaled(CARD_BESIDE_WIDTH)
         ways = QBoxLayout.Direction
         self._beside.setDirection(ways.LeftToRight if is_wide else ways.TopToBottom)
         wide = round(self.theme.scaled(WIDTH))

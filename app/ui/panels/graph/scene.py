@@ -27,18 +27,18 @@ from app.ui.panels.graph.words import (
 from app.ui.theme.theme import Theme
 from app.ui.widgets import paint
 
-CORNER = 10.0
-ARROW_LONG, ARROW_WIDE = 9.0, 8.0
-ROUND = 14.0
+CORNER_RADIUS = 10.0
+ARROW_LENGTH, ARROW_WIDTH = 9.0, 8.0
+LINE_MARGIN = 14.0
 """Margin around lines for arrows and thick pens."""
-CELL = (160.0, 48.0)
-LABEL_ROOM = 7
+CELL_SIZE = (160.0, 48.0)
+LABEL_FIGURE_CHARS = 7
 """Characters reserved in a label for its figure."""
-LEAST_SMALL_PX = 7.0
+MIN_TEXT_PX = 7.0
 """Text below this size is not painted, because it would be illegible."""
-TINY = 0.2
+TINY_SCALE = 0.2
 """Below this scale thousands of lines are visible, so figures and line widths are left out."""
-REACH = 6.0
+HIT_TOLERANCE_PX = 6.0
 """Maximum distance of a click from a line, in px."""
 JOIN = 48.0
 """Width of the part of a bridge that names the other network."""
@@ -209,7 +209,7 @@ class GraphScene:
 
     def _room_for(self, item: LineItem) -> QRectF | None:
         # Tries the longest horizontal segment first, and prefers places that no other line crosses.
-        letters = len(line_name(item.line.topics)) + LABEL_ROOM
+        letters = len(line_name(item.line.topics)) + LABEL_FIGURE_CHARS
         wide, high = letters * self.letter + 4, QFontMetricsF(self.label_font).height()
         rooms = [rect for rect in _rooms(item, wide, high) if self._taken.is_free(rect)]
         found = next((rect for rect in rooms if self._crossed.is_free(rect)), rooms[0] if rooms else None)
@@ -243,11 +243,11 @@ class GraphScene:
     @staticmethod
     def has_figures(scale: float) -> bool:
         """Return False for scales at which lines are 1 px wide without arrows and figures."""
-        return scale >= TINY
+        return scale >= TINY_SCALE
 
     def has_words(self, scale: float) -> bool:
         """Return True if the small text is legible at this scale."""
-        return scale * self.small_font.pixelSize() >= LEAST_SMALL_PX
+        return scale * self.small_font.pixelSize() >= MIN_TEXT_PX
 
     # -- hit testing --------------------------------------------------------------------------------------
 
@@ -271,7 +271,7 @@ class GraphScene:
         found = next(labelled, None)
         if found is not None:
             return found
-        reach = REACH / scale
+        reach = HIT_TOLERANCE_PX / scale
         near = [
             (_distance(at, points), number)
             for number, item in enumerate(self.lines)
@@ -285,14 +285,14 @@ class GraphScene:
 def _line_item(line: GraphLine, ways: dict[tuple[str, str], Sequence[Place]]) -> LineItem:
     xs = [x for points in ways.values() for x, _y in points]
     ys = [y for points in ways.values() for _x, y in points]
-    left, top = min(xs) - ROUND, min(ys) - ROUND
-    return LineItem(line, ways, QRectF(left, top, max(xs) + ROUND - left, max(ys) + ROUND - top))
+    left, top = min(xs) - LINE_MARGIN, min(ys) - LINE_MARGIN
+    return LineItem(line, ways, QRectF(left, top, max(xs) + LINE_MARGIN - left, max(ys) + LINE_MARGIN - top))
 
 
 def _add_rounded(path: QPainterPath, points: Sequence[Place]) -> None:
     path.moveTo(*points[0])
     for before, at, after in zip(points, points[1:], points[2:], strict=False):
-        radius = min(CORNER, math.dist(before, at) / 2, math.dist(at, after) / 2)
+        radius = min(CORNER_RADIUS, math.dist(before, at) / 2, math.dist(at, after) / 2)
         into, out = _towards(at, before, radius), _towards(at, after, radius)
         path.lineTo(*into)
         path.quadTo(*at, *out)
@@ -307,10 +307,10 @@ def _towards(at: Place, other: Place, length: float) -> Place:
 def _arrow(points: Sequence[Place]) -> QPolygonF:
     tip = points[-1]
     before = next((each for each in reversed(points[:-1]) if each != tip), (tip[0] - 1, tip[1]))
-    base = _towards(tip, before, ARROW_LONG)
+    base = _towards(tip, before, ARROW_LENGTH)
     across = (
-        (tip[1] - base[1]) * ARROW_WIDE / ARROW_LONG / 2,
-        (base[0] - tip[0]) * ARROW_WIDE / ARROW_LONG / 2,
+        (tip[1] - base[1]) * ARROW_WIDTH / ARROW_LENGTH / 2,
+        (base[0] - tip[0]) * ARROW_WIDTH / ARROW_LENGTH / 2,
     )
     return QPolygonF(
         [
@@ -388,7 +388,7 @@ class _TakenRoom:
 
 
 def _cells(rect: QRectF) -> Iterator[tuple[int, int]]:
-    wide, high = CELL
+    wide, high = CELL_SIZE
     for column in range(math.floor(rect.left() / wide), math.floor(rect.right() / wide) + 1):
         for row in range(math.floor(rect.top() / high), math.floor(rect.bottom() / high) + 1):
             yield column, row

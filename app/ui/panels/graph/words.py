@@ -13,11 +13,11 @@ from app.ui.text.nodes import cpu_words, generation_words
 from app.ui.text.numbers import grouped
 from nep.i18n import _, ngettext, number, pgettext
 
-BRIDGE = "bridge-"
-NAMED = 2
+BRIDGE_PREFIX = "bridge-"
+MAX_NAMED_TOPICS = 2
 """Maximum number of topic names in a line's label; further ones are counted."""
-THIN, THICK, STEPS = 1.25, 3.0, 7
-LEAST_BPS, DECADES = 100.0, 5.0
+MIN_WIDTH, MAX_WIDTH, WIDTH_STEPS = 1.25, 3.0, 7
+MIN_WIDTH_BPS, WIDTH_DECADES = 100.0, 5.0
 """Lines are thin up to 100 B/s and thickest from 10 MB/s."""
 ICONS = {
     "studio": "app-window",
@@ -54,7 +54,7 @@ def node_name(node: DrawnNode, host: str) -> str:
     if node.kind == "group":
         return group_name(node.key, host)
     if node.joins:  # the rest of the name is painted in the bridge's right part
-        return node.name.removeprefix(BRIDGE).rpartition(BRIDGE_TO)[0] or node.name
+        return node.name.removeprefix(BRIDGE_PREFIX).rpartition(BRIDGE_TO)[0] or node.name
     return node.name
 
 
@@ -147,7 +147,7 @@ def line_figures(
     names = line_name(line.topics)
     if line.kind == "service":
         known = [hertz[name] for name in line.topics if name in hertz]
-        return LineFigures(f"{names} {short_rate(sum(known))}" if known else names, THIN)
+        return LineFigures(f"{names} {short_rate(sum(known))}" if known else names, MIN_WIDTH)
     topics = [topic for name in line.topics if (topic := topic_of(name)) is not None]
     rates = [hz for topic in topics if (hz := known_figure(topic.rate_hz)) is not None]
     rate = short_rate(sum(rates)) if rates else ""
@@ -173,9 +173,9 @@ def known_figure(value: float | None) -> float | None:
 
 
 def line_name(topics: Sequence[str]) -> str:
-    """Return the names of a line's topics; more than `NAMED` are summarized by their number."""
-    named = " ".join(split_key(topic)[1] for topic in topics[:NAMED])
-    more = len(topics) - NAMED
+    """Return the names of a line's topics; more than `MAX_NAMED_TOPICS` are summarized by their number."""
+    named = " ".join(split_key(topic)[1] for topic in topics[:MAX_NAMED_TOPICS])
+    more = len(topics) - MAX_NAMED_TOPICS
     return _("{names} and {count} more").format(names=named, count=more) if more > 0 else named
 
 
@@ -190,10 +190,10 @@ def short_rate(rate_hz: float) -> str:
 
 def line_width(bytes_per_s: float) -> float:
     """Return the width of a line in px, quantized so that small changes cause no repaint."""
-    if not bytes_per_s > LEAST_BPS:
-        return THIN
-    share = min(1.0, math.log10(bytes_per_s / LEAST_BPS) / DECADES)
-    return THIN + (THICK - THIN) * round(share * STEPS) / STEPS
+    if not bytes_per_s > MIN_WIDTH_BPS:
+        return MIN_WIDTH
+    share = min(1.0, math.log10(bytes_per_s / MIN_WIDTH_BPS) / WIDTH_DECADES)
+    return MIN_WIDTH + (MAX_WIDTH - MIN_WIDTH) * round(share * WIDTH_STEPS) / WIDTH_STEPS
 
 
 def percent_words(share: float) -> str:

@@ -18,9 +18,9 @@ from app.ui.widgets.flow_layout import Flow
 from app.ui.widgets.inputs.slider import Track
 from nep.i18n import _, lazy
 
-STEPS = 100
+SLIDER_STEPS = 100
 """Steps of a slider to each side of its neutral middle."""
-WORDS = {
+MAP_NAMES = {
     "grey": lazy("Grey"),
     "viridis": lazy("Viridis"),
     "turbo": lazy("Turbo"),
@@ -52,7 +52,7 @@ class LookBar(QWidget):
         self.look = PLAIN
         self.brightness = self._slider(theme, _("Brightness"), self._set_brightness)
         self.contrast = self._slider(theme, _("Contrast"), self._set_contrast)
-        maps = [(name, _(WORDS[name])) for name in COLOUR_MAPS]
+        maps = [(name, _(MAP_NAMES[name])) for name in COLOUR_MAPS]
         names = [("", _("Default colours")), *maps]
         self.colours = ComboBox(theme, names, name=_("Colour map"))
         self.colours.activated.connect(lambda _at: self._set(replace(self.look, colours=self.colours.value)))
@@ -77,19 +77,19 @@ class LookBar(QWidget):
         self.show_look(PLAIN)
 
     def _slider(self, theme: Theme, name: str, does: Callable[[int], None]) -> Track:
-        made = Track(theme, 2 * STEPS)
+        made = Track(theme, 2 * SLIDER_STEPS)
         made.setAccessibleName(name)
         made.setMaximumWidth(120)
         made.valueChanged.connect(does)
-        made.reset.connect(lambda: made.setValue(STEPS))
+        made.reset.connect(lambda: made.setValue(SLIDER_STEPS))
         return made
 
     def show_look(self, look: PictureLook) -> None:
         """Show the settings without emitting `changed`."""
         self.look = look
         wanted = (
-            (self.brightness, round(STEPS * (1 + look.brightness))),
-            (self.contrast, round(STEPS * (1 + log(look.contrast) / log(MOST_CONTRAST)))),
+            (self.brightness, round(SLIDER_STEPS * (1 + look.brightness))),
+            (self.contrast, round(SLIDER_STEPS * (1 + log(look.contrast) / log(MOST_CONTRAST)))),
         )
         for slider, value in wanted:
             slider.blockSignals(True)
@@ -123,10 +123,10 @@ class LookBar(QWidget):
             self.changed.emit(look)
 
     def _set_brightness(self, value: int) -> None:
-        self._set(replace(self.look, brightness=value / STEPS - 1))
+        self._set(replace(self.look, brightness=value / SLIDER_STEPS - 1))
 
     def _set_contrast(self, value: int) -> None:
-        self._set(replace(self.look, contrast=exp((value / STEPS - 1) * log(MOST_CONTRAST))))
+        self._set(replace(self.look, contrast=exp((value / SLIDER_STEPS - 1) * log(MOST_CONTRAST))))
 
     def _set_own_range(self, on: bool) -> None:
         picture = self._picture()

@@ -12,8 +12,8 @@ from app.core.session import Session
 from nep.errors import NepError
 from nep.messages.message import Message
 
-TYPES = ("foxglove.ImageAnnotations", "ImageAnnotations", "image_annotations")
-NAME = "face_positions"
+ANNOTATION_TYPES = ("foxglove.ImageAnnotations", "ImageAnnotations", "image_annotations")
+FACES_NAME = "face_positions"
 MOST_OVERLAYS = 8
 
 
@@ -21,7 +21,9 @@ def may_draw(topic: Topic) -> bool:
     """Return True if the topic's type or name indicates annotations for images."""
     if topic.codec not in {"json", "msgpack"}:
         return False
-    return topic.msg_type.rpartition("/")[2] in TYPES or topic.name.rpartition("/")[2] == NAME
+    return (
+        topic.msg_type.rpartition("/")[2] in ANNOTATION_TYPES or topic.name.rpartition("/")[2] == FACES_NAME
+    )
 
 
 class Overlays:

@@ -34,8 +34,8 @@ if TYPE_CHECKING:
     from nep.messages.message import Message
 
 CODEC = "image"
-ROOMY = 320
-MOST_PLACES = 200
+ALL_BUTTONS_WIDTH = 320
+MAX_PLACES = 200
 
 
 class ImagePanel(PanelWidget):
@@ -159,7 +159,7 @@ class ImagePanel(PanelWidget):
 
     def _show_place_of(self, topic: str) -> None:
         # Zoom, rotation and image settings are remembered per topic.
-        if len(self._places) >= MOST_PLACES:
+        if len(self._places) >= MAX_PLACES:
             self._places.clear()
             self._looks.clear()
         self.view.place = self._places.setdefault(topic, PicturePlace())
@@ -227,7 +227,7 @@ class ImagePanel(PanelWidget):
         for button in (self.freeze, self.tune, self.layers):
             button.setVisible(self._there is True)
         for button in (self.fit, self.keep):
-            button.setVisible(self._there is True and self.width() >= self.theme.scaled(ROOMY))
+            button.setVisible(self._there is True and self.width() >= self.theme.scaled(ALL_BUTTONS_WIDTH))
 
     def resizeEvent(self, event: QResizeEvent) -> None:
         super().resizeEvent(event)

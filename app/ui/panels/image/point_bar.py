@@ -24,7 +24,7 @@ from nep.errors import BadTopicError
 from nep.i18n import _, ngettext
 from nep.protocol.wire import check_topic
 
-TOPIC_PX, MOST_LETTERS = 130, 200
+TOPIC_WIDTH_PX, MAX_TOPIC_LENGTH = 130, 200
 
 
 class PointStrip(ArmedStrip):
@@ -64,8 +64,8 @@ class PointBar(QWidget):
         theme = context.theme
         self.topic = QLineEdit()
         self.topic.setAccessibleName(_("Topic for points"))
-        self.topic.setMaxLength(MOST_LETTERS)
-        self.topic.setMinimumWidth(round(theme.scaled(TOPIC_PX)))
+        self.topic.setMaxLength(MAX_TOPIC_LENGTH)
+        self.topic.setMinimumWidth(round(theme.scaled(TOPIC_WIDTH_PX)))
         self.topic.setProperty("focusRadius", theme.radius("control"))
         self.topic.textEdited.connect(lambda _text: self._changed())
         EditMenu(theme, self.topic)
@@ -229,7 +229,7 @@ class PointBar(QWidget):
             return
         topic, kind = saved.get("topic"), saved.get("type")
         if isinstance(topic, str):
-            self.topic.setText(topic[:MOST_LETTERS])
+            self.topic.setText(topic[:MAX_TOPIC_LENGTH])
         if isinstance(kind, str):
             self.kind.set_value(kind)
         self._changed()

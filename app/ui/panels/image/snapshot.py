@@ -19,7 +19,7 @@ from nep.i18n import _
 if TYPE_CHECKING:
     from nep.messages.message import Message
 
-LOOK_MS = 30
+POLL_MS = 30
 Made = Path | QImage | str
 """Path of the saved file, the image, or an error sentence."""
 
@@ -40,7 +40,7 @@ class SnapshotJob(QObject):
         self._thread: threading.Thread | None = None
         self._made: queue.SimpleQueue[Made] = queue.SimpleQueue()
         self._timer = QTimer(self)
-        self._timer.setInterval(LOOK_MS)
+        self._timer.setInterval(POLL_MS)
         self._timer.timeout.connect(self._tell)
 
     @property

@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from nep.messages.message import Message
 
 
-FIND = QKeyCombination(Qt.KeyboardModifier.ControlModifier, Qt.Key.Key_F)
+FIND_KEY = QKeyCombination(Qt.KeyboardModifier.ControlModifier, Qt.Key.Key_F)
 
 
 class InspectorActions(QObject):
@@ -76,7 +76,7 @@ class InspectorActions(QObject):
 
     def eventFilter(self, watched: QObject, event: QEvent) -> bool:
         # Ctrl+F finds in the panel; otherwise the window's shortcut would find blocks.
-        if isinstance(event, QKeyEvent) and event.keyCombination() == FIND:
+        if isinstance(event, QKeyEvent) and event.keyCombination() == FIND_KEY:
             if event.type() == QEvent.Type.ShortcutOverride:
                 event.accept()
                 return True

@@ -14,8 +14,8 @@ from nep.i18n import _, lazy, ngettext
 
 Mark = Literal["", "changed", "added", "removed"]
 Key = str | int
-MOST_CHILDREN = 5000  # children of one value checked for changes
-MOST_VALUES = 20_000  # values of a message counted
+MAX_CHILDREN = 5000  # children of one value checked for changes
+MAX_VALUES = 20_000  # values of a message counted
 Part = tuple[Key, object, object, Mark]
 Counts = dict[Mark, int]
 MARK_WORDS: Mapping[Mark, str] = {
@@ -68,19 +68,19 @@ def parts_of(
 
     A child is key, value, base value and mark. Removed children follow the present ones, with their old
     values. All children of an added value are added, all of a removed one removed (`mark` is the parent's).
-    With `changes_only` the first `MOST_CHILDREN` are compared.
+    With `changes_only` the first `MAX_CHILDREN` are compared.
     """
     if mark in {"added", "removed"} or not is_container(base) or _kind(base) != _kind(value):
         whole: Mark = "removed" if mark == "removed" else "added"
         pairs = zip(keys_of(value, count), values_of(value, count), strict=False)
         return [(key, below, MISSING, whole) for key, below in pairs], size_of(value)
     if changes_only:
-        found = [part for part in islice(_compared(value, base), MOST_CHILDREN) if part[3]]
+        found = [part for part in islice(_compared(value, base), MAX_CHILDREN) if part[3]]
         return found[:count], len(found)
     return list(islice(_compared(value, base), count)), _total(value, base)
 
 
-def count_changes(value: object, base: object, most: int = MOST_VALUES) -> tuple[Counts, bool]:
+def count_changes(value: object, base: object, most: int = MAX_VALUES) -> tuple[Counts, bool]:
     """Count changed, added and removed values; the bool is False if the count is incomplete.
 
     Added or removed containers count once. At most `most` values are compared, and only the beginning of long
@@ -97,7 +97,7 @@ def count_changes(value: object, base: object, most: int = MOST_VALUES) -> tuple
         looked += 1
         if mark == "changed" and is_container(here) and is_container(before):
             parts, _total = parts_of(here, before, mark, most, changes_only=True)
-            whole = whole and max(size_of(here), size_of(before)) <= MOST_CHILDREN
+            whole = whole and max(size_of(here), size_of(before)) <= MAX_CHILDREN
             waiting += [(below, was, how) for _key, below, was, how in parts]
         elif mark:
             counts[mark] += 1

@@ -19,11 +19,11 @@ from nep.i18n import _, pgettext
 if TYPE_CHECKING:
     from app.core.messages.lazy_json import JsonIndex
 
-MOST = 1000
+MAX_MATCHES = 1000
 Path = tuple[str | int, ...]
 
 
-def find_in_text(index: JsonIndex, words: str, most: int = MOST) -> list[int]:
+def find_in_text(index: JsonIndex, words: str, most: int = MAX_MATCHES) -> list[int]:
     """Return the offsets of `words` in a large JSON text; ASCII letters match in any case."""
     text, wanted = bytes(index.data).lower(), words.encode().lower()
     found: list[int] = []
@@ -168,11 +168,11 @@ class FindBar(QWidget):
         value, self._index = self._source()
         found: list[Path] | list[int]
         if self._index is not None:
-            found = find_in_text(self._index, words, MOST + 1)
+            found = find_in_text(self._index, words, MAX_MATCHES + 1)
         else:
-            found = list(islice(search(value, words), MOST + 1))
-        self._more = len(found) > MOST
-        self._matches = found[:MOST]
+            found = list(islice(search(value, words), MAX_MATCHES + 1))
+        self._more = len(found) > MAX_MATCHES
+        self._matches = found[:MAX_MATCHES]
 
     def _say(self, *, wrong: bool) -> None:
         total = f"{len(self.matches)}{'+' if self._more else ''}"

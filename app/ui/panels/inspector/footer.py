@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from app.core.networks.kinds import NetworkKind
     from nep.messages.message import Message
 
-_SHOWN_S = 0.0001
+_MIN_SHOWN_LATENCY_S = 0.0001
 """Latencies below the last displayed digit are not shown as zero."""
 
 
@@ -62,7 +62,7 @@ def _latency_facts(message: Message) -> list[str]:
     words = latency_words(latency_s)
     if uncertainty_s:
         words = _("{latency} ± {uncertainty}").format(
-            latency=words, uncertainty=latency_words(max(uncertainty_s, _SHOWN_S))
+            latency=words, uncertainty=latency_words(max(uncertainty_s, _MIN_SHOWN_LATENCY_S))
         )
     return [_("latency {latency}").format(latency=words)]
 

@@ -9,8 +9,8 @@ from PySide6.QtWidgets import QAbstractScrollArea
 from app.ui.theme.theme import Theme
 from nep.i18n import _
 
-WIDE, NARROW = 16, 8
-EDGE = 12
+WIDE_BYTES, NARROW_BYTES = 16, 8
+MARGIN = 12
 
 
 def hex_line(data: memoryview, offset: int, count: int) -> tuple[str, str, str]:
@@ -48,7 +48,11 @@ class HexView(QAbstractScrollArea):
     def per_line(self) -> int:
         """Return the number of bytes per line at the current width."""
         sign = QFontMetricsF(self._theme.font("code")).horizontalAdvance("0")
-        return WIDE if self.viewport().width() >= (6 + WIDE * 4 + 3) * sign + 2 * EDGE else NARROW
+        return (
+            WIDE_BYTES
+            if self.viewport().width() >= (6 + WIDE_BYTES * 4 + 3) * sign + 2 * MARGIN
+            else NARROW_BYTES
+        )
 
     def _height(self) -> int:
         return round(self._theme.scaled(20))
@@ -74,7 +78,7 @@ class HexView(QAbstractScrollArea):
         sign = QFontMetricsF(font).horizontalAdvance("0")
         count, height = self.per_line(), self._height()
         first = self.verticalScrollBar().value()
-        columns = (EDGE, EDGE + 6 * sign, EDGE + (7 + count * 3) * sign)
+        columns = (MARGIN, MARGIN + 6 * sign, MARGIN + (7 + count * 3) * sign)
         for row in range(self.viewport().height() // height + 1):
             offset = (first + row) * count
             if offset >= len(self._data):

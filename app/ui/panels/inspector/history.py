@@ -15,7 +15,7 @@ from app.ui.widgets.paint import show_when
 from nep.i18n import _
 from nep.messages.message import Message
 
-SAYS_EVERY = 6
+UPDATE_TICKS = 6
 """Refreshes (at 30 Hz) between updates of the figures."""
 
 
@@ -113,7 +113,7 @@ class HistoryStrip(QWidget):
         kept = self.kept
         state = (kept.first, kept.end, self.at)
         is_there = len(kept) > 1 or self.at is not None
-        waits = SAYS_EVERY if beside else 2 * SAYS_EVERY
+        waits = UPDATE_TICKS if beside else 2 * UPDATE_TICKS
         due = at_once or is_there is self.isHidden() or self._ticks >= waits
         if state == self._said or not due:
             return

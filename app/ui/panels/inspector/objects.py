@@ -35,11 +35,11 @@ from app.ui.widgets.table.view import TableView
 from nep.i18n import _, ngettext
 from nep.messages.fields import path_text
 
-SORT_S = 1.0
+SORT_INTERVAL_S = 1.0
 """Interval of re-sorting, so that rows with changing values stay readable."""
-LETTER, LEAST, MOST = 8, 56, 220
+CHAR_WIDTH, MIN_COLUMN_WIDTH, MAX_COLUMN_WIDTH = 8, 56, 220
 """Width of a character, and limits of a column's width, in px."""
-SMALL_ROOM = 24
+COLUMN_PADDING = 24
 
 
 class ObjectsView(QWidget):
@@ -154,7 +154,7 @@ class ObjectsView(QWidget):
         table = self.table
         if table is None:
             return
-        if now - self._sorted_at >= SORT_S or now < self._sorted_at:
+        if now - self._sorted_at >= SORT_INTERVAL_S or now < self._sorted_at:
             self._sorted_at = now
             rows = table.order.sort(rows)
         else:
@@ -278,4 +278,4 @@ def _role(value: object) -> str:
 def _width(head: str, words: Sequence[str]) -> int:
     # From the header with its sort arrow and the first rows.
     letters = max([len(head) + 2, *(len(each) for each in words[:20])])
-    return min(MOST, max(LEAST, letters * LETTER + SMALL_ROOM))
+    return min(MAX_COLUMN_WIDTH, max(MIN_COLUMN_WIDTH, letters * CHAR_WIDTH + COLUMN_PADDING))

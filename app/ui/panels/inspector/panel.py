@@ -36,8 +36,8 @@ if TYPE_CHECKING:
     from app.core.network.watches import Suspendable, Watch
     from nep.messages.message import Message
 
-FIRST_ROWS = 24
-FADES_HZ = 7.0  # slower than message updates, which paint the marks too
+MAX_EXPANDED_ROWS = 24
+FADE_HZ = 7.0  # slower than message updates, which paint the marks too
 BEFORE, PINNED = lazy("Previous message"), lazy("Pinned message")
 
 
@@ -54,7 +54,7 @@ class InspectorPanel(PanelWidget):
         self._reading: Reading | None = None  # source of the tree's contents
         self._raw_wanted = self._table_wanted = False
         self._since_ns = 0  # start of the subscription
-        self._pace, self._fades = ReadingPace(), ReadingPace(burst=1, hz=FADES_HZ)
+        self._pace, self._fades = ReadingPace(), ReadingPace(burst=1, hz=FADE_HZ)
         self._facts_of: tuple[Message | None, str] = (None, "")
         self._value: object = None
         self._before: object = OFF  # previous value of the same topic
@@ -262,7 +262,7 @@ class InspectorPanel(PanelWidget):
         only = self.comparing and base is not OFF and self.strip.only.isChecked()
         self.model.set_value(self._value, self.clock(), base, changes_only=only)
         if first:
-            self.tree.expand_small(FIRST_ROWS)
+            self.tree.expand_small(MAX_EXPANDED_ROWS)
 
     def _show_found(self, answer: QueryAnswer) -> None:
         if self._table_wanted:
@@ -271,7 +271,7 @@ class InspectorPanel(PanelWidget):
         first = not self.model.rowCount()
         self.model.set_value(answer.found, self.clock())
         if first:
-            self.tree.expand_small(FIRST_ROWS)
+            self.tree.expand_small(MAX_EXPANDED_ROWS)
 
     def _show_raw(self, message: Message, sentence: str) -> None:
         self._shown = message

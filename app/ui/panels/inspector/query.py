@@ -15,7 +15,7 @@ from app.ui.widgets.labels import set_role
 from app.ui.widgets.paint import show_when
 from nep.i18n import ngettext
 
-SHARE = 4
+LOAD_DIVISOR = 4
 """Inverse of the maximum load: after a slow query, wait so that it uses at most a quarter of a core."""
 
 
@@ -82,7 +82,7 @@ class QueryStrip(QWidget):
         """Return a new answer once, or None; call on every refresh with monotonic time."""
         done = self._worker.take()
         if done is not None:
-            self._not_before = now + (SHARE - 1) * done.took_s
+            self._not_before = now + (LOAD_DIVISOR - 1) * done.took_s
             self._say(found_words(done.answer), wrong=False)
         if self._due and self._query is not None and not self._worker.busy and now >= self._not_before:
             self._due = False

@@ -19,7 +19,7 @@ from app.ui.text import plain
 from nep.i18n import _
 
 Index = QModelIndex | QPersistentModelIndex
-PAGE = 500
+PAGE_SIZE = 500
 NODE_ROLE = int(Qt.ItemDataRole.UserRole)
 _ROOT = QModelIndex()
 
@@ -120,7 +120,7 @@ class TreeModel(QAbstractItemModel):
             return
         node = self.node(parent)
         have = len(node.children or ())
-        self._load(node, have + PAGE)
+        self._load(node, have + PAGE_SIZE)
 
     def data(self, index: Index, role: int = Qt.ItemDataRole.DisplayRole) -> object:
         if not index.isValid():
@@ -172,7 +172,7 @@ class TreeModel(QAbstractItemModel):
         try:
             self._update(self._root, (0, shown, _as_container(base), ""), None if first else now)
             if not self._root.children:
-                self._load(self._root, PAGE)
+                self._load(self._root, PAGE_SIZE)
         finally:
             self._changing = False
 
@@ -201,7 +201,7 @@ class TreeModel(QAbstractItemModel):
             if marked:
                 self._tell(node, node)
             return
-        parts = self._parts(node, max(len(loaded), PAGE) if loaded or is_container(value) else 0)
+        parts = self._parts(node, max(len(loaded), PAGE_SIZE) if loaded or is_container(value) else 0)
         wanted = [each[0] for each in parts]
         if [child.key for child in loaded] != wanted[: len(loaded)] or len(wanted) < len(loaded):
             self._fit(node, loaded, parts)
@@ -272,7 +272,7 @@ class TreeModel(QAbstractItemModel):
             keys: list[str | int] = keys_of(node.value, size_of(node.value))
             if key not in keys:
                 return QModelIndex()
-            self._load(node, max(keys.index(key) + 1, min(PAGE, len(keys))))
+            self._load(node, max(keys.index(key) + 1, min(PAGE_SIZE, len(keys))))
             below = next((child for child in node.children or () if child.key == key), None)
             if below is None:
                 return QModelIndex()  # omitted because it is unchanged

@@ -27,8 +27,8 @@ from app.ui.theme.theme import Theme
 
 Index = QModelIndex | QPersistentModelIndex
 INDENT, LEFT_EDGE, CHEVRON, VALUE_EDGE = 14, 8, 14, 10
-BAR = 3
-BARS = {"": "changed", "changed": "changed", "added": "ok", "removed": "error"}
+BAR_WIDTH = 3
+BAR_ROLES = {"": "changed", "changed": "changed", "added": "ok", "removed": "error"}
 SIGNS = {"added": "+ ", "removed": "\u2212 "}
 LEFT = Qt.AlignmentFlag.AlignLeft | Qt.AlignmentFlag.AlignVCenter
 
@@ -132,8 +132,8 @@ class TreeView(QTreeView):
             painter.fillRect(rect, ground)
         share = self.share_changed(node)
         if share > 0:
-            bar = mixed(ground, self.theme.colour(BARS[node.mark]), share)
-            painter.fillRect(QRect(0, rect.top() + 4, BAR, rect.height() - 8), bar)
+            bar = mixed(ground, self.theme.colour(BAR_ROLES[node.mark]), share)
+            painter.fillRect(QRect(0, rect.top() + 4, BAR_WIDTH, rect.height() - 8), bar)
         key_end = self._paint_key(painter, rect, node, chosen=chosen)
         if not node.is_container:
             self._paint_value(painter, rect, node, key_end, ground, share)
@@ -158,7 +158,7 @@ class TreeView(QTreeView):
         said = SIGNS.get(node.mark, "") + str(node.key)
         key = metrics.elidedText(said, Qt.TextElideMode.ElideRight, max(40.0, room * 0.6))
         painter.setFont(font)
-        role = BARS[node.mark] if node.mark in SIGNS else "selectedText" if chosen else "text"
+        role = BAR_ROLES[node.mark] if node.mark in SIGNS else "selectedText" if chosen else "text"
         painter.setPen(theme.colour(role))
         width = metrics.horizontalAdvance(key)
         painter.drawText(QRectF(x, rect.top(), width + 2, rect.height()), LEFT, key)
@@ -187,7 +187,7 @@ class TreeView(QTreeView):
             )
             colour = mixed(colour, theme.colour("changed"), share)
         if node.mark in SIGNS:
-            colour = theme.colour(BARS[node.mark])
+            colour = theme.colour(BAR_ROLES[node.mark])
         painter.setFont(theme.font("code"))
         painter.setPen(colour)
         painter.drawText(QRectF(right - width, rect.top(), width + 2, rect.height()), LEFT, text)

@@ -37,8 +37,8 @@ WORDS = TableWords(
     clear_the_filter=lazy("Clear the filter to see all nodes."),
     not_recorded=lazy("Recordings don't contain programs"),
 )
-SORT_EVERY = 30  # refreshes at 30 Hz: changing columns are re-sorted once a second
-LIVELY = frozenset({"cpu"})
+SORT_TICKS = 30  # refreshes at 30 Hz: changing columns are re-sorted once a second
+CHANGING_COLUMNS = frozenset({"cpu"})
 
 
 class NodesPanel(NetworkTable[NodeRow]):
@@ -89,11 +89,11 @@ class NodesPanel(NetworkTable[NodeRow]):
     def refresh(self) -> None:
         self._ticks += 1
         order = self.table.order.column
-        due = order is not None and order.name in LIVELY and self._ticks % SORT_EVERY == 0
+        due = order is not None and order.name in CHANGING_COLUMNS and self._ticks % SORT_TICKS == 0
         if due or self._facts() != self._seen:
             self.rebuild()
         values = self.session.nodes.values_revision + self.session.networks.values_revision
-        if values != self._values or (self._gone and self._ticks % SORT_EVERY == 0):
+        if values != self._values or (self._gone and self._ticks % SORT_TICKS == 0):
             self._values = values
             self.table.tell_visible_changed()
         self.parameters.refresh()

@@ -25,9 +25,9 @@ from app.ui.widgets.table.view import TableView
 from nep.i18n import _, lazy, listed
 from nep.text import shortened
 
-CHANGED_S = 0.8
-SHOWN_LETTERS = 200
-CHOICES_SHOWN = 6
+CHANGE_MARK_S = 0.8
+MAX_SHOWN_CHARS = 200
+MAX_SHOWN_CHOICES = 6
 LINE, CHOICE = range(2)
 
 
@@ -36,8 +36,8 @@ def allowed_words(parameter: ShownParameter) -> str:
     if parameter.read_only:
         return _("read only")
     if parameter.choices:
-        some = [shortened(text_of(each), 40) for each in parameter.choices[:CHOICES_SHOWN]]
-        return ", ".join(some) + " …" if len(parameter.choices) > CHOICES_SHOWN else listed(some, "or")
+        some = [shortened(text_of(each), 40) for each in parameter.choices[:MAX_SHOWN_CHOICES]]
+        return ", ".join(some) + " …" if len(parameter.choices) > MAX_SHOWN_CHOICES else listed(some, "or")
     least, most = parameter.minimum, parameter.maximum
     if least is not None and most is not None:
         return _("{least} to {most}").format(least=text_of(least), most=text_of(most))
@@ -117,9 +117,9 @@ class ParametersPart(QWidget):
         return Cell(parameter.name, role=self._ink("text"), mono=True, middle=True)
 
     def _value_cell(self, parameter: ShownParameter) -> Cell:
-        words = shortened(parameter.text, SHOWN_LETTERS)
+        words = shortened(parameter.text, MAX_SHOWN_CHARS)
         changed = self.parameters.changed.get(parameter.name)
-        if changed is not None and self.clock() - changed < CHANGED_S:
+        if changed is not None and self.clock() - changed < CHANGE_MARK_S:
             return Cell(words, role="changed", mono=True, tint="changedTint")
         return Cell(words, role=self._ink("text"), mono=True)
 
@@ -141,7 +141,7 @@ class ParametersPart(QWidget):
             self.title.setText(self._title())
             self.model.set_rows(parameters.all)
             self._show_chosen()
-            self._fades_until = self.clock() + 2 * CHANGED_S
+            self._fades_until = self.clock() + 2 * CHANGE_MARK_S
         if self.clock() < self._fades_until:  # repaint while marks of changes fade
             self.table.tell_visible_changed()
 
@@ -199,7 +199,7 @@ class ParametersPart(QWidget):
             if [self.choice.itemData(place) for place in range(self.choice.count())] != options:
                 self.choice.clear()
                 for each in options:
-                    self.choice.addItem(shortened(each, SHOWN_LETTERS), each)
+                    self.choice.addItem(shortened(each, MAX_SHOWN_CHARS), each)
             self.choice.set_value(now)
         elif not self._edited and self.field.text() != now:
             self.field.setText(now[:EDITED_LETTERS])

@@ -41,18 +41,18 @@ from nep.i18n import _, number
 
 AXIS_WIDTH, AXIS_HEIGHT = 54, 24
 FLAG = QSize(22, 19)
-ABOVE = 24  # px, space for the flags of the cursors
+FLAG_SPACE = 24  # px, space for the flags of the cursors
 ZOOM_STEP = 1.2
-LEAST_WINDOW_S, MOST_WINDOW_S = 1e-4, 1e9
-SMOOTH_POINTS = 3000
+MIN_WINDOW_S, MAX_WINDOW_S = 1e-4, 1e9
+MAX_ANTIALIASED_POINTS = 3000
 """Number of points above which antialiasing is invisible and expensive."""
-SIGNS, BUSY = 5, 5.0
-TICK_APART, TICK_ABOVE = 84, 34  # minimum distance of ticks in px
-BESIDE = 60
+DENSE_LINE_MARKS, DENSE_TRAVEL_RATIO = 5, 5.0
+TICK_SPACING_X, TICK_SPACING_Y = 84, 34  # minimum distance of ticks in px
+LABEL_OVERHANG = 60
 FARTHEST = 1e300
 """Limit of drawn values; larger ones would overflow in the axis calculations."""
-NEAR = 10  # px
-BETWEEN = 0.045
+HIT_WIDTH_PX = 10  # px
+BETWEEN_ALPHA = 0.045
 
 
 @dataclass(slots=True)
@@ -87,10 +87,10 @@ class TimeAxis(pg.AxisItem):  # type: ignore[misc]  # pyqtgraph is untyped
 
     def boundingRect(self) -> QRectF:
         # pyqtgraph omits labels that exceed the bounding rectangle, such as the clock at the edge.
-        return QRectF(super().boundingRect()).adjusted(-BESIDE, 0, BESIDE, 0)
+        return QRectF(super().boundingRect()).adjusted(-LABEL_OVERHANG, 0, LABEL_OVERHANG, 0)
 
     def tickSpacing(self, least: float, most: float, size: float) -> list[tuple[float, float]]:
-        return readable(super().tickSpacing(least, most, size), most - least, size, TICK_APART)
+        return readable(super().tickSpacing(least, most, size), most - least, size, TICK_SPACING_X)
 
     def tickStrings(self, values: Sequence[float], _scale: float, spacing: float) -> list[str]:
         return [self.clock if abs(value) < spacing / 100 else time_words(value, spacing) for value in values]
@@ -100,7 +100,7 @@ class ValueAxis(pg.AxisItem):  # type: ignore[misc]
     """Axis of numbers with as many digits as the tick spacing requires."""
 
     def tickSpacing(self, least: float, most: float, size: float) -> list[tuple[float, float]]:
-        apart = TICK_ABOVE if self.orientation in {"left", "right"} else TICK_APART
+        apart = TICK_SPACING_Y if self.orientation in {"left", "right"} else TICK_SPACING_X
         return readable(super().tickSpacing(least, most, size), most - least, size, apart)
 
     def tickStrings(self, values: Sequence[float], scale: float, spacing: float) -> list[str]:
@@ -177,7 +177,7 @@ class PlotCanvas(pg.GraphicsView):  # type: ignore[misc]
         self.view = pg.ViewBox(enableMenu=False)
         self.plot = pg.PlotItem(viewBox=self.view, axisItems=axes, enableMenu=False)
         self.plot.hideButtons()
-        self.plot.layout.setContentsMargins(6, ABOVE, 6, 0)
+        self.plot.layout.setContentsMargins(6, FLAG_SPACE, 6, 0)
         self.setCentralItem(self.plot)
         self.right_view = pg.ViewBox(enableMenu=False)
         self.plot.showAxis("right")
@@ -283,18 +283,18 @@ class PlotCanvas(pg.GraphicsView):  # type: ignore[misc]
 
     def _is_dense(self, line: Line, *, right: bool) -> bool:
         # Many points, or steep oscillations.
-        if len(line.times) > SMOOTH_POINTS or not line.is_whole:
+        if len(line.times) > MAX_ANTIALIASED_POINTS or not line.is_whole:
             return True
         shown = self.ranges["right" if right else "left"]
         with np.errstate(over="ignore", invalid="ignore"):
             travelled = float(np.nansum(np.abs(np.diff(line.values)))) / (shown.high - shown.low)
-        return not travelled * self.area.height() < BUSY * self.area.width()
+        return not travelled * self.area.height() < DENSE_TRAVEL_RATIO * self.area.width()
 
     def _add_signs(self, curve: ShownCurve, shift: float) -> None:
         # Dense lines have no dashes; marks at fixed times identify them instead.
-        step_s = (self.end_s - self.begin_s) / SIGNS
+        step_s = (self.end_s - self.begin_s) / DENSE_LINE_MARKS
         first = math.floor(self.begin_s / step_s) + shift
-        for place in range(SIGNS + 1):
+        for place in range(DENSE_LINE_MARKS + 1):
             time_s = (first + place) * step_s
             found = curve.curve.samples.at(time_s)
             if found is not None and self.begin_s <= time_s <= self.end_s:
@@ -362,7 +362,7 @@ class PlotCanvas(pg.GraphicsView):  # type: ignore[misc]
         if len(places) == 2:
             left, right = sorted(min(max(x, area.left()), area.right()) for x in places.values())
             tint = theme.colour("text")
-            tint.setAlphaF(BETWEEN)
+            tint.setAlphaF(BETWEEN_ALPHA)
             painter.fillRect(QRectF(left, area.top(), right - left, area.height()), tint)
         pen = QPen(theme.colour("text"), 1.25)
         pen.setDashPattern([1.5, 2.5])
@@ -382,7 +382,7 @@ class PlotCanvas(pg.GraphicsView):  # type: ignore[misc]
             paint.words(painter, flag, name, font, theme.colour("tooltipText"), paint.CENTRE)
 
     def _flag(self, x: float) -> QRectF:
-        wide, high = self.theme.scaled(FLAG.width()), min(ABOVE - 2.0, self.theme.scaled(FLAG.height()))
+        wide, high = self.theme.scaled(FLAG.width()), min(FLAG_SPACE - 2.0, self.theme.scaled(FLAG.height()))
         return QRectF(x - wide / 2, self.area.top() - high - 3, wide, high)
 
     def _paint_distance(self, painter: QPainter, places: dict[str, float]) -> None:
@@ -405,7 +405,7 @@ class PlotCanvas(pg.GraphicsView):  # type: ignore[misc]
             x = self.x_of(time_s)
             if self._flag(x).adjusted(-4, -4, 4, 4).contains(place):
                 return name
-            if abs(place.x() - x) <= NEAR / 2 and self.area.contains(place):
+            if abs(place.x() - x) <= HIT_WIDTH_PX / 2 and self.area.contains(place):
                 return name
         return None
 

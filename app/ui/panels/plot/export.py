@@ -27,10 +27,10 @@ from nep.i18n import _, lazy
 CSV = FileKind(lazy("Values (CSV)"), ".csv")
 PNG = FileKind(lazy("Image (PNG)"), ".png")
 SVG = FileKind(lazy("Drawing (SVG)"), ".svg")
-RATIO = 2
-WAITS_S = 3.0
+PNG_SCALE = 2
+CLOSE_TIMEOUT_S = 3.0
 Part = tuple[QSize, Callable[[QPainter, QRectF], object]]
-LEGEND_ROW = 22
+LEGEND_ROW_HEIGHT = 22
 
 
 class CsvWriter:
@@ -67,9 +67,9 @@ class CsvWriter:
 
     def close(self) -> None:
         """Wait some seconds for completion, then abort and remove the partial file."""
-        self._thread.join(WAITS_S)
+        self._thread.join(CLOSE_TIMEOUT_S)
         self._given_up.set()
-        self._thread.join(WAITS_S)
+        self._thread.join(CLOSE_TIMEOUT_S)
 
 
 class PlotPicture:
@@ -93,7 +93,7 @@ class PlotPicture:
     @property
     def size(self) -> QSize:
         """Size in px."""
-        row = round(self._theme.scaled(LEGEND_ROW))
+        row = round(self._theme.scaled(LEGEND_ROW_HEIGHT))
         high = sum(size.height() for size, _paint in self._parts) + row * len(self._curves) + 8
         return QSize(max(size.width() for size, _paint in self._parts), high)
 
@@ -107,7 +107,7 @@ class PlotPicture:
             painted(painter, QRectF(0, 0, size.width(), size.height()))
             painter.restore()
             top += size.height()
-        row = self._theme.scaled(LEGEND_ROW)
+        row = self._theme.scaled(LEGEND_ROW_HEIGHT)
         for curve in self._curves:
             box = QRectF(12, top + 4, self.size.width() - 24, row)
             Stroke(curve.look, curve.curve.is_state, hidden=False).paint(painter, box, self._theme)
@@ -117,10 +117,10 @@ class PlotPicture:
 
     def png(self) -> bytes:
         """Return the image as PNG with twice the screen resolution."""
-        image = QImage(self.size * RATIO, QImage.Format.Format_RGB32)
+        image = QImage(self.size * PNG_SCALE, QImage.Format.Format_RGB32)
         if image.isNull():
             raise OSError(errno.ENOMEM, _("not enough memory"))
-        image.setDevicePixelRatio(RATIO)
+        image.setDevicePixelRatio(PNG_SCALE)
         painter = QPainter(image)
         painter.setRenderHint(QPainter.RenderHint.Antialiasing)
         self.paint(painter)

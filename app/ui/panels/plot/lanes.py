@@ -17,9 +17,9 @@ from app.ui.theme.theme import Theme
 from app.ui.widgets import paint
 from nep.i18n import _
 
-LANE, LEAST_WORD = 26, 34
-MOST_LANES = 8
-LEAST_BOX = 2.0
+LANE_HEIGHT, MIN_WORD_WIDTH = 26, 34
+MAX_LANES = 8
+MIN_BOX_WIDTH = 2.0
 
 
 class StateLanes(QWidget):
@@ -36,14 +36,14 @@ class StateLanes(QWidget):
     def show_curves(self, curves: Sequence[ShownCurve]) -> None:
         """Show the states of these curves, eight at most; the legend lists all."""
         count = len(self.curves)
-        self.curves = curves[:MOST_LANES]
+        self.curves = curves[:MAX_LANES]
         if len(self.curves) != count:
             self.updateGeometry()
         paint.show_when(self, bool(self.curves))
         self.update()
 
     def _lane(self) -> float:
-        return max(float(LANE), self._theme.scaled(LANE))
+        return max(float(LANE_HEIGHT), self._theme.scaled(LANE_HEIGHT))
 
     def sizeHint(self) -> QSize:
         return QSize(200, round(self._lane() * len(self.curves)))
@@ -66,9 +66,13 @@ class StateLanes(QWidget):
             for run in states.runs(canvas.begin_s, canvas.end_s, step_s=pixel_s / 2, without=without):
                 left = max(area.left(), canvas.x_of(run.begin_s))
                 right = min(area.right(), canvas.x_of(run.end_s))
-                if right >= left and max(right, left + LEAST_BOX) > painted + 0.5:
-                    painted = max(right, left + LEAST_BOX)
-                    yield curve, run, QRectF(left, top + 2, max(LEAST_BOX, right - left), self._lane() - 3)
+                if right >= left and max(right, left + MIN_BOX_WIDTH) > painted + 0.5:
+                    painted = max(right, left + MIN_BOX_WIDTH)
+                    yield (
+                        curve,
+                        run,
+                        QRectF(left, top + 2, max(MIN_BOX_WIDTH, right - left), self._lane() - 3),
+                    )
 
     def paintEvent(self, _event: QPaintEvent) -> None:
         painter = QPainter(self)
@@ -88,7 +92,7 @@ class StateLanes(QWidget):
             paint.words(painter, name, short_name(curve.name), font, theme.colour(role), paint.RIGHT)
         for curve, run, box in self.boxes():
             paint_state(painter, theme, box, curve.look)
-            if box.width() >= LEAST_WORD:
+            if box.width() >= MIN_WORD_WIDTH:
                 inside = box.adjusted(6, 0, -4, 0)
                 paint.words(painter, inside, run.word or "", theme.font("small"), theme.colour("text"))
         self._paint_cursors(painter)

@@ -11,12 +11,12 @@ from app.ui.theme.theme import Theme
 from app.ui.widgets import paint
 from nep.i18n import lazy
 
-WIDTH = 1.75
+LINE_WIDTH = 1.75
 COLOURS = (lazy("Blue"), lazy("Orange"), lazy("Green"), lazy("Pink"), lazy("Yellow"), lazy("Violet"))
 """Names of the theme's curve colours, in their order."""
 DASHES: tuple[tuple[float, ...], ...] = ((), (6, 4), (2, 4), (12, 4))
 """Dash patterns in px; the first one is solid."""
-LANE_FILL, LANE_EDGE = 0.20, 0.55
+LANE_FILL_ALPHA, LANE_EDGE_ALPHA = 0.20, 0.55
 
 
 @dataclass(frozen=True, slots=True)
@@ -32,11 +32,11 @@ class CurveLook:
 
     def pen(self, theme: Theme, *, is_dense: bool = False) -> QPen:
         """Return the line's pen; for dense lines it is solid and thin, which is faster to paint."""
-        pen = QPen(self.ink(theme), 1.0 if is_dense else WIDTH)
+        pen = QPen(self.ink(theme), 1.0 if is_dense else LINE_WIDTH)
         pen.setCosmetic(True)
         dash = DASHES[self.pattern % len(DASHES)]
         if dash and not is_dense:
-            pen.setDashPattern([pixels / WIDTH for pixels in dash])
+            pen.setDashPattern([pixels / LINE_WIDTH for pixels in dash])
             pen.setCapStyle(Qt.PenCapStyle.FlatCap)
         return pen
 
@@ -86,6 +86,6 @@ class Stroke:
 def paint_state(painter: QPainter, theme: Theme, box: QRectF, look: CurveLook) -> None:
     """Paint the box of a state."""
     fill, edge = look.ink(theme), look.ink(theme)
-    fill.setAlphaF(LANE_FILL)
-    edge.setAlphaF(1.0 if theme.high_contrast else LANE_EDGE)
+    fill.setAlphaF(LANE_FILL_ALPHA)
+    edge.setAlphaF(1.0 if theme.high_contrast else LANE_EDGE_ALPHA)
     paint.box(painter, box, theme.radius("key"), fill, edge)

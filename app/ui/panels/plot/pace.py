@@ -11,7 +11,7 @@ DRAW_EVERY = (2, 8)
 """Minimum and maximum interval between drawings, in refreshes at 30 Hz."""
 DRAWING_SHARE = 0.08
 """Maximum share of a processor core for drawing."""
-MIXED = 0.1
+AVERAGE_WEIGHT = 0.1
 """Weight of the moving average: thread clocks can have a resolution of only 16 ms."""
 
 
@@ -38,7 +38,7 @@ class DrawingPace:
 
     def took(self, seconds: float) -> None:
         """Add a measurement of drawing and painting (processor time in s)."""
-        self.drawing_s += MIXED * (seconds - self.drawing_s)
+        self.drawing_s += AVERAGE_WEIGHT * (seconds - self.drawing_s)
 
     def every(self, pixel_s: float) -> int:
         """Return the interval in refreshes; no shorter than the time in which data moves by a pixel."""

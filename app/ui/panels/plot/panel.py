@@ -50,9 +50,9 @@ if TYPE_CHECKING:
     from PySide6.QtGui import QDragEnterEvent, QDropEvent
 
 
-FIGURES_EVERY = 10  # refreshes at 30 Hz; faster changes would be illegible
-SOON = 2 * FIGURES_EVERY
-MOST_ROWS, TABLE_SHARE = 6, 0.32
+FIGURES_TICKS = 10  # refreshes at 30 Hz; faster changes would be illegible
+SOON = 2 * FIGURES_TICKS
+MAX_ROWS, MAX_TABLE_RATIO = 6, 0.32
 
 
 class PlotPanel(PanelWidget):
@@ -261,7 +261,7 @@ class PlotPanel(PanelWidget):
             with self._pace.drawing(self.canvas):
                 self._draw()
         self._since_figures += 1
-        if self._since_figures >= (FIGURES_EVERY if drawn else SOON):  # in the same repaint as the curves
+        if self._since_figures >= (FIGURES_TICKS if drawn else SOON):  # in the same repaint as the curves
             self._show_figures()
 
     def _soon(self) -> None:
@@ -347,8 +347,8 @@ class PlotPanel(PanelWidget):
         self._soon()
 
     def _fit_table(self) -> None:
-        room = round(self.height() * TABLE_SHARE / max(1, self.table.row_height)) - 1
-        rows = max(1, min(MOST_ROWS, room, len(self.shown)))
+        room = round(self.height() * MAX_TABLE_RATIO / max(1, self.table.row_height)) - 1
+        rows = max(1, min(MAX_ROWS, room, len(self.shown)))
         self.table.setFixedHeight(self.table.row_height * rows + self.table.horizontalHeader().height() + 2)
         self.table.fit_columns()
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-LEAST_S, MOST_S = 1e-4, 1e8
+MIN_SPAN_S, MAX_SPAN_S = 1e-4, 1e8
 SPANS: tuple[tuple[str, float], ...] = (("12", 12.0), ("60", 60.0), ("300", 300.0), ("all", 0.0))
 """Choices of the range in s; 0 is everything."""
 
@@ -26,7 +26,7 @@ class TimeView:
         """Return the visible range for data in a range."""
         end_s = newest_s if self.held_s is None else self.held_s
         if self.is_all:
-            return min(oldest_s, end_s - LEAST_S), end_s
+            return min(oldest_s, end_s - MIN_SPAN_S), end_s
         return end_s - self.span_s, end_s
 
     def hold(self, shown: tuple[float, float]) -> None:
@@ -46,7 +46,7 @@ class TimeView:
     def zoom(self, factor: float, at_s: float, shown: tuple[float, float]) -> None:
         """Scale the range by `factor` around `at_s`, or around its end while it follows new data."""
         span_s = _bounded((shown[1] - shown[0]) * factor)
-        share = (shown[1] - at_s) / max(LEAST_S, shown[1] - shown[0])
+        share = (shown[1] - at_s) / max(MIN_SPAN_S, shown[1] - shown[0])
         self.span_s, self.is_all = span_s, False
         if self.held_s is not None:
             self.held_s = at_s + share * span_s
@@ -63,4 +63,4 @@ class TimeView:
 
 
 def _bounded(span_s: float) -> float:
-    return min(MOST_S, max(LEAST_S, span_s))
+    return min(MAX_SPAN_S, max(MIN_SPAN_S, span_s))

@@ -32,10 +32,10 @@ if TYPE_CHECKING:
     from app.core.network.watches import Watch
     from app.core.session import Session
 
-WIDE, HIGH = 470, 300
-MOST_TOPICS, MOST_BYTES_PER_S = 40, 2e6
-MOST_SHOWN, MOST_OFFERED = 60, 4000
-RENEW_MS = 250
+MATCHES_WIDTH, MATCHES_HEIGHT = 470, 300
+MAX_TOPICS, MAX_BYTES_PER_S = 40, 2e6
+MAX_SHOWN, MAX_FIELDS = 60, 4000
+REFRESH_MS = 250
 ICONS = {"number": "hash", "state": "toggle-left", "list": "brackets"}
 EXAMPLES = ("difference({})", "derivative({})", "integral({})", "mean({}, 2 s)")
 
@@ -64,9 +64,9 @@ class FieldOffers:
         fitting = [
             topic
             for topic in topics
-            if topic.codec not in {"image", "bytes"} and (topic.bandwidth_Bps or 0.0) <= MOST_BYTES_PER_S
+            if topic.codec not in {"image", "bytes"} and (topic.bandwidth_Bps or 0.0) <= MAX_BYTES_PER_S
         ]
-        return fitting[:MOST_TOPICS]
+        return fitting[:MAX_TOPICS]
 
     def names(self) -> list[str]:
         """Return the keys of all topics."""
@@ -84,7 +84,7 @@ class FieldOffers:
             for found in fields_of(reading.value, 400) if reading.error is None else ():
                 yield str(FieldSource(key, found.path)), found
                 told += 1
-                if told >= MOST_OFFERED:
+                if told >= MAX_FIELDS:
                     return
 
 
@@ -130,7 +130,7 @@ class AddCurve(SearchField):
         self._matches: _Matches | None = None
         self._known: dict[str, FieldFound] = {}
         self._timer = QTimer(self)
-        self._timer.setInterval(RENEW_MS)
+        self._timer.setInterval(REFRESH_MS)
         self._timer.timeout.connect(self._renew)
         self.textEdited.connect(self._search)
 
@@ -230,9 +230,9 @@ class AddCurve(SearchField):
             for text, found in self._known.items()
         ]
         if typed:
-            found, count = Finder(fields).find(typed, MOST_SHOWN)
+            found, count = Finder(fields).find(typed, MAX_SHOWN)
         else:
-            found, count = [Match(entry) for entry in fields[:MOST_SHOWN]], len(fields)
+            found, count = [Match(entry) for entry in fields[:MAX_SHOWN]], len(fields)
         lines: list[Line] = [Heading(_("Fields")), *found] if found else []
         names = [example.split("(")[0] for example in EXAMPLES]
         of = next(iter(self._plotted()), None) or (found[0].entry.words if found else "/odom.speed")
@@ -263,8 +263,10 @@ class AddCurve(SearchField):
         window = self.window()
         at = self.mapTo(window, QPoint(0, self.height() + 4))
         foot = matches.foot.sizeHint()
-        wide = min(max(round(self._theme.scaled(WIDE)), foot.width() + 4), window.width() - 8)
-        high = min(matches.list.height_of_all() + foot.height() + 12, round(self._theme.scaled(HIGH)))
+        wide = min(max(round(self._theme.scaled(MATCHES_WIDTH)), foot.width() + 4), window.width() - 8)
+        high = min(
+            matches.list.height_of_all() + foot.height() + 12, round(self._theme.scaled(MATCHES_HEIGHT))
+        )
         high = min(high, window.height() - at.y() - 4)
         matches.setGeometry(min(at.x(), window.width() - wide - 4), at.y(), wide, max(60, high))
         matches.show()

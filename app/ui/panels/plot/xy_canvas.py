@@ -20,19 +20,19 @@ from app.ui.widgets import paint
 from nep.i18n import _
 
 SHADES = 8
-FAINTEST = 0.25
-MOST_POINTS = 4000
-ARROW = 7.0
+MIN_ALPHA = 0.25
+MAX_POINTS = 4000
+ARROW_SIZE = 7.0
 Path = tuple[ShownCurve, ShownCurve, Floats, Floats, Floats]
 
 
 def path_of(
     across: ShownCurve, up: ShownCurve, begin_s: float, end_s: float
 ) -> tuple[Floats, Floats, Floats]:
-    """Return times, x and y of two curves at the times of the first one, at most `MOST_POINTS` points."""
+    """Return times, x and y of two curves at the times of the first one, at most `MAX_POINTS` points."""
     samples = across.curve.samples
     first, end = samples.places(begin_s, end_s)
-    step = max(1, math.ceil((end - first) / MOST_POINTS))
+    step = max(1, math.ceil((end - first) / MAX_POINTS))
     part = slice(first, end, step)
     times, xs = samples.times[part].copy(), np.clip(samples.values[part], -FARTHEST, FARTHEST)
     gaps = samples.gaps[part]
@@ -95,7 +95,7 @@ class XYCanvas(pg.GraphicsView):  # type: ignore[misc]  # pyqtgraph is untyped
                 first = shade * len(times) // SHADES
                 last = (shade + 1) * len(times) // SHADES + 1
                 ink = up.look.ink(self.theme)
-                ink.setAlphaF(FAINTEST + (1 - FAINTEST) * (shade + 1) / SHADES)
+                ink.setAlphaF(MIN_ALPHA + (1 - MIN_ALPHA) * (shade + 1) / SHADES)
                 self._line(used).setData(xs[first:last], ys[first:last], pen=pg.mkPen(ink, width=1.75))
                 used += 1
         for line in self._lines[used:]:
@@ -178,7 +178,12 @@ class XYCanvas(pg.GraphicsView):  # type: ignore[misc]  # pyqtgraph is untyped
         angle = math.atan2(tip.y() - before.y(), tip.x() - before.x())
         corners = [
             tip + QPointF(length * math.cos(angle + turn), length * math.sin(angle + turn))
-            for length, turn in ((ARROW, 0.0), (ARROW, 2.5), (ARROW * 0.35, math.pi), (ARROW, -2.5))
+            for length, turn in (
+                (ARROW_SIZE, 0.0),
+                (ARROW_SIZE, 2.5),
+                (ARROW_SIZE * 0.35, math.pi),
+                (ARROW_SIZE, -2.5),
+            )
         ]
         painter.setPen(Qt.PenStyle.NoPen)
         painter.setBrush(up.look.ink(self.theme))

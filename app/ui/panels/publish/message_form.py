@@ -34,9 +34,9 @@ from nep.errors import NepError
 from nep.i18n import _
 from nep.messages.json_fault import JsonFault
 
-LABEL_PX = 80
-RATE_PX = 84
-MOST_OFFERED = 500
+LABEL_WIDTH_PX = 80
+RATE_WIDTH_PX = 84
+MAX_COMPLETIONS = 500
 
 
 class TopicEdit(QLineEdit):
@@ -61,7 +61,7 @@ class TopicEdit(QLineEdit):
 
     def offer(self, names: Sequence[str]) -> None:
         """Set the completions."""
-        some = list(names[:MOST_OFFERED])
+        some = list(names[:MAX_COMPLETIONS])
         if some != self._offered.stringList():
             self._offered.setStringList(some)
 
@@ -136,7 +136,7 @@ class MessageForm(QWidget):
         self.repeat = Button(theme, _("Start sending"), "repeat")
         self.rate = NumberEdit(theme, LEAST_HZ, MOST_HZ, _("/s"), 1)
         self.rate.setAccessibleName(_("Messages per second"))
-        self.rate.setFixedWidth(round(theme.scaled(RATE_PX)))
+        self.rate.setFixedWidth(round(theme.scaled(RATE_WIDTH_PX)))
         self.rate.number.connect(lambda value: self._edit(rate_hz=value))
         self.count = ElidedLabel("small", "textSecondary")
         self.rate_hint = label("", "small", role="textTertiary", wrap=True)
@@ -154,7 +154,7 @@ class MessageForm(QWidget):
         fields = QGridLayout()
         fields.setHorizontalSpacing(10)
         fields.setVerticalSpacing(8)
-        fields.setColumnMinimumWidth(0, round(self._theme.scaled(LABEL_PX)))
+        fields.setColumnMinimumWidth(0, round(self._theme.scaled(LABEL_WIDTH_PX)))
         fields.setColumnStretch(1, 1)
         self._value_words = _name(_("Values"))
         rows = ((_name(_("Name")), self.name), (_name(_("Topic")), self.topic), (_name(_("Type")), self.kind))

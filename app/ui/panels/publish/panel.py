@@ -30,8 +30,8 @@ from app.ui.widgets.paint import show_when
 from nep.errors import NepError
 from nep.i18n import _, lazy, ngettext
 
-LIST_PX, SIDE_BY_SIDE_PX, LIST_HIGH_PX = 236, 520, 130
-STATES_EVERY = 6  # refreshes at 30 Hz
+LIST_WIDTH_PX, SIDE_BY_SIDE_PX, LIST_HEIGHT_PX = 236, 520, 130
+STATE_UPDATE_TICKS = 6  # refreshes at 30 Hz
 
 
 class PublishPanel(PanelWidget):
@@ -92,8 +92,8 @@ class PublishPanel(PanelWidget):
         self._sides = ListBeside(
             self.theme,
             (self.filter, self.list, scroll),
-            list_px=LIST_PX,
-            list_high_px=LIST_HIGH_PX,
+            list_px=LIST_WIDTH_PX,
+            list_high_px=LIST_HEIGHT_PX,
             narrow_px=SIDE_BY_SIDE_PX,
         )
         self.pages = QStackedWidget()
@@ -117,7 +117,7 @@ class PublishPanel(PanelWidget):
             self._seen = facts
             self._rebuild()
             self.form.topic.offer(sorted(topic.name for topic in topics.live()))
-        elif self._ticks % STATES_EVERY == 0:
+        elif self._ticks % STATE_UPDATE_TICKS == 0:
             self._say_sending()
             self.list.tell_visible_changed()
 

@@ -14,7 +14,7 @@ from app.ui.widgets.flow_layout import Flow
 from app.ui.widgets.menus import EditMenu
 from nep.i18n import _
 
-FIELD_PX = 120
+FIELD_WIDTH_PX = 120
 
 
 class ValueFields(QWidget):
@@ -62,7 +62,7 @@ class ValueFields(QWidget):
         row.setSpacing(6)
         words = label(name, "mono", role="accentText")
         field = QLineEdit()
-        field.setMinimumWidth(round(self._theme.scaled(FIELD_PX)))
+        field.setMinimumWidth(round(self._theme.scaled(FIELD_WIDTH_PX)))
         field.setAccessibleName(_("Value of {name}").format(name=name))
         hint = _("A number such as 12.5 or 12,5, JSON such as true, or text. Quotes make a number text.")
         field.setToolTip(plain.tip(hint))

@@ -19,7 +19,7 @@ from app.ui.widgets.table.model import Cell, Column
 from nep.i18n import _, lazy
 
 PICTURE = QSize(64, 48)
-GAP, CHIP_HIGH, CHIP_PADDING = 14, 18, 8
+GAP, CHIP_HEIGHT, CHIP_PADDING = 14, 18, 8
 BADGES = {
     "recording": (lazy("recording"), "error", "circle-dot"),
     "unreadable": (lazy("can't be read"), "error", "circle-x"),
@@ -71,7 +71,7 @@ class RecordingMark:
         wide = min(paint.width_of(name, self.name) + 1, room)
         paint.words(painter, QRectF(words.left(), top, wide, high), self.name, name, theme.colour("text"))
         if chip:
-            middle = QRectF(words.left() + wide + 8, top + high / 2 - CHIP_HIGH / 2, chip, CHIP_HIGH)
+            middle = QRectF(words.left() + wide + 8, top + high / 2 - CHIP_HEIGHT / 2, chip, CHIP_HEIGHT)
             self._paint_chip(painter, middle, theme)
         if self.note:
             line = QRectF(words.left(), top + high, words.width(), low)

@@ -35,7 +35,7 @@ from nep.errors import BadTopicError
 from nep.i18n import _, lazy, ngettext
 from nep.recordings.export import ALL_OF_IT, Part, takes
 
-BAR_PX = 120
+BAR_WIDTH_PX = 120
 FORMAT_WORDS = {
     "csv": lazy("CSV"), "parquet": lazy("Parquet"), "pictures": lazy("Images"), "mp4": lazy("MP4"),
     "mcap": lazy("MCAP"),
@@ -65,7 +65,7 @@ class RecordingDetails(QWidget):
         self.export = Button(theme, _("Export"), "download", size="small")
         self.export.clicked.connect(self._press)
         self.bar = ValueBar(theme)
-        self.bar.setFixedWidth(round(theme.scaled(BAR_PX)))
+        self.bar.setFixedWidth(round(theme.scaled(BAR_WIDTH_PX)))
         self.progress = label("", "small", role="textSecondary")
         self._is_exporting = False
         self._arrange()

@@ -14,9 +14,9 @@ from app.ui.theme.theme import Theme
 from app.ui.widgets import paint
 from nep.i18n import _
 
-HIGH, LABELS, HANDLE = 71, 18, 8
-STEP_NS, FAR_NS = 1_000_000_000, 10_000_000_000
-FAINT = 0.35
+FILM_HEIGHT, LABEL_HEIGHT, HANDLE_WIDTH = 71, 18, 8
+STEP_NS, BIG_STEP_NS = 1_000_000_000, 10_000_000_000
+UNSELECTED_OPACITY = 0.35
 
 
 class StripHandle(QWidget):
@@ -39,7 +39,7 @@ class StripHandle(QWidget):
 
     def keyPressEvent(self, event: QKeyEvent) -> None:
         far = bool(event.modifiers() & Qt.KeyboardModifier.ShiftModifier)
-        step = FAR_NS if far else STEP_NS
+        step = BIG_STEP_NS if far else STEP_NS
         if event.key() in {Qt.Key.Key_Left, Qt.Key.Key_Right}:
             self.moved.emit(-step if event.key() == Qt.Key.Key_Left else step)
         elif event.key() in {Qt.Key.Key_Home, Qt.Key.Key_End}:
@@ -138,15 +138,15 @@ class FilmStrip(QWidget):
     # -- geometry -----------------------------------------------------------------------------------------
 
     def sizeHint(self) -> QSize:
-        return QSize(360, round(self._theme.scaled(HIGH) + self._theme.scaled(LABELS)))
+        return QSize(360, round(self._theme.scaled(FILM_HEIGHT) + self._theme.scaled(LABEL_HEIGHT)))
 
     def minimumSizeHint(self) -> QSize:
         return QSize(120, self.sizeHint().height())
 
     def _film(self) -> QRectF:
         # Leaves room for the handles at both ends.
-        high = self._theme.scaled(HIGH)
-        return QRectF(HANDLE, 0, max(1.0, self.width() - 2 * HANDLE), high)
+        high = self._theme.scaled(FILM_HEIGHT)
+        return QRectF(HANDLE_WIDTH, 0, max(1.0, self.width() - 2 * HANDLE_WIDTH), high)
 
     def _x(self, at_ns: int) -> float:
         film, look = self._film(), self.look
@@ -165,8 +165,8 @@ class FilmStrip(QWidget):
         begin, end = self._x(self.begin_ns), self._x(self.end_ns)
         if self.look is not None and self.look.end_ns <= self.look.start_ns:
             end = self._film().right()
-        self.begin.setGeometry(round(begin) - HANDLE, 0, HANDLE, high)
-        self.end.setGeometry(round(end), 0, HANDLE, high)
+        self.begin.setGeometry(round(begin) - HANDLE_WIDTH, 0, HANDLE_WIDTH, high)
+        self.end.setGeometry(round(end), 0, HANDLE_WIDTH, high)
         self.updateGeometry()
         self.update()
 
@@ -202,7 +202,7 @@ class FilmStrip(QWidget):
         else:
             self._paint_counts(painter, film, look.counts)
         veil = QColor(theme.colour("panel"))
-        veil.setAlphaF(1.0 - FAINT)
+        veil.setAlphaF(1.0 - UNSELECTED_OPACITY)
         begin, end = float(self.begin.geometry().right() + 1), float(self.end.geometry().left())
         painter.fillRect(QRectF(film.left(), 0, max(0.0, begin - film.left()), film.height()), veil)
         painter.fillRect(QRectF(end, 0, max(0.0, film.right() - end), film.height()), veil)
@@ -240,7 +240,7 @@ class FilmStrip(QWidget):
     def _paint_labels(self, painter: QPainter, film: QRectF, look: FilmStripLook) -> None:
         # Labels of the ends and of the selection, as far as they don't overlap.
         theme, font = self._theme, self._theme.font("small")
-        high = theme.scaled(LABELS)
+        high = theme.scaled(LABEL_HEIGHT)
         taken: list[tuple[float, float]] = []
         digits = 0 if look.end_ns - look.start_ns > STEP_NS else 3
         for at_ns, role in (

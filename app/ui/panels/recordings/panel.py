@@ -41,10 +41,10 @@ WORDS = TableWords(
     nothing_fits=lazy("No matching recordings"),
     clear_the_filter=lazy("Clear the filter to see all recordings."),
 )
-ROW = 56
-LOOK_EVERY = 30  # refreshes at 30 Hz
-FIRST_LOOK = 1
-PICTURES_KEPT = 300
+ROW_HEIGHT = 56
+SCAN_TICKS = 30  # refreshes at 30 Hz
+FIRST_SCAN_TICK = 1
+MAX_CACHED_PICTURES = 300
 STRIP_PICTURES, STRIP_BARS, STRIP_SIZE = 8, 120, (240, 142)
 SIDECAR = ".bookmarks.json"
 
@@ -111,10 +111,10 @@ class RecordingsPanel(TablePanel[RecordingFacts]):
         if recordings.folder != self._folder.folder:
             self._folder.close()
             self._folder = RecordingFolder(recordings.folder, recordings.new_opener())
-            self._ticks = FIRST_LOOK
+            self._ticks = FIRST_SCAN_TICK
         seen = recordings.client.revision
         is_new = seen != self._recorder_seen
-        if self._ticks % LOOK_EVERY == FIRST_LOOK:
+        if self._ticks % SCAN_TICKS == FIRST_SCAN_TICK:
             self._folder.look(recordings.client.state.path if recordings.is_recording else None)
         found = self._folder.take()
         if found is not None:
@@ -233,7 +233,7 @@ class RecordingsPanel(TablePanel[RecordingFacts]):
                 is_any = True
                 del self._asked[owner]
                 self._pictures[mark] = made[0]
-        while len(self._pictures) > PICTURES_KEPT:
+        while len(self._pictures) > MAX_CACHED_PICTURES:
             self._pictures.popitem(last=False)
         return is_any
 
@@ -436,7 +436,7 @@ class RecordingsPanel(TablePanel[RecordingFacts]):
         return super().event(event)
 
     def row_height(self) -> int:
-        return round(self.theme.scaled(ROW))
+        return round(self.theme.scaled(ROW_HEIGHT))
 
     def set_density(self, density: Density) -> None:
         super().set_density(density)

@@ -17,7 +17,7 @@ from app.ui.widgets.table.view import TableView
 from nep.i18n import _, lazy, ngettext
 from nep.recordings.reader import RecordedTopic
 
-ROWS_HIGH = 150
+TABLE_HEIGHT = 150
 
 
 class TopicList(QWidget):
@@ -44,7 +44,7 @@ class TopicList(QWidget):
         self.table.order_changed.connect(self._show_rows)
         self.table.filter_wanted.connect(lambda: self.filter.setFocus(Qt.FocusReason.ShortcutFocusReason))
         self.filter.leave.connect(lambda: self.table.setFocus(Qt.FocusReason.ShortcutFocusReason))
-        self.table.setFixedHeight(round(theme.scaled(ROWS_HIGH)))
+        self.table.setFixedHeight(round(theme.scaled(TABLE_HEIGHT)))
         row = Flow(gap=8, row_gap=6)
         for widget in (self.all, self.none):
             row.addWidget(widget)

@@ -29,17 +29,17 @@ from nep.i18n import _
 TOUCHABLE = ("head", "left_hand", "right_hand")
 BODY = "body"
 """Part by which a robot is picked up."""
-STALE = QColor(90, 90, 90, 150)
-KEYS = {Qt.Key.Key_H: "head", Qt.Key.Key_L: "left_hand", Qt.Key.Key_R: "right_hand"}
-ARROWS = {
+STALE_COLOUR = QColor(90, 90, 90, 150)
+TOUCH_KEYS = {Qt.Key.Key_H: "head", Qt.Key.Key_L: "left_hand", Qt.Key.Key_R: "right_hand"}
+ARROW_DIRECTIONS = {
     Qt.Key.Key_Up: (-1, 0),
     Qt.Key.Key_Down: (1, 0),
     Qt.Key.Key_Left: (0, -1),
     Qt.Key.Key_Right: (0, 1),
 }
-PRESSES = {Qt.Key.Key_Space, Qt.Key.Key_Return, Qt.Key.Key_Enter}
+PRESS_KEYS = {Qt.Key.Key_Space, Qt.Key.Key_Return, Qt.Key.Key_Enter}
 STEP_M, SMALL_STEP_M = 0.1, 0.02
-DRAG_FROM_PX = 4
+DRAG_DISTANCE_PX = 4
 
 
 def split(part: str) -> tuple[str, str]:
@@ -153,7 +153,7 @@ class RoomView(QWidget):
         area = QRectF(self.rect())
         self._drawing.paint(painter, area, state, self.others, marks=marks, dark=self._theme.dark)
         if self.stale:
-            painter.fillRect(self.rect(), STALE)
+            painter.fillRect(self.rect(), STALE_COLOUR)
         if self.heard:
             paint_heard(painter, area, self.heard, self._theme.font("label"))
         painter.end()
@@ -219,7 +219,7 @@ class RoomView(QWidget):
 
     def _drag(self, position: QPointF) -> None:
         if not self._dragging:
-            if (position - self._pressed_at).manhattanLength() < DRAG_FROM_PX:
+            if (position - self._pressed_at).manhattanLength() < DRAG_DISTANCE_PX:
                 return
             self._dragging = True
             self.setCursor(Qt.CursorShape.ClosedHandCursor)
@@ -296,14 +296,14 @@ class RoomView(QWidget):
 
     def keyPressEvent(self, event: QKeyEvent) -> None:
         key, where = Qt.Key(event.key()), self._where(self.chosen)
-        if key in ARROWS and where is not None and self.chosen is not None:
+        if key in ARROW_DIRECTIONS and where is not None and self.chosen is not None:
             small = bool(event.modifiers() & Qt.KeyboardModifier.ShiftModifier)
             step = SMALL_STEP_M if small else STEP_M
-            ahead, aside = ARROWS[key]
+            ahead, aside = ARROW_DIRECTIONS[key]
             self._move(self.chosen, where[0] + ahead * step, where[1] + aside * step)
         elif key in {Qt.Key.Key_Delete, Qt.Key.Key_Backspace} and self._thing(self.chosen) is not None:
             self.removed.emit(self.chosen)
-        elif key in PRESSES and self._has_bumper(self._pressed_by_keys()) and is_plain(event):
+        elif key in PRESS_KEYS and self._has_bumper(self._pressed_by_keys()) and is_plain(event):
             if not event.isAutoRepeat():
                 self.bumped.emit(split(self.chosen or "")[0], "front")
         else:
@@ -314,8 +314,8 @@ class RoomView(QWidget):
         return self.chosen or BODY
 
     def _touch_by(self, event: QKeyEvent, key: Qt.Key) -> None:
-        part = KEYS.get(key) if is_plain(event) else None
-        if key in PRESSES and is_plain(event) and self._robot(self._pressed_by_keys()) is not None:
+        part = TOUCH_KEYS.get(key) if is_plain(event) else None
+        if key in PRESS_KEYS and is_plain(event) and self._robot(self._pressed_by_keys()) is not None:
             part = "head"
         if part is None:
             event.ignore()

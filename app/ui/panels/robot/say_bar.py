@@ -17,10 +17,10 @@ from app.ui.widgets.keyboard import is_plain
 from app.ui.widgets.menus import Menu, drop_below
 from nep.i18n import _
 
-HEARS = "heard"
+HEARD_EVENT = "heard"
 """Event of a robot that hears speech."""
-MOST_ENTRIES = 24
-MOST_WIDTH = 720
+MAX_ENTRIES = 24
+MAX_WIDTH = 720
 """Maximum width in px, for the enlarged room."""
 Awaited: TypeAlias = Callable[[Event, str], Sequence[str]]
 Happening: TypeAlias = dict[str, object]
@@ -37,7 +37,7 @@ class SayField(SearchField):
         super().__init__(theme, _("Say something"))
         self.setMaxLength(200)
         self.setMinimumWidth(60)
-        self.setMaximumWidth(MOST_WIDTH)
+        self.setMaximumWidth(MAX_WIDTH)
         self._last = ""
 
     def sizeHint(self) -> QSize:
@@ -100,7 +100,7 @@ class SayBar(QWidget):
     def show_robot(self, robot: Robot) -> None:
         """Switch to this robot."""
         self._robot = robot
-        hears = robot.event(HEARS) is not None
+        hears = robot.event(HEARD_EVENT) is not None
         words = _("Say something to {robot}").format(robot=robot.name)
         self.field.setPlaceholderText(words)
         self.field.setAccessibleName(words)
@@ -113,7 +113,7 @@ class SayBar(QWidget):
 
     def choices(self) -> Sequence[str]:
         """Return the words that programs are waiting for."""
-        event = self._robot.event(HEARS) if self._robot is not None else None
+        event = self._robot.event(HEARD_EVENT) if self._robot is not None else None
         return self._awaited(event, event.filters[0]) if event is not None and event.filters else ()
 
     def show_words(self) -> None:
@@ -132,14 +132,14 @@ class SayBar(QWidget):
     def happenings(self) -> Iterator[tuple[str, str, Happening]]:
         """Yield text, icon and data of each event that can be simulated."""
         for event in self._robot.events if self._robot is not None else ():
-            if event.name in {HEARS, "released"}:  # a tap includes the release
+            if event.name in {HEARD_EVENT, "released"}:  # a tap includes the release
                 continue
             yield from _entries(event, self._awaited)
 
     def show_events(self) -> None:
         """Show the menu of events."""
         menu = Menu(self._theme, self)
-        for words, icon, happening in list(self.happenings())[:MOST_ENTRIES]:
+        for words, icon, happening in list(self.happenings())[:MAX_ENTRIES]:
             action = menu.addAction(self._theme.icon(icon), plain.entry(words))
             action.triggered.connect(lambda _on=False, told=happening: self.happened.emit(told))
         self._pop_up(menu, self.events)

@@ -9,7 +9,7 @@ from app.robots.description.inputs import to_words
 from nep.i18n import _, number, translate
 
 UNITS = {"s": "seconds", "min": "minutes"}
-LONGEST_TEXT = 32
+MAX_TEXT_LENGTH = 32
 
 
 def input_words(action: Action, given: Mapping[str, object], *, texts: bool = True) -> str:
@@ -40,10 +40,10 @@ def _words(parameter: Parameter, value: object, *, texts: bool) -> str:
         return _("a picture")
     if parameter.kind == "text" and isinstance(value, str) and value:
         text = " ".join(value.split())
-        return f"“{text if len(text) <= LONGEST_TEXT else text[: LONGEST_TEXT - 1] + '…'}”"
+        return f"“{text if len(text) <= MAX_TEXT_LENGTH else text[: MAX_TEXT_LENGTH - 1] + '…'}”"
     if parameter.kind in ("list", "object") and value:
         words = to_words(value)
-        return words if len(words) <= LONGEST_TEXT else f"{words[: LONGEST_TEXT - 1]}…"
+        return words if len(words) <= MAX_TEXT_LENGTH else f"{words[: MAX_TEXT_LENGTH - 1]}…"
     return str(value) if parameter.kind == "colour" and value else ""
 
 

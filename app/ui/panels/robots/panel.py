@@ -39,9 +39,9 @@ if TYPE_CHECKING:
     from app.core.robots.robot_link import RobotLink
     from app.core.session import Session
 
-UNFOLDED = 4
-LIST_FROM_WIDTH = 760
-FINDER_FROM_WIDTH, ABOUT_FROM_WIDTH = 620, 440
+EXPANDED_CARDS = 4
+LIST_MIN_WIDTH = 760
+FINDER_MIN_WIDTH, ABOUT_MIN_WIDTH = 620, 440
 FINDER_WIDTH = 180
 PICTURE_CODEC = "image"
 
@@ -228,7 +228,7 @@ class RobotsPanel(OneRobotPanel):
                 self.theme,
                 action,
                 self._options,
-                folded=place >= UNFOLDED,
+                folded=place >= EXPANDED_CARDS,
                 pictures=self._pictures,
                 title_of=lambda name: titles.get(name, name.replace("_", " ")),
             )
@@ -334,12 +334,12 @@ class RobotsPanel(OneRobotPanel):
         # When space is short, the description is hidden first, then the list.
         width = self.width() / self.theme.scaled(1.0)
         count = self.list.count
-        wide = count > 1 or (count == 1 and width >= LIST_FROM_WIDTH)
+        wide = count > 1 or (count == 1 and width >= LIST_MIN_WIDTH)
         self.list.setVisible(wide)
         self._list_line.setVisible(wide)
         room = width - (LIST_WIDTH if wide else 0)
-        self.finder.setVisible(room >= FINDER_FROM_WIDTH)
-        self.about.setVisible(room >= ABOUT_FROM_WIDTH)
+        self.finder.setVisible(room >= FINDER_MIN_WIDTH)
+        self.about.setVisible(room >= ABOUT_MIN_WIDTH)
 
     def focus_filter(self) -> bool:
         self.finder.setFocus(Qt.FocusReason.ShortcutFocusReason)

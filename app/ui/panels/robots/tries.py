@@ -25,10 +25,10 @@ if TYPE_CHECKING:
     from app.core.robots.robot_link import Invocation
 
 TO_GO = "to_go"
-SHARES = ("progress", "ratio", "share")
-PERCENT = ("percent", "percentage")
-ROW = 28
-SHOWN = 5
+RATIO_FIELDS = ("progress", "ratio", "share")
+PERCENT_FIELDS = ("percent", "percentage")
+ROW_HEIGHT = 28
+MAX_SHOWN = 5
 
 
 def field_words(fields: Sequence[DataField], told: Mapping[str, object]) -> str:
@@ -36,7 +36,7 @@ def field_words(fields: Sequence[DataField], told: Mapping[str, object]) -> str:
     parts = []
     for field in fields:
         value = told.get(field.name)
-        if value is None or field.name in SHARES:
+        if value is None or field.name in RATIO_FIELDS:
             continue
         if isinstance(value, bool):
             parts.append(f"{field.title} {yes_words(value)}")
@@ -65,7 +65,7 @@ def output_words(action: Action, output: Mapping[str, object]) -> str:
 
 def progress_of(action: Action, given: Mapping[str, object], feedback: Mapping[str, object]) -> float | None:
     """Return the progress from 0 to 1, as reported or derived from requested and remaining amounts."""
-    for name in SHARES:
+    for name in RATIO_FIELDS:
         share = _number(feedback.get(name))
         if share is not None:
             return _within(share)
@@ -73,7 +73,7 @@ def progress_of(action: Action, given: Mapping[str, object], feedback: Mapping[s
         value = _number(feedback.get(field.name))
         if value is None:
             continue
-        if field.unit == "%" or field.name in PERCENT:
+        if field.unit == "%" or field.name in PERCENT_FIELDS:
             return _within(value / 100)
         asked = next(
             (
@@ -159,7 +159,7 @@ class TryRow(PaintedButton):
         self.setToolTip(plain.tip(_("{result}. Click to use these values again").format(result=self.result)))
 
     def sizeHint(self) -> QSize:
-        return QSize(200, round(self._theme.scaled(ROW)))
+        return QSize(200, round(self._theme.scaled(ROW_HEIGHT)))
 
     def paint_button(self, painter: QPainter, rect: QRectF) -> None:
         theme = self._theme
@@ -204,7 +204,7 @@ class TryList(QWidget):
 
     def show_tries(self, tries: Sequence[Invocation]) -> None:
         """Show the latest tries that have ended."""
-        ended = [made for made in tries if made.action == self._action.name and not made.running][-SHOWN:]
+        ended = [made for made in tries if made.action == self._action.name and not made.running][-MAX_SHOWN:]
         ids = tuple(made.id for made in ended)
         if ids == self._shown:
             return

@@ -24,11 +24,11 @@ from nep.i18n import _, lazy
 from nep.text import shortened
 
 MOST_ROWS = 500
-DEEPEST = 12
+MAX_DEPTH = 12
 TEXT_LETTERS = 200
 INDENT_PX = 14
 # px at 100 % text size: minimum width, and width from which the header is one row
-LEAST_PX, BESIDE_PX = 200, 420
+MIN_WIDTH_PX, ONE_ROW_WIDTH_PX = 200, 420
 
 
 @dataclass(frozen=True, slots=True)
@@ -61,7 +61,7 @@ def _has_parts(value: object) -> bool:
 def _rows(path: str, depth: int, name: str, value: object) -> Iterator[AnswerRow]:
     if name:
         yield AnswerRow(path, depth - 1, name, _words(value))
-    if depth >= DEEPEST or not _has_parts(value):
+    if depth >= MAX_DEPTH or not _has_parts(value):
         return
     inside = value.items() if isinstance(value, Mapping) else enumerate(value)  # type: ignore[arg-type]
     for key, part in inside:
@@ -162,11 +162,11 @@ class AnswerView(QWidget):
 
     def minimumSizeHint(self) -> QSize:
         # A wider minimum would clip the values of the reply.
-        return QSize(round(self._theme.scaled(LEAST_PX)), super().minimumSizeHint().height())
+        return QSize(round(self._theme.scaled(MIN_WIDTH_PX)), super().minimumSizeHint().height())
 
     def resizeEvent(self, event: QResizeEvent) -> None:
         super().resizeEvent(event)
-        is_narrow = self.width() < self._theme.scaled(BESIDE_PX)
+        is_narrow = self.width() < self._theme.scaled(ONE_ROW_WIDTH_PX)
         way = QBoxLayout.Direction.TopToBottom if is_narrow else QBoxLayout.Direction.LeftToRight
         if self._head.direction() != way:
             self._head.setDirection(way)

@@ -41,8 +41,8 @@ from nep.errors import NepError
 from nep.i18n import _, lazy
 from nep.text import shortened
 
-LIST_PX, SIDE_BY_SIDE_PX, LIST_HIGH_PX, SECONDS_PX = 196, 480, 120, 84
-REQUEST_LETTERS = 120
+LIST_WIDTH_PX, SIDE_BY_SIDE_PX, LIST_HEIGHT_PX, SECONDS_WIDTH_PX = 196, 480, 120, 84
+MAX_REQUEST_CHARS = 120
 EMPTY_REQUEST = "{}"
 
 
@@ -90,7 +90,7 @@ class ServicesPanel(PanelWidget):
         self.give_up = Button(theme, _("Cancel"), "x")
         self.seconds = NumberEdit(theme, LEAST_S, MOST_S, _("s"), 1)
         self.seconds.setAccessibleName(_("Time limit in seconds"))
-        self.seconds.setFixedWidth(round(theme.scaled(SECONDS_PX)))
+        self.seconds.setFixedWidth(round(theme.scaled(SECONDS_WIDTH_PX)))
         self.seconds.show_number(TIMEOUT_S)
         self.timeout_s = TIMEOUT_S
 
@@ -138,8 +138,8 @@ class ServicesPanel(PanelWidget):
         self._sides = ListBeside(
             self.theme,
             (self.filter, self.list, self._right_side()),
-            list_px=LIST_PX,
-            list_high_px=LIST_HIGH_PX,
+            list_px=LIST_WIDTH_PX,
+            list_high_px=LIST_HEIGHT_PX,
             narrow_px=SIDE_BY_SIDE_PX,
         )
         self.pages = QStackedWidget()
@@ -452,7 +452,7 @@ def _request_cell(record: CallRecord) -> Cell:
         words = ", ".join(f"{name} {_short(value)}" for name, value in asked.items()) or _("nothing")
     else:
         words = " ".join(record.request.split())
-    return Cell(shortened(words, REQUEST_LETTERS))
+    return Cell(shortened(words, MAX_REQUEST_CHARS))
 
 
 def _short(value: object) -> str:

@@ -16,10 +16,10 @@ from app.ui.widgets import Switch, label
 from app.ui.widgets.menus import EditMenu
 from nep.i18n import _, lazy
 
-LABEL_PX = 80
-MOST_FIELDS = 60
-WIDER = {("float", "int")}
-NEEDS = {
+LABEL_WIDTH_PX = 80
+MAX_FIELDS = 60
+WIDENING_KINDS = {("float", "int")}
+TYPE_ERRORS = {
     "int": lazy("{name} needs a whole number."),
     "float": lazy("{name} needs a number."),
     "separators": lazy("{name} needs a number with at most one comma or point."),
@@ -55,7 +55,7 @@ class RequestForm(QWidget):
         self._grid.setContentsMargins(0, 0, 0, 0)
         self._grid.setHorizontalSpacing(10)
         self._grid.setVerticalSpacing(8)
-        self._grid.setColumnMinimumWidth(0, round(theme.scaled(LABEL_PX)))
+        self._grid.setColumnMinimumWidth(0, round(theme.scaled(LABEL_WIDTH_PX)))
         self._grid.setColumnStretch(1, 1)
         column = QVBoxLayout(self)
         column.setContentsMargins(0, 0, 0, 0)
@@ -73,7 +73,7 @@ class RequestForm(QWidget):
         given = dict(request) if isinstance(request, Mapping) else {}
         if given == self._request and self._kinds and not self.problems:
             return
-        some = dict(list(given.items())[:MOST_FIELDS])
+        some = dict(list(given.items())[:MAX_FIELDS])
         kinds = {name: self._kind(name, value) for name, value in some.items()}
         if kinds != self._kinds or list(kinds) != list(self.fields):
             self._rebuild(kinds)
@@ -85,14 +85,16 @@ class RequestForm(QWidget):
         elif not given:
             said = _("This service doesn't describe its request. Studio sends {} or the JSON you write.")
             self.nothing.setText(said)
-        elif len(given) > MOST_FIELDS:
+        elif len(given) > MAX_FIELDS:
             self.nothing.setText(_("Not all fields are shown; the JSON has all of them."))
-        self.nothing.setVisible(not given or len(given) > MOST_FIELDS)
+        self.nothing.setVisible(not given or len(given) > MAX_FIELDS)
 
     def _kind(self, name: str, value: object) -> str:
         # A float field stays one when an integer is typed, and a JSON field stays one for any value.
         kind, before = kind_of(value), self._kinds.get(name)
-        return before if (before is not None and (before, kind) in WIDER) or before == "json" else kind
+        return (
+            before if (before is not None and (before, kind) in WIDENING_KINDS) or before == "json" else kind
+        )
 
     def _show(self, name: str, value: object) -> None:
         field, kind = self.fields[name], self._kinds[name]
@@ -138,7 +140,7 @@ class RequestForm(QWidget):
         meant = self._meant(name, text)
         field = self.fields[name]
         if meant is None:
-            said = NEEDS["separators" if self._has_separators(name, text) else self._kinds[name]]
+            said = TYPE_ERRORS["separators" if self._has_separators(name, text) else self._kinds[name]]
             self.problems[name] = _(said).format(name=name, example="[1, 2]")
             if isinstance(field, QLineEdit):
                 self._mark(field, wrong=True)

@@ -39,19 +39,19 @@ from app.ui.widgets.inputs.rename_field import RenameField
 from nep.i18n import _, ngettext
 from nep.recordings.bookmarks import Bookmark
 
-NAMES, FIGURES = 200, 140
-NARROW_NAMES, NARROW_FIGURES, NARROW = 120, 76, 560
-RULER, MARKS, ROW = 26, 24, 22
-DENSITY, TICK = 10, 2
-FAINT, FULL = 0.14, 0.76
-RARE = 8
+NAMES_WIDTH, FIGURES_WIDTH = 200, 140
+NARROW_NAMES_WIDTH, NARROW_FIGURES_WIDTH, NARROW_WIDTH = 120, 76, 560
+RULER_HEIGHT, LANE_HEIGHT, ROW_HEIGHT = 26, 24, 22
+DENSITY_HEIGHT, TICK_WIDTH = 10, 2
+MIN_ALPHA, MAX_ALPHA = 0.14, 0.76
+SPARSE_PX = 8
 """Average px per message above which messages are drawn as ticks."""
-MARK_PX = 78
-MOST_BUCKETS = 4000
-GRIP = 6
-FIELD_WIDE = 180
+LABEL_SPACING_PX = 78
+MAX_BUCKETS = 4000
+GRIP_PX = 6
+FIELD_WIDTH = 180
 ICONS = {"image": "image", "json": "braces", "string": "type", "msgpack": "braces"}
-WHEEL = 1.0015
+ZOOM_PER_WHEEL_UNIT = 1.0015
 
 
 class TimelineCanvas(QAbstractScrollArea):
@@ -136,24 +136,26 @@ class TimelineCanvas(QAbstractScrollArea):
         """Request the figures of the visible range from the background thread."""
         replay, scale = self._replay, self.scale
         if replay is not None and replay.densities is not None and scale is not None:
-            buckets = max(1, min(MOST_BUCKETS, round(self._plot().width())))
+            buckets = max(1, min(MAX_BUCKETS, round(self._plot().width())))
             replay.densities.want(scale.begin_ns, scale.end_ns + 1, buckets)
 
     # -- geometry -----------------------------------------------------------------------------------------
 
     def _row(self) -> float:
-        return max(float(ROW), self._theme.scaled(ROW))
+        return max(float(ROW_HEIGHT), self._theme.scaled(ROW_HEIGHT))
 
     def _top(self) -> float:
         # Top of the topic lanes.
-        return self._theme.scaled(RULER) + self._theme.scaled(MARKS) * len(shown_lanes(self._replay))
+        return self._theme.scaled(RULER_HEIGHT) + self._theme.scaled(LANE_HEIGHT) * len(
+            shown_lanes(self._replay)
+        )
 
     def _plot(self) -> QRectF:
         # Area of the time axis, including the ruler.
         view = self.viewport()
-        narrow = view.width() < self._theme.scaled(NARROW)
-        left = self._theme.scaled(NARROW_NAMES if narrow else NAMES)
-        right = self._theme.scaled(NARROW_FIGURES if narrow else FIGURES)
+        narrow = view.width() < self._theme.scaled(NARROW_WIDTH)
+        left = self._theme.scaled(NARROW_NAMES_WIDTH if narrow else NAMES_WIDTH)
+        right = self._theme.scaled(NARROW_FIGURES_WIDTH if narrow else FIGURES_WIDTH)
         return QRectF(left, 0, max(20.0, view.width() - left - right), view.height())
 
     def x_of(self, at_ns: int) -> float:
@@ -246,8 +248,8 @@ class TimelineCanvas(QAbstractScrollArea):
         theme, scale = self._theme, self.scale
         if scale is None:
             return
-        high = theme.scaled(RULER)
-        most = max(2, int(plot.width() / theme.scaled(MARK_PX)))
+        high = theme.scaled(RULER_HEIGHT)
+        most = max(2, int(plot.width() / theme.scaled(LABEL_SPACING_PX)))
         digits = 0 if scale.step_s(most) >= 1 else 3
         font, ink = theme.font("small"), theme.colour("textSecondary")
         painter.setPen(QPen(theme.colour("border"), 1))
@@ -258,13 +260,15 @@ class TimelineCanvas(QAbstractScrollArea):
             from_start = span_words(at_ns - scale.first_ns, digits=digits)
             words = clock_words(at_ns, digits=digits) if self.by_clock else from_start
             if x + 3 + paint.width_of(font, words) <= plot.right():  # otherwise it would overlap the figures
-                paint.words(painter, QRectF(x + 3, 0, theme.scaled(MARK_PX), high - 4), words, font, ink)
+                paint.words(
+                    painter, QRectF(x + 3, 0, theme.scaled(LABEL_SPACING_PX), high - 4), words, font, ink
+                )
         paint.hairline(
             painter, QRectF(0, 0, self.viewport().width(), high), Qt.Edge.BottomEdge, theme.colour("border")
         )
         right = QRectF(plot.right(), 0, self.viewport().width() - plot.right() - 10, high)
         tertiary = theme.colour("textTertiary")
-        if right.width() > theme.scaled(FIGURES) - 12:
+        if right.width() > theme.scaled(FIGURES_WIDTH) - 12:
             half = QRectF(right.left(), 0, right.width() / 2, high)
             paint.words(painter, half, _("Messages"), font, tertiary, paint.RIGHT)
         paint.words(painter, right, _("Lost"), font, tertiary, paint.RIGHT)
@@ -275,9 +279,9 @@ class TimelineCanvas(QAbstractScrollArea):
         self._marks = []
         if replay is None:
             return
-        lanes, high = EventLanes(theme, painter, plot, self._places(plot)), theme.scaled(MARKS)
+        lanes, high = EventLanes(theme, painter, plot, self._places(plot)), theme.scaled(LANE_HEIGHT)
         for place, lane in enumerate(shown_lanes(replay)):
-            top = theme.scaled(RULER) + place * high
+            top = theme.scaled(RULER_HEIGHT) + place * high
             icon, name = NAMES_OF_LANES[lane]
             box = QRectF(0, top, plot.left(), high)
             self._paint_name(painter, box, icon, _(name), "textSecondary")
@@ -291,8 +295,8 @@ class TimelineCanvas(QAbstractScrollArea):
         lanes = shown_lanes(replay)
         if replay is None or replay.densities is None or RUNS not in lanes:
             return
-        plot, high = self._plot(), theme.scaled(MARKS)
-        top = theme.scaled(RULER) + lanes.index(RUNS) * high
+        plot, high = self._plot(), theme.scaled(LANE_HEIGHT)
+        top = theme.scaled(RULER_HEIGHT) + lanes.index(RUNS) * high
         event_lanes = EventLanes(theme, painter, plot, self._places(plot))
         painter.save()
         painter.setClipRect(QRectF(plot.left(), top, plot.width(), high))
@@ -342,16 +346,18 @@ class TimelineCanvas(QAbstractScrollArea):
         peak = density.peak(topic)
         colour = self._theme.colour("accentText" if is_chosen else "textTertiary")
         left, right = self.x_of(density.start_ns), self.x_of(density.end_ns)
-        box = QRectF(left, top + (self._row() - DENSITY) / 2, right - left, DENSITY)
+        box = QRectF(left, top + (self._row() - DENSITY_HEIGHT) / 2, right - left, DENSITY_HEIGHT)
         painter.save()
         painter.setClipRect(
             QRectF(plot.left(), top, plot.width(), self._row()), Qt.ClipOperation.IntersectClip
         )
-        if filled * RARE < density.buckets:
+        if filled * SPARSE_PX < density.buckets:
             per_px = box.width() / density.buckets
             for place, count in enumerate(counts):
                 if count:
-                    painter.fillRect(QRectF(left + place * per_px, box.top(), TICK, DENSITY), colour)
+                    painter.fillRect(
+                        QRectF(left + place * per_px, box.top(), TICK_WIDTH, DENSITY_HEIGHT), colour
+                    )
         elif peak:
             painter.setRenderHint(QPainter.RenderHint.SmoothPixmapTransform, False)
             painter.drawImage(box, shades(counts, peak, colour))
@@ -386,7 +392,9 @@ class TimelineCanvas(QAbstractScrollArea):
         about = [span for span in replay.densities.spans.alarms if span.topic == topic]
         for span in EventLanes(self._theme, painter, plot, self._places(plot)).seen(about):
             left, right = self.x_of(span.start_ns), self.x_of(span.end_ns)
-            box = QRectF(left, top + (self._row() - DENSITY) / 2 - 2, max(4.0, right - left), DENSITY + 4)
+            box = QRectF(
+                left, top + (self._row() - DENSITY_HEIGHT) / 2 - 2, max(4.0, right - left), DENSITY_HEIGHT + 4
+            )
             edge = self._theme.colour("error" if span.is_error else "warn")
             paint.box(painter, box, 2, None, edge)
         painter.restore()
@@ -398,7 +406,7 @@ class TimelineCanvas(QAbstractScrollArea):
         font, count = theme.font("code"), replay.recorded[topic].message_count
         known = replay.figures.get(topic)
         lost = None if known is None or known.lost is None else known.lost + known.unkept
-        if box.width() > theme.scaled(FIGURES) - 12:
+        if box.width() > theme.scaled(FIGURES_WIDTH) - 12:
             half = QRectF(box.left(), box.top(), box.width() / 2, box.height())
             paint.words(painter, half, grouped(count), font, theme.colour("textSecondary"), paint.RIGHT)
         if lost is not None:
@@ -422,7 +430,7 @@ class TimelineCanvas(QAbstractScrollArea):
         painter.fillRect(QRectF(left, 0, right - left, plot.height()), tint)
         for x in (left, right):
             painter.fillRect(QRectF(x - 1, 0, 2, plot.height()), accent)
-        high = self._theme.scaled(RULER)
+        high = self._theme.scaled(RULER_HEIGHT)
         for x in (left - 8, right):
             paint.box(painter, QRectF(x, 5, 8, high - 10), 2, accent)
         painter.restore()
@@ -438,7 +446,7 @@ class TimelineCanvas(QAbstractScrollArea):
         words = clock_words(self._position_ns) if self.by_clock else span_words(self._position_ns - first_ns)
         wide = paint.width_of(font, words) + 12
         left = max(plot.left(), min(plot.right() - wide, x - wide / 2))
-        flag = QRectF(left, 3, wide, theme.scaled(RULER) - 7)
+        flag = QRectF(left, 3, wide, theme.scaled(RULER_HEIGHT) - 7)
         paint.box(painter, flag, theme.radius("small"), theme.colour("tooltip"))
         paint.words(painter, flag, words, font, theme.colour("tooltipText"), paint.CENTRE)
 
@@ -452,12 +460,12 @@ class TimelineCanvas(QAbstractScrollArea):
     def _grip(self, at: QPointF) -> str:
         # The part that a press at this position would drag.
         plot = self._plot()
-        if not plot.left() - GRIP <= at.x() <= plot.right() + GRIP or self.scale is None:
+        if not plot.left() - GRIP_PX <= at.x() <= plot.right() + GRIP_PX or self.scale is None:
             return ""
-        if self._loop is not None and at.y() < self._theme.scaled(RULER):
+        if self._loop is not None and at.y() < self._theme.scaled(RULER_HEIGHT):
             for name, edge in zip(("start", "end"), self._loop, strict=True):
                 outer = self.x_of(edge) + (-4 if name == "start" else 4)
-                if abs(at.x() - outer) <= GRIP:
+                if abs(at.x() - outer) <= GRIP_PX:
                     return name
         return "playhead"
 
@@ -507,7 +515,7 @@ class TimelineCanvas(QAbstractScrollArea):
         if event.reason() == QContextMenuEvent.Reason.Keyboard:
             bookmark = self._replay.bookmark_here() if self._replay is not None else None
             if bookmark is not None:
-                corner = QPoint(round(self.x_of(bookmark.at_ns)), round(self._theme.scaled(RULER)))
+                corner = QPoint(round(self.x_of(bookmark.at_ns)), round(self._theme.scaled(RULER_HEIGHT)))
                 place = self.viewport().mapToGlobal(corner)
         elif (mark := self.mark_at(QPointF(event.pos()))) is not None:
             bookmark = mark.bookmark
@@ -522,9 +530,9 @@ class TimelineCanvas(QAbstractScrollArea):
         if self.scale is not None:
             self.set_scale(self.scale.with_time(bookmark.at_ns))
         scaled, view = self._theme.scaled, self.viewport()
-        wide = min(round(scaled(FIELD_WIDE)), view.width())
+        wide = min(round(scaled(FIELD_WIDTH)), view.width())
         left = max(0, min(round(self.x_of(bookmark.at_ns)), view.width() - wide))
-        place = QRect(left, round(scaled(RULER)), wide, round(scaled(MARKS)))
+        place = QRect(left, round(scaled(RULER_HEIGHT)), wide, round(scaled(LANE_HEIGHT)))
         self.field = RenameField(self._theme, view, place, bookmark.name, take, _("Bookmark name"))
         self.field.ended.connect(self._renamed)
 
@@ -546,7 +554,7 @@ class TimelineCanvas(QAbstractScrollArea):
         elif delta.x() and not delta.y():
             self.set_scale(self.scale.moved(-round(delta.x() / 1200 * self.scale.span_ns)))
         else:
-            self.zoom(WHEEL ** -delta.y(), self.time_at(x))
+            self.zoom(ZOOM_PER_WHEEL_UNIT ** -delta.y(), self.time_at(x))
         event.accept()
 
     def viewportEvent(self, event: QEvent) -> bool:
@@ -565,7 +573,7 @@ class TimelineCanvas(QAbstractScrollArea):
             mark = self.mark_at(at)
             return mark.words if mark is not None else ""
         losses = replay.densities.losses.get(topic, ()) if replay.densities is not None else ()
-        lost = sum(each.count for each in losses if abs(self.x_of(each.at_ns) - at.x()) <= GRIP)
+        lost = sum(each.count for each in losses if abs(self.x_of(each.at_ns) - at.x()) <= GRIP_PX)
         if at.x() >= self._plot().left() and lost:
             words = ngettext(
                 "{count} message of {topic} was lost here", "{count} messages of {topic} were lost here", lost
@@ -578,7 +586,7 @@ def shades(counts: Sequence[int], peak: int, colour: QColor) -> QImage:
     """Return a one-line image with one pixel per bucket, more opaque for higher counts."""
     levels = []
     for level in range(256):
-        alpha = 0.0 if level == 0 else FAINT + (FULL - FAINT) * level / 255
+        alpha = 0.0 if level == 0 else MIN_ALPHA + (MAX_ALPHA - MIN_ALPHA) * level / 255
         rgb = (round(each * alpha) for each in (colour.red(), colour.green(), colour.blue()))
         red, green, blue = rgb
         levels.append(round(alpha * 255) << 24 | red << 16 | green << 8 | blue)

@@ -30,9 +30,9 @@ RESULTS = {
     "failed": ("circle-x", "error", lazy("failed")),
 }
 """Icon, colour and text of a run's result."""
-LEAST = 3.0
+MIN_MARK_WIDTH = 3.0
 """Minimum width of a mark in px."""
-ICON, GAP, LEAST_WORDS, LONGEST_NAME, FLAG = 13, 4, 34, 160, 8
+ICON_SIZE, GAP, MIN_TEXT_WIDTH, MAX_NAME_WIDTH, FLAG_SIZE = 13, 4, 34, 160, 8
 
 
 @dataclass(frozen=True, slots=True)
@@ -82,9 +82,9 @@ class EventLanes:
         plot, free = self._plot, -1.0
         for span in spans:
             left, right = self._x_of(span.start_ns), self._x_of(span.end_ns)
-            if right < plot.left() - 1 or left > plot.right() + 1 or max(right, left + LEAST) < free:
+            if right < plot.left() - 1 or left > plot.right() + 1 or max(right, left + MIN_MARK_WIDTH) < free:
                 continue
-            free = max(right, left + LEAST) + 1
+            free = max(right, left + MIN_MARK_WIDTH) + 1
             yield span
 
     # -- bookmarks ----------------------------------------------------------------------------------------
@@ -94,7 +94,7 @@ class EventLanes:
         font, ink = theme.font("small"), theme.colour("accentText")
         if not marks:
             tertiary = theme.colour("textTertiary")
-            paint.words(painter, box.adjusted(FLAG, 0, 0, 0), _("Press B to add one"), font, tertiary)
+            paint.words(painter, box.adjusted(FLAG_SIZE, 0, 0, 0), _("Press B to add one"), font, tertiary)
         made, free = [], box.left() - 1.0
         for mark in marks:
             x = self._x_of(mark.at_ns)
@@ -104,14 +104,14 @@ class EventLanes:
             painter.drawLine(QPointF(x, box.top() + 3), QPointF(x, box.bottom() - 3))
             painter.setPen(Qt.PenStyle.NoPen)
             painter.setBrush(ink)
-            painter.drawRect(QRectF(x, box.top() + 4, FLAG, 7))
+            painter.drawRect(QRectF(x, box.top() + 4, FLAG_SIZE, 7))
             wide = 0.0
             if x >= free and mark.name:
-                wide = min(paint.width_of(font, mark.name), theme.scaled(LONGEST_NAME))
+                wide = min(paint.width_of(font, mark.name), theme.scaled(MAX_NAME_WIDTH))
                 place = QRectF(x + 12, box.top(), wide, box.height())
                 paint.words(painter, place, mark.name, font, theme.colour("text"))
                 free = x + 16 + wide
-            pressed = QRectF(x - GAP, box.top(), FLAG + 2 * GAP + wide, box.height())
+            pressed = QRectF(x - GAP, box.top(), FLAG_SIZE + 2 * GAP + wide, box.height())
             made.append(LaneMark(pressed, mark.at_ns, mark.name or _("Bookmark"), mark))
         return made
 
@@ -120,7 +120,7 @@ class EventLanes:
     def bar(self, span: RecordedSpan, top: float, high: float) -> QRectF:
         """Return the rectangle of a run."""
         left, right = self._x_of(span.start_ns), self._x_of(span.end_ns)
-        return QRectF(left, top + 3, max(LEAST, right - left), high - 6)
+        return QRectF(left, top + 3, max(MIN_MARK_WIDTH, right - left), high - 6)
 
     def _run(self, span: RecordedSpan, box: QRectF, start_ns: int) -> LaneMark:
         bar = self.bar(span, box.top(), box.height())
@@ -133,15 +133,15 @@ class EventLanes:
         paint.box(painter, bar, theme.radius("small"), theme.colour(fill), theme.colour(edge))
         seen = bar.intersected(QRectF(self._plot.left(), bar.top(), self._plot.width(), bar.height()))
         inside = seen.adjusted(6, 0, -6, 0)
-        if inside.width() < theme.scaled(LEAST_WORDS):
+        if inside.width() < theme.scaled(MIN_TEXT_WIDTH):
             return
-        font, side = theme.font("small"), theme.scaled(ICON)
+        font, side = theme.font("small"), theme.scaled(ICON_SIZE)
         self._icon("blocks", inside.left(), inside, "textTertiary")
         inside.adjust(side + GAP, 0, 0, 0)
         icon, role, result = RESULTS.get(span.result, ("", "", ""))
         words = span.words or (_(result) if result else "")
         wide = side + GAP + paint.width_of(font, words)
-        name = min(paint.width_of(font, span.name), theme.scaled(LONGEST_NAME))
+        name = min(paint.width_of(font, span.name), theme.scaled(MAX_NAME_WIDTH))
         if icon and name + 2 * GAP + wide <= inside.width():
             self._icon(icon, inside.right() - wide, inside, role)
             paint.words(painter, inside, words, font, theme.colour(role), paint.RIGHT)
@@ -152,7 +152,7 @@ class EventLanes:
         paint.words(painter, inside, span.name, font, theme.colour("text"))
 
     def _icon(self, name: str, left: float, row: QRectF, role: str) -> None:
-        side = self._theme.scaled(ICON)
+        side = self._theme.scaled(ICON_SIZE)
         square = QRectF(left, row.center().y() - side / 2, side, side)
         paint_icon(self._painter, square, name, self._theme.colour(role))
 
@@ -161,18 +161,18 @@ class EventLanes:
     def _alarms(self, spans: list[RecordedSpan], box: QRectF, start_ns: int) -> list[LaneMark]:
         # Each bar has its text up to the next bar.
         made, theme = [], self._theme
-        font, side = theme.font("small"), theme.scaled(ICON)
+        font, side = theme.font("small"), theme.scaled(ICON_SIZE)
         for place, span in enumerate(spans):
             role = "error" if span.is_error else "warn"
             left, right = self._x_of(span.start_ns), self._x_of(span.end_ns)
-            bar = QRectF(left, box.top() + 5, max(LEAST, right - left), box.height() - 10)
+            bar = QRectF(left, box.top() + 5, max(MIN_MARK_WIDTH, right - left), box.height() - 10)
             paint.box(self._painter, bar, 1.5, theme.colour(role))
             words = alarm_words(span)
             until = self._x_of(spans[place + 1].start_ns) if place + 1 < len(spans) else box.right()
             begin = max(bar.right(), box.left()) + 5
             room = min(until, box.right()) - begin - side - GAP
             pressed = bar.adjusted(-3, -3, 3, 3)
-            if room >= theme.scaled(LEAST_WORDS):
+            if room >= theme.scaled(MIN_TEXT_WIDTH):
                 wide = min(room, paint.width_of(font, words) + 1)
                 self._icon("circle-x" if span.is_error else "triangle-alert", begin, box, role)
                 text = QRectF(begin + side + GAP, box.top(), wide, box.height())

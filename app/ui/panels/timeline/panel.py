@@ -25,8 +25,8 @@ from nep.errors import RecordingError
 from nep.i18n import _, pgettext
 from nep.recordings.bookmarks import Bookmark
 
-START, CLOCK = "start", "clock"
-ZOOM = 1.5
+FROM_START, BY_CLOCK = "start", "clock"
+ZOOM_FACTOR = 1.5
 
 
 class TimelinePanel(PanelWidget):
@@ -40,8 +40,8 @@ class TimelinePanel(PanelWidget):
         self.transport, self.canvas = TransportRow(theme), TimelineCanvas(theme)
         self.ruler = Segments(
             theme,
-            ((START, _("From start"), None), (CLOCK, _("Clock"), None)),
-            START,
+            ((FROM_START, _("From start"), None), (BY_CLOCK, _("Clock"), None)),
+            FROM_START,
             size="small",
             name=_("Ruler"),
         )
@@ -154,7 +154,7 @@ class TimelinePanel(PanelWidget):
             self._shown.choose(topic)
 
     def _choose_ruler(self, which: str) -> None:
-        self.canvas.by_clock = which == CLOCK
+        self.canvas.by_clock = which == BY_CLOCK
         self.canvas.renew()
 
     def _bookmark(self) -> None:
@@ -193,9 +193,9 @@ class TimelinePanel(PanelWidget):
             (NONE, Qt.Key.Key_BracketRight): lambda: replay.set_loop_edge(is_start=False),
             (NONE, Qt.Key.Key_L): replay.toggle_loop,
             (NONE, Qt.Key.Key_B): self._bookmark,
-            (NONE, Qt.Key.Key_Plus): lambda: self.canvas.zoom(1 / ZOOM),
-            (SHIFT, Qt.Key.Key_Plus): lambda: self.canvas.zoom(1 / ZOOM),
-            (NONE, Qt.Key.Key_Minus): lambda: self.canvas.zoom(ZOOM),
+            (NONE, Qt.Key.Key_Plus): lambda: self.canvas.zoom(1 / ZOOM_FACTOR),
+            (SHIFT, Qt.Key.Key_Plus): lambda: self.canvas.zoom(1 / ZOOM_FACTOR),
+            (NONE, Qt.Key.Key_Minus): lambda: self.canvas.zoom(ZOOM_FACTOR),
             (NONE, Qt.Key.Key_0): self.canvas.show_all,
             (NONE, Qt.Key.Key_Up): lambda: self._next_topic(-1),
             (NONE, Qt.Key.Key_Down): lambda: self._next_topic(1),

@@ -23,8 +23,8 @@ from app.ui.widgets.table.model import Cell, Column, TableModel
 from app.ui.widgets.table.view import TableView
 from nep.i18n import _, lazy, ngettext
 
-LEAST_ROWS_PX = 96
-NAME_PX = 240
+MIN_TABLE_HEIGHT_PX = 96
+NAME_WIDTH_PX = 240
 
 
 class ReplayStrip(ArmedStrip):
@@ -95,7 +95,7 @@ class SendChooser(QWidget):
         self.model: TableModel[SendRow] = TableModel(_columns(), lambda row: row.topic)
         self.table: TableView[SendRow] = TableView(theme, self.model, "topic")
         self.table.setAccessibleName(_("Topics that can be sent"))
-        self.table.setMinimumHeight(round(theme.scaled(LEAST_ROWS_PX)))
+        self.table.setMinimumHeight(round(theme.scaled(MIN_TABLE_HEIGHT_PX)))
         self.words = label("", "small", role="textSecondary", wrap=True)
         self.words.setMinimumWidth(0)
         self.problem = label("", "small", role="error", wrap=True)
@@ -103,8 +103,8 @@ class SendChooser(QWidget):
         self.name = QLineEdit()
         self.name.setAccessibleName(_("Name it is sent under"))
         self.name.setProperty("focusRadius", theme.radius("control"))
-        self.name.setMinimumWidth(round(theme.scaled(NAME_PX) / 2))
-        self.name.setMaximumWidth(round(theme.scaled(NAME_PX)))
+        self.name.setMinimumWidth(round(theme.scaled(NAME_WIDTH_PX) / 2))
+        self.name.setMaximumWidth(round(theme.scaled(NAME_WIDTH_PX)))
         EditMenu(theme, self.name)
         self.arm = Button(theme, _("Arm and send"), "lock", kind="primary", size="small")
         self.cancel = Button(theme, _("Cancel"), size="small")

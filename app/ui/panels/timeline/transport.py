@@ -19,7 +19,7 @@ from nep.i18n import _
 from nep.recordings.player import SPEED_MAX, SPEED_MIN, PlayerStatus
 
 SPEED_STEPS = 40
-SLOW = 0.97
+SLOW_RATIO = 0.97
 """Ratio of actual to requested speed below which the actual speed is shown."""
 
 
@@ -122,7 +122,7 @@ class TransportRow(QWidget):
 
     def _say_speed(self, player: PlayerStatus) -> None:
         asked, true = player.speed, player.true_speed
-        is_slow = player.is_playing and true is not None and true < SLOW * asked
+        is_slow = player.is_playing and true is not None and true < SLOW_RATIO * asked
         if is_slow:
             words = _("requested {asked}, actual {true} \u00d7").format(
                 asked=f"{asked:.3g}", true=f"{true:.2g}"

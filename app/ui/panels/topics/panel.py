@@ -43,10 +43,10 @@ WORDS = TableWords(
     clear_the_filter=lazy("Clear the filter to see all topics."),
     not_recorded=lazy("The recording has no topics yet"),
 )
-FIGURES_EVERY = 6  # refreshes at 30 Hz; faster changes would be illegible
-SORT_EVERY = 30
-LIVELY = frozenset({"rate", "bandwidth", "age", "loss"})
-MOST_CLOSED = 1000
+FIGURES_TICKS = 6  # refreshes at 30 Hz; faster changes would be illegible
+SORT_TICKS = 30
+CHANGING_COLUMNS = frozenset({"rate", "bandwidth", "age", "loss"})
+MAX_CLOSED = 1000
 """Maximum number of collapsed folders saved in a layout."""
 
 
@@ -115,10 +115,10 @@ class TopicsPanel(NetworkTable[TreeRow]):
         self._ticks += 1
         facts = self._facts()
         order = self.table.order.column
-        lively = order is not None and order.name in LIVELY
-        if facts != self._seen or (lively and self._ticks % SORT_EVERY == 0):
+        lively = order is not None and order.name in CHANGING_COLUMNS
+        if facts != self._seen or (lively and self._ticks % SORT_TICKS == 0):
             self.rebuild()
-        if self._ticks % FIGURES_EVERY == 0 and self.model.rowCount():
+        if self._ticks % FIGURES_TICKS == 0 and self.model.rowCount():
             if self._tree is not None:
                 self._tree.renew()
             self.table.tell_visible_changed()
@@ -215,7 +215,7 @@ class TopicsPanel(NetworkTable[TreeRow]):
             is_open = not folder.is_open
         if is_open:
             self._closed.discard(key)
-        elif len(self._closed) < MOST_CLOSED and not self.filter_words():
+        elif len(self._closed) < MAX_CLOSED and not self.filter_words():
             self._closed.add(key)
         self.rebuild()
         self.table.choose(key)
@@ -229,7 +229,7 @@ class TopicsPanel(NetworkTable[TreeRow]):
     def _fold_all(self, *, is_open: bool) -> None:
         self._closed.clear()
         if not is_open and self._tree is not None:
-            self._closed.update(folder.key for folder in list(self._tree)[:MOST_CLOSED])
+            self._closed.update(folder.key for folder in list(self._tree)[:MAX_CLOSED])
         self.rebuild()
 
     def row_actions(self, key: str) -> Sequence[RowAction]:
@@ -262,7 +262,7 @@ class TopicsPanel(NetworkTable[TreeRow]):
     def restore_state(self, state: Mapping[str, object]) -> None:
         closed = state.get("closed")
         known = closed if isinstance(closed, list) else []
-        self._closed = {key for key in known[:MOST_CLOSED] if isinstance(key, str)}
+        self._closed = {key for key in known[:MAX_CLOSED] if isinstance(key, str)}
         self.as_tree.setChecked(state.get("tree") is True)
         super().restore_state(state)
 

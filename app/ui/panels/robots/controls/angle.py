@@ -12,7 +12,7 @@ from app.ui.text import plain
 from app.ui.theme.theme import Theme
 from nep.i18n import _, number
 
-SIDE = 44
+DIAL_SIZE = 44
 PAGE_STEPS = 10
 WHEEL_NOTCH = 120
 
@@ -46,7 +46,7 @@ class AngleDial(QWidget):
         self.setAccessibleName(name)
         self.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
         self.setSizePolicy(QSizePolicy.Policy.Fixed, QSizePolicy.Policy.Fixed)
-        self.setProperty("focusRadius", SIDE // 2)
+        self.setProperty("focusRadius", DIAL_SIZE // 2)
         self.setToolTip(plain.tip(_("Drag to turn; double-click to reset")))
         self.setCursor(Qt.CursorShape.PointingHandCursor)
 
@@ -62,7 +62,7 @@ class AngleDial(QWidget):
         self.update()
 
     def sizeHint(self) -> QSize:
-        side = round(self._theme.scaled(SIDE))
+        side = round(self._theme.scaled(DIAL_SIZE))
         return QSize(side, side)
 
     def direction(self, angle_deg: float) -> QPointF:

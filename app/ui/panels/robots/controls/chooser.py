@@ -19,8 +19,8 @@ __all__ = [
     "NUMBERS", "ROW_HEIGHT", "Control", "NoPictures", "Pictures", "control_for", "sentence_case",
 ]  # fmt: skip
 
-SEGMENTS_AT_MOST = 4
-SEGMENT_LETTERS = 44
+MAX_SEGMENTS = 4
+MAX_SEGMENT_CHARS = 44
 
 
 def control_for(
@@ -44,7 +44,7 @@ def _choice(theme: Theme, parameter: Parameter, options: Sequence[str]) -> Contr
     pairs = [(str(choice.value), choice.title) for choice in parameter.choices] or [(o, o) for o in options]
     values: dict[str, object] = {str(choice.value): choice.value for choice in parameter.choices}
     made: Control
-    if len(pairs) <= SEGMENTS_AT_MOST and sum(len(words) for _value, words in pairs) <= SEGMENT_LETTERS:
+    if len(pairs) <= MAX_SEGMENTS and sum(len(words) for _value, words in pairs) <= MAX_SEGMENT_CHARS:
         segments = Segments(
             theme,
             [(value, sentence_case(title), None) for value, title in pairs],

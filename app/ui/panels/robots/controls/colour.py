@@ -28,11 +28,11 @@ LAMP_COLOURS: tuple[tuple[str, str], ...] = (
     ("#ff6b5e", lazy("coral")),
     ("#b06bff", lazy("violet")),
 )
-SWATCH = 32
-STRIP = QSize(168, 34)
+SWATCH_SIZE = 32
+STRIP_SIZE = QSize(168, 34)
 HUES = 360
 HUE_STEP, LIGHT_STEP = 5, 0.05
-PALEST, DARKEST = 0.95, 0.15
+MAX_LIGHTNESS, MIN_LIGHTNESS = 0.95, 0.15
 
 
 class _Swatch(PaintedButton):
@@ -42,7 +42,7 @@ class _Swatch(PaintedButton):
         self.setAutoExclusive(True)
         self.setAccessibleName(name)
         self.setToolTip(plain.tip(name))
-        self.setFixedSize(SWATCH + 8, SWATCH + 8)
+        self.setFixedSize(SWATCH_SIZE + 8, SWATCH_SIZE + 8)
         self.setProperty("focusInset", 4)
 
     def paint_button(self, painter: QPainter, rect: QRectF) -> None:
@@ -125,22 +125,22 @@ class HueStrip(QWidget):
         self.setCursor(Qt.CursorShape.CrossCursor)
 
     def sizeHint(self) -> QSize:
-        return STRIP
+        return STRIP_SIZE
 
     def show_colour(self, colour: QColor) -> None:
         """Move the marker to the nearest colour of the strip."""
         if colour.hslHueF() >= 0:
             self._hue = colour.hslHueF()
-        self._light = min(PALEST, max(DARKEST, colour.lightnessF()))
+        self._light = min(MAX_LIGHTNESS, max(MIN_LIGHTNESS, colour.lightnessF()))
         self.update()
 
     def _choose(self, hue: float, light: float) -> None:
-        self._hue, self._light = min(max(hue, 0.0), 0.999), min(max(light, DARKEST), PALEST)
+        self._hue, self._light = min(max(hue, 0.0), 0.999), min(max(light, MIN_LIGHTNESS), MAX_LIGHTNESS)
         self.update()
         self.changed.emit(QColor.fromHslF(self._hue, 0.9, self._light).name())
 
     def _press(self, at: QPointF) -> None:
-        light = PALEST - at.y() / self.height() * (PALEST - DARKEST)
+        light = MAX_LIGHTNESS - at.y() / self.height() * (MAX_LIGHTNESS - MIN_LIGHTNESS)
         self._choose(at.x() / self.width(), light)
 
     def mousePressEvent(self, event: QMouseEvent) -> None:
@@ -182,7 +182,7 @@ class HueStrip(QWidget):
         painter.setBrush(Qt.BrushStyle.NoBrush)
         painter.setPen(QPen(self._theme.colour("controlBorder"), 1))
         painter.drawRoundedRect(rect, radius, radius)
-        y = (PALEST - self._light) / (PALEST - DARKEST) * self.height()
+        y = (MAX_LIGHTNESS - self._light) / (MAX_LIGHTNESS - MIN_LIGHTNESS) * self.height()
         mark = QPointF(self._hue * self.width(), min(max(y, 5.0), self.height() - 5.0))
         painter.setPen(QPen(self._theme.colour("text"), 3))
         painter.drawEllipse(mark, 5, 5)

@@ -17,8 +17,8 @@ from app.ui.widgets.inputs.slider import decimals_of
 from app.ui.widgets.keyboard import is_plain
 from nep.i18n import number as number_text
 
-COARSE_FROM = 20
-UPRIGHT = ("pitch", "tilt", "down", "up", "nod")
+COARSE_SPAN = 20
+UPRIGHT_WORDS = ("pitch", "tilt", "down", "up", "nod")
 PAGE_STEPS = 10
 
 
@@ -74,7 +74,7 @@ def step_of(parameter: Parameter) -> float:
     if parameter.step is not None and parameter.step > 0:
         return parameter.step
     span = (parameter.maximum or 0.0) - (parameter.minimum or 0.0)
-    if parameter.kind == "integer" or span > COARSE_FROM or span <= 0:
+    if parameter.kind == "integer" or span > COARSE_SPAN or span <= 0:
         return 1.0
     return 0.01 if span <= 2 else 0.1
 
@@ -100,7 +100,7 @@ def _dial(theme: Theme, parameter: Parameter, slider: SliderWithUnit) -> AngleDi
         value=slider.value,
         default=_number(parameter.default),
         name=parameter.title,
-        upright=any(word in words for word in UPRIGHT),
+        upright=any(word in words for word in UPRIGHT_WORDS),
     )
 
     def from_dial(value: float) -> None:

@@ -31,7 +31,7 @@ from nep.i18n import _
 if TYPE_CHECKING:
     from app.core.messages.image_streams import ImageStream
 
-LOOK_MS = 200
+POLL_MS = 200
 THUMBNAIL = QSize(72, 54)
 
 
@@ -134,7 +134,7 @@ class PictureChoice(QWidget):
         self._wrong.hide()
         self._lay_out()
         self._timer = QTimer(self)
-        self._timer.setInterval(LOOK_MS)
+        self._timer.setInterval(POLL_MS)
         self._timer.timeout.connect(self._look)
         self.field.textEdited.connect(self._typed)
         self.choose.clicked.connect(self._ask)

@@ -18,7 +18,7 @@ from nep.errors import DecodeError
 from nep.i18n import _
 from nep.messages.image_files import MOST_BYTES, ImageFile, examine
 
-LONGEST_SIDE, QUALITY = 1280, 85
+MAX_SIDE_PX, QUALITY = 1280, 85
 MOST_FILE_BYTES = 40_000_000
 
 
@@ -72,9 +72,9 @@ def upright(image: QImage, file: ImageFile) -> QImage:
 
 def encoded(image: QImage, *, bare: bool = False) -> str:
     """Return an image as base64 JPEG, scaled to at most 1280 px on its longer side."""
-    if max(image.width(), image.height()) > LONGEST_SIDE:
+    if max(image.width(), image.height()) > MAX_SIDE_PX:
         keep, smooth = Qt.AspectRatioMode.KeepAspectRatio, Qt.TransformationMode.SmoothTransformation
-        image = image.scaled(LONGEST_SIDE, LONGEST_SIDE, keep, smooth)
+        image = image.scaled(MAX_SIDE_PX, MAX_SIDE_PX, keep, smooth)
     held = QByteArray()
     buffer = QBuffer(held)
     buffer.open(QIODevice.OpenModeFlag.WriteOnly)

@@ -11,7 +11,7 @@ from app.ui.theme.theme import Theme
 from app.ui.widgets.inputs.fields import LongText
 from nep.i18n import _
 
-LONG_FROM = 200
+MULTILINE_LENGTH = 200
 """Maximum length from which a text gets several lines."""
 
 
@@ -22,7 +22,7 @@ def text_control(theme: Theme, parameter: Parameter) -> Control:
     """
     if parameter.kind in ("list", "object"):
         return _list(theme, parameter)
-    if (parameter.max_length or 0) >= LONG_FROM or parameter.widget == "multiline":
+    if (parameter.max_length or 0) >= MULTILINE_LENGTH or parameter.widget == "multiline":
         return _long(theme, parameter)
     field = line_field(theme, parameter)
     made = Control(
