@@ -84,7 +84,7 @@ class TablePanel(PanelWidget, Generic[Row]):
         raise NotImplementedError
 
     def open_row(self, key: str) -> None:
-        """Open the row with this key (double click or Enter)."""
+        """Open the row with this key; called after a click or Enter."""
         raise NotImplementedError
 
     def row_actions(self, key: str) -> Sequence[RowAction]:
