@@ -1,4 +1,4 @@
-"""What a command is, its QAction, and its keys as a person changed them.
+"""Commands, their QActions and their configurable keyboard shortcuts.
 
-It knows no window: `app.ui.shell.commands` is what the commands do.
+Independent of the window; `app.ui.shell.commands` implements the commands.
 """

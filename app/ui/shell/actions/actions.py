@@ -1,4 +1,4 @@
-"""The commands as QActions: menus, keys and buttons trigger them."""
+"""QActions of all commands, shared by menus, keys and buttons."""
 
 from __future__ import annotations
 
@@ -23,13 +23,16 @@ ROLES = {
     "file.quit": QAction.MenuRole.QuitRole,
     "help.about": QAction.MenuRole.AboutRole,
 }
-"""Where a Mac has a place of its own for a command, in the menu with the program's name."""
+"""Commands that macOS places in the application menu."""
 
 T = TypeVar("T")
 
 
 class Actions:
-    """One QAction for each command; ``do`` is what the commands are run with."""
+    """One QAction per command.
+
+    ``do`` is passed to each command's ``run`` and ``why_not``.
+    """
 
     def __init__(self, window: QWidget, theme: Theme, commands: Sequence[Command[T]], do: T) -> None:
         self._theme, self._commands = theme, commands
@@ -59,43 +62,51 @@ class Actions:
         return action
 
     def __getitem__(self, name: str) -> QAction:
-        """The action of a command; raises UnknownCommandError."""
         try:
             return self._actions[name]
         except KeyError:
             raise UnknownCommandError(name) from None
 
     def __contains__(self, name: object) -> bool:
-        """Whether there is a command of that name."""
         return name in self._actions
 
     def bind(self, button: QAbstractButton, name: str) -> None:
-        """Let a button trigger a command; its tooltip says the command's keys (`Shortcuts.tell`)."""
+        """Make a button trigger a command; its tooltip shows the command's keys (`Shortcuts.tell`)."""
         name_command(button, name)
         button.clicked.connect(self[name].trigger)
 
     def set_keys(self, keys_of: Callable[[str], Sequence[str]]) -> None:
-        """Give every command the keys that a person chose; the first stands in menus."""
+        """Set the shortcuts of all commands; the first key of each is shown in menus."""
         for name, action in self._actions.items():
             action.setShortcuts([QKeySequence(key) for key in keys_of(name)])
 
     def why_not(self, name: str) -> str:
-        """Why a command can't be done now, in a short sentence without a full stop; "" when it can."""
+        """Return why a command is unavailable, or "" if it is available.
+
+        The reason is a short phrase without a full stop.
+        """
         self[name]
         return self._why_not[name]()
 
     def disable(self) -> None:
-        """Grey what can't be done now; Stop never is."""
+        """Disable the actions of unavailable commands; Stop stays enabled."""
         for name, action in self._actions.items():
             action.setEnabled(name == STOP or not self.why_not(name))
 
     def enable_all(self) -> None:
-        """Let keys do everything again: each command looks itself whether it can be done."""
+        """Enable all actions, so that shortcuts work again.
+
+        Each command checks for itself whether it can run.
+        """
         for action in self._actions.values():
             action.setEnabled(True)
 
     def run(self, name: str) -> bool:
-        """Do a command; False when it can't be done now. Raises UnknownCommandError."""
+        """Run a command; return False if it is unavailable.
+
+        Raises:
+            UnknownCommandError: The name is unknown.
+        """
         action = self[name]
         if not action.isEnabled():
             return False
@@ -103,15 +114,13 @@ class Actions:
         return True
 
     def choose(self, name: str) -> None:
-        """Mark one choice of a group, without doing it."""
+        """Check one choice of an exclusive group without running it."""
         self[name].setChecked(True)
 
     def fill(self, bar: QMenuBar, menus: Sequence[str]) -> dict[str, Menu]:
-        """Make these menus in a menu bar; they are returned by name, and say it in the language of now.
+        """Add menus to a menu bar and return them by name, with titles in the current language.
 
-        Alt with a letter of its name opens each.
-
-        Those in them are returned as "View/Look".
+        Alt with a letter of its name opens each. Submenus are returned as "View/Look".
         """
         titles = marked([_(name) for name in menus])
         made = {name: Menu(self._theme, bar, title) for name, title in zip(menus, titles, strict=True)}

@@ -1,4 +1,4 @@
-"""What a command is: one row of the table of commands."""
+"""Command: a row of the command table."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ T = TypeVar("T")
 
 
 class UnknownCommandError(LookupError):
-    """Somebody asked for a command that is not in the table: a mistake in a program, never a person's."""
+    """Request for a command that isn't in the table: a programming error."""
 
     def __init__(self, name: str) -> None:
         super().__init__(f"no command '{name}'; the commands are in app.ui.shell.commands.table")
@@ -26,16 +26,25 @@ def _always(_do: object) -> str:
 
 @dataclass(frozen=True)
 class Command(Generic[T]):
-    """One command. ``run`` does it; ``why_not`` says in a short sentence why it can't be done now, else "".
+    """An action of the window with a text, keys and a place in a menu.
 
-    ``text``, ``menu`` and ``tip`` are marked with `lazy`; people read `words`, in which ``number`` fills the
-    hole of that name, and ``menu`` and ``tip`` by `_`. ``tip`` is what a button of it says under the mouse.
-    ``group`` makes it one of several choices; ``above`` puts a line over it in its ``menu``; without a menu
-    it is only in the palette and among the shortcuts, if it is there. ``under`` names a menu in its ``menu``
-    that has it, also marked with `lazy`. ``check`` makes it something that is on or off, ``everywhere`` a key
-    that works in all windows. ``shows`` is a key that stands in the menu and that whoever has the keyboard
-    hears itself, as text fields hear Ctrl+C. ``mac`` are the keys of a Mac in place of ``keys``: Ctrl is
-    written there for Cmd, Meta for the key that says Ctrl.
+    Attributes:
+        id: Unique name, such as ``file.open``.
+        text, menu, tip, under: Marked with `lazy` and translated when shown; `words` is the translated text.
+        run: Executes the command.
+        why_not: Returns a short phrase if the command is unavailable, else "".
+        tip: Tooltip of its buttons.
+        under: Submenu of ``menu`` that contains it.
+        group: Name of the exclusive group that it belongs to.
+        above: Insert a separator above it in the menu.
+        everywhere: The key works in all windows.
+        check: The action is checkable.
+        mac: Keys on macOS in place of ``keys``. As in Qt, Ctrl stands for Cmd and Meta for Ctrl.
+        number: Fills the placeholder ``number`` of ``text``.
+        shows: Key shown in the menu but handled by the focused widget, as Ctrl+C is by text fields.
+
+    A command without a menu appears only in the palette (``in_palette``) and in the list of shortcuts
+    (``in_shortcuts``).
     """
 
     id: str
@@ -59,20 +68,20 @@ class Command(Generic[T]):
 
     @property
     def words(self) -> str:
-        """What people read of it: its text, in their language."""
+        """Translated text of the command."""
         return _(self.text).format(number=self.number)
 
     def keys_at_first(self, platform: str = sys.platform) -> tuple[str, ...]:
-        """The keys at first, the one that stands in menus before the others."""
+        """Return the default keys for a platform, the one shown in menus first."""
         return self.mac if platform == "darwin" and self.mac else self.keys
 
 
 @dataclass(frozen=True)
 class ArgumentCommand(Generic[T]):
-    """A command about one thing, asked for as ``id:argument``: ``inspect:/faces``.
+    """A command with an argument, written ``id:argument``, such as ``inspect:/faces``.
 
-    ``run`` gets the text behind the colon and says whether there was such a thing; ValueError for a text that
-    can be none.
+    ``run`` gets the text after the colon and returns whether such a thing exists. It raises ValueError for an
+    argument that is invalid.
     """
 
     id: str

@@ -1,7 +1,7 @@
-"""Which keys do what: those of the table of commands as a person changed them, and those that stay.
+"""Keyboard shortcuts: the table's defaults, a person's changes, and fixed keys.
 
-Kept in the settings under "shortcuts": only what differs from the table. F12 is Stop and stays so; Stop has a
-second key, Ctrl+. at first (Cmd+. on Macs, where F12 is a key for sound).
+The settings store only the differences from the table, under "shortcuts". F12 is always Stop. Stop also has a
+second key, Ctrl+. by default (Cmd+. on macOS, where F12 changes the volume).
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ HOLDS = (
 
 @dataclass(frozen=True, slots=True)
 class Fixed:
-    """A key that can't be changed: where it works, what it does (both `lazy`), the key as it is spelled."""
+    """A key that can't be changed: where it works and what it does (both `lazy`), and the keys."""
 
     place: str
     words: str
@@ -109,17 +109,17 @@ FIXED: tuple[Fixed, ...] = (
 
 
 def normal(key: str) -> str:
-    """A key in the one spelling that is compared and kept; "" when it is none."""
+    """Return a key in Qt's portable spelling, used for comparing and storing; "" if it is invalid."""
     return QKeySequence(key).toString(QKeySequence.SequenceFormat.PortableText)
 
 
 def key_of(pressed: QKeyCombination) -> str:
-    """The key of a key press."""
+    """Return the key of a key press in the portable spelling."""
     return QKeySequence(pressed).toString(QKeySequence.SequenceFormat.PortableText)
 
 
 class Shortcuts(QObject):
-    """The keys of all commands; `changed` when any of them did."""
+    """Keys of all commands; emits `changed` when any of them changes."""
 
     changed = Signal()
 
@@ -131,14 +131,13 @@ class Shortcuts(QObject):
         *,
         platform: str = sys.platform,
     ) -> None:
-        """``complain`` is told, in a sentence, what can't be kept; ``platform`` as `sys.platform` says it."""
+        # complain gets a sentence when the shortcuts can't be saved; platform is a value of sys.platform.
         super().__init__()
         self._settings, self._complain, self._platform = settings, complain, platform
         self.commands: Mapping[str, Command[Any]] = {command.id: command for command in commands}
         self._own = self._read()
 
     def _read(self) -> dict[str, tuple[str, ...]]:
-        """What a person changed, as far as it makes sense."""
         kept: dict[str, object] = self._settings.get("shortcuts", {})
         found: dict[str, tuple[str, ...]] = {}
         for name, keys in kept.items():
@@ -147,17 +146,19 @@ class Shortcuts(QObject):
                 found[name] = good
         return found
 
-    # -- asking -----------------------------------------------------------------------------------
-
     def default(self, name: str) -> tuple[str, ...]:
-        """The keys that the table gives a command. Raises UnknownCommandError."""
+        """Return the default keys of a command.
+
+        Raises:
+            UnknownCommandError: The name is unknown.
+        """
         command = self.commands.get(name)
         if command is None:
             raise UnknownCommandError(name)
         return tuple(normal(key) for key in command.keys_at_first(self._platform))
 
     def of(self, name: str) -> tuple[str, ...]:
-        """The keys of a command now, the first of them in menus and tooltips."""
+        """Return the current keys of a command, the one shown in menus and tooltips first."""
         keys = self._own.get(name, self.default(name))
         if name == STOP:
             given = {key for other, own in self._own.items() if other != STOP for key in own}
@@ -165,19 +166,19 @@ class Shortcuts(QObject):
         return tuple(key for key in keys if key != STOP_KEY)
 
     def first(self, name: str) -> str:
-        """The first key of a command; "" when it has none."""
+        """Return the first key of a command, or ""."""
         return next(iter(self.of(name)), "")
 
     def own(self, name: str) -> bool:
-        """Whether a person changed the keys of a command."""
+        """Return whether the keys of a command differ from the defaults."""
         return self.of(name) != self.default(name)
 
     def holder(self, key: str) -> str:
-        """The command that has a key; "" when none has."""
+        """Return the command that has a key, or ""."""
         return next((name for name in self.commands if normal(key) in self.of(name)), "")
 
     def refusal(self, name: str, pressed: QKeyCombination) -> str:
-        """Why a key can't be a command's, in a sentence; "" when it can."""
+        """Return why a command can't have a key as a sentence, or "" if it can."""
         key = key_of(pressed)
         if key == STOP_KEY:
             return "" if name == STOP else _("F12 always stops and can't be changed.")
@@ -185,17 +186,15 @@ class Shortcuts(QObject):
         if not held and pressed.key() not in ALONE:
             return _(NEEDS_WITH)
         for fixed in FIXED:
-            own = key in self.default(name)  # Ctrl+F finds in the Inspector there, else in the blocks
+            own = key in self.default(name)  # Ctrl+F is "find" both in the Inspector and in the blocks
             if key in [normal(each) for each in fixed.key.split(", ")] and held and not own:
                 return _("{key} is reserved for “{command}” ({place}).").format(
                     key=spoken_key(key), command=_(fixed.words), place=_(fixed.place)
                 )
         return ""
 
-    # -- changing ---------------------------------------------------------------------------------
-
     def give(self, name: str, key: str) -> None:
-        """Give a command this key, alone; Stop gets it beside F12. Another command loses it."""
+        """Make a key the only one of a command (for Stop next to F12), removing it from another command."""
         key, holder = normal(key), self.holder(key)
         if holder and holder != name:
             self._own[holder] = tuple(each for each in self.of(holder) if each != key)
@@ -203,7 +202,7 @@ class Shortcuts(QObject):
         self._keep()
 
     def swap(self, name: str, key: str) -> None:
-        """Give a command this key, and the one that had it this command's first key."""
+        """Assign a key to a command and give its previous holder the command's first key."""
         holder, before = self.holder(key), self.first(name)
         self._own[name] = (normal(key),)
         if holder and holder != name:
@@ -211,9 +210,10 @@ class Shortcuts(QObject):
         self._keep()
 
     def reset(self, name: str) -> None:
-        """Give a command the key of the table; another command that had got it loses it.
+        """Restore the default keys of a command and remove them from commands that have taken them.
 
-        It has its own of the table again, unless somebody else has that: no swap leaves one without a key.
+        Such a command gets its own default back unless that is taken, so that a swap leaves no command
+        without a key.
         """
         self._own.pop(name, None)
         for key in self.default(name):
@@ -224,7 +224,7 @@ class Shortcuts(QObject):
         self._keep()
 
     def reset_all(self) -> None:
-        """Every command has the key of the table again."""
+        """Restore the default keys of all commands."""
         self._own = {}
         self._keep()
 
@@ -237,14 +237,12 @@ class Shortcuts(QObject):
             self._complain(str(error))
         self.changed.emit()
 
-    # -- where they are shown ---------------------------------------------------------------------
-
     def tell(self) -> None:
-        """Put the keys of the moment into the tooltips of all buttons that have the property ``command``."""
+        """Update the keys in the tooltips of all buttons with the property ``command``."""
         for widget in QApplication.allWidgets():
             command = widget.property("command")
             if isinstance(command, str):
                 said = _(self.commands[command].tip)
-                if not said or isinstance(widget, IconButton):  # nothing else says what it is
+                if not said or isinstance(widget, IconButton):  # the tooltip is an icon button's only text
                     said = widget.accessibleName()
                 widget.setToolTip(plain.tip(tip_with_key(said, ", ".join(self.of(command)))))
