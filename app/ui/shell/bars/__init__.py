@@ -1,4 +1,4 @@
-"""The bars of the window, and what shows above or below them: banner and toast.
+"""Bars of the window, with the banner and toasts above them.
 
-A bar shows what it is given, and its buttons trigger the commands' actions.
+Bars only display state; their buttons trigger the actions of commands.
 """

@@ -1,4 +1,4 @@
-"""The bar above every layout: logo, menus, layout switch, palette field, robots, on the start page Stop."""
+"""App bar: logo, menus, layout switch, palette field, robots, and Stop on the start page."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ from nep.i18n import _, lazy, ngettext
 WIDE, HIGH, LEFT, ICON, GAP = 248, 28, 10, 14, 9
 EDGE = 12
 DIRECT = Qt.FindChildOption.FindDirectChildrenOnly
-LEAST_ROOM = 44  # px of the field: less than that for the words, and only icon and key are shown
+LEAST_ROOM = 44  # minimum text width of the palette field in px; below it only icon and key are shown
 CHIP_WORDS = {
     "ready": lazy("{robot} ready"),
     "busy": lazy("{robot} moving"),
@@ -35,23 +35,23 @@ CHIP_WORDS = {
     "paused": lazy("{robot} is paused"),
     "running": lazy("{robot} running"),
 }
-"""What the only robot does, for a person or for its program."""
+"""Text of the robot chip when there is one robot, by state."""
 
 
 class AppBar(QWidget):
-    """Menus at the left, the layouts in the middle, the robots at the right."""
+    """Menus at the left, the layout switch in the middle, the robots at the right."""
 
     layout_chosen = Signal(str)
 
     def __init__(self, theme: Theme, layouts: Sequence[Layout], platform: str = sys.platform) -> None:
-        """``platform`` as `sys.platform` says it."""
+        # platform is a value of sys.platform.
         super().__init__()
         self._theme = theme
         self.setMinimumHeight(theme.size("appBar"))
         self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Fixed)
         self.setAccessibleName(_("Menus and layouts"))
         self.menus = MenuBar(theme)
-        self.native = platform == "darwin"  # a Mac shows the menus at the top of its screen
+        self.native = platform == "darwin"  # macOS shows the menus at the top of the screen
         self.menus.setNativeMenuBar(self.native)
         self.menus.setSizePolicy(QSizePolicy.Policy.Minimum, QSizePolicy.Policy.Preferred)
         self.switch = Segments(
@@ -106,10 +106,7 @@ class AppBar(QWidget):
         self._fit()
 
     def _fit(self) -> None:
-        """Where the menus have no room: the switch loses its words, then the chip, then the field its key.
-
-        The switch is in the middle as long as what is right of it has room in its half.
-        """
+        # Shrinks in this order when the menus lack room: texts of the switch, the chip, the key of the field.
         for bare in range(4):
             self.switch.set_bare(bare > 0)
             self.chip.set_bare(bare > 1)
@@ -121,13 +118,11 @@ class AppBar(QWidget):
         self._grid.setColumnStretch(2, int(self._halves[1].sizeHint().width() <= half))
 
     def _needed(self) -> int:
-        """The width at which nothing of the bar is shortened more than it is now."""
         parts = [part for half in self._halves for part in half.findChildren(QWidget, options=DIRECT)]
         wide = sum(self._least(part) + GAP for part in (self.switch, *parts) if not part.isHidden())
         return wide + 2 * EDGE
 
     def _least(self, part: QWidget) -> int:
-        """How narrow a part may be; the menus may not be at all."""
         if part is self.menus:
             return 0 if self.native else part.sizeHint().width()
         if part is self.switch:
@@ -135,16 +130,16 @@ class AppBar(QWidget):
         return max(part.minimumSizeHint().width(), part.minimumWidth())
 
     def use(self, actions: Actions) -> None:
-        """Let its buttons trigger these."""
+        """Connect the buttons to the actions."""
         actions.bind(self.home, "file.start_page")
         self.back.clicked.connect(actions["start_page.leave"].trigger)
         actions.bind(self.search, "palette.open")
         actions.bind(self.stop, "run.stop")
 
     def show_layout(self, name: str | None, *, back: bool = False) -> None:
-        """Mark the layout that shows; None is the start page, which has no switch but a Stop.
+        """Mark the current layout; None means the start page, which shows Stop in place of the switch.
 
-        The way to the start page is where the way ``back`` from it is, when there is one.
+        With ``back`` the start page shows a button that returns to the open work.
         """
         self.home.setVisible(name is not None)
         self.back.setVisible(name is None and back)
@@ -155,7 +150,7 @@ class AppBar(QWidget):
         self._fit()
 
     def show_robots(self, text: str, status: str) -> None:
-        """The chip: which robots there are and how they are."""
+        """Set the robot chip to a text and status."""
         if text != self.chip.text:
             self.chip.set(text, status)
             self._fit()
@@ -171,9 +166,9 @@ class AppBar(QWidget):
 
 
 class PaletteField(PaintedButton):
-    """Opens the command palette; it looks like a field, with its key at the right.
+    """Button that opens the command palette, painted as a search field with its key at the right.
 
-    In narrow windows it says less, or only icon and key are left.
+    Narrow windows shorten the text, then show only icon and key.
     """
 
     def __init__(self, theme: Theme, parent: QWidget | None = None) -> None:
@@ -183,14 +178,14 @@ class PaletteField(PaintedButton):
         self.setSizePolicy(QSizePolicy.Policy.Preferred, QSizePolicy.Policy.Fixed)
 
     def set_bare(self, bare: bool) -> None:
-        """Show only the icon, or the key beside it again, and the words where they have room."""
+        """Show only the icon (and key), or the text again where it fits."""
         if bare != self._bare:
             self._bare = bare
             self.updateGeometry()
             self.update()
 
     def show_key(self, key: str) -> None:
-        """The key that opens the palette now; "" for none."""
+        """Show the key that opens the palette; "" for none."""
         self._key = spoken_key(key)
         self.updateGeometry()
         self.update()
@@ -232,7 +227,7 @@ class PaletteField(PaintedButton):
 
 
 def robots_chip(session: Session) -> tuple[str, str]:
-    """The chip's words and status: "Pepper ready", "2 robots", "Camera silent", "No robot"."""
+    """Return text and status of the robot chip, such as "Pepper ready", "2 robots" or "No robot"."""
     links = [link for link in session.fleet.links if link.state != "away"]
     if not links:
         coming = session.coming
@@ -266,7 +261,6 @@ def robots_chip(session: Session) -> tuple[str, str]:
 
 
 def _doing(session: Session, link: RobotLink) -> str:
-    """What the only robot does, for its program or for a person."""
     state: str = link.state
     if session.runs.active:
         state = "paused" if session.runs.view().state == "paused" else "running"

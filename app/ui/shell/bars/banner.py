@@ -1,6 +1,6 @@
-"""The alert in the free area of the bar that shows: one at a time, with its next step. It moves nothing.
+"""Alert banner: lies over the free area of the current bar and offers the alert's next step.
 
-A banner above the panels would have to cover tabs and titles, or to move them under the mouse.
+It shows one alert at a time. A banner that takes space of its own would move the panels under the mouse.
 """
 
 from __future__ import annotations
@@ -22,10 +22,10 @@ from app.ui.widgets.cards import AlertBox
 from nep.i18n import _, ngettext
 
 FIGURES = re.compile(r"\d+")
-LEAST_WIDTH = 140  # px at 100 % text; with less room only the status bar tells of alerts
-LEAST_WORDS = 160  # px at 100 % text: with less the next step is its icon alone
+LEAST_WIDTH = 140  # px at 100 % text; below it only the status bar shows alerts
+LEAST_WORDS = 160  # px at 100 % text; below it the next step is only an icon
 FONTS = ("bodyLarge", "body", "small")
-TALL = 44  # px at 100 % text: lower banners have small buttons
+TALL = 44  # px at 100 % text; lower banners have small buttons
 STEP_ICONS = {
     "help.doctor": "stethoscope",
     "help.report": "message-square-warning",
@@ -34,39 +34,39 @@ STEP_ICONS = {
 }
 NEXT = "arrow-right"
 FRESH_S = 0.5
-"""So long after it came under a mouse the banner lets a press through to what was there before."""
+"""Seconds during which a banner that appears under the mouse passes clicks on to what was there."""
 
 
 class AlertLike(Protocol):
-    """What the banner needs of an alert (`app.core.alerts.ActiveAlert`)."""
+    """Interface of `app.core.alerts.ActiveAlert` that the banner uses."""
 
     @property
     def id(self) -> str:
-        """Its identity."""
+        """Unique id."""
 
     @property
     def severity(self) -> str:
-        """Its severity: "error", "warn" or "info"."""
+        """Severity: "error", "warn" or "info"."""
 
     @property
     def title(self) -> str:
-        """What is wrong, one sentence."""
+        """The problem as one sentence."""
 
     @property
     def detail(self) -> str:
-        """What it means."""
+        """Explanation of the problem."""
 
     @property
     def button(self) -> str | None:
-        """The words of the next step."""
+        """Text of the button for the next step."""
 
     @property
     def action(self) -> str | None:
-        """The next step's name in the table of actions."""
+        """Name of the next step in the table of actions."""
 
 
 class BannerWords(QWidget):
-    """A bold sentence and a plain one, in as many lines as there is room for; the tooltip has all of both."""
+    """A bold and a plain sentence, wrapped to the available lines; the tooltip has the full text."""
 
     def __init__(self, theme: Theme) -> None:
         super().__init__()
@@ -76,7 +76,7 @@ class BannerWords(QWidget):
         theme.changed.connect(self.update)
 
     def show_words(self, title: str, detail: str) -> None:
-        """Show other sentences."""
+        """Set title and detail."""
         if (title, detail) != (self._title, self._detail):
             self._title, self._detail = title, detail
             self.setToolTip(plain.tip(f"{title}\n{detail}".strip()))
@@ -90,7 +90,7 @@ class BannerWords(QWidget):
 
     def paintEvent(self, _event: QPaintEvent) -> None:
         painter = QPainter(self)
-        # the largest font in which all of it has room, else the smallest
+        # the largest font in which the full text fits, else the smallest
         kind = next((each for each in FONTS if self.lines(each)[1]), FONTS[-1])
         lines, high = self.lines(kind)[0], paint.height_of(self._theme.font(kind))
         top = (self.height() - high * len(lines)) / 2
@@ -104,9 +104,9 @@ class BannerWords(QWidget):
         painter.end()
 
     def lines(self, kind: str) -> tuple[list[list[tuple[str, QFont, str]]], bool]:
-        """Return the lines as pieces of text with font and colour, and whether they hold all of the words.
+        """Return the lines as pieces of text with font and colour, and whether the full text fits.
 
-        The last line is elided where it is painted.
+        The last line is elided when painted.
         """
         plain_font, bold = self._theme.font(kind), self._theme.font(kind)
         bold.setWeight(QFont.Weight.DemiBold)
@@ -137,7 +137,6 @@ class BannerWords(QWidget):
 
 
 def _fitting(font: QFont, words: Sequence[str], width: float) -> int:
-    """Return how many of the words fit into one line of this width."""
     count = len(words)
     while count and paint.width_of(font, " ".join(words[:count])) > width:
         count -= 1
@@ -145,7 +144,7 @@ def _fitting(font: QFont, words: Sequence[str], width: float) -> int:
 
 
 class Banner(AlertBox):
-    """Icon, a bold sentence, a plain one, one button with the next step, perhaps a second one, and close."""
+    """Icon, title, detail, a button for the next step, an optional second button, and close."""
 
     icon_side, icon_left, left, high, gap = 18, 12, 40, 0, 6
 
@@ -187,14 +186,14 @@ class Banner(AlertBox):
         second: str | None = None,
         icon: str | None = None,
     ) -> None:
-        """Say what is wrong; ``others`` counts the alerts that wait behind this one."""
+        """Set the content; ``others`` is the number of further alerts."""
         self._icon = self.button.icon_name = icon
         self.set_status(status)
         self.words.show_words(title, detail)
         spoken = f"{title} {detail}".strip()
         self.setAccessibleName(spoken)
         news = FIGURES.sub("", spoken)
-        if news != self._announced:  # a count that goes on is no news
+        if news != self._announced:  # changed numbers alone aren't announced again
             self._announced = news
             paint.announce(self, spoken)
         self._step, self._others = button or "", others
@@ -208,7 +207,6 @@ class Banner(AlertBox):
         self.mouse_left.emit()
 
     def _fit(self) -> None:
-        """Low: the buttons are small. Narrow: the next step is its icon, the count of the others a figure."""
         scaled = self._theme.scaled
         size: Size = "form" if self.height() >= scaled(TALL) else "small"
         for button in (self.button, self.second):
@@ -233,7 +231,7 @@ class Banner(AlertBox):
 
 
 class AlertBanner(QWidget):
-    """Where the banner is: shows the worst alert that was not closed, and goes when it is cured."""
+    """Banner over the current bar: shows the worst alert that isn't dismissed, until it is solved."""
 
     def __init__(
         self,
@@ -243,7 +241,7 @@ class AlertBanner(QWidget):
         mouse_at: Callable[[], QPoint] = QCursor.pos,
         clock: Callable[[], float] = time.monotonic,
     ) -> None:
-        """``mouse_at`` tells where the mouse is on the screen, ``clock`` gives monotonic seconds."""
+        # mouse_at returns the mouse position on the screen; clock returns monotonic seconds.
         super().__init__()
         self.banner = banner if banner is not None else Banner(theme)
         self.mouse_at, self.clock = mouse_at, clock
@@ -268,19 +266,19 @@ class AlertBanner(QWidget):
 
     @property
     def identity(self) -> str:
-        """What is shown, whatever its words say now: an alert's id, "offer", or "" for nothing."""
+        """Identity of the content, independent of its texts: an alert's id, "offer", or "" for nothing."""
         if self._offer is not None:
             return "offer"
         return self._alert.id if self._alert is not None else ""
 
     @property
     def alert(self) -> AlertLike | None:
-        """The alert that is shown."""
+        """Alert that is shown, or None."""
         return self._alert
 
     @property
     def offers(self) -> bool:
-        """Whether something is offered that nobody has answered yet."""
+        """True while an offer waits for an answer."""
         return self._offer is not None
 
     def offer(
@@ -290,13 +288,13 @@ class AlertBanner(QWidget):
         yes: tuple[str, Callable[[], object]],
         no: tuple[str, Callable[[], object]],
     ) -> None:
-        """Offer something once, with two answers; alerts wait until it is answered."""
+        """Show an offer with two answers; alerts wait until one is chosen."""
         self._offer = (yes[1], no[1])
         self.banner.show_words("info", title, detail, yes[0], second=no[0])
         self.show()
 
     def show_alerts(self, alerts: Sequence[AlertLike]) -> None:
-        """The alerts that are active and not closed, worst first."""
+        """Set the active alerts that aren't dismissed, worst first."""
         self._alerts = alerts
         if self._offer is not None:
             return
@@ -311,7 +309,8 @@ class AlertBanner(QWidget):
         self.show()
 
     def _first(self, alerts: Sequence[AlertLike]) -> AlertLike | None:
-        """The worst; while the mouse is on the banner the one that is shown, whose button may be pressed."""
+        # Keeps the shown alert while the mouse is over the banner, so that the button under it doesn't
+        # change.
         shown = self._alert
         if shown is not None and self.banner.underMouse():
             still = next((alert for alert in alerts if alert.id == shown.id), None)
@@ -345,9 +344,9 @@ class AlertBanner(QWidget):
         self.on_more()
 
     def follow(self, area: QRect) -> None:
-        """Lie in this area of the parent; called with every tick, as the bars change with what happens.
+        """Move to an area of the parent; called with every tick, as the bars change their layout.
 
-        Another banner that comes under the mouse is not pressed by a click that was meant for what was there.
+        A banner that appears under the mouse ignores clicks for `FRESH_S`.
         """
         if not self.identity:
             self._placed = ""

@@ -1,4 +1,4 @@
-"""What can be chosen as the answer to a question: large buttons, for mouse, arrows and number keys."""
+"""Answers to a question as large buttons, operated by mouse, arrow keys and number keys."""
 
 from __future__ import annotations
 
@@ -24,10 +24,10 @@ _WRAPPED = int(Qt.TextFlag.TextWordWrap | Qt.AlignmentFlag.AlignLeft | Qt.Alignm
 
 
 class ChoiceButton(PaintedButton):
-    """One choice: the key that chooses it, and its words on as many lines as they need."""
+    """One answer: its number key and its text, wrapped."""
 
     def __init__(self, theme: Theme, words: str, key: str) -> None:
-        """``key`` is empty where no key is left for it."""
+        # key is "" for answers beyond the number keys.
         super().__init__(theme, words, radius="large")
         self.key = key
         self._shown = plain.breakable(words)
@@ -37,15 +37,14 @@ class ChoiceButton(PaintedButton):
         return self._theme.font("button")
 
     def _before_words(self) -> float:
-        """What stands left of the words: the edge, and the key's cap."""
         return PADDING + (paint.key_width(self._theme, self.key) + 10 if self.key else 0)
 
     def one_line_width(self) -> int:
-        """How wide it is with all its words on one line."""
+        """Return the width in px with the text on one line."""
         return math.ceil(self._before_words() + paint.width_of(self._font(), self.text()) + PADDING) + 1
 
     def height_for(self, width: int) -> int:
-        """How high it is at this width."""
+        """Return the height in px for a width."""
         room = QRectF(0, 0, max(1.0, width - self._before_words() - PADDING), 1e6)
         needed = QFontMetricsF(self._font()).boundingRect(room, _WRAPPED, self._shown).height()
         return max(round(self._theme.scaled(LEAST_HEIGHT)), math.ceil(needed) + 2 * PADDING)
@@ -55,7 +54,7 @@ class ChoiceButton(PaintedButton):
         return QSize(wide, self.height_for(wide))
 
     def keyPressEvent(self, event: QKeyEvent) -> None:
-        """Enter and Space press it; all other keys go to the choices, also those that Qt's buttons take."""
+        """Handle Enter and Space; leave other keys to `Choices`, including those that Qt's buttons handle."""
         if is_pressed_key(event.key()):
             super().keyPressEvent(event)
         else:
@@ -79,11 +78,11 @@ class ChoiceButton(PaintedButton):
 
 
 class Choices(QWidget):
-    """The choices of one question in rows: beside each other where all of them fit so on one line each."""
+    """Answers of one question, in as many columns as fit with each answer on one line."""
 
     chosen = Signal(str)
     reached = Signal(QWidget)
-    """An arrow led to this button, which may be out of sight."""
+    """An arrow key moved the focus to this button, which may have to be scrolled into view."""
 
     def __init__(self, theme: Theme) -> None:
         super().__init__()
@@ -94,7 +93,7 @@ class Choices(QWidget):
         self.setSizePolicy(policy)
 
     def show_choices(self, choices: Sequence[str]) -> None:
-        """Offer these from now on."""
+        """Replace the answers."""
         for button in self.buttons:
             button.hide()
             button.deleteLater()
@@ -109,25 +108,23 @@ class Choices(QWidget):
         self.updateGeometry()
 
     def take_keyboard(self) -> None:
-        """The first choice has the keyboard."""
+        """Focus the first answer."""
         if self.buttons:
             self.buttons[0].setFocus(Qt.FocusReason.PopupFocusReason)
 
     def hold(self, *, held: bool) -> None:
-        """Nothing can be chosen while it is held."""
+        """Disable or enable all answers."""
         for button in self.buttons:
             button.setEnabled(not held)
 
-    # -- where they stand -------------------------------------------------------------------------
-
     def columns(self, width: int) -> int:
-        """How many stand beside each other."""
+        """Return the number of columns for a width in px."""
         widest = max((each.one_line_width() for each in self.buttons), default=1)
         fitting = (width - GAP) // (widest + GAP)
         return max(1, min(MOST_COLUMNS, len(self.buttons), fitting))
 
     def places(self, width: int) -> list[QRect]:
-        """The place of each button at this width; those of a row are as high as the highest of them."""
+        """Return the rectangles of the buttons for a width; the buttons of a row have equal heights."""
         columns = self.columns(width)
         wide = (width - GAP) // columns - GAP
         found: list[QRect] = []
@@ -161,10 +158,8 @@ class Choices(QWidget):
         for button, place in zip(self.buttons, self.places(max(60, self.width())), strict=True):
             button.setGeometry(place)
 
-    # -- the keyboard -----------------------------------------------------------------------------
-
     def press(self, event: QKeyEvent) -> bool:
-        """Go to the choice beside it, or choose by a number; whether the key meant one of these."""
+        """Move the focus by an arrow key or choose by a number key; return whether the key was handled."""
         key = event.key()
         number = key - Qt.Key.Key_1
         if not is_plain(event) or not self.buttons or not self.buttons[0].isEnabled():

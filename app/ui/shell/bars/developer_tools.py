@@ -1,4 +1,4 @@
-"""The left end of the tool bar: record, keep, freeze, which source and layout this is, and its panels."""
+"""Left end of the tool bar: record, save the flight recorder, freeze, source, layouts and panels."""
 
 from __future__ import annotations
 
@@ -21,19 +21,19 @@ from app.ui.widgets.menus import Menu, drop_below
 from nep.i18n import _
 
 FREEZE, RECORD, KEEP = "view.freeze", "recording.toggle", "recording.keep"
-EVERY = 8  # half ticks
-RECORD_PX = 146  # of the button in both states, so that nothing moves when it begins
-KEEP_ROOM_PX = 1340  # what the whole bar needs at 100 % text
-ROOM_PX = 940  # without Keep, which has a key
-WORDS_ROOM_PX = 680  # below that the button to record is its dot alone
+EVERY = 8  # refresh interval in half ticks
+RECORD_PX = 146  # fixed width of the record button, so that nothing moves when a recording starts
+KEEP_ROOM_PX = 1340  # width of the whole bar at 100 % text
+ROOM_PX = 940  # width without Keep, which has a shortcut
+WORDS_ROOM_PX = 680  # below this the record button shows only its dot
 FREEZE_ROOM_PX = 548
-RECORD_ROOM_PX = 520  # below that nothing of what a stop brought would be whole beside it
-SOURCE_ROOM_PX = 1120  # with the source that shows, which the File menu has, too
-RECORDING_ROOM_PX = 1240  # ... and with the way back to the live network
+RECORD_ROOM_PX = 520  # below this the result of a stop would be cut
+SOURCE_ROOM_PX = 1120  # width with the source switch, which is also in the File menu
+RECORDING_ROOM_PX = 1240  # the same with the button back to the live network
 
 
 class RecordButton(Button):
-    """Begins a recording; while one goes on it tells how long and how large it is."""
+    """Button that starts a recording and shows the length and size of the current one."""
 
     def __init__(self, theme: Theme) -> None:
         super().__init__(theme, _("Record"), "circle-dot", size="small")
@@ -41,7 +41,7 @@ class RecordButton(Button):
         self._is_on = self._is_bare = False
 
     def set_bare(self, bare: bool) -> None:
-        """Show the dot alone, or the words again."""
+        """Show only the dot, or the text again."""
         if bare != self._is_bare:
             self._is_bare = bare
             self.updateGeometry()
@@ -51,7 +51,7 @@ class RecordButton(Button):
         return "" if self._is_bare else self.text()
 
     def show_recording(self, recordings: SessionRecordings) -> None:
-        """Say what is so now."""
+        """Show the state of the recording."""
         self._is_on = recordings.is_recording
         if not self._is_on:
             self.set_word(_("Record"))
@@ -79,7 +79,7 @@ LIVE_ICON, RECORDING_ICON = "radio-tower", "history"
 
 
 class SourceSwitch(MenuButton):
-    """Says what shows, and lets a person choose; `back` stands beside it while a recording shows."""
+    """Menu button that shows and chooses the source; ``back`` is visible while a recording is shown."""
 
     def __init__(self, theme: Theme, session: Session, actions: Actions) -> None:
         super().__init__(theme, _("Live network"), LIVE_ICON, size="small")
@@ -93,11 +93,11 @@ class SourceSwitch(MenuButton):
 
     @property
     def is_recording(self) -> bool:
-        """Whether a recording shows."""
+        """True while a recording is shown."""
         return self._is_recording
 
     def refresh(self) -> None:
-        """Say what is so now."""
+        """Show the current source."""
         replay = self._session.replay
         self._is_recording = replay is not None
         if replay is None:
@@ -120,7 +120,7 @@ class SourceSwitch(MenuButton):
 
 
 class DeveloperTools(QObject):
-    """Puts the tools into the tool bar; `follow` keeps them true."""
+    """Adds the tools to the tool bar and keeps them up to date by `follow`."""
 
     def __init__(self, shell: Shell, bar: ToolBar, commands: Commands, session: Session) -> None:
         super().__init__(bar)
@@ -154,7 +154,7 @@ class DeveloperTools(QObject):
         theme.changed.connect(self._fit)
 
     def refresh(self) -> None:
-        """Say what is so now."""
+        """Update all tools from the session."""
         was_recording = self.source.is_recording
         self.source.refresh()
         if self.source.is_recording != was_recording:
@@ -176,7 +176,8 @@ class DeveloperTools(QObject):
         return False
 
     def _fit(self) -> None:
-        """Large text in a narrow window: Keep, the source, layouts, Freeze, Record are in menus."""
+        # Hides tools in this order when room is short; all are in menus: Keep, source, layouts, Freeze,
+        # Record.
         width, scaled, recording = self._bar.width(), self._shell.theme.scaled, self.source.is_recording
         paint.show_when(self.source, recording or width >= scaled(SOURCE_ROOM_PX))
         paint.show_when(self.source.back, recording)
@@ -188,7 +189,7 @@ class DeveloperTools(QObject):
         paint.show_when(self.record, width >= scaled(RECORD_ROOM_PX))
 
     def follow(self) -> None:
-        """Called with every half tick: say what is so, while it can be seen."""
+        """Refresh every few half ticks while the bar is visible."""
         self._ticks += 1
         if self._ticks % EVERY == 0 and self._bar.isVisible():
             self.refresh()

@@ -1,4 +1,4 @@
-"""A card that lies over a window without darkening it: it keeps its place when either has another size."""
+"""Card that floats over a window without darkening it and keeps its place when either is resized."""
 
 from __future__ import annotations
 
@@ -7,16 +7,15 @@ from PySide6.QtWidgets import QWidget
 
 
 class FloatingCard(QWidget):
-    """Hidden at first. Subclasses say in `place` where it lies."""
+    """Card, hidden at first; subclasses position it in `place`."""
 
     def __init__(self, window: QWidget) -> None:
-        """A card over ``window``."""
         super().__init__(window)
         window.installEventFilter(self)
         self.hide()
 
     def place(self) -> None:
-        """Go to its place, with the size that its words need now."""
+        """Set position and size for the current content."""
         raise NotImplementedError
 
     def event(self, event: QEvent) -> bool:

@@ -1,4 +1,4 @@
-"""The logo: an N between two amber joints, on the accent; painted at any size."""
+"""The logo: an N between two amber joints on the accent colour, painted at any size."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ JOINT = 0.12
 
 
 def paint_logo(painter: QPainter, rect: QRectF, theme: Theme) -> None:
-    """The logo in a square."""
+    """Paint the logo into a square."""
     side = rect.width()
 
     def at(x: float, y: float) -> QPointF:
@@ -35,7 +35,7 @@ def paint_logo(painter: QPainter, rect: QRectF, theme: Theme) -> None:
 
 
 class Logo(QWidget):
-    """The logo in the app bar."""
+    """Logo of the app bar."""
 
     def __init__(self, theme: Theme) -> None:
         super().__init__()
@@ -49,9 +49,9 @@ class Logo(QWidget):
         painter.end()
 
 
-@guard  # no QObject
+@guard  # not a QObject
 class LogoEngine(QIconEngine):
-    """The logo as the window's icon."""
+    """Icon engine that paints the logo as the window icon."""
 
     def __init__(self, theme: Theme) -> None:
         super().__init__()

@@ -1,4 +1,4 @@
-"""The menu bar, which underlines the letter of each menu while Alt is held."""
+"""Menu bar that underlines the mnemonics of menus while Alt is held."""
 
 from __future__ import annotations
 
@@ -12,10 +12,10 @@ from app.ui.widgets.letters import plain_words
 
 
 class _Alt(QObject):
-    """Hears whether Alt is held in a window.
+    """Event filter that reports whether Alt is held.
 
-    An object of its own: Qt lets a menu bar filter the events of the whole application while Alt is held, and
-    those of the web view's own objects must not come to Python.
+    A separate object: while Alt is held, Qt makes a menu bar filter the events of the whole application, and
+    those of the web view's internal objects must not reach Python.
     """
 
     held = Signal(bool)
@@ -29,7 +29,7 @@ class _Alt(QObject):
 
 
 class MenuBar(QMenuBar):
-    """Alt with a letter opens a menu; lines below the letters at all times would only be noise."""
+    """Menu bar with mnemonics that are underlined only while Alt is held."""
 
     def __init__(self, theme: Theme) -> None:
         super().__init__()
@@ -40,13 +40,13 @@ class MenuBar(QMenuBar):
 
     @property
     def shows_letters(self) -> bool:
-        """Whether the letters are underlined now."""
+        """True while the mnemonics are underlined."""
         return self._shows_letters
 
     def showEvent(self, event: QShowEvent) -> None:
         super().showEvent(event)
         window = self.window().windowHandle()
-        if window is not None:  # hears Alt before whoever has the keyboard; a second time is the first one
+        if window is not None:  # sees Alt before the focused widget; installing a filter again is harmless
             window.removeEventFilter(self._alt)
             window.installEventFilter(self._alt)
 

@@ -1,4 +1,4 @@
-"""What a running behaviour asks: a card over the window, which takes the keyboard and covers no Stop."""
+"""Card for questions of a running behaviour; it takes the focus and never covers Stop."""
 
 from __future__ import annotations
 
@@ -28,18 +28,18 @@ from nep.i18n import _
 
 WIDE, WIDE_WITH_CHOICES = 460, 560
 MARGIN = 16
-LOWER = 0.8  # how far down the window its lower edge is: over the blocks, not over what is below them
+LOWER = 0.8  # lower edge as a share of the window's height: over the blocks, above the panels below them
 LONGEST_ANSWER = 10_000
 
 
 class QuestionCard(FloatingCard):
-    """The question, and a field and a button or what can be chosen. Enter answers; Esc answers nothing.
+    """Question with a text field or choices. Enter answers; Esc gives no answer.
 
-    While paused it is held.
+    The card is disabled while the behaviour is paused.
     """
 
     def __init__(self, theme: Theme, window: QWidget, answer: Callable[[AskedQuestion, str], object]) -> None:
-        """``answer`` gets the question and what was typed or chosen."""
+        # answer gets the question and the text or choice.
         super().__init__(window)
         self._theme, self._answer = theme, answer
         self._question: AskedQuestion | None = None
@@ -57,7 +57,7 @@ class QuestionCard(FloatingCard):
         self._offered = Scrolled(self.choices)
         self.choices.reached.connect(lambda button: self._offered.ensureWidgetVisible(button, 0, GAP))
         self._hint = label(_("Press Resume first"), "small", role="textSecondary")
-        self.setFocusPolicy(Qt.FocusPolicy.ClickFocus)  # while it is held, there is nothing else for the keys
+        self.setFocusPolicy(Qt.FocusPolicy.ClickFocus)  # receives the keys while the card is held
         row = QHBoxLayout()
         row.setSpacing(10)
         row.addWidget(self.field, 1)
@@ -76,7 +76,10 @@ class QuestionCard(FloatingCard):
         self.setGraphicsEffect(shadow)
 
     def show_question(self, question: AskedQuestion | None, *, held: bool) -> None:
-        """Show this question, or none; ``held`` while the behaviour is paused. Called with every tick."""
+        """Show a question, or hide the card for None; called with every tick.
+
+        ``held`` disables the card while the behaviour is paused.
+        """
         if question != self._question:
             self._question = question
             if question is None:
@@ -93,7 +96,7 @@ class QuestionCard(FloatingCard):
         self.field.setAccessibleName(words)
         self.field.clear()
         self.choices.show_choices(question.choices)
-        self._offered.updateGeometry()  # while the card is hidden nobody hears that they want another height
+        self._offered.updateGeometry()  # a hidden card isn't notified of changed size hints
         self.choices.setAccessibleName(words)
         typed = not question.choices
         self.field.setVisible(typed)
@@ -109,7 +112,7 @@ class QuestionCard(FloatingCard):
         paint.announce(self, ", ".join((words, *question.choices)))
 
     def take_keyboard(self) -> None:
-        """Get the keys, if there is a question and it is not held."""
+        """Take the focus if there is a question that isn't held."""
         if self._question is None or self._held:
             return
         if self.choices.buttons:
@@ -118,7 +121,6 @@ class QuestionCard(FloatingCard):
             self.field.setFocus(Qt.FocusReason.PopupFocusReason)
 
     def _leave(self) -> None:
-        """Go, and give the keyboard back to where it was."""
         inside = self._has_keyboard()
         before, self._before = self._before, None
         if inside and before is not None and isValid(before) and before.isVisible():
@@ -133,7 +135,7 @@ class QuestionCard(FloatingCard):
         had = self._has_keyboard()
         self._held = held
         if had and held and self.choices.buttons:
-            # What is disabled would give the keyboard to whatever comes next in the window.
+            # Otherwise Qt moves the focus from the disabled widget to the next one in the window.
             self.setFocus(Qt.FocusReason.OtherFocusReason)
         self.choices.hold(held=held)
         self._hint.setVisible(held and bool(self.choices.buttons))
@@ -144,7 +146,7 @@ class QuestionCard(FloatingCard):
         self.button.setEnabled(not held)
 
     def place(self) -> None:
-        """Go to the middle of the lower part of the window, or higher so that no Stop is covered."""
+        """Move to the centre of the lower part of the window, or higher if Stop would be covered."""
         window = self.parentWidget()
         layout = self.layout()
         if window is None or layout is None:
@@ -160,7 +162,7 @@ class QuestionCard(FloatingCard):
         self.setGeometry(left, bottom - high, wide, high)
 
     def _free(self, window: QWidget, left: int, wide: int) -> tuple[int, int]:
-        """From where to where it may reach, between the Stops above and below it."""
+        # Vertical range between the Stop buttons above and below.
         middle, top, bottom = window.height() // 2, MARGIN, window.height() - MARGIN
         for each in stops_in(window):
             stop = QRect(each.mapTo(window, QPoint()), each.size())

@@ -1,4 +1,4 @@
-"""The run bar of the Behaviour layout and the tool bar of the Developer layout: Run, Pause, Step, Stop."""
+"""Run bar of the Behaviour layout and tool bar of the Developer layout: Run, Pause, Step, Stop."""
 
 from __future__ import annotations
 
@@ -19,16 +19,16 @@ from app.ui.widgets.menus import Menu, drop_below
 from nep.i18n import _
 
 PACES = ("run.full_speed", "run.slow", "run.very_slow")
-ROOM_PX = 960  # what the bar needs at 100 % text
-SENTENCE_PX, RESULT_PX = 190, 230  # at 100 % text: what should be left for what happens, and for a result
-LEAST_RESULT_PX = 110  # where there is less for both, a good result is shortened to this
-EDGES_PX = 150  # the button for the speed, the mark, and what is between all of them
-LEAST_ROOM_PX = 600  # below that even Run is an icon, so that nothing of a stop's result is cut
+ROOM_PX = 960  # width of the bar at 100 % text
+SENTENCE_PX, RESULT_PX = 190, 230  # at 100 % text: room for the state and for a result
+LEAST_RESULT_PX = 110  # minimum width of a successful result; it is elided to this
+EDGES_PX = 150  # speed button, mark and the gaps between all items
+LEAST_ROOM_PX = 600  # below this even Run is an icon, so that the result of a stop isn't cut
 LEAST_SENTENCE = 30  # px at 100 % text
-WIDE_SENTENCE_PX, SENTENCE_SHARE = 300, 0.2  # at 100 % text, and of the bar: what happens now beside an alert
-BANNER_PX = 300  # at 100 % text: with less room an alert lies over the state of the tool bar, too
+WIDE_SENTENCE_PX, SENTENCE_SHARE = 300, 0.2  # at 100 % text, and share of the bar: state next to an alert
+BANNER_PX = 300  # at 100 % text; with less room an alert also covers the state of the tool bar
 BANNER_EDGE, GAP = 3, 8
-QWIDGETSIZE_MAX = 16777215  # Qt's own: no limit
+QWIDGETSIZE_MAX = 16777215  # Qt's constant for "no limit"
 DOT = 10
 HALO = 16
 MARKS = {
@@ -42,7 +42,7 @@ MARKS = {
 
 
 class Mark(QWidget):
-    """Ring: nothing runs; amber dot: something runs; pause; crossed circle: somebody must act."""
+    """Run state as a mark: ring (idle), amber dot (running), pause, crossed circle (action needed)."""
 
     def __init__(self, theme: Theme) -> None:
         super().__init__()
@@ -52,11 +52,11 @@ class Mark(QWidget):
 
     @property
     def state(self) -> str:
-        """The state that is shown: one of the six of Run and Stop."""
+        """Current state: one of the six states of Run and Stop."""
         return self._state
 
     def show_state(self, state: str) -> None:
-        """One of the six states of Run and Stop."""
+        """Show one of the six states of Run and Stop."""
         if state != self._state:
             self._state = state
             self.update()
@@ -88,7 +88,7 @@ class Mark(QWidget):
 
 
 class Sentence(QWidget):
-    """What happens now: a title and a detail, one line each."""
+    """Current state as a title and a detail."""
 
     def __init__(self, theme: Theme) -> None:
         super().__init__()
@@ -99,18 +99,18 @@ class Sentence(QWidget):
         theme.changed.connect(self.updateGeometry)
 
     def keep_to(self, width: float | None) -> None:
-        """Paint the words in this width only, as an alert lies over the rest; None: in all of it."""
+        """Limit the text to a width because an alert covers the rest; None removes the limit."""
         if width != self._shared_px:
             self._shared_px = width
             self.update()
 
     @property
     def colour_role(self) -> str:
-        """The colour of the title: that of errors when somebody must act."""
+        """Colour of the title: the error colour if a person must act."""
         return self._theme.status("error").colour if self._is_alarm else "text"
 
     def show_words(self, title: str, detail: str, *, is_alarm: bool = False) -> None:
-        """Say something else; `is_alarm`: somebody must act, so the title is red."""
+        """Set the texts; with ``is_alarm`` the title is red because a person must act."""
         if (title, detail, is_alarm) != (self._title, self._detail, self._is_alarm):
             self._title, self._detail, self._is_alarm = title, detail, is_alarm
             said = [each for each in (title, detail) if each]
@@ -124,7 +124,7 @@ class Sentence(QWidget):
         return font
 
     def full_width(self) -> float:
-        """How wide its longer line is."""
+        """Return the width of the longer line in px."""
         lines = self.lines(float(QWIDGETSIZE_MAX))
         return max(paint.width_of(font, text) for text, font, _role in lines)
 
@@ -138,7 +138,7 @@ class Sentence(QWidget):
     def paintEvent(self, _event: QPaintEvent) -> None:
         width = self.width() if self._shared_px is None else min(self.width(), self._shared_px)
         if width < self._theme.scaled(LEAST_SENTENCE):
-            return  # two letters and dots say nothing; its tooltip and a screen reader say all
+            return  # too narrow to read; the tooltip and screen readers have the full text
         painter = QPainter(self)
         lines = self.lines(width)
         top = (self.height() - sum(paint.height_of(font) for _text, font, _role in lines)) / 2
@@ -149,9 +149,9 @@ class Sentence(QWidget):
         painter.end()
 
     def lines(self, width: float) -> list[tuple[str, QFont, str]]:
-        """What is painted: lines with their font and colour; the last one is elided where it is too long.
+        """Return the painted lines with font and colour; the last one is elided if it is too long.
 
-        A detail that is too long for its line has two small ones, as far as the bar has room for them.
+        A detail too long for one line is split into two lines in a small font if the bar is high enough.
         """
         bold, plain, small = self._title_font(), self._theme.font("body"), self._theme.font("small")
         title, quiet = [(self._title, bold, self.colour_role)], "textSecondary"
@@ -164,7 +164,7 @@ class Sentence(QWidget):
 
 
 class Result(QWidget):
-    """What a stop brought, beside the button: proven, counted, not answered; while running a reminder."""
+    """Result of a stop (confirmed, pending, unanswered), or while running a reminder of the last one."""
 
     def __init__(self, theme: Theme, *, compact: bool = False) -> None:
         super().__init__()
@@ -177,21 +177,21 @@ class Result(QWidget):
 
     @property
     def text(self) -> str:
-        """The words shown now."""
+        """Current text."""
         return self._text
 
     @property
     def look(self) -> str:
-        """How they are shown: "ok", "off", "error", "counting", "reminder" or ""."""
+        """Style: "ok", "off", "error", "counting", "reminder" or ""."""
         return self._look
 
     @property
     def status(self) -> StopStatus:
-        """Whose icon and colour they have."""
+        """Status that gives icon and colour."""
         return self._status
 
     def show_view(self, view: RunView) -> None:
-        """Show what a stop brought."""
+        """Show the result of a stop."""
         look, text = "", ""
         if view.state == "unanswered":
             look, text = "error", (view.compact if self._compact else view.result or "")
@@ -273,7 +273,7 @@ class Result(QWidget):
 
 
 class Bar(QWidget):
-    """The surface below the app bar, with its line."""
+    """Surface below the app bar with a line at its bottom."""
 
     def __init__(self, theme: Theme, height: int) -> None:
         super().__init__()
@@ -290,13 +290,13 @@ class Bar(QWidget):
 
 
 def free_area(bar: Bar, left: int, beside: Iterable[QWidget]) -> QRect:
-    """Return the area of the bar from ``left`` to the first of these widgets, above the bar's line."""
+    """Return the area of the bar from ``left`` to the first of the widgets, above the bar's line."""
     right = min((each.x() for each in beside), default=bar.width()) - GAP
     return QRect(left, BANNER_EDGE, max(0, right - left), bar.height() - 1 - 2 * BANNER_EDGE)
 
 
 class RunBar(Bar):
-    """60 px: three large buttons, what happens now, what the last stop brought, and Stop."""
+    """Run bar, 60 px high: three large buttons, the current state, the result of the last stop, and Stop."""
 
     def __init__(self, theme: Theme) -> None:
         super().__init__(theme, theme.size("runBar"))
@@ -341,14 +341,14 @@ class RunBar(Bar):
         row.addWidget(self.stop)
 
     def use(self, actions: Actions) -> None:
-        """Let its buttons trigger these; the button for the speed offers full speed and slow motion."""
+        """Connect the buttons to the actions and fill the menu of speeds."""
         bind(self, actions)
         self._paces.addActions([actions[name] for name in PACES])
 
     def banner_area(self) -> QRect:
-        """Return where an alert may lie: beside what happens now, which is whole while somebody must act.
+        """Return the area for an alert: next to the state, which stays readable while a person must act.
 
-        The reminder of the last stop may be covered; buttons and the result of a stop may not.
+        It may cover the reminder of the last stop, but not buttons or the result of a stop.
         """
         left = self.sentence.x() + self._sentence_px() + GAP
         beside: list[QWidget] = [
@@ -359,11 +359,11 @@ class RunBar(Bar):
         return free_area(self, round(left), beside)
 
     def share(self, *, has_banner: bool) -> None:
-        """Leave room for an alert beside what happens now, or take all of it again."""
+        """Leave room for an alert next to the state, or give the room back."""
         self.sentence.keep_to(self._sentence_px() if has_banner else None)
 
     def _sentence_px(self) -> float:
-        """Return how wide what happens now is beside an alert, whatever its words are at the moment."""
+        # Independent of the current text, so that the alert doesn't move.
         if self.mark.state == "unanswered":
             return self.sentence.full_width()
         scaled = self._theme.scaled
@@ -374,10 +374,8 @@ class RunBar(Bar):
         self._fit()
 
     def _fit(self) -> None:
-        """Large text in a narrow window, or long words: Pause and Step are icons in every state, then Run.
-
-        A good result leaves room for what happens now, which may be a fault.
-        """
+        # Pause and Step become icons in every state, then Run. A successful result leaves room for the state,
+        # which may be an error.
         scaled, buttons = self._theme.scaled, (self.run, self.pause, self.step)
         words = sum(each.full_width() for each in buttons)
         needed = words + self.stop.sizeHint().width() + EDGES_PX + scaled(SENTENCE_PX) + scaled(RESULT_PX)
@@ -395,7 +393,7 @@ class RunBar(Bar):
         self.result.setMaximumWidth(round(left) if self.result.look in {"ok", "off"} else QWIDGETSIZE_MAX)
 
     def show_view(self, view: RunView) -> None:
-        """Show one of the six states. Restart has the place of Run; while paused that is Go on."""
+        """Show one of the six states. Restart takes the place of Run, which is Resume while paused."""
         restarts = view.can_restart and not view.can_run
         self.run.set_word(_(view.run_word), "rotate-ccw" if view.run_word == RESTART else "play")
         self.run.set_filled(view.can_run or (restarts and view.edited))
@@ -410,13 +408,13 @@ class RunBar(Bar):
         self.confirm.set_word(view.confirm or "")
         paint.show_when(self.confirm, view.confirm is not None)
         self.stop.show_state(_(view.stop_word), ring=view.state == "stopping")
-        if view != self._fitted:  # called with every tick
+        if view != self._fitted:  # this method is called with every tick
             self._fitted = view
             self._fit()
 
 
 class ToolBar(Bar):
-    """40 px: the same states, small, at the right end."""
+    """Tool bar, 40 px high: shows the same states at its right end."""
 
     def __init__(self, theme: Theme) -> None:
         super().__init__(theme, theme.size("toolBar"))
@@ -453,7 +451,7 @@ class ToolBar(Bar):
         row.addWidget(self.stop)
 
     def banner_area(self) -> QRect:
-        """Return where an alert may lie: between the tools and the state, in a narrow bar over the state."""
+        """Return the area for an alert: between tools and state, in a narrow bar also over the state."""
         shown = [each for each in self._tools() if not each.isHidden()]
         left = max((each.geometry().right() + 1 for each in shown), default=0) + GAP
         buttons = (self.result, self.restart, self.pause, self.step, self.confirm, self.run, self.stop)
@@ -467,15 +465,15 @@ class ToolBar(Bar):
         return [tool for item in items if item is not None and (tool := item.widget()) is not None]
 
     def use(self, actions: Actions) -> None:
-        """Let its buttons trigger these."""
+        """Connect the buttons to the actions."""
         bind(self, actions)
 
     def add_tool(self, tool: QWidget, place: int = -1) -> None:
-        """Put a button at the left end, at that place among those there, else after them."""
+        """Insert a button at the left end, by default after the existing ones."""
         self.tools.insertWidget(place, tool)
 
     def show_view(self, view: RunView) -> None:
-        """Show one of the six states, small."""
+        """Show one of the six states in the small form."""
         self.result.show_view(view)
         spoken = bool(self.result.text) and view.state in {"proven", "unanswered"}
         self.mark.show_state(view.state)
@@ -493,7 +491,7 @@ class ToolBar(Bar):
 
 
 def bind(bar: RunBar | ToolBar, actions: Actions) -> None:
-    """Run, Restart, Pause, Step, Stop and the button that confirms: the same commands in both bars."""
+    """Connect the run buttons of either bar to the same commands."""
     actions.bind(bar.run, "run.run")
     actions.bind(bar.restart, "run.restart")
     actions.bind(bar.pause, "run.pause")

@@ -1,4 +1,4 @@
-"""The status bar: facts with their numbers; what is not known is not there."""
+"""Status bar: facts with their figures; unknown facts are omitted."""
 
 from __future__ import annotations
 
@@ -22,19 +22,18 @@ from app.ui.theme.theme import Theme
 from app.ui.widgets import Separator, StatusItem, paint
 from nep.i18n import _, ngettext
 
-Fact = tuple[str, str, str | None]  # icon, words, status
+Fact = tuple[str, str, str | None]  # icon, text, status
 NOTHING: Fact = ("", "", None)
 TICK_MS = 33
 FIGURE_SPACE = "\u2007"
 
 
 def _worst(found: Iterable[str]) -> tuple[str, str]:
-    """Icon and status of the worst of what was found."""
     return ("circle-x", "error") if "error" in found else ("triangle-alert", "warn")
 
 
 class StatusFacts:
-    """Reads the session and says it in a few words."""
+    """Formats the session's state as short texts with icons."""
 
     def __init__(self, session: Session, clock: Callable[[float], time.struct_time] = time.localtime) -> None:
         self._session = session
@@ -43,7 +42,7 @@ class StatusFacts:
         self._web_host = self._web_network = ""
 
     def alerts(self, *, for_developers: bool = False) -> Fact:
-        """How many alerts there are; nothing when there are none."""
+        """Return the number of alerts; nothing without alerts."""
         alerts = self._session.alerts.to_tell(for_developers=for_developers)
         if not alerts:
             return NOTHING
@@ -52,9 +51,9 @@ class StatusFacts:
         return icon, words.format(count=len(alerts)), status
 
     def health(self) -> Fact:
-        """Say how many alerts there are, how much Health has to look at, or that Pepper is well.
+        """Return the number of alerts or problems in Health, or that the robots are well.
 
-        A robot that has told nothing yet is only connected.
+        A robot that hasn't reported its state yet is only "connected".
         """
         alerts = self.alerts()
         if alerts != NOTHING:
@@ -62,7 +61,7 @@ class StatusFacts:
         known = self._session.fleet.links
         links = [
             link for link in known if link.state != "away"
-        ] or known  # Health shows one that has gone, too
+        ] or known  # Health also shows robots that have left
         if not links:
             coming = self._session.coming
             return "circle-dashed", connected_words((), coming) if coming else _("No robot"), "off"
@@ -89,7 +88,7 @@ class StatusFacts:
         return "circle-dashed", words.format(robot=name, count=count), "off"
 
     def saved(self) -> Fact:
-        """When the behaviour was saved, or that it is not saved yet, and whether it is kept all the same."""
+        """Return when the behaviour was saved, or that it has unsaved changes and if they are backed up."""
         document = self._session.document
         if document.dirty and document.journal_error is not None:
             return "circle-x", _("Not saved · no backup"), "error"
@@ -102,28 +101,28 @@ class StatusFacts:
         return "save", _("Saved {clock}").format(clock=f"{then.tm_hour}:{then.tm_min:02d}"), None
 
     def topics(self) -> Fact:
-        """How many topics are live."""
+        """Return the number of active topics."""
         live = sum(1 for topic in self._session.live.topics if topic.gone_s is None)
         return "", ngettext("{count} active topic", "{count} active topics", live).format(count=live), None
 
     def remote_access(self) -> Fact:
-        """Who can reach this master."""
+        """Return which computers can reach this master."""
         return access_words(self._session.remote_access)
 
     def remote_access_quietly(self) -> Fact:
-        """The same; without an icon while it is as it always is."""
+        """Return the same as `remote_access`, without an icon for the default setting."""
         icon, words, status = self.remote_access()
         return ("" if status is None else icon), words, status
 
     def web_pages(self) -> Fact:
-        """Say who can connect to the web server and how many pages do; nothing while it is off."""
+        """Return the web server's network and the number of connected pages; nothing while it is off."""
         web = self._session.web_pages
-        if web.host != self._web_host:  # asking for the computer's addresses takes a while
+        if web.host != self._web_host:  # resolving the computer's addresses is slow
             self._web_host, self._web_network = web.host, host_words(web)
         return web_status(web, self._web_network)
 
     def master(self) -> Fact:
-        """Whether a master is there, and where."""
+        """Return the state and address of the master."""
         master = self._session.master
         if master.kind == "connected":
             return "circle-check", _("Master {address}").format(address=master.address), "ok"
@@ -133,7 +132,7 @@ class StatusFacts:
         return "circle-dashed", _("No master"), "off"
 
     def traffic(self) -> Fact:
-        """Nodes, topics and messages per second."""
+        """Return the numbers of nodes and topics and the message rate."""
         graph = self._session.live.graph
         if graph is None:
             return NOTHING
@@ -148,7 +147,7 @@ class StatusFacts:
         return "", ", ".join(facts), None
 
     def lost(self) -> Fact:
-        """How many messages were lost lately; nothing when none were."""
+        """Return the number of messages lost in 30 s; nothing for 0."""
         lost = self._session.traffic.lost_30s
         if not lost:
             return NOTHING
@@ -156,7 +155,7 @@ class StatusFacts:
         return "triangle-alert", words.format(count=grouped(lost)), "warn"
 
     def recording(self) -> Fact:
-        """That something is recorded: how long, how much, and what was lost; nothing when nothing is."""
+        """Return length, size and losses of the current recording; nothing without one."""
         recordings = self._session.recordings
         state = recordings.client.state
         if not recordings.is_recording:
@@ -173,7 +172,7 @@ class StatusFacts:
         return ("triangle-alert", words, "warn") if state.unkept else ("circle-dot", words, "recording")
 
     def armed(self) -> Fact:
-        """That something may be sent by hand, for how long still, and what is sent now; nothing while not."""
+        """Return the remaining arming time and the topics being sent; nothing while disarmed."""
         acting = self._session.acting
         if not acting.arming.is_on:
             return NOTHING
@@ -196,14 +195,14 @@ class StatusFacts:
         return "triangle-alert", words, "warn"
 
     def ring(self) -> Fact:
-        """How much of the last seconds could be kept; nothing without a flight recorder."""
+        """Return the seconds available in the flight recorder; nothing while it is off."""
         seconds = self._session.recordings.client.state.ring_s
         if seconds is None:
             return NOTHING
         return "history", _("last {count} s available").format(count=round(seconds)), None
 
     def replayed(self) -> tuple[Fact, ...]:
-        """Which recording shows, from when to when, what is in it, and what was lost while it was made."""
+        """Return name, time range, content and losses of the recording that is shown."""
         replay = self._session.replay
         if replay is None or replay.opened is None:
             return ()
@@ -226,11 +225,11 @@ class StatusFacts:
         )
 
     def live_goes_on(self) -> Fact:
-        """That a recording does not hide from robots, Stop and alarms what happens now."""
+        """Return the note that robots, Stop and alarms still use the live network."""
         return "radio-tower", _("The live network keeps running"), None
 
     def shown(self) -> Fact:
-        """How many messages of the topics that are looked at were shown; nothing when all were."""
+        """Return the number of shown messages of watched topics; nothing if all were shown."""
         traffic = self._session.traffic
         if traffic.shown_30s >= traffic.sent_30s:
             return NOTHING
@@ -238,20 +237,20 @@ class StatusFacts:
         return "", words.format(shown=grouped(traffic.shown_30s), sent=grouped(traffic.sent_30s)), None
 
     def window(self) -> Fact:
-        """How long the last refresh of the window took."""
-        spent = f"{round(self.window_ms):>2}".replace(" ", FIGURE_SPACE)  # as wide for 9 as for 10
+        """Return the duration of the last refresh of the window."""
+        spent = f"{round(self.window_ms):>2}".replace(" ", FIGURE_SPACE)  # equal width for 9 and 10
         return "", _("Window {spent} ms of {most} ms").format(spent=spent, most=TICK_MS), None
 
 
 class StatusBar(QWidget):
-    """26 px: facts at the left and at the right, divided by lines. A press on some runs a command."""
+    """Status bar, 26 px high: facts at the left and right; clicking some runs a command."""
 
     pressed = Signal(str)
 
     def __init__(self, theme: Theme) -> None:
         super().__init__()
         self._theme = theme
-        self.setObjectName("statusBar")  # sheets at the edge of the window end above it
+        self.setObjectName("statusBar")  # sheets end above the widget with this name
         self.setMinimumHeight(theme.size("statusBar"))
         self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Fixed)
         self.setAccessibleName(_("Status"))
@@ -259,7 +258,7 @@ class StatusBar(QWidget):
         self._row.setContentsMargins(16, 0, 16, 0)
         self._row.setSpacing(0)
         self.commands: Mapping[str, str] = {}
-        """The command that a press on these words runs."""
+        """Commands of facts, by their text."""
         self._left: list[tuple[StatusItem, Separator]] = []
         self._right: list[tuple[StatusItem, Separator]] = []
         self._row.addStretch(1)
@@ -279,7 +278,7 @@ class StatusBar(QWidget):
             items.append((item, line))
 
     def show_facts(self, left: Sequence[Fact], right: Sequence[Fact]) -> None:
-        """Show these facts; those without words are left out."""
+        """Show the facts that have a text."""
         for facts, items, at_right in ((left, self._left, False), (right, self._right, True)):
             shown = [fact for fact in facts if fact[1]]
             self._grow(items, len(shown), right=at_right)
@@ -294,11 +293,11 @@ class StatusBar(QWidget):
                 paint.show_when(line, bool(fact[1]) and (at_right or index < len(shown) - 1))
 
     def items(self) -> list[StatusItem]:
-        """Return the items that show a fact now, from left to right."""
+        """Return the items that show a fact, from left to right."""
         return [item for item, _line in (*self._left, *self._right) if item.text]
 
     def words(self) -> list[str]:
-        """All facts shown now, from left to right."""
+        """Return the texts of all facts, from left to right."""
         return [item.text for item in self.items()]
 
     def paintEvent(self, _event: QPaintEvent) -> None:

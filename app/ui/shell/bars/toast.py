@@ -1,4 +1,4 @@
-"""What the person just did, said for six seconds at the bottom right; errors are never toasts."""
+"""Toast: confirms a person's action for six seconds at the bottom right; never used for errors."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ CHECK_AGAIN_MS = 1000
 
 
 class Toast(FloatingCard):
-    """One sentence and perhaps one button; it stays while the mouse or the focus is on it."""
+    """One sentence with an optional button; stays while hovered or focused."""
 
     def __init__(self, theme: Theme, window: QWidget) -> None:
         super().__init__(window)
@@ -47,7 +47,7 @@ class Toast(FloatingCard):
 
     @property
     def text(self) -> str:
-        """The sentence shown last."""
+        """Sentence shown last."""
         return self._words.text()
 
     def say(
@@ -58,7 +58,7 @@ class Toast(FloatingCard):
         *,
         until: Callable[[], bool] | None = None,
     ) -> None:
-        """Show a sentence; ``button`` undoes or follows what it says. It goes once ``until`` is so."""
+        """Show a sentence until ``until`` returns True; ``button`` undoes or follows up the action."""
         self._until = until
         self._words.setText(words)
         self.setAccessibleName(words)
@@ -72,13 +72,13 @@ class Toast(FloatingCard):
         self._timer.start(self._theme.duration("toastShown"))
 
     def refresh(self) -> None:
-        """Go when what it says is not so any more; called with every tick."""
+        """Hide once the sentence has become false; called with every tick."""
         if self._until is not None and self._until():
             self._until = None
             self.hide()
 
     def place(self) -> None:
-        """Go to the bottom right of the window, or beside a sheet that lies there if there is room."""
+        """Move to the bottom right of the window, or left of a sheet there if it fits."""
         window = self.parentWidget()
         if window is not None:
             self._fit(window.width() - 2 * MARGIN)
@@ -90,7 +90,6 @@ class Toast(FloatingCard):
             self.move(max(MARGIN, left), window.height() - self.height() - ABOVE_STATUS_BAR)
 
     def _fit(self, room: int) -> None:
-        """One line where there is room for it, else as many as it takes."""
         aside = self.sizeHint().width() - self._words.sizeHint().width()
         line = paint.width_of(self._words.font(), self._words.text()) + 2
         wide = min(room, round(line) + aside)
