@@ -1,4 +1,4 @@
-"""The table of commands, and what they do with a window, which they know as a `Shell`.
+"""Command table and the handlers that implement the commands on a `Shell`.
 
-`Commands` is the way in; menus and the palette's entries are made from the table.
+`Commands` is the entry point; menus and palette entries are built from the table.
 """

@@ -1,4 +1,4 @@
-"""What the commands about acting by hand do: publish a message on a topic, call a service."""
+"""Commands for manual operation: publish a message, call a service."""
 
 from __future__ import annotations
 
@@ -11,27 +11,27 @@ from nep.i18n import _
 
 @runtime_checkable
 class SupportsActing(Protocol):
-    """A panel from which something is sent."""
+    """A panel that sends messages or calls."""
 
     def begin(self, name: str) -> None:
-        """Begin with this topic or service; with "" choose nothing yet."""
+        """Select a topic or service; "" selects none."""
 
 
 class ActingCommands:
-    """Opens the panels where a person acts. Nothing is sent by that: they are armed there."""
+    """Open the panels for manual sending. Nothing is sent until a person arms them."""
 
     def __init__(self, shell: Shell) -> None:
         self._shell = shell
 
     def publish(self, key: str = "") -> bool:
-        """A message for this topic, or for one that is chosen then."""
+        """Open a new message for a topic, or without one for ""."""
         if split_key(key)[0]:
             self._shell.say(_("Only topics of Studio's own network can be published to"))
             return False
         return self._begin("publish", key)
 
     def call(self, service: str) -> bool:
-        """Show a service, to be called; with "" all of them."""
+        """Show a service to be called, or all services for ""."""
         return self._begin("services", service)
 
     def _begin(self, panel: str, name: str) -> bool:

@@ -1,4 +1,4 @@
-"""What the commands about the open behaviours do: tabs, blocks, run and step; and how tabs come back."""
+"""Commands for open behaviours: tabs, blocks, run and step, and restoring tabs at start."""
 
 from __future__ import annotations
 
@@ -34,20 +34,20 @@ Answer = tuple[str, Callable[[], object]]
 
 
 class OfferChoice(Protocol):
-    """Offers something once, with two answers: their words, and what they do."""
+    """Shows an offer with two answers, each a text and a callback."""
 
     def __call__(self, title: str, detail: str, yes: Answer, no: Answer) -> None: ...
 
 
 @runtime_checkable
 class SupportsUndo(Protocol):
-    """A panel whose edits can be undone."""
+    """A panel with an undo stack."""
 
     def undo(self) -> None:
-        """Take back the last edit."""
+        """Undo the last edit."""
 
     def redo(self) -> None:
-        """Do it again."""
+        """Redo the last undone edit."""
 
 
 @runtime_checkable
@@ -55,12 +55,12 @@ class SupportsBlockEdits(Protocol):
     """A panel whose blocks can be copied and pasted."""
 
     def edit_blocks(self, what: str) -> None:
-        """Do "copy", "cut", "paste" or "duplicate", unless the page has the keys itself."""
+        """Perform "copy", "cut", "paste" or "duplicate", unless the page handles the keys itself."""
 
 
 @runtime_checkable
 class SupportsShowBlock(Protocol):
-    """A panel that can bring a block into view."""
+    """A panel that can scroll to a block."""
 
     def show_block(self, block: str) -> None:
         """Scroll to a block by its id."""
@@ -68,69 +68,77 @@ class SupportsShowBlock(Protocol):
 
 @runtime_checkable
 class SupportsFindBlocks(Protocol):
-    """A panel that finds blocks by words."""
+    """A panel that can search for blocks."""
 
     def find_blocks(self, *, to_add: bool) -> None:
-        """Ask for the words: of blocks in the behaviour, or of blocks to add."""
+        """Open the search in the behaviour's blocks, or in the toolbox with ``to_add``."""
 
 
 @runtime_checkable
 class SupportsPointAt(Protocol):
-    """A panel that can show where a block is that comes next."""
+    """A panel that can highlight a block in the toolbox."""
 
     def point_at(self, block: str) -> None:
-        """Put a ring round the block of this type in the toolbox; "" for none."""
+        """Highlight the block of this type in the toolbox; "" removes the highlight."""
 
 
 @dataclass(frozen=True, slots=True)
 class TabPlace:
-    """A tab, by its document's key, and the place it is to have, from 0."""
+    """A new position, from 0, for the tab with a document's key."""
 
     key: str
     place: int
 
     @classmethod
     def parse(cls, text: str) -> TabPlace:
-        """Of ``KEY:2``; ValueError for a place that is no number."""
+        """Parse ``KEY:2``.
+
+        Raises:
+            ValueError: The position isn't a number.
+        """
         key, _colon, place = text.rpartition(":")
         return cls(key, int(place))
 
 
 def read_stack(text: str) -> Stack:
-    """What the editor's page says is to be tried, as JSON; ValueError when it is none."""
+    """Parse the stack that the editor's page sends as JSON.
+
+    Raises:
+        ValueError: The text isn't a valid stack.
+    """
     return Stack.from_json(deep_json.loads(text))
 
 
 @dataclass(frozen=True, slots=True)
 class TabName:
-    """A tab, by its document's key, and the name that it is to have."""
+    """A new name for the tab with a document's key."""
 
     key: str
     name: str
 
     @classmethod
     def parse(cls, text: str) -> TabName:
-        """Of ``KEY:NAME``."""
+        """Parse ``KEY:NAME``."""
         key, _colon, name = text.partition(":")
         return cls(key, name)
 
 
 @runtime_checkable
 class SupportsRename(Protocol):
-    """A panel in which a behaviour's name can be edited."""
+    """A panel in which the name of a behaviour can be edited."""
 
     def rename_tab(self, key: str) -> None:
-        """Let a person edit the name of the tab of that key."""
+        """Start editing the name of the tab with this key."""
 
 
 def bring_into_view(shell: Shell) -> None:
-    """The blocks, in front of whatever shares their place."""
+    """Show the Behaviour layout with the blocks in front of other tabs."""
     shell.show_layout("behaviour")
     shell.open_panel("behaviour")
 
 
 class BehaviourCommands:
-    """What a person does with behaviours and their tabs."""
+    """Commands for behaviours and their tabs."""
 
     def __init__(self, shell: Shell, session: Session, files: DocumentController, asks: FileDialogs) -> None:
         self._shell, self._session, self._files = shell, session, files
@@ -138,10 +146,8 @@ class BehaviourCommands:
         self.pictures = ProgramPictures(shell, session, asks)
         self.printing = Printing(shell, session, asks)
 
-    # -- run --------------------------------------------------------------------------------------
-
     def run_or_go_on(self) -> None:
-        """Run with the editor's newest edit, restart, or go on where the program is paused."""
+        """Resume a paused program; otherwise run or restart with the editor's newest edit."""
         runs = self._session.runs
         if runs.view().state == "paused":
             runs.go_on()
@@ -149,7 +155,7 @@ class BehaviourCommands:
             self._files.with_newest(partial(self._instead_of_what_runs, runs.run))
 
     def _instead_of_what_runs(self, begin: Callable[[], object]) -> None:
-        """Begin something, and say which other behaviour was stopped for it."""
+        # Shows a toast with the name of the behaviour that was stopped.
         session = self._session
         runs, shown, running = session.runs, session.document, session.runs.document
         was_active = runs.active
@@ -162,9 +168,9 @@ class BehaviourCommands:
             )
 
     def run_named(self, name: str) -> str:
-        """Run the behaviour of this name, open or opened lately; why it can't be run, "" when it begins.
+        """Run the behaviour of this name, open or recent; return why it can't be run, or "".
 
-        What runs is not broken off.
+        A running program isn't interrupted.
         """
         session = self._session
         if session.runs.active:
@@ -186,53 +192,51 @@ class BehaviourCommands:
         return ""
 
     def try_stack(self, stack: Stack) -> None:
-        """Run one stack alone, with the editor's newest edit."""
+        """Run a single stack with the editor's newest edit."""
         try_it = partial(self._session.runs.try_stack, stack)
         self._files.with_newest(partial(self._instead_of_what_runs, try_it))
 
     def restart(self) -> None:
-        """Run anew what runs, with the editor's newest edit."""
+        """Restart the running behaviour with the editor's newest edit."""
         self._files.with_newest(self._session.runs.restart)
 
     def run_step(self) -> None:
-        """Run one block, with the editor's newest edit."""
+        """Run one block with the editor's newest edit."""
         self._files.with_newest(self._session.runs.step)
 
     def demo(self) -> None:
-        """Begin with the virtual Pepper and the first example."""
+        """Start the virtual Pepper and open the first example."""
         self._session.launcher.start_virtual_robot()
         self._shell.show_layout("behaviour")
         if self._shell.examples:
             self._files.example(self._shell.examples[0].path)
 
-    # -- tabs -------------------------------------------------------------------------------------
-
     def next_tab(self, step: int) -> None:
-        """Show the tab that many places further, round the ends."""
+        """Show the tab that is ``step`` positions further, wrapping around."""
         self._files.show(self._session.documents.neighbour(step))
         bring_into_view(self._shell)
 
     def close(self) -> None:
-        """Close the tab that shows."""
+        """Close the current tab."""
         self._files.close(self._session.document)
 
     def show_tab(self, key: str) -> bool:
-        """Show the tab of that key; this and those below: False when there is none."""
+        """Show the tab with a key. Like the methods below, return False if it doesn't exist."""
         return self._with(key, self._files.show)
 
     def close_tab(self, key: str) -> bool:
-        """Close it."""
+        """Close the tab."""
         return self._with(key, self._files.close)
 
     def close_other_tabs(self, key: str) -> bool:
-        """Close all others."""
+        """Close all other tabs."""
         documents = self._session.documents
         return self._with(
             key, lambda document: self._files.close(*(other for other in documents if other is not document))
         )
 
     def save_tab_as(self, key: str) -> bool:
-        """Show it, and ask where to save it."""
+        """Show the tab and ask where to save it."""
 
         def save_as(document: Document) -> None:
             self._files.show(document)
@@ -241,22 +245,22 @@ class BehaviourCommands:
         return self._with(key, save_as)
 
     def rename_current(self) -> None:
-        """Let a person edit the name of the tab that shows."""
+        """Start editing the name of the current tab."""
         bring_into_view(self._shell)
         editor = self._shell.editor()
         if isinstance(editor, SupportsRename):
             editor.rename_tab(self._session.document.key)
 
     def rename_tab(self, to: TabName) -> bool:
-        """Give it another name."""
+        """Rename the behaviour."""
         return self._with(to.key, lambda document: self._files.rename(document, to.name))
 
     def duplicate_tab(self, key: str) -> bool:
-        """Open a copy of it as a new behaviour."""
+        """Open a copy as a new behaviour."""
         return self._with(key, self._files.duplicate)
 
     def save_tab(self, key: str) -> bool:
-        """Show it, and save it."""
+        """Show the tab and save it."""
 
         def save(document: Document) -> None:
             self._files.show(document)
@@ -265,7 +269,7 @@ class BehaviourCommands:
         return self._with(key, save)
 
     def show_folder(self, key: str) -> bool:
-        """Show the folder of its file, as the system shows folders."""
+        """Open the folder of its file in the file manager."""
 
         def show(document: Document) -> None:
             if document.path is None:
@@ -277,7 +281,7 @@ class BehaviourCommands:
         return self._with(key, show)
 
     def move_tab(self, to: TabPlace) -> bool:
-        """Put it to another place."""
+        """Move the tab to another position."""
         return self._with(to.key, lambda document: self._files.move(document, to.place))
 
     def _with(self, key: str, act: Callable[[Document], object]) -> bool:
@@ -286,35 +290,33 @@ class BehaviourCommands:
             act(document)
         return document is not None
 
-    # -- blocks -----------------------------------------------------------------------------------
-
     def undo(self) -> None:
-        """Take back the last edit of the blocks."""
+        """Undo the last edit of the blocks."""
         editor = self._shell.editor()
         if isinstance(editor, SupportsUndo):
             editor.undo()
 
     def redo(self) -> None:
-        """Do it again."""
+        """Redo the last undone edit of the blocks."""
         editor = self._shell.editor()
         if isinstance(editor, SupportsUndo):
             editor.redo()
 
     def edit_blocks(self, what: str) -> None:
-        """Copy, cut, paste or duplicate blocks, wherever in the Behaviour layout the keys are."""
+        """Perform "copy", "cut", "paste" or "duplicate" on blocks, wherever the focus is in the layout."""
         editor = self._shell.editor()
         if self._shell.showing == "behaviour" and isinstance(editor, SupportsBlockEdits):
             editor.edit_blocks(what)
 
     def show_block(self, block: str) -> None:
-        """Scroll to a block by its id."""
+        """Show the Behaviour layout and scroll to a block by its id."""
         self._shell.show_layout("behaviour")
         editor = self._shell.editor()
         if isinstance(editor, SupportsShowBlock):
             editor.show_block(block)
 
     def point_at(self, block: str) -> bool:
-        """Show where the block of this type is that comes next; "-" ends that."""
+        """Highlight the block of this type in the toolbox; "-" removes the highlight."""
         shows = block != "-"
         if shows:
             bring_into_view(self._shell)
@@ -324,16 +326,14 @@ class BehaviourCommands:
         return isinstance(editor, SupportsPointAt)
 
     def find_blocks(self, *, to_add: bool) -> None:
-        """Ask for the words of blocks in the behaviour, or of blocks to add."""
+        """Open the search in the behaviour's blocks, or in the toolbox with ``to_add``."""
         self._shell.show_layout("behaviour")
         editor = self._shell.editor()
         if isinstance(editor, SupportsFindBlocks):
             editor.find_blocks(to_add=to_add)
 
-    # -- files of before --------------------------------------------------------------------------
-
     def earlier_versions(self) -> None:
-        """Show what the file said before, once the newest edit is in it."""
+        """Show earlier versions of the file, after the newest edit was written to it."""
         self._files.with_newest(self._show_versions)
 
     def _show_versions(self) -> None:
@@ -346,7 +346,7 @@ class BehaviourCommands:
         self._versions.show_for(document.name, document.path, document.workspace, title=title)
 
     def forget_recent(self) -> None:
-        """Clear the list of recent files; it can be taken back."""
+        """Clear the list of recent files, with undo."""
         before: list[RecentFile] = self._session.settings.recent_known
         words = _("Recent files cleared")
         if not self._set_recent([]):
@@ -364,7 +364,7 @@ class BehaviourCommands:
         return kept
 
     def come_back(self, left: Sequence[Unsaved], offer: OfferChoice) -> None:
-        """Open the tabs of the last start; offer what a Studio that died left behind."""
+        """Restore the tabs of the last session and offer to recover changes left by a crash."""
         rest = self._session.tabs.come_back(left)
         if not rest:
             return
@@ -382,7 +382,7 @@ class BehaviourCommands:
 
 
 def unsaved_words(left: Sequence[Unsaved]) -> str:
-    """Which behaviours were not saved."""
+    """Return a sentence that names the unsaved behaviours."""
     if len(left) == 1:
         return _("“{name}” wasn't saved before Studio closed.").format(name=left[0].name)
     if len(left) == 2:

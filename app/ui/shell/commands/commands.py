@@ -1,4 +1,4 @@
-"""The commands of one window: everything that the table needs, and the way in by a command's id."""
+"""Commands of one window: the handlers of the table, and running a command by its id."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ _ABOUT = {command.id: command for command in ARGUMENT_COMMANDS}
 
 
 class Commands:
-    """Gives a window its menus and keys, and whoever names a command what that does."""
+    """Creates menus and keys of a window and runs commands by id."""
 
     def __init__(self, shell: Shell, session: Session, asks: FileDialogs) -> None:
         keys = Shortcuts(session.settings, shell.complain, COMMANDS)
@@ -71,10 +71,12 @@ class Commands:
         self.stop_keys = StopKeys(shell.surface, lambda: keys.of(STOP), self.actions[STOP].trigger)
 
     def run(self, name: str) -> bool:
-        """Do a command by its id, or by ``id:argument``; False when it can't be done now.
+        """Run a command by its id or ``id:argument``; return False if it is unavailable.
 
-        ``panel:topics`` shows a panel, ``inspect:/faces`` a topic, ``block:ID`` a block. Raises
-        UnknownCommandError for an id that is not in the table (`app.ui.shell.commands.table`).
+        ``panel:topics`` shows a panel, ``inspect:/faces`` a topic, ``block:ID`` a block.
+
+        Raises:
+            UnknownCommandError: The id isn't in `app.ui.shell.commands.table`.
         """
         id, colon, argument = name.partition(":")
         if not colon:

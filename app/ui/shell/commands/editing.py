@@ -1,4 +1,4 @@
-"""Cut, copy, paste and select all of the Edit menu: in the field that has the keyboard, else with blocks."""
+"""Cut, copy, paste and select all of the Edit menu, applied to the focused field or to blocks."""
 
 from __future__ import annotations
 
@@ -18,16 +18,16 @@ CHANGES = frozenset({"cut", "paste"})
 
 @runtime_checkable
 class SupportsEditMenu(Protocol):
-    """A panel with blocks, and with fields that are no widgets of Qt."""
+    """A panel with blocks and with fields that aren't Qt widgets."""
 
     def edit_from_menu(self, what: Edit) -> None:
-        """Do it in the field of the page that has the keyboard, else with the chosen blocks."""
+        """Apply the edit to the focused field of the page, or to the selected blocks."""
 
 
 class EditCommands:
-    """Does what the keys would do, for who looks for it in the menu.
+    """Perform in the menu what the keys do.
 
-    Ctrl+C and the others stay with whoever has the keyboard: fields, the page of the blocks, the Inspector.
+    The keys themselves, such as Ctrl+C, are handled by the focused field, page or panel.
     """
 
     def __init__(self, shell: Shell) -> None:
@@ -38,12 +38,12 @@ class EditCommands:
             application.focusChanged.connect(self._changed)
 
     def _changed(self, _old: QWidget | None, now: QWidget | None) -> None:
-        """Remember who has the keyboard when the menu bar takes it, as with Alt."""
+        # The menu bar takes the focus when opened by Alt: remember the previous widget.
         if now is not None and not isinstance(now, (QMenu, QMenuBar)):
             self._had = now
 
     def do(self, what: Edit) -> None:
-        """Cut, copy, paste or select all."""
+        """Perform cut, copy, paste or select all."""
         field = self._field()
         if field is not None:
             getattr(field, what)()
@@ -53,7 +53,7 @@ class EditCommands:
             editor.edit_from_menu(what)
 
     def why_not(self, what: Edit) -> str:
-        """Why it can't be done now; "" when it can."""
+        """Return why the edit is unavailable, or ""."""
         field = self._field()
         if field is not None:
             return _("This text can't be changed") if what in CHANGES and field.isReadOnly() else ""

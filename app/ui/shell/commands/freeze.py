@@ -1,4 +1,4 @@
-"""Freezing what shows: every open panel that holds its message or its picture by a button of its own."""
+"""Freeze all open panels that have a freeze button."""
 
 from __future__ import annotations
 
@@ -11,26 +11,26 @@ from app.ui.shell.docking.workbench import Workbench
 
 @runtime_checkable
 class SupportsFreeze(Protocol):
-    """A panel whose button ``freeze`` holds what it shows; the button hides when there is nothing."""
+    """A panel whose button ``freeze`` holds its content; the button is hidden without live content."""
 
     freeze: QAbstractButton
 
 
 def freezable(bench: Workbench | None) -> list[QAbstractButton]:
-    """The buttons of the open panels that show something live now."""
+    """Return the freeze buttons of open panels that show live content."""
     panels = [bench.docks[name].panel for name in bench.open_names()] if bench is not None else []
     buttons = [panel.freeze for panel in panels if isinstance(panel, SupportsFreeze)]
     return [button for button in buttons if not button.isHidden()]
 
 
 def all_frozen(bench: Workbench | None) -> bool:
-    """Whether there is something live, and all of it is held."""
+    """Return True if there is live content and all of it is frozen."""
     found = freezable(bench)
     return bool(found) and all(button.isChecked() for button in found)
 
 
 def freeze_or_go_on(bench: Workbench | None) -> None:
-    """Hold all of them; when all are held, let them go on."""
+    """Freeze all panels, or unfreeze them if all are frozen."""
     on = not all_frozen(bench)
     for button in freezable(bench):
         button.setChecked(on)

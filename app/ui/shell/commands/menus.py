@@ -1,4 +1,4 @@
-"""Menus whose entries change: recent files, panels, layouts; and what is grey because it can't be done."""
+"""Dynamic menus: recent files, panels, layouts; and disabling of unavailable entries."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ ARRANGING = ("layout.keep", "layout.rename", "layout.delete", "layout.export", "
 
 
 class MenuLists:
-    """Fills them anew at each opening."""
+    """Rebuilds the lists when their menus open."""
 
     def __init__(
         self,
@@ -34,7 +34,6 @@ class MenuLists:
         view: ViewCommands,
         open_file: Callable[[Path], object],
     ) -> None:
-        """Put the three lists into the File and the View menu."""
         self._shell, self._session, self.actions = shell, session, actions
         self._view, self._open_file = view, open_file
         theme, surface = shell.theme, shell.surface
@@ -52,14 +51,14 @@ class MenuLists:
         self._arranging.aboutToHide.connect(actions.enable_all)
 
     def drop_layouts(self, anchor: QWidget) -> None:
-        """Open below a button which layouts there are, and what can be done with this one."""
+        """Open a menu of layouts and layout commands below a button."""
         self.actions.disable()
         self._list_layouts(self._arranging)
         self._arranging.addAction(self.actions["layout.reset"])
         drop_below(self._arranging, anchor)
 
     def drop_panels(self, anchor: QWidget) -> None:
-        """Open below a button which panels there are."""
+        """Open a menu of panels below a button."""
         self._list_panels()
         drop_below(self._panels, anchor)
 

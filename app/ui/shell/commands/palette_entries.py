@@ -1,4 +1,4 @@
-"""What the command palette offers: commands, panels, topics, robots and recent files, with their keys."""
+"""Entries of the command palette: commands, panels, topics, robots and recent files, with their keys."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ TOPIC_ICONS = {"json": "braces", "string": "type", "bytes": "binary", "image": "
 
 
 class PaletteEntries:
-    """Makes the entries for a window; those of topics only when the topics changed."""
+    """Builds the palette entries of a window; those of topics are cached until the topics change."""
 
     def __init__(
         self,
@@ -31,7 +31,7 @@ class PaletteEntries:
         why_not: Callable[[str], str],
         shortcuts: Shortcuts,
     ) -> None:
-        """``why_not`` says why a command can't be done now, "" when it can."""
+        # why_not returns why a command is unavailable, or "".
         self._shell, self._session, self._shortcuts = shell, session, shortcuts
         self._shown = [command for command in commands if command.in_palette]
         self._why_not = why_not
@@ -39,7 +39,7 @@ class PaletteEntries:
         self._topics_seen = (-1, -1)
 
     def all(self) -> list[Entry]:
-        """Everything, in the order in which equals stand in the palette."""
+        """Return all entries; the order breaks ties between equally good matches."""
         return [
             *self._commands(),
             *self._panels(),

@@ -1,4 +1,4 @@
-"""The blocks on paper: by a printer that this computer knows, or as a PDF."""
+"""Printing of blocks, on a printer or to PDF."""
 
 from __future__ import annotations
 
@@ -22,19 +22,19 @@ if TYPE_CHECKING:
     from PySide6.QtPrintSupport import QPrinter
 
 MOST_DPI = 300
-"""Finer is not seen in blocks, and a page of 1200 dpi takes half a gigabyte."""
+"""Limit of the resolution: more isn't visible in blocks, and a page at 1200 dpi takes 500 MB."""
 
 
 @runtime_checkable
 class SupportsPrinting(Protocol):
-    """A panel whose contents can be printed."""
+    """A panel with printable content."""
 
     def pdf(self, title: str, date: str, layout: QPageLayout, done: Callable[[bytes], None]) -> None:
-        """Make a PDF on such paper; ``done`` gets b"" when there is nothing to print."""
+        """Render a PDF with this page layout; ``done`` gets b"" if there is nothing to print."""
 
 
 class Printing:
-    """Prints the blocks that are open."""
+    """Prints the blocks of the open behaviour."""
 
     def __init__(
         self,
@@ -43,31 +43,31 @@ class Printing:
         asks: FileDialogs,
         printers: Callable[[], list[str]] | None = None,
     ) -> None:
-        """``printers`` names those that this computer knows."""
+        # printers returns the names of the computer's printers.
         self._shell, self._session, self._asks = shell, session, asks
         self._printers = printers if printers is not None else known_printers
 
     def ask(self) -> None:
-        """Ask on which printer and how; where there is none, where to save a PDF."""
+        """Open the print dialog, or without printers the dialog to save a PDF."""
         if not self._printers():
             self._shell.say(_("No printer is set up on this computer. Save the pages as PDF instead."))
             self.ask_pdf()
             return
-        from PySide6.QtPrintSupport import QPrintDialog, QPrinter  # noqa: PLC0415 - only who prints needs it
+        from PySide6.QtPrintSupport import QPrintDialog, QPrinter  # noqa: PLC0415 - needed for printing only
 
         printer = QPrinter(QPrinter.PrinterMode.HighResolution)
         printer.setDocName(self._session.document.name)
         printer.setPageLayout(usual_paper())
         dialog = QPrintDialog(printer, self._shell.surface.window())
         dialog.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
-        dialog.setWindowModality(Qt.WindowModality.NonModal)  # Stop is free meanwhile
+        dialog.setWindowModality(Qt.WindowModality.NonModal)  # so that Stop remains accessible
         dialog.finished.connect(
             lambda result: self.print(printer) if result == QDialog.DialogCode.Accepted else None
         )
         dialog.show()
 
     def print(self, printer: QPrinter) -> None:
-        """Print on this one, as it is set."""
+        """Print with the settings of the printer object."""
 
         def paint(data: bytes) -> None:
             if not data:
@@ -80,7 +80,7 @@ class Printing:
         self._make(printer.pageLayout(), paint)
 
     def ask_pdf(self) -> None:
-        """Ask where, then save a PDF there."""
+        """Ask for a file and save a PDF."""
         self._asks.save_as(
             _("Save blocks as PDF"),
             beside(self._session.document),
@@ -89,7 +89,7 @@ class Printing:
         )
 
     def save(self, path: Path) -> None:
-        """Write a PDF there; a name with another ending gets the right one."""
+        """Save a PDF, adding the ending ".pdf" if it is missing."""
         whole = path if path.suffix.lower() == ".pdf" else path.with_name(f"{path.name}.pdf")
 
         def write(data: bytes) -> None:
@@ -117,24 +117,24 @@ class Printing:
 
 
 def known_printers() -> list[str]:
-    """The names of the printers of this computer; none where Qt has no part that prints."""
+    """Return the names of the computer's printers; empty if Qt's print support is missing."""
     try:
-        from PySide6.QtPrintSupport import QPrinterInfo  # noqa: PLC0415 - only who prints needs it
+        from PySide6.QtPrintSupport import QPrinterInfo  # noqa: PLC0415 - needed for printing only
     except ImportError:
         return []
     return list(QPrinterInfo.availablePrinterNames())
 
 
 def usual_paper() -> QPageLayout:
-    """A4, and Letter where people use that."""
+    """Return A4, or Letter where US units are the system's default."""
     inches = QLocale.system().measurementSystem() == QLocale.MeasurementSystem.ImperialUSSystem
     size = QPageSize.PageSizeId.Letter if inches else QPageSize.PageSizeId.A4
     return QPageLayout(QPageSize(size), QPageLayout.Orientation.Portrait, QMarginsF())
 
 
 def paint_pdf(data: bytes, printer: QPrinter) -> bool:
-    """Paint the pages that the printer was asked for; whether it took them."""
-    from PySide6.QtPdf import QPdfDocument  # noqa: PLC0415 - only who prints needs it
+    """Paint the requested page range; return whether the printer accepted it."""
+    from PySide6.QtPdf import QPdfDocument  # noqa: PLC0415 - needed for printing only
 
     buffer = QBuffer()
     buffer.setData(QByteArray(data))

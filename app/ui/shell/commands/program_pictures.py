@@ -1,4 +1,4 @@
-"""Pictures of the blocks: saved as PNG or SVG, or copied."""
+"""Images of blocks: save as PNG or SVG, or copy to the clipboard."""
 
 from __future__ import annotations
 
@@ -29,7 +29,10 @@ KINDS = (
 
 
 def beside(document: Document) -> Path:
-    """The name of what is made of a behaviour, beside its file unless Studio keeps that one."""
+    """Return a suggested path for a file made from a behaviour, without its ending.
+
+    The folder is that of the behaviour's file, or the home folder for files that Studio manages.
+    """
     own = document.path
     folder = own.parent if own is not None and own.parent != kept_folder() else Path.home()
     return folder / document.name
@@ -37,20 +40,20 @@ def beside(document: Document) -> Path:
 
 @runtime_checkable
 class SupportsPicture(Protocol):
-    """A panel of which pictures can be made."""
+    """A panel that can render an image of its content."""
 
     def picture(self, kind: str, white: bool, done: Callable[[bytes], None]) -> None:
-        """Make a "png" or "svg", on white or on nothing; ``done`` gets b"" when there is none."""
+        """Render a "png" or "svg", on white or transparent; ``done`` gets b"" if there are no blocks."""
 
 
 class ProgramPictures:
-    """Makes pictures of the blocks that are open."""
+    """Creates images of the blocks of the open behaviour."""
 
     def __init__(self, shell: Shell, session: Session, asks: FileDialogs) -> None:
         self._shell, self._session, self._asks = shell, session, asks
 
     def ask(self) -> None:
-        """Ask where and as what, then save there."""
+        """Ask for a file and format, then save."""
         suggestion = beside(self._session.document)
 
         def take(path: Path, kind: FileKind) -> None:
@@ -59,7 +62,7 @@ class ProgramPictures:
         self._asks.save_as(_("Save blocks as image"), suggestion, KINDS, take)
 
     def save(self, path: Path, kind: str, white: bool) -> None:
-        """Write a "png" or "svg" there; a name with another ending gets the right one."""
+        """Save a "png" or "svg", adding the ending if it is missing."""
         whole = path if path.suffix.lower() == f".{kind}" else path.with_name(f"{path.name}.{kind}")
 
         def write(data: bytes) -> None:
@@ -76,7 +79,7 @@ class ProgramPictures:
         self._make(kind, white, write)
 
     def copy(self) -> None:
-        """Put a picture onto the computer's clipboard, for documents and slides."""
+        """Copy an image to the clipboard."""
 
         def put(data: bytes) -> None:
             image = QImage.fromData(data)

@@ -1,4 +1,4 @@
-"""What the commands about recordings do: begin and end one, keep the last seconds, choose what and where."""
+"""Commands for recording: start, stop, save the flight recorder, choose topics and folder."""
 
 from __future__ import annotations
 
@@ -23,14 +23,14 @@ else:
 
 @runtime_checkable
 class SupportsRecordings(Protocol):
-    """The panel of recordings."""
+    """The recordings panel."""
 
     def choose_file(self, path: Path) -> None:
-        """Show this one as the chosen one, as soon as it is listed."""
+        """Select this recording as soon as it is listed."""
 
 
 class RecordCommands:
-    """Recording as a person does it: by keys, menus, the tool bar and the sheet."""
+    """Commands for recording, used by keys, menus, the tool bar and the sheet."""
 
     def __init__(self, shell: Shell, session: Session, asks: FileDialogs) -> None:
         self._shell, self._session, self._asks = shell, session, asks
@@ -38,17 +38,15 @@ class RecordCommands:
         self._recordings.on_made = self._made
         self._sheet: record_sheet.RecordSheet | None = None
 
-    # ---- one recording
-
     def toggle(self) -> None:
-        """Begin with the last choice, or end what goes on."""
+        """Start a recording with the last settings, or stop the current one."""
         if self._recordings.is_recording:
             self._recordings.stop()
         else:
             self._begin()
 
     def press(self) -> None:
-        """The button in the tool bar: begin with the last choice, and show what is recorded."""
+        """Start a recording with the last settings if none is running, and open the sheet."""
         if not self._recordings.is_recording:
             self._begin()
         self.open_sheet()
@@ -64,7 +62,7 @@ class RecordCommands:
         return not why_not
 
     def record_topic(self, key: str) -> bool:
-        """Record this topic alone; what was chosen stays for the next time."""
+        """Record only this topic, without changing the saved settings."""
         network, topic = split_key(key)
         if network:
             self._shell.say(_("Only topics of Studio's own network can be recorded"))
@@ -77,7 +75,7 @@ class RecordCommands:
         return True
 
     def open_sheet(self) -> None:
-        """Show what is recorded, and how."""
+        """Open the sheet for the recording's topics and settings."""
         if self._sheet is None:
             shell = self._shell
             self._sheet = record_sheet.RecordSheet(
@@ -85,10 +83,8 @@ class RecordCommands:
             )
         self._sheet.open()
 
-    # ---- the last seconds
-
     def keep(self) -> None:
-        """Make a recording of the last seconds."""
+        """Save the flight recorder's last seconds as a recording."""
         recordings = self._recordings
         if not recordings.wish.is_on:
             self._shell.say(
@@ -107,12 +103,10 @@ class RecordCommands:
         words = _("The flight recorder now keeps the last {count} s")
         self._shell.say(words.format(count=recordings.wish.seconds))
 
-    # ---- the files
-
     def show(self, path: Path | None = None) -> None:
-        """Show the panel of recordings, with this one chosen."""
+        """Show the recordings panel and select a recording."""
         if self._sheet is not None:
-            self._sheet.shut()  # it may lie over the panel
+            self._sheet.shut()  # it may cover the panel
         if self._shell.bench is None:
             self._shell.show_layout("developer")
         dock = self._shell.open_panel("recordings")
@@ -121,7 +115,7 @@ class RecordCommands:
         self._shell.panel_focus.give(dock)
 
     def show_for_export(self, path: Path) -> None:
-        """Show where a part of this recording is exported: the loop of the time line, when it is open."""
+        """Show where a part of a recording can be exported: its timeline's loop, or the recordings panel."""
         if path.parent == self._recordings.folder:
             self.show(path)
         else:
@@ -129,7 +123,7 @@ class RecordCommands:
             self._shell.say(words.format(file=path.name), _("Choose a folder"), self.choose_folder)
 
     def choose_folder(self) -> None:
-        """Ask where recordings are to go."""
+        """Ask for the folder of recordings."""
         recordings = self._recordings
 
         def take(folder: Path) -> None:

@@ -1,4 +1,4 @@
-"""What the commands about recordings do: which one is shown, and where in it."""
+"""Commands for replay: open and close recordings, play, add bookmarks."""
 
 from __future__ import annotations
 
@@ -25,19 +25,19 @@ TIMELINE = "timeline"
 
 
 class ReplayCommands:
-    """Opens recordings in place of the live network, and leads back."""
+    """Shows recordings in place of the live network."""
 
     def __init__(self, shell: Shell, session: Session, asks: FileDialogs) -> None:
         self._shell, self._session, self._asks = shell, session, asks
 
     def ask_open(self) -> None:
-        """Let a person choose a recording, and open it."""
+        """Ask for a recording and open it."""
         replay = self._session.replay
         place = replay.path.parent if replay is not None else folder.usual_folder()
         self._asks.open_recording(str(place), self.open)
 
     def open(self, path: Path) -> None:
-        """Show a recording, with its time line; what is wrong with it becomes an alert."""
+        """Open a recording with its timeline; errors become alerts."""
         if not path.is_file():
             self._shell.say(_("{file} no longer exists").format(file=path.name))
             return
@@ -46,14 +46,14 @@ class ReplayCommands:
         self._shell.open_panel(TIMELINE)
 
     def back_to_live(self) -> None:
-        """Show the live network again, and close the recording."""
+        """Close the recording and show the live network."""
         self._session.back_to_live()
         bench = self._shell.bench
         if bench is not None and TIMELINE in bench.open_names():
             bench.docks[TIMELINE].close()
 
     def show_folder(self, path: Path) -> None:
-        """Show where a recording is."""
+        """Open the folder of a recording in the file manager."""
         open_outside(QUrl.fromLocalFile(str(path.parent)))
 
     @property
@@ -61,12 +61,12 @@ class ReplayCommands:
         return self._session.replay
 
     def play(self) -> None:
-        """Play, or pause."""
+        """Play or pause."""
         if self._replay is not None:
             self._replay.toggle()
 
     def bookmark(self) -> None:
-        """Make a bookmark at the playhead."""
+        """Add a bookmark at the playhead."""
         replay = self._replay
         if replay is None:
             return

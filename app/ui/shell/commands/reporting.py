@@ -1,4 +1,4 @@
-"""What the commands about problems do: the report of a problem, the log, and the page of new versions."""
+"""Commands of the Help menu: problem report, log, and the page of releases."""
 
 from __future__ import annotations
 
@@ -29,13 +29,13 @@ else:
     report_sheet = lazy_module("app.ui.shell.dialogs.report")
 
 DOCTOR_S = 15.0
-"""So long a report waits for the connection doctor."""
+"""Time that a report waits for the connection doctor."""
 FRESH_S = 60.0
-"""What the doctor found is true for about so long."""
+"""Age up to which the doctor's results are reused."""
 
 
 class ReportCommands:
-    """The report of a problem, and where newer versions are."""
+    """Opens problem reports and the page of releases."""
 
     def __init__(
         self,
@@ -45,13 +45,13 @@ class ReportCommands:
         asks: FileDialogs,
         clock: Callable[[], float] = time.time,
     ) -> None:
-        """``clock`` gives epoch seconds."""
+        # clock returns epoch seconds.
         self._shell, self._session, self._files, self._asks = shell, session, files, asks
         self._clock = clock
         self._sheet: report_sheet.ReportSheet | None = None
 
     def report(self) -> None:
-        """Open the report of a problem, with the newest edits of the behaviours at hand."""
+        """Open a problem report that contains the newest edits of the open behaviours."""
         self._session.alerts.resolve(ALERT)
         doctor = self._session.doctor
         if doctor.looked_s is None or self._clock() - doctor.looked_s > FRESH_S:
@@ -83,7 +83,10 @@ class ReportCommands:
         ]
 
     def look_for_new_version(self, page: str = RELEASES_PAGE) -> None:
-        """Open the page of releases in the browser, and say which version this is. Nothing is asked here."""
+        """Open the page of releases in the browser and show the installed version.
+
+        Studio itself makes no request.
+        """
         opened = open_outside(QUrl(page))
         words = (
             _("This is NEP Studio {version}. Your browser shows the newest version.")
@@ -94,7 +97,7 @@ class ReportCommands:
 
 
 def qt_facts(window: QWidget) -> tuple[tuple[str, str], ...]:
-    """What only Qt knows: its version, the screens, the window. For developers, so in English."""
+    """Return facts that only Qt has (version, screens, window), in English for developers."""
     screens = [
         (f"screen {place}", f"{size.width()} x {size.height()} at {each.devicePixelRatio():g}, {rate:.0f} Hz")
         for place, each in enumerate(QGuiApplication.screens(), start=1)

@@ -1,4 +1,4 @@
-"""What the commands about robots and other computers do; and a problem's button about a missing robot."""
+"""Commands for robots and other computers, and fixes for problems with missing robots."""
 
 from __future__ import annotations
 
@@ -19,42 +19,40 @@ from nep.i18n import _
 
 @dataclass(frozen=True, slots=True)
 class RobotSwap:
-    """A robot that is missing, and another one that is to do what it was asked to do."""
+    """A missing robot and the one that replaces it in the behaviour."""
 
     missing: str
     other: str
 
     @classmethod
     def parse(cls, text: str) -> RobotSwap:
-        """Of ``MISSING:OTHER``."""
+        """Parse ``MISSING:OTHER``."""
         missing, _colon, other = text.partition(":")
         return cls(missing, other)
 
 
 @runtime_checkable
 class FillsScreen(Protocol):
-    """A panel whose content can fill the screen."""
+    """A panel that can be shown in full screen."""
 
     def fill_screen(self) -> None:
-        """Fill the screen, or not any more."""
+        """Toggle full screen."""
 
 
 class RobotCommands:
-    """Starts virtual robots, connects missing ones, and asks who may connect."""
+    """Starts virtual robots, connects missing ones, and opens the sheets for network access."""
 
     def __init__(
         self, shell: Shell, session: Session, files: DocumentController, undo: Callable[[], object]
     ) -> None:
-        """``undo`` takes back the last edit of the blocks."""
+        # undo reverts the last edit of the blocks.
         self._shell, self._session, self._files, self._undo = shell, session, files, undo
         self._network_access: NetworkAccessSheet | None = None
         self._other_networks: OtherNetworksSheet | None = None
         self._web_pages: WebPagesSheet | None = None
 
-    # -- virtual robots ---------------------------------------------------------------------------
-
     def choose_start(self) -> None:
-        """Let virtual robots go to their start position before each run, or leave them where they are."""
+        """Toggle whether virtual robots return to their start position before each run."""
         fleet = self._session.fleet
         try:
             fleet.choose_start(begins=not fleet.begins_at_start)
@@ -62,13 +60,13 @@ class RobotCommands:
             self._shell.complain(str(error))
 
     def start_pepper(self) -> None:
-        """Start the virtual Pepper; what shows stays."""
+        """Start the virtual Pepper without changing the layout."""
         self._session.launcher.start_virtual_robot()
 
     def virtual_pepper(self) -> None:
         """Start the virtual Pepper and show the Behaviour layout."""
         self.start_pepper()
-        if self._shell.showing != "behaviour":  # else the keyboard stays where it is
+        if self._shell.showing != "behaviour":  # otherwise keep the focus
             self._shell.show_layout("behaviour")
 
     def virtual_turtle(self) -> None:
@@ -82,7 +80,7 @@ class RobotCommands:
         return name in self._session.coming
 
     def end_virtual(self, name: str = "") -> bool:
-        """End this virtual robot, or all that were started here; they do not come back at the next start."""
+        """Stop one or all virtual robots started here; they aren't restored at the next start."""
         launcher = self._session.launcher
         names = [each for each in launcher.wanted if name in {"", each}]
         for each in names:
@@ -90,15 +88,13 @@ class RobotCommands:
         return bool(names)
 
     def room_in_full_screen(self) -> None:
-        """Show the virtual robots' room as large as the screen, or in its panel again."""
+        """Show the room of virtual robots in full screen, or in its panel again."""
         dock = self._shell.open_panel("robot")
         if dock is not None and isinstance(dock.panel, FillsScreen):
             dock.panel.fill_screen()
 
-    # -- robots that are missing ------------------------------------------------------------------
-
     def connect(self, name: str) -> None:
-        """A virtual robot starts again; for a real one the list of robots shows."""
+        """Restart a missing virtual robot, or show the list of robots for a real one."""
         kind = self._described(name).get("rb:robot")
         model = _model(kind) if isinstance(kind, Mapping) and kind.get("virtual") is True else None
         if model is not None:
@@ -107,7 +103,7 @@ class RobotCommands:
             self._shell.open_panel("robots")
 
     def start_for(self, missing: str) -> bool:
-        """Start the virtual robot of a missing one's model; False when there is none. It can be undone."""
+        """Start the virtual model of a missing robot, with undo; return False if it has none."""
         model = _model(self._described(missing).get("rb:robot"))
         if model is None:
             return False
@@ -122,15 +118,12 @@ class RobotCommands:
         return True
 
     def _described(self, name: str) -> Mapping[str, object]:
-        """A robot's description, as it was seen last or as the behaviour keeps it."""
+        # The last received description, or the one saved in the behaviour.
         link = self._session.fleet.link(name)
         return link.robot.source if link is not None else self._session.document.robots.get(name, {})
 
     def use(self, swap: RobotSwap) -> bool:
-        """Let another robot do what a missing one was asked to do; False when it is away.
-
-        It can be undone.
-        """
+        """Replace a missing robot in the behaviour, with undo; return False if the other is away."""
         link = self._session.fleet.link(swap.other)
         if link is None:
             return False
@@ -145,10 +138,8 @@ class RobotCommands:
         self._files.with_newest(change)
         return True
 
-    # -- who may --------------------------------------------------------------------------------
-
     def ask_before_moving(self) -> None:
-        """Ask again before a real robot moves."""
+        """Revoke the permission for real robots to move, so that Studio asks again."""
         words = _("Studio will ask again before a real robot moves")
         try:
             self._session.fleet.permission.forget()
@@ -158,7 +149,7 @@ class RobotCommands:
         self._shell.say(words)
 
     def ask_about_others(self) -> None:
-        """Ask whether other computers may connect."""
+        """Open the sheet for access from other computers."""
         if self._network_access is None:
             self._network_access = NetworkAccessSheet(
                 self._shell.theme, self._shell.surface, self._session.remote_access
@@ -166,7 +157,7 @@ class RobotCommands:
         self._network_access.open()
 
     def choose_networks(self) -> None:
-        """Show which other networks are looked at, and let the person choose."""
+        """Open the sheet for monitoring other networks."""
         if self._other_networks is None:
             self._other_networks = OtherNetworksSheet(
                 self._shell.theme, self._shell.surface, self._session.live.networks
@@ -174,7 +165,7 @@ class RobotCommands:
         self._other_networks.open()
 
     def show_web_pages(self) -> None:
-        """Show the web server: its switch, who may connect, and which pages are connected."""
+        """Open the sheet of the web server: switch, permissions, connected pages."""
         if self._web_pages is None:
             self._web_pages = WebPagesSheet(
                 self._shell.theme,
@@ -190,6 +181,6 @@ class RobotCommands:
 
 
 def _model(kind: object) -> str | None:
-    """The model of a robot's description, if there is a virtual robot of it."""
+    # None without a virtual robot of the model.
     model = str(kind.get("model")) if isinstance(kind, Mapping) else ""
     return model if model in VIRTUAL_ROBOTS else None

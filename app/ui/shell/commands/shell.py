@@ -1,4 +1,4 @@
-"""What commands, menus and the palette may use of the window that they belong to."""
+"""Interface of the window for commands, menus and the palette."""
 
 from __future__ import annotations
 
@@ -16,11 +16,11 @@ from app.ui.shell.start_page.page import Example
 from app.ui.shell.window_state import WindowState
 from app.ui.theme.theme import Theme
 
-START = "start"  # what `Shell.showing` says of the start page
+START = "start"  # value of `Shell.showing` for the start page
 
 
 class Shell(Protocol):
-    """What commands, menus and the palette use of the window: what shows, and how to show something else."""
+    """The window as commands, menus and the palette use it."""
 
     theme: Theme
     state: WindowState
@@ -30,62 +30,62 @@ class Shell(Protocol):
 
     @property
     def examples(self) -> Sequence[Example]:
-        """The examples of the start page."""
+        """Examples of the start page."""
 
     @property
     def menu_bar(self) -> QMenuBar:
-        """Where the menus are."""
+        """Menu bar of the window."""
 
     @property
     def surface(self) -> QWidget:
-        """The widget over which sheets and menus open, and in which keys work."""
+        """Parent of sheets and menus, in which shortcuts work."""
 
     @property
     def showing(self) -> str:
-        """The name of the layout that shows, or `START`."""
+        """Name of the current layout, or `START`."""
 
     @property
     def bench(self) -> Workbench | None:
-        """The workbench that shows; None on the start page."""
+        """Current workbench, or None on the start page."""
 
     @property
     def say(self) -> ShowToast:
-        """Says for some seconds what the person just did."""
+        """Function that shows a toast."""
 
     def complain(self, sentence: str) -> None:
-        """Say in the Console what went wrong and needs nobody's hand."""
+        """Log a problem in the Console that needs no action."""
 
     def editor(self) -> object:
-        """The panel of behaviours; None until it was first shown."""
+        """Return the panel of behaviours, or None before it was first shown."""
 
     @property
     def left(self) -> str:
-        """The layout that leads back from the start page to the work; "" when there is none."""
+        """Layout to return to from the start page, or ""."""
 
     def show_start(self) -> None:
         """Show the start page."""
 
     def show_examples(self) -> None:
-        """Show all examples of the start page, and give the keyboard to the first."""
+        """Show all examples on the start page and focus the first."""
 
     def show_recent(self) -> None:
-        """Show on the start page which files were opened lately."""
+        """Show the recent files on the start page."""
 
     def show_layout(self, name: str) -> Workbench:
-        """Show a layout, as it was left."""
+        """Show a layout in its last state."""
 
     def open_panel(self, name: str) -> Dock | None:
-        """Show a panel; None when there is no such panel."""
+        """Show a panel; return None if the name is unknown."""
 
     def open_topic(self, topic: str) -> None:
-        """Show a topic in the open panel that fits it best."""
+        """Show a topic in the open panel that suits it best."""
 
     def close(self) -> bool:
-        """Close the window; whether it did."""
+        """Close the window; return whether it was closed."""
 
     @property
     def can_restart(self) -> bool:
-        """Whether Studio can start again by itself, with everything that is open."""
+        """True if Studio can restart itself with all open documents."""
 
     def restart(self) -> str:
-        """Close the window and start Studio again; why that can't be done now, "" when it is done."""
+        """Close the window and restart Studio; return why that is impossible, or ""."""

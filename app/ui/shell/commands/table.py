@@ -1,7 +1,6 @@
-"""The one table of commands: what menus, palette, shortcuts, tooltips and buttons offer, and what each does.
+"""Table of all commands for menus, palette, shortcuts, tooltips and buttons.
 
-Panels, alerts and problems ask for a command by its id: ``help.doctor``, or ``inspect:/faces`` for one that
-is about something.
+Panels, alerts and problems run a command by its id: ``help.doctor``, or ``inspect:/faces`` with an argument.
 """
 
 from __future__ import annotations
@@ -42,7 +41,7 @@ NOTHING_TO_RUN = lazy("Nothing to run")
 
 @dataclass(frozen=True)
 class Handlers:
-    """What the commands are run with."""
+    """Objects that implement the commands."""
 
     session: Session
     shell: Shell
@@ -58,7 +57,7 @@ class Handlers:
     acting: ActingCommands
 
 
-# ---- why a command can't be done now: menus grey it, the palette says the sentence ------------------
+# Reasons for unavailable commands, shown in the palette.
 
 
 def _no_run(do: Handlers) -> str:
@@ -143,8 +142,6 @@ def _smallest_text(do: Handlers) -> str:
     return _("Text is at its smallest") if do.shell.theme.text_percent <= TEXT_PERCENT[0] else ""
 
 
-# ---- the tables -------------------------------------------------------------------------------------
-
 C = Command[Handlers]
 
 
@@ -160,7 +157,7 @@ def _go_to_panel(number: int) -> C:
 
 
 def _edit(what: Edit, text: str, key: str, icon: str, *, above: bool = False) -> C:
-    """An entry that does what a key does in whatever has the keyboard: the key is not the command's."""
+    # A menu entry only: its key is handled by the focused widget.
     return C(
         f"edit.{what}",
         text,
@@ -176,7 +173,7 @@ def _edit(what: Edit, text: str, key: str, icon: str, *, above: bool = False) ->
 
 
 def releases(page: str) -> tuple[C, ...]:
-    """The entry that opens the page of releases; none while the project has no such page."""
+    """Return the command for the page of releases; none if the project has no such page."""
     if not page:
         return ()
     return (
@@ -232,7 +229,7 @@ COMMANDS: tuple[C, ...] = (
       icon="list-plus"),
     C("palette.open", lazy("Find a command or panel"), lambda do: do.view.open_palette(), "View", ("Ctrl+K",),
       "search", in_palette=False),
-    # with Option (Alt) a Mac types signs, and Cmd+Tab is the system's
+    # macOS types special characters with Option (Alt) and reserves Cmd+Tab
     C("layout.behaviour", lazy("Behaviour layout"), lambda do: do.view.show_layout("behaviour"), "View",
       ("Alt+1",), "blocks", group="layout", above=True, mac=("Ctrl+Alt+1",)),
     C("layout.developer", lazy("Developer layout"), lambda do: do.view.show_layout("developer"), "View",
@@ -301,7 +298,7 @@ COMMANDS: tuple[C, ...] = (
     C("run.from_start", lazy("Reset robots to their start position before each run"),
       lambda do: do.robots.choose_start(), "Run", check=True, above=True,
       tip=lazy("Virtual robots return to their start position before each run")),
-    # two keys: F12 is one for sound on Macs and many laptops
+    # two keys: on Macs and many laptops F12 changes the volume
     C("run.stop", lazy("Stop the program and all robots"), lambda do: do.session.runs.stop(), "Run",
       ("F12", "Ctrl+."), "square", lazy("Stops the program and every robot"), above=True, everywhere=True),
     C("run.confirm", lazy("Not playing"), lambda do: do.session.runs.confirm_still(), in_palette=False,
@@ -314,7 +311,7 @@ COMMANDS: tuple[C, ...] = (
       why_not=_no_virtual_robot),
     C("robots.room", lazy("Room in full screen"), lambda do: do.robots.room_in_full_screen(), "Robots",
       ("F11",), "fullscreen", why_not=_no_room),
-    # unlike "robots.virtual" it stays in the layout that shows
+    # unlike "robots.virtual" without changing the layout
     C("robots.start", lazy("Start the virtual Pepper"), lambda do: do.robots.start_pepper(), in_palette=False,
       in_shortcuts=False),
     C("robots.show", lazy("Try what a robot can do"), lambda do: do.shell.open_panel("robots"), "Robots",
@@ -363,7 +360,7 @@ COMMANDS: tuple[C, ...] = (
 def _about(
     id: str, parse: Callable[[str], A], run: Callable[[Handlers, A], object]
 ) -> ArgumentCommand[Handlers]:
-    """A command about one thing: ``run`` gives False when there is no such thing now."""
+    # run returns False if the argument refers to nothing.
     return ArgumentCommand(id, lambda do, text: run(do, parse(text)) is not False)
 
 
@@ -411,6 +408,6 @@ ARGUMENT_COMMANDS: tuple[ArgumentCommand[Handlers], ...] = (
     _about("robot.virtual", str, lambda do, missing: do.robots.start_for(missing)),
     *map(
         _fix_blocks, ("limit", "define", "add", "after", "begin", "receive")
-    ),  # what a problem's button does (`app.blocks.fixes.fixes`)
+    ),  # buttons of problems (`app.blocks.fixes.fixes`)
 )
-"""Asked for as ``id:argument``; a tab goes by its document's key."""
+"""Commands run as ``id:argument``; tabs are identified by their document's key."""

@@ -1,4 +1,4 @@
-"""What is done with the variables of the behaviour that shows: new ones, their names, where they are used."""
+"""Commands for variables of the current behaviour: create, rename, delete, watch, find uses."""
 
 from __future__ import annotations
 
@@ -27,19 +27,19 @@ class SupportsVariables(Protocol):
     """A panel in which variables can be edited."""
 
     def edit_variable(self, edit: Mapping[str, object]) -> None:
-        """Make, rename or delete one, or show it: as one edit that can be undone."""
+        """Create, rename, delete or watch a variable, as one undoable edit."""
 
 
 class VariableCommands:
-    """Asks for names, says what was done; the editor of the blocks does it."""
+    """Asks for names and confirms with toasts; the block editor makes the edits."""
 
     def __init__(self, shell: Shell, session: Session, files: DocumentController) -> None:
         self._shell, self._session, self._files = shell, session, files
         self._sheet: name_sheet.NameSheet | None = None
-        self._used_before: dict[str, str] = {}  # of a variable the block that was shown last
+        self._used_before: dict[str, str] = {}  # block found last, by variable
 
     def new(self, *, is_list: bool) -> None:
-        """Ask for the name of a new variable, or of a new list."""
+        """Ask for the name of a new variable or list, then create it."""
         question = _("New list") if is_list else _("New variable")
         verb = _("Create")
 
@@ -50,12 +50,12 @@ class VariableCommands:
         self._with_newest(asked)
 
     def _free_name(self, *, is_list: bool) -> str:
-        """A name that can be taken as it is, without a keyboard: "count", else "count 2", "count 3"."""
+        # Suggests a name that needs no typing: "count", else "count 2", "count 3".
         first = pgettext("variable", "list") if is_list else pgettext("variable", "count")
         return next(n for n in chain([first], (f"{first} {n}" for n in count(2))) if not self.refusal(n))
 
     def ask_other_name(self, id: str) -> None:
-        """Ask for another name of a variable, or for one of a variable that has none."""
+        """Ask for a new name of a variable, or for one of an unnamed variable."""
 
         def asked() -> None:
             workspace = self._workspace()
@@ -74,7 +74,7 @@ class VariableCommands:
         self._with_newest(asked)
 
     def delete(self, id: str) -> None:
-        """Delete a variable with the blocks that use it; it can be taken back."""
+        """Delete a variable and the blocks that use it, with undo."""
 
         def delete() -> None:
             workspace = self._workspace()
@@ -94,11 +94,11 @@ class VariableCommands:
         self._with_newest(delete)
 
     def watch(self, id: str) -> None:
-        """Show the variable's value on the page of the blocks, or no longer."""
+        """Toggle the display of the variable's value next to the blocks."""
         self._edit({"do": "watch", "id": id})
 
     def find(self, id: str) -> None:
-        """Show a block that uses the variable; asked again, the next one."""
+        """Show the next block that uses the variable."""
 
         def show() -> None:
             uses = uses_of(self._workspace(), id)
@@ -111,7 +111,7 @@ class VariableCommands:
         self._with_newest(show)
 
     def put(self, id: str) -> None:
-        """Ask for another value while the program runs."""
+        """Ask for a new value while the program runs."""
         runs = self._session.runs
         name = self._workspace().variables.get(id)
         now = runs.values.get(id)
@@ -132,7 +132,7 @@ class VariableCommands:
         )
 
     def refusal(self, name: str, own: str = "") -> str:
-        """Why a variable can't have this name; nothing when it can. ``own`` is the one that would get it."""
+        """Return why a name is invalid, or ""; ``own`` is the id of the variable to be renamed."""
         if not name:
             return _("A variable needs a name.")
         if len(name) > LONGEST:
@@ -141,8 +141,6 @@ class VariableCommands:
         if name.casefold() in used:
             return _("A variable named “{name}” already exists. Choose another name.").format(name=name)
         return ""
-
-    # -- inside -----------------------------------------------------------------------------------
 
     def _with_newest(self, act: Callable[[], None]) -> None:
         self._shell.show_layout("behaviour")
@@ -163,7 +161,7 @@ class VariableCommands:
 
 
 def uses_of(workspace: Workspace, id: str) -> list[str]:
-    """The blocks that set, change or read a variable, in the order of the page."""
+    """Return the ids of blocks that set, change or read a variable, in page order."""
     found: list[str] = []
     waiting: list[Placed] = [placed for script in reversed(workspace.scripts) for placed in reversed(script)]
     while waiting:
@@ -179,7 +177,7 @@ def _names(field: object, id: str) -> bool:
 
 
 def separators_refusal(words: str) -> str:
-    """Return why a number with several separators can't be the value of a variable; "" for other words."""
+    """Return why a number with several separators is invalid as a value; "" for other text."""
     try:
         parse_number(words)
     except TypedNumberError as error:
@@ -188,7 +186,7 @@ def separators_refusal(words: str) -> str:
 
 
 def value_of(words: str) -> str | float | bool:
-    """What a person typed: a number where it is one, yes or no (also “true”, “false”), else the text."""
+    """Parse a typed value: a number, yes or no (also "true" and "false"), otherwise text."""
     plain = words.strip()
     said = plain.casefold()
     if said in ("true", _("yes").casefold()):

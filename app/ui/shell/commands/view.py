@@ -1,6 +1,6 @@
-"""What the commands about the window do: palette, sheets, layouts, theme, text, help.
+"""Commands for the window: palette, sheets, layouts, theme, text size, help.
 
-Everything that opens over the window is made when it is first asked for, so that the start does not wait.
+Sheets are created on first use so that they don't delay the start.
 """
 
 from __future__ import annotations
@@ -64,10 +64,10 @@ MOST_NAMED = 4
 
 @runtime_checkable
 class SupportsRobotChoice(Protocol):
-    """A panel that can show one robot of many."""
+    """A panel that can show one of several robots."""
 
     def choose(self, name: str) -> None:
-        """Show the robot of that name."""
+        """Select the robot of this name."""
 
 
 @runtime_checkable
@@ -75,7 +75,7 @@ class AnswersWhy(Protocol):
     """The panel of the connection doctor."""
 
     def begin_for(self, asker: PanelWidget | None) -> None:
-        """Tell the panel in which somebody misses something; None where that is none in particular."""
+        """Set the panel whose missing data is diagnosed; None for a general check."""
 
 
 @runtime_checkable
@@ -83,20 +83,20 @@ class SupportsAlarms(Protocol):
     """The panel of alarms."""
 
     def begin(self) -> None:
-        """Begin an alarm."""
+        """Start a new alarm."""
 
     def edit(self, rule_id: str, slot: str) -> None:
-        """Show an alarm and open one of its slots, or none."""
+        """Show an alarm and open one of its fields, if any."""
 
 
 def read_value(text: str) -> tuple[str, str]:
-    """The topic and the path in "/odom pose.x"; a topic has no blank in its name."""
+    """Parse "/odom pose.x" into topic and field path; topics contain no spaces."""
     topic, _blank, path = text.partition(" ")
     return topic, path
 
 
 class ViewCommands:
-    """What shows in the window, and what opens over it. `use` gives it the actions, before any command."""
+    """Commands for the window's content and sheets; `use` must be called before any command."""
 
     def __init__(self, shell: Shell, session: Session, files: DocumentController, keys: Shortcuts) -> None:
         self._shell, self._session, self._files = shell, session, files
@@ -109,7 +109,7 @@ class ViewCommands:
         self._guide: guide.GuideSheet | None = None
 
     def use(self, actions: Actions, entries: PaletteEntries) -> None:
-        """Keep the keys and marks of these actions up to date; the palette offers these entries."""
+        """Keep keys and check marks of the actions up to date and fill the palette with the entries."""
         self._actions, self._entries = actions, entries
         self.shortcuts.changed.connect(self.show_keys)
         self._shell.theme.changed.connect(self._mark_theme)
@@ -117,20 +117,21 @@ class ViewCommands:
         self._mark_theme()
 
     def show_keys(self) -> None:
-        """Finding blocks has its key where blocks are seen; elsewhere it is the panels' own."""
+        """Update the keys of all actions.
+
+        Find has its key only in the Behaviour layout; other panels use the key themselves.
+        """
         here = self._shell.showing == "behaviour" and self._shell.bench is not None
         of = self.shortcuts.of
         self._actions.set_keys(lambda name: of(name) if here or name != "blocks.find" else ())
 
     def press(self, key: str) -> bool:
-        """Do what a key is for, as the person chose; False when it is for nothing."""
+        """Run the command that has a key; return False if none has."""
         holder = self.shortcuts.holder(key)
         return bool(holder) and self._actions.run(holder)
 
-    # -- over the window --------------------------------------------------------------------------
-
     def open_palette(self) -> None:
-        """Open the command palette, or close it."""
+        """Open or close the command palette."""
         if self._palette is None:
             shell = self._shell
             self._palette = command_palette.Palette(
@@ -142,7 +143,7 @@ class ViewCommands:
         self._palette.open()
 
     def do(self, entry: Entry) -> None:
-        """Do what an entry of the palette is about."""
+        """Activate an entry of the palette."""
         kind, name, shell = entry.kind, entry.name, self._shell
         if kind == "command":
             self._actions.run(name)
@@ -169,7 +170,7 @@ class ViewCommands:
             self._shell.bench.focus_panel(dock)
 
     def inspect(self, topic: str) -> None:
-        """Show a topic in the inspector."""
+        """Show a topic in the Inspector."""
         self.show_layout("developer")
         bench = self._shell.bench
         dock = bench.open_latest("inspector") if bench is not None else None
@@ -178,7 +179,7 @@ class ViewCommands:
             self._mark_topic(topic)
 
     def new_alarm(self, about: AlarmCondition | None = None) -> None:
-        """Begin an alarm about this, and show it where its words are chosen."""
+        """Create an alarm with this condition and open it for editing."""
         dock = self._shell.open_panel("alarms")
         if dock is None or not isinstance(dock.panel, SupportsAlarms):
             return
@@ -186,13 +187,13 @@ class ViewCommands:
             dock.panel.begin()
             return
         rule = self._session.alarms.new(about)
-        waits = about.kind in NUMBER_KINDS  # for its limit: the value of now is none
+        waits = about.kind in NUMBER_KINDS  # until its limit is entered
         if waits:
             self._session.alarms.put(replace(rule, is_on=False))
         dock.panel.edit(rule.id, "limit" if waits else "")
 
     def alarm_on_value(self, about: tuple[str, str]) -> None:
-        """Begin an alarm about a value of a topic: of a number its limit is asked for."""
+        """Create an alarm on a value of a topic; for a number the limit has to be entered."""
         topic, path = about
         known = self._session.topics.get(topic)
         newest = known.newest if known is not None else None
@@ -205,13 +206,13 @@ class ViewCommands:
         self.new_alarm(AlarmCondition(kind, topic, path or ".", limit))
 
     def _mark_topic(self, name: str) -> None:
-        """Choose a topic that was opened by command in the list of topics too, where that is open."""
+        # Also selects the topic in the topics panel if that is open.
         bench = self._shell.bench
         if bench is not None and "topics" in bench.open_names():
             bench.docks["topics"].panel.show_topic(name)
 
     def open_shortcuts(self) -> None:
-        """Open the table of shortcuts."""
+        """Open the sheet of shortcuts."""
         self._sheet_of_shortcuts().open()
 
     def _sheet_of_shortcuts(self) -> shortcuts.ShortcutSheet:
@@ -245,33 +246,31 @@ class ViewCommands:
             self._shell.say(why_not)
 
     def _voice_words(self) -> str:
-        """Also what was found when a robot spoke: an engine may be there, and have no voice."""
+        # Includes the result of real speech: an engine can be installed without a voice.
         return voice_words(self._session.voices.problem, has_engine=has_voice_engine())
 
-    # -- layouts ----------------------------------------------------------------------------------
-
     def start_page(self) -> None:
-        """Show the start page, also at the next start."""
+        """Show the start page, now and at the next start."""
         self._shell.show_start()
         self._shell.state.keep_layout(START)
 
     def leave_start_page(self) -> None:
-        """From the start page back to the work."""
+        """Return from the start page to the work."""
         if self._shell.showing == START and self._shell.left:
             self.show_layout(self._shell.left)
 
     def show_layout(self, layout: str) -> None:
-        """Show Behaviour or Developer as it was left."""
+        """Show Behaviour or Developer in its last state."""
         self._shell.show_layout(layout)
         self._actions.choose(f"layout.{layout}")
 
     def show_built_in_layout(self, layout: str) -> None:
-        """Show the built-in arrangement of a layout, also in place of an own one."""
+        """Show the built-in arrangement of a layout, replacing a custom one."""
         self._shell.saved_layouts.use(self._shell.show_layout(layout), layout, "")
         self._actions.choose(f"layout.{layout}")
 
     def show_own_layout(self, name: str) -> None:
-        """Show a layout with a name of its own."""
+        """Show a custom layout by name."""
         own = self._shell.saved_layouts.named(name)
         if own is not None:
             bench = self._shell.show_layout(own.base)
@@ -279,7 +278,7 @@ class ViewCommands:
             self._actions.choose(f"layout.{own.base}")
 
     def reset_layout(self) -> None:
-        """Put the panels where the layout has them at first."""
+        """Restore the default arrangement of the panels."""
         if self._shell.bench is not None:
             self._shell.bench.arrange()
 
@@ -289,7 +288,7 @@ class ViewCommands:
         return self._name_sheet
 
     def keep_layout(self) -> None:
-        """Keep what shows under a name that is asked for."""
+        """Ask for a name and save the current layout."""
         shell = self._shell
         arrangements, bench, base = shell.saved_layouts, shell.bench, shell.showing
         if bench is None:
@@ -307,7 +306,7 @@ class ViewCommands:
         self._ask_name().ask(_("Save layout as"), _("Keep"), arrangements.refusal, keep)
 
     def rename_layout(self) -> None:
-        """Give the own layout that shows another name."""
+        """Ask for a new name of the current custom layout."""
         arrangements = self._shell.saved_layouts
         old = arrangements.own(self._shell.showing)
         if old:
@@ -320,7 +319,7 @@ class ViewCommands:
             )
 
     def delete_layout(self) -> None:
-        """Forget the own layout that shows; it can be undone."""
+        """Delete the current custom layout, with undo."""
         arrangements, shell = self._shell.saved_layouts, self._shell
         name = arrangements.own(shell.showing)
         if name:
@@ -333,7 +332,7 @@ class ViewCommands:
             shell.say(words.format(name=name), _("Undo"), undo)
 
     def export_layout(self) -> None:
-        """Save how the panels are now as a file that others can open."""
+        """Export the current layout to a file."""
         shell = self._shell
         bench, base = shell.bench, shell.showing
         if bench is None:
@@ -354,11 +353,11 @@ class ViewCommands:
         self._files.asks.save_as(_("Save layout to a file"), suggestion, [kind], save)
 
     def ask_layout(self) -> None:
-        """Let a person choose a layout's file, and show it."""
+        """Ask for a layout file and open it."""
         self._files.asks.open_layout(str(Path.home()), self.open_layout)
 
     def open_layout(self, path: Path) -> None:
-        """Keep the layout of a file, and show it; why it can't be is said."""
+        """Import a layout file and show it; errors are shown as a toast."""
         shell = self._shell
         try:
             found = read_layout(read_whole(path, MOST_BYTES), path.stem, shell.panels)
@@ -389,48 +388,43 @@ class ViewCommands:
         shell.say(words, _("Undo"), undo)
 
     def freeze(self) -> None:
-        """Hold what shows, or let it go on."""
+        """Freeze all panels, or unfreeze them if all are frozen."""
         freeze_or_go_on(self._shell.bench)
 
-    # -- the look ---------------------------------------------------------------------------------
-
     def _mark_theme(self) -> None:
-        """The marks in the menus say what is chosen."""
         theme = self._shell.theme
         self._actions.choose(f"theme.{theme.mode}")
         self._actions["theme.motion"].setChecked(theme.reduced_motion)
         self._actions["theme.contrast"].setChecked(theme.high_contrast)
 
     def set_theme(self, mode: Mode) -> None:
-        """Light, dark, or as the system."""
+        """Set the colour theme: light, dark or that of the system."""
         self._shell.theme.set_mode(mode)
         self._shell.state.keep_theme(self._shell.theme)
 
     def choose_motion(self) -> None:
-        """Less motion or all of it, as its action is marked."""
+        """Set reduced motion from the state of its action."""
         self._shell.theme.set_motion(_wish(self._actions["theme.motion"]))
         self._shell.state.keep_theme(self._shell.theme)
 
     def choose_contrast(self) -> None:
-        """High contrast or not, as its action is marked."""
+        """Set high contrast from the state of its action."""
         self._shell.theme.set_contrast(_wish(self._actions["theme.contrast"]))
         self._shell.state.keep_theme(self._shell.theme)
 
     def set_text(self, percent: int) -> None:
-        """Another size of text, in percent."""
+        """Set the text size in percent."""
         self._shell.theme.set_text_percent(percent)
         self._shell.state.keep_theme(self._shell.theme)
 
-    # -- help -------------------------------------------------------------------------------------
-
     def first_steps(self) -> None:
-        """Show the card with the first steps beside the blocks."""
+        """Show the card with the first steps next to the blocks."""
         self.show_layout("behaviour")
         self._shell.open_panel("behaviour")
         self._shell.panel_focus.give(self._shell.open_panel("first_steps"))
 
     def open_guide(self) -> None:
-        """Open the guide at the page where it was left."""
+        """Open the guide at its last page."""
         if self._guide is None:
             shell = self._shell
             self._guide = guide.GuideSheet(shell.theme, shell.surface, self._guide_pages)
@@ -440,18 +434,18 @@ class ViewCommands:
         return guide.read_pages(resources.folder() / "guide", language(), self.shortcuts.first)
 
     def examples(self) -> None:
-        """Show all examples, on the start page."""
+        """Show all examples on the start page."""
         self.start_page()
         self._shell.show_examples()
 
     def point_at(self, command: str) -> bool:
-        """Put a ring round the button that does this command; False when none can be seen."""
+        """Highlight the button of a command; return False if none is visible."""
         if self._ring is None:
             self._ring = HintRing(self._shell.theme, self._shell.surface)
         return self._ring.point_at(command)
 
     def open_doctor(self, asker: PanelWidget | None = None, topic: str = "") -> None:
-        """Look at the connection, first of all for why the ``asker`` shows nothing of a topic."""
+        """Run the connection doctor, first for the topic that ``asker`` doesn't receive."""
         self._session.doctor.miss(topic)
         if self._shell.bench is None:
             self.show_layout("developer")
@@ -460,7 +454,7 @@ class ViewCommands:
             dock.panel.begin_for(asker)
 
     def show_log(self) -> None:
-        """Open the folder of the log files, which is there even when nothing was ever wrong."""
+        """Open the folder of log files, creating it if it is missing."""
         folder = log_folder()
         try:
             folder.mkdir(0o700, parents=True, exist_ok=True)
@@ -472,7 +466,7 @@ class ViewCommands:
             self._shell.say(_("The log files are in {folder}").format(folder=folder))
 
     def about(self) -> None:
-        """Say what this program is."""
+        """Show the About dialog."""
         AboutSheet(self._shell.theme, self._shell.surface, self._shell.say).open()
 
 
