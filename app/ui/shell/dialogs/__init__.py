@@ -1,4 +1,4 @@
-"""What opens over the window: palette, settings, shortcuts and questions.
+"""Sheets and dialogs over the window: palette, settings, shortcuts and questions.
 
-Nothing here is modal: each is an `Overlay`, or leaves Stop free as one does.
+They aren't modal: each is an `Overlay`, or leaves Stop accessible in the same way.
 """

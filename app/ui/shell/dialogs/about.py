@@ -1,4 +1,4 @@
-"""What Studio is: its version, licences, and what it runs on, to copy. Esc closes it."""
+"""About sheet: versions, licences and system, with a button to copy them."""
 
 from __future__ import annotations
 
@@ -25,7 +25,10 @@ WIDE = 460
 
 
 def versions() -> tuple[tuple[str, str], ...]:
-    """What it is made of and runs on: (name, version). Names of programs are the same in every language."""
+    """Return names and versions of Studio, its libraries and the system.
+
+    Names of programs aren't translated.
+    """
     return (
         ("NEP Studio", __version__),
         ("nep", __version__),
@@ -36,12 +39,12 @@ def versions() -> tuple[tuple[str, str], ...]:
 
 
 class AboutSheet(Overlay):
-    """It is gone when it is closed."""
+    """About sheet, deleted when closed."""
 
     top = 96
 
     def __init__(self, theme: Theme, window: QWidget, say: Callable[[str], object]) -> None:
-        """``say`` is told that the versions were copied."""
+        # say confirms that the versions were copied.
         super().__init__(theme, window, TITLE)
         self._say = say
         column = QVBoxLayout(self)

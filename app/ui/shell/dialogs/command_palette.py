@@ -1,4 +1,4 @@
-"""The command palette: Ctrl+K finds every command, panel, topic, robot, layout and recent file."""
+"""Command palette (Ctrl+K): finds commands, panels, topics, robots, layouts and recent files."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ MOST, MOST_EMPTY, LAST_SHOWN, LAST_KEPT = 40, 8, 5, 12
 
 
 class _Field(QLineEdit):
-    """The field at the top, bare in the surface: its icon at the left, Esc at the right."""
+    """Frameless search field with an icon at the left and Esc at the right."""
 
     def __init__(self, theme: Theme) -> None:
         super().__init__()
@@ -60,7 +60,7 @@ class _Field(QLineEdit):
 
 
 class _Foot(QWidget):
-    """Which keys do what, and how many fit."""
+    """Hints for the keys, and the number of matches."""
 
     KEYS = (
         (("↑", "↓"), lazy("choose")),
@@ -101,7 +101,10 @@ class _Foot(QWidget):
 
 
 class Palette(Overlay):
-    """640 wide, 128 from the top. ``run`` does an entry, ``rebind`` asks for a command's new key."""
+    """Palette, 640 px wide and 128 px from the top.
+
+    ``run`` activates an entry; ``rebind`` asks for a new key of a command.
+    """
 
     top = TOP
 
@@ -113,7 +116,7 @@ class Palette(Overlay):
         run: Callable[[Entry], object],
         rebind: Callable[[str], object],
     ) -> None:
-        """``offers`` is asked at each opening."""
+        # offers is called at each opening.
         super().__init__(theme, window, _("Command palette"))
         self._offers, self._run, self._rebind = offers, run, rebind
         self._finder = Finder(())
@@ -140,13 +143,11 @@ class Palette(Overlay):
         self.rows.pressed_row.connect(self.do_it)
         theme.changed.connect(self._restyle)
 
-    # -- showing ----------------------------------------------------------------------------------
-
     def first(self) -> QWidget:
         return self.field
 
     def open(self) -> None:
-        """Show everything that there is now, what was used last at the top."""
+        """Open with all entries, the last used ones first; close if already open."""
         if self.isVisible():
             self.shut()
             return
@@ -188,7 +189,7 @@ class Palette(Overlay):
         self.place()
 
     def _for_nothing_typed(self) -> list[Line]:
-        """What was used last, then the first of each kind."""
+        # Last used entries, then the first ones of each kind.
         entries = self._finder.entries
         known = {entry.id: entry for entry in entries if entry.id in self.last}
         last = [known[id] for id in self.last if id in known][:LAST_SHOWN]
@@ -207,12 +208,10 @@ class Palette(Overlay):
         return lines
 
     def _say(self) -> None:
-        """A screen reader says the chosen row: the keyboard stays in the field."""
+        # The focus stays in the field, so the selected row is announced to screen readers.
         entry = self.rows.entry
         if entry is not None and self.isVisible():
             paint.announce(self.field, str(self.rows.currentIndex().data(Qt.ItemDataRole.AccessibleTextRole)))
-
-    # -- doing ------------------------------------------------------------------------------------
 
     def eventFilter(self, watched: QObject, event: QEvent) -> bool:
         if watched is self.field and event.type() == QEvent.Type.KeyPress:
@@ -229,7 +228,7 @@ class Palette(Overlay):
         return super().eventFilter(watched, event)
 
     def do_it(self) -> None:
-        """Do what is chosen, unless it can't be done now."""
+        """Run the selected entry, unless it is unavailable."""
         entry = self.rows.entry
         if entry is None:
             return
@@ -242,7 +241,7 @@ class Palette(Overlay):
         self._run(entry)
 
     def rebind(self) -> None:
-        """Ask for a new key of the chosen command."""
+        """Ask for a new key of the selected command."""
         entry = self.rows.entry
         if entry is not None and entry.kind == "command":
             self.shut()

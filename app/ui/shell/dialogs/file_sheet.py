@@ -1,6 +1,6 @@
-"""Which file? Our own sheet over the window: places at the left, what is in the folder, the name below.
+"""File sheet over the window: places at the left, the folder's content, the name below.
 
-Stop stays bright and can be pressed; the sheet stays open meanwhile, so that no name is typed twice.
+Stop stays accessible, and the sheet stays open when it is pressed so that no input is lost.
 """
 
 from __future__ import annotations
@@ -52,10 +52,9 @@ NAME, CHANGED, SIZE = range(3)
 
 @dataclass(frozen=True)
 class FileQuestion:
-    """What a person is asked for: a file with one of the ``endings``, or a folder.
+    """Kind of file to choose: a file with one of the ``endings``, or a folder.
 
-    ``empty`` is said of a folder in which there is nothing to choose; ``kinds`` are offered
-    for what is saved.
+    ``empty`` is shown for a folder without matching files; ``kinds`` are the formats for saving.
     """
 
     heading: str
@@ -79,7 +78,7 @@ FOLDER = FileQuestion(lazy("Choose a folder"), lazy("Use this folder"), "", endi
 
 @dataclass(frozen=True)
 class FolderPlace:
-    """A folder that people know by a name: "Documents"."""
+    """A folder with a well-known name such as "Documents"."""
 
     name: str
     icon: str
@@ -87,7 +86,7 @@ class FolderPlace:
 
 
 def known_places(studio: Path, recent: Iterable[Path]) -> tuple[FolderPlace, ...]:
-    """The person's folders that are there, the one of Studio, and those of files used lately."""
+    """Return the person's existing standard folders, Studio's folder, and those of recent files."""
     kinds = QStandardPaths.StandardLocation
     found = [
         FolderPlace(_("Home"), "house", Path.home()),
@@ -109,7 +108,7 @@ def _standard(kind: QStandardPaths.StandardLocation) -> Path:
 
 
 class _Row(QTreeWidgetItem):
-    """A file or folder; folders stand first, whichever column sorts."""
+    """A file or folder; folders come first in every sort order."""
 
     def __init__(self, theme: Theme, entry: FolderEntry, now: dt.datetime, icon: str) -> None:
         then = dt.datetime.fromtimestamp(entry.changed_s, tz=now.tzinfo)
@@ -138,15 +137,15 @@ class _Row(QTreeWidgetItem):
 
 
 class FileSheet(Overlay):
-    """Asks for one file, to open or to save. ``take`` gets it; nothing is told when the person gives up."""
+    """Asks for a file to open or save and passes it to ``take``, which isn't called on cancel."""
 
     top = 56
     lies_over_others = True
 
     def __init__(self, theme: Theme, window: QWidget, places: Callable[[], Sequence[FolderPlace]]) -> None:
-        """``places`` are asked for at each opening."""
+        # places is called at each opening.
         super().__init__(theme, window, _("Files"))
-        self._scrim.pressed.disconnect(self.shut)  # a name that is half typed is not lost by a press beside
+        self._scrim.pressed.disconnect(self.shut)  # a click outside must not discard a typed name
         self._places = places
         self._take: Callable[[Path], object] = lambda _path: None
         self.question = OPEN
@@ -244,22 +243,20 @@ class FileSheet(Overlay):
         column.addLayout(head)
         column.addLayout(middle, 1)
 
-    # -- asking -----------------------------------------------------------------------------------
-
     def ask_open(self, folder: Path, take: Callable[[Path], object], question: FileQuestion = OPEN) -> None:
-        """Which behaviour, or whatever the question is about, to open."""
+        """Ask for a file to open, by default a behaviour."""
         self._ask(question, folder, take)
 
     def ask_picture(self, folder: Path, take: Callable[[Path], object]) -> None:
-        """Which picture to take."""
+        """Ask for an image."""
         self._ask(PICTURE, folder, take)
 
     def ask_folder(self, folder: Path, take: Callable[[Path], object]) -> None:
-        """Which folder to keep pictures in: the one that is chosen in the list, else the one that shows."""
+        """Ask for a folder: the one selected in the list, otherwise the current one."""
         self._ask(FOLDER, folder, take)
 
     def ask_save(self, suggestion: Path, take: Callable[[Path], object]) -> None:
-        """Where to save, and under which name."""
+        """Ask where and under which name to save a behaviour."""
         self._ask_name(SAVE, suggestion, take)
 
     def ask_save_as(
@@ -269,7 +266,7 @@ class FileSheet(Overlay):
         kinds: Sequence[FileKind],
         take: Callable[[Path, FileKind], object],
     ) -> None:
-        """Where to save something that is no behaviour, under which name, and as what."""
+        """Ask where, under which name and in which format to save another kind of file."""
         endings = tuple(dict.fromkeys(each.ending for each in kinds))
         question = FileQuestion(
             title, SAVE.verb, SAVE.empty, endings=endings, icon="image", saves=True, kinds=tuple(kinds)
@@ -295,7 +292,7 @@ class FileSheet(Overlay):
         return self.question.kinds[max(0, self.kind.currentIndex())]
 
     def _kind_chosen(self) -> None:
-        """Another ending; one that was typed goes, since it would count for more."""
+        # Drops an ending that was typed, because it would override the chosen format.
         name = self.name.text()
         typed = next((each for each in self.question.endings if name.lower().endswith(each)), "")
         self.name.setText(name[: len(name) - len(typed)])
@@ -315,7 +312,7 @@ class FileSheet(Overlay):
 
     @property
     def saves(self) -> bool:
-        """Whether a name is asked for."""
+        """True if a name is asked for."""
         return self.question.saves
 
     @property
@@ -330,7 +327,8 @@ class FileSheet(Overlay):
         return QSize(min(room.width(), round(scaled(WIDE))), min(room.height(), round(scaled(HIGH))))
 
     def _focus_changed(self, _old: QWidget | None, _new: QWidget | None) -> None:
-        """It stays open while Stop is pressed."""
+        # Overrides the closing on focus loss: the sheet stays open while Stop is pressed.
+        ...
 
     def _show_places(self) -> None:
         column = self.places.column
@@ -345,10 +343,8 @@ class FileSheet(Overlay):
             column.insertWidget(number, button)
         self.places.setFixedWidth(round(self.theme.scaled(PLACES_WIDE)))
 
-    # -- the folder -------------------------------------------------------------------------------
-
     def go_to(self, folder: Path) -> None:
-        """Show what is in a folder; one that can't be read says why, and the one before stays."""
+        """Show a folder; on an error show the reason and stay in the current one."""
         try:
             found = entries_of(folder, self.question.endings)
         except OSError as error:
@@ -383,9 +379,9 @@ class FileSheet(Overlay):
 
     @property
     def chosen(self) -> FolderEntry | None:
-        """The file or folder that is chosen in the list."""
+        """File or folder selected in the list, or None."""
         row = self.list.currentItem()
-        # The list makes its first row the current one as soon as it has the keyboard; nobody has chosen that.
+        # QTreeWidget makes the first row current when it gets the focus, which isn't a selection.
         meant = row is not None and (row.isSelected() or not self.question.wants_folder)
         return row.entry if meant and isinstance(row, _Row) else None
 
@@ -395,7 +391,7 @@ class FileSheet(Overlay):
         self._judge()
 
     def _opened(self, item: QTreeWidgetItem) -> None:
-        """Return or a double click: into a folder; a file is opened, or its name is taken over."""
+        # Return or double click: enter a folder, open a file or copy its name.
         if isinstance(item, _Row) and item.entry.is_folder:
             self.go_to(item.entry.path)
         elif isinstance(item, _Row) and not self.saves:
@@ -409,7 +405,7 @@ class FileSheet(Overlay):
         self.folder_name.setFocus(Qt.FocusReason.OtherFocusReason)
 
     def _show_folder_field(self, shown: bool) -> None:
-        """The field for a folder's name in the place of the button that asks for it."""
+        # The field takes the place of the "New folder" button.
         self.folder_name.setMinimumWidth(round(self.theme.scaled(FOLDER_NAME_WIDE)))
         for widget in (self.folder_name, self.make_folder):
             paint.show_when(widget, shown and self._makes_folders)
@@ -433,11 +429,9 @@ class FileSheet(Overlay):
         self.go_to(self.folder / name)
         self.first().setFocus(Qt.FocusReason.OtherFocusReason)
 
-    # -- the answer -------------------------------------------------------------------------------
-
     @property
     def target(self) -> Path | None:
-        """The file that is meant now; None while there is none."""
+        """File or folder that the button would use, or None."""
         chosen = self.chosen
         if self.question.wants_folder:
             return chosen.path if chosen is not None else self.folder
@@ -453,7 +447,7 @@ class FileSheet(Overlay):
         return self.folder / f"{name}{ending}" if name and not name_refusal(name) else None
 
     def _judge(self) -> None:
-        """Say what would happen, and call the buttons after it."""
+        # Shows the consequence of the button, such as overwriting, and sets its text.
         target = self.target
         taken = self.saves and target is not None and target.exists()
         paint.show_when(self.keep_both, taken)
@@ -524,10 +518,8 @@ class FileSheet(Overlay):
             self._show_places()
             self.go_to(self.folder)
 
-    # -- keys -------------------------------------------------------------------------------------
-
     def eventFilter(self, watched: QObject, event: QEvent) -> bool:
-        """Backspace in the list leads to the folder above."""
+        """Go to the parent folder on Backspace in the list."""
         if (
             watched is self.list
             and event.type() == QEvent.Type.KeyPress

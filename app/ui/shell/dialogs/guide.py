@@ -1,8 +1,8 @@
-"""The guide: pages about Studio, inside Studio, in the person's language; found by their words.
+"""Guide: searchable help pages in the person's language.
 
-The pages are Markdown in ``resources/guide``, a folder each language. ``{key:run.stop}`` in them becomes
-the keys of a command as they are now. ``![words](name)`` is a picture: ``light/name.png`` or
-``dark/name.png`` in the folder of the language, as Studio looks now; the words are for who can't see it.
+The pages are Markdown in ``resources/guide``, with a folder per language. ``{key:run.stop}`` is replaced with
+the current keys of a command. ``![words](name)`` includes an image: ``light/name.png`` or ``dark/name.png``
+in the folder of the language, by the current theme; the words are its alternative text.
 """
 
 from __future__ import annotations
@@ -50,7 +50,7 @@ from nep.i18n import ENGLISH, _, ngettext
 WIDE, HIGH, LIST_WIDE = 920, 640, 220
 LINE_PERCENT = 115.0
 PICTURE_RATIO = 1.5
-"""Pixels of a picture's file for one of the window at 100 %: sharp on fine screens, too."""
+"""Pixels of the image file per pixel of the window at 100 %, for sharpness on high-DPI screens."""
 _PICTURE = re.compile(r"!\[([^\]]*)\]\(([a-z-]+)\)")
 _KEY = re.compile(r"\{key:([a-z_.]+)\}")
 _MARKS = re.compile(r"[*#|`_-]+")
@@ -58,32 +58,32 @@ _MARKS = re.compile(r"[*#|`_-]+")
 
 @dataclass(frozen=True)
 class GuidePage:
-    """One page: its heading, its Markdown, and the folders of its pictures, those of its language first."""
+    """A page: title, Markdown, and folders of its images in order of preference."""
 
     title: str
     text: str
     folders: tuple[Path, ...] = ()
 
     def has(self, words: str) -> bool:
-        """Whether all of these words are in it, in any order, or in the words of its pictures."""
+        """Return whether the page or its alternative texts contain all of these words in any order."""
         said = _MARKS.sub(" ", _PICTURE.sub(r"\1", self.text)).casefold()
         return all(word in said for word in words.casefold().split())
 
     @property
     def pictures(self) -> tuple[tuple[str, str], ...]:
-        """The name of each picture, and the words for who can't see it."""
+        """Name and alternative text of each image."""
         return tuple((name, words) for words, name in _PICTURE.findall(self.text))
 
     def picture(self, name: str, *, dark: bool) -> Path | None:
-        """The file of a picture in these colours; None when there is none."""
+        """Return the file of an image in the light or dark variant, or None."""
         files = (folder / ("dark" if dark else "light") / f"{name}.png" for folder in self.folders)
         return next((file for file in files if file.is_file()), None)
 
 
 def read_pages(folder: Path, language: str, key_of: Callable[[str], str]) -> tuple[GuidePage, ...]:
-    """The pages in this language, or in English where nobody has translated one, by the order of their files.
+    """Return the pages in file order, in this language or in English where a translation is missing.
 
-    ``key_of`` gives the first key of a command; "" for none.
+    ``key_of`` returns the first key of a command, or "".
     """
     made = []
     own = folder / language.split("-", maxsplit=1)[0].split("_", maxsplit=1)[0]
@@ -97,7 +97,7 @@ def read_pages(folder: Path, language: str, key_of: Callable[[str], str]) -> tup
 
 
 class PageView(QTextBrowser):
-    """Shows a page with its pictures, each at most as wide as there is room."""
+    """Shows a page with images scaled to the available width."""
 
     def __init__(self, theme: Theme) -> None:
         super().__init__()
@@ -113,7 +113,7 @@ class PageView(QTextBrowser):
         self._again.timeout.connect(self._fit_pictures)
 
     def show_page(self, page: GuidePage) -> None:
-        """Show it from its beginning."""
+        """Show a page from its start."""
         self._page = page
         self.setMarkdown(page.text)
         self.setAccessibleDescription(" ".join(words for _name, words in page.pictures))
@@ -134,7 +134,7 @@ class PageView(QTextBrowser):
         return self.viewport().width() - 2 * round(self.document().documentMargin())
 
     def _fit_pictures(self) -> None:
-        """Give each picture its size here, and an image of as many pixels as it has then on the screen."""
+        # Scales each image to device pixels, so that it stays sharp.
         self._laid_for = self._room()
         document, ratio = self.document(), self.devicePixelRatioF()
         cursor = QTextCursor(document)
@@ -162,7 +162,7 @@ class PageView(QTextBrowser):
             cursor.setCharFormat(look)
 
     def _places(self) -> list[int]:
-        """Where pictures are in the text."""
+        # Text positions of images.
         found = []
         block = self.document().begin()
         while block.isValid():
@@ -173,12 +173,12 @@ class PageView(QTextBrowser):
 
 
 class GuideSheet(Overlay):
-    """The list of pages with its search at the left, the page at the right; it stays where it was left."""
+    """List of pages with a search field at the left, the page at the right; remembers its page."""
 
     top = 64
 
     def __init__(self, theme: Theme, window: QWidget, pages: Callable[[], Sequence[GuidePage]]) -> None:
-        """``pages`` are read at each opening: keys may have changed."""
+        # pages is called at each opening, because keys may have changed.
         super().__init__(theme, window, _("Guide"))
         self._read = pages
         self._pages: tuple[GuidePage, ...] = ()
@@ -233,7 +233,7 @@ class GuideSheet(Overlay):
 
     @property
     def shown(self) -> tuple[GuidePage, ...]:
-        """The pages in the list: those that have the words of the search."""
+        """Pages that match the search."""
         return tuple(page for page in self._pages if page.has(self.search.text()))
 
     def _filter(self, words: str) -> None:
@@ -276,7 +276,7 @@ class GuideSheet(Overlay):
             self.page.verticalScrollBar().setValue(0)
 
     def _set_text(self, document: QTextDocument) -> None:
-        """Room between paragraphs; what is emphasised is semibold, never italic."""
+        # Paragraph spacing, and semibold instead of italic emphasis.
         cursor = QTextCursor(document)
         block = document.begin()
         while block.isValid():
@@ -287,7 +287,7 @@ class GuideSheet(Overlay):
                 picture = "\ufffc" in block.text()
                 look.setBottomMargin(self.theme.scaled(4 if block.textList() is not None else 10))
                 look.setTopMargin(self.theme.scaled(12 if heading > 1 else 6 if picture else 0))
-                percent = 100.0 if picture else LINE_PERCENT  # above a picture it would be a gap
+                percent = 100.0 if picture else LINE_PERCENT  # above an image it would look like a gap
                 look.setLineHeight(percent, QTextBlockFormat.LineHeightTypes.ProportionalHeight.value)
                 cursor.setBlockFormat(look)
             for part in [each.fragment() for each in cast("Iterable[QTextBlock.iterator]", block)]:
@@ -301,7 +301,7 @@ class GuideSheet(Overlay):
             block = block.next()
 
     def eventFilter(self, watched: QObject, event: QEvent) -> bool:
-        """From the list to the field by "/", from the field to the list by Down."""
+        """Move the focus from the list to the field on "/", and back on Down."""
         if event.type() == QEvent.Type.KeyPress and isinstance(event, QKeyEvent):
             if watched is self.list and event.text() == "/":
                 self.search.setFocus(Qt.FocusReason.ShortcutFocusReason)
@@ -312,7 +312,7 @@ class GuideSheet(Overlay):
         return super().eventFilter(watched, event)
 
     def _line(self, table: QTextTable) -> None:
-        """Lines between rows, room in the cells, and the whole width."""
+        # Row lines, cell padding and full width.
         look = table.format().toTableFormat()
         look.setBorderStyle(QTextFrameFormat.BorderStyle.BorderStyle_Solid)
         look.setBorderBrush(self.theme.colour("border"))

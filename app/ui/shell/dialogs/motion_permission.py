@@ -1,4 +1,4 @@
-"""May this robot move? A card over the window, asked once for each real robot; Stop stays free and bright."""
+"""Card that asks once for each real robot if it may move; Stop stays accessible."""
 
 from __future__ import annotations
 
@@ -18,12 +18,12 @@ from app.ui.widgets import Button, Switch, label, paint
 from nep.i18n import _
 
 WIDE = 480
-TOP_SHARE = 0.42  # below every Stop: the run bar's and the robots' own
+TOP_SHARE = 0.42  # below every Stop: those of the run bar and of the robots
 TILE, EDGE, BETWEEN = 40, 20, 10
 
 
 class _Tile(QWidget):
-    """The sign of something that moves."""
+    """Icon for motion."""
 
     def __init__(self, theme: Theme) -> None:
         super().__init__()
@@ -40,15 +40,15 @@ class _Tile(QWidget):
 
 
 class MotionQuestion(QWidget):
-    """Shows the question of `MotionPermission` while it stands; Escape is "Not now".
+    """Shows the pending question of `MotionPermission`; Escape means "Not now".
 
-    The keyboard is on "Not now" first: an Enter that was meant for something else moves nothing.
+    "Not now" has the initial focus, so that an Enter meant for something else moves nothing.
     """
 
     def __init__(
         self, theme: Theme, window: QWidget, moving: MotionPermission, complain: Callable[[str], object]
     ) -> None:
-        """``complain`` is told when an "always" can't be kept."""
+        # complain gets a message when "always" can't be saved.
         super().__init__(window)
         self._theme, self._moving = theme, moving
         self._seen = moving.revision
@@ -94,7 +94,7 @@ class MotionQuestion(QWidget):
         column.addLayout(foot)
 
     def refresh(self) -> None:
-        """Show the question that stands now, or nothing."""
+        """Show the pending question, or hide the card."""
         if self._moving.revision == self._seen:
             return
         self._seen = self._moving.revision
@@ -115,7 +115,7 @@ class MotionQuestion(QWidget):
         self.setAccessibleDescription(question.sentence)
         if not self.isVisible():
             self._before = QApplication.focusWidget()
-        self.show()  # first: fonts and margins of the style sheet come with it
+        self.show()  # before measuring: showing applies fonts and margins of the style sheet
         self._place()
         self.raise_()
         self.not_now.setFocus(Qt.FocusReason.PopupFocusReason)
@@ -152,7 +152,7 @@ class MotionQuestion(QWidget):
         self.move((window.width() - wide) // 2, min(top, max(8, window.height() - self.height() - 8)))
 
     def _name_always(self, wide: int) -> None:
-        """The robot's name on the switch where there is room for all of it; the title has it anyway."""
+        # The name is on the switch only where it fits; the title always has it.
         self.always.setText(self._always_for)
         buttons = self.not_now.sizeHint().width() + self.let.sizeHint().width()
         if self.always.sizeHint().width() > wide - 2 * EDGE - 2 * BETWEEN - buttons:

@@ -1,4 +1,4 @@
-"""Asks for a name: one field, one button, and a sentence when the name can't be."""
+"""Sheet that asks for a name: a field, a button, and a reason if the name is invalid."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ WIDE = 420
 
 
 class NameSheet(Overlay):
-    """Opened once for one question."""
+    """Name sheet; `ask` opens it for a question."""
 
     top = 128
 
@@ -55,7 +55,15 @@ class NameSheet(Overlay):
         take: Callable[[str], object],
         name: str = "",
     ) -> None:
-        """``refusal`` says why a name can't be, ``take`` gets one that can."""
+        """Open the sheet for a question.
+
+        Args:
+            question: Title of the sheet.
+            verb: Text of the button.
+            refusal: Returns why a name is invalid, or "".
+            take: Called with a valid name.
+            name: Initial name.
+        """
         self._refusal, self._take = refusal, take
         self.setAccessibleName(question)
         self.heading.setText(question)
@@ -91,7 +99,7 @@ class NameSheet(Overlay):
             paint.announce(self.wrong, sentence)
 
     def _typed(self, text: str) -> None:
-        """Say at once why a name can't be; an empty field is only not done yet."""
+        # An empty field shows no error until the button is pressed.
         name = text.strip()
         sentence = self._refusal(name) if name else ""
         self._complain(sentence)

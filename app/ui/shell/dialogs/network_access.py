@@ -1,4 +1,4 @@
-"""Lets other computers connect, or no more: at which address, what it means, and what they type."""
+"""Sheet that lets other computers connect: address, consequences, and the address to type on them."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ WARNING = lazy(
 
 
 class NetworkAccessSheet(Overlay):
-    """Opened by the command "Let other computers connect" and from the status bar."""
+    """Sheet of the command "Let other computers connect" and of the status bar."""
 
     top = 128
 
@@ -79,7 +79,7 @@ class NetworkAccessSheet(Overlay):
         return QSize(wide, min(room.height(), high))
 
     def open(self) -> None:
-        """Show what is so now."""
+        """Open with the current settings."""
         self._show()
         super().open()
 

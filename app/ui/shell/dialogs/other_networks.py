@@ -1,4 +1,4 @@
-"""Which other networks Studio looks at beside its own: a switch for each, where it is, and how it is."""
+"""Sheet of other networks to monitor: a switch, the address and the state of each."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ INTRODUCTION = lazy(
 
 
 class OtherNetworksSheet(Overlay):
-    """What is switched applies at once and is kept for the next start; there is nothing to confirm."""
+    """Sheet whose changes apply at once and persist; without confirmation."""
 
     top = 96
 
@@ -73,12 +73,12 @@ class OtherNetworksSheet(Overlay):
         wide = min(room.width(), max(round(self.theme.scaled(WIDE)), least))
         inner = wide - 2 - 2 * SIDE - SCROLL_BAR
         high = self.introduction.heightForWidth(inner)
-        # asked of each row: its place in the sheet's layout knows only later that its words have changed
+        # measured per row: their layout items are updated late after a change of text
         high += sum(row.height_for(inner) + 1 + 2 * GAP for row in self.rows)
         return QSize(wide, min(room.height(), high + self._head.sizeHint().height() + 14 + 10 + 16 + 4))
 
     def open(self) -> None:
-        """Show what is chosen, and how it is, as long as it is open."""
+        """Open and update the states until it is closed."""
         for row in self.rows:
             row.show_choice()
         self.show_states()
@@ -86,19 +86,19 @@ class OtherNetworksSheet(Overlay):
         super().open()
 
     def shut(self) -> None:
-        """Also take over what was typed."""
+        """Apply typed addresses and close."""
         for row in self.rows:
             row.take()
         super().shut()
 
     def show_states(self) -> None:
-        """Say how each of them is."""
+        """Update the state of each network."""
         for row in self.rows:
             row.show_state()
 
 
 class NetworkRow(QWidget):
-    """A switch with the network's name, its address, and a sentence below; `changed`: it may be higher."""
+    """Switch with a network's name, its address and its state; `changed` when its height may differ."""
 
     changed = Signal()
 
@@ -128,12 +128,12 @@ class NetworkRow(QWidget):
         self.address.editingFinished.connect(self.take)
 
     def height_for(self, width: int) -> int:
-        """The height that it needs now."""
+        """Return the height in px for a width."""
         self._lines.invalidate()
         return self._lines.totalHeightForWidth(width)
 
     def show_choice(self) -> None:
-        """What is chosen now."""
+        """Show the saved setting."""
         network = self._network
         self.switch.setChecked(network.is_chosen)
         if network.is_chosen:
@@ -141,7 +141,7 @@ class NetworkRow(QWidget):
         self._complain("")
 
     def show_state(self) -> None:
-        """How it is: there, looked for, or why it is not; what its address means while it is off."""
+        """Show the state: connected, searching or the error; while off, the meaning of the address."""
         words = self._wrong or state_words(self._network)
         role = "error" if self._wrong else "warn" if self._network.state == "lost" else "textSecondary"
         set_role(self.state, role)
@@ -158,7 +158,7 @@ class NetworkRow(QWidget):
             self._do(lambda: self._networks.leave(self._network.kind.name))
 
     def take(self) -> None:
-        """Look at the address that was typed, if it is switched on and another one."""
+        """Apply a changed address if the network is on."""
         network = self._network
         if network.is_chosen and self.address.text().strip() != network.address:
             self._do(lambda: self._networks.choose(network.kind.name, self.address.text()))
@@ -182,7 +182,7 @@ class NetworkRow(QWidget):
 
 
 class AddressField(QLineEdit):
-    """Where a network is; Return takes it over and stays."""
+    """Address field; Return applies the address and keeps the focus."""
 
     def __init__(self, theme: Theme, name: str, example: str, take: Callable[[], object]) -> None:
         super().__init__()
@@ -195,7 +195,7 @@ class AddressField(QLineEdit):
         EditMenu(theme, self)
 
     def mark(self, *, wrong: bool) -> None:
-        """Give it the edge of a wrong value, or take it away."""
+        """Set or remove the style of an invalid value."""
         self.setProperty("wrong", "true" if wrong else "false")
         self.style().unpolish(self)
         self.style().polish(self)
@@ -208,7 +208,7 @@ class AddressField(QLineEdit):
 
 
 def state_words(network: OtherNetwork) -> str:
-    """How a network is, in a sentence; what its address means while it is not looked at."""
+    """Return a sentence about the state of a network; while off, the meaning of its address."""
     if network.state == "lost":
         return f"{network.sentence[:1].upper()}{network.sentence[1:]}."
     if network.state == "looking":

@@ -1,4 +1,4 @@
-"""What opens over the window: a surface with a shadow, and a scrim that leaves every Stop bright."""
+"""Overlay: a sheet with a shadow over the window, and a scrim that leaves every Stop accessible."""
 
 from __future__ import annotations
 
@@ -28,18 +28,18 @@ SHADOW_PX = 28
 SHADOW_DOWN = 10
 EDGE = 16
 BELOW_STOP = 5
-STOP_INSET = 4  # the button keeps that much free around its body for its ring
+STOP_INSET = 4  # px that the button leaves around its body for the focus ring
 
 
 def stops_in(window: QWidget) -> list[StopButton]:
-    """Each Stop that can be seen in a window."""
+    """Return all visible Stop buttons of a window."""
     return [stop for stop in window.findChildren(StopButton) if stop.isVisible() and stop.window() is window]
 
 
 class StopPlaces(QObject):
-    """Tells when a Stop of a window comes, goes, or gets another place or size, also with what holds it.
+    """Emits `changed` when a Stop of a window is shown, hidden, moved or resized, also with its parents.
 
-    A change of the size of text lays bars out after all widgets have heard of it, and more than once.
+    Needed since a change of text size lays out the bars several times, after all widgets were notified.
     """
 
     changed = Signal()
@@ -51,7 +51,7 @@ class StopPlaces(QObject):
         self._watched: list[QWidget] = []
 
     def watch(self) -> None:
-        """Watch from now on until `rest`; all Stops, also those that can't be seen yet."""
+        """Watch all Stop buttons, including hidden ones, until `rest` is called."""
         self.rest()
         for stop in self._window.findChildren(StopButton):
             widget: QWidget | None = stop
@@ -61,7 +61,7 @@ class StopPlaces(QObject):
                 widget = widget.parentWidget()
 
     def rest(self) -> None:
-        """Watch nothing."""
+        """Stop watching."""
         watched, self._watched = self._watched, []
         for widget in watched:
             if isValid(widget):
@@ -74,7 +74,7 @@ class StopPlaces(QObject):
 
 
 class Scrim(QWidget):
-    """Darkens a window except its Stop buttons, which can be pressed as ever; a press elsewhere closes."""
+    """Darkens a window except for its Stop buttons, which stay clickable; emits `pressed` elsewhere."""
 
     pressed = Signal()
 
@@ -86,7 +86,7 @@ class Scrim(QWidget):
         self.hide()
 
     def cover(self) -> None:
-        """Lie over the whole window, with a hole over each Stop that can be seen."""
+        """Cover the whole window with a hole for each visible Stop."""
         window = self.parentWidget()
         if window is None:
             return
@@ -100,7 +100,7 @@ class Scrim(QWidget):
         self.update()
 
     def set_strength(self, strength: float) -> None:
-        """How dark, 0 to 1."""
+        """Set the opacity of the scrim, from 0 to 1."""
         self.strength = strength
         self.update()
 
@@ -118,7 +118,7 @@ class Scrim(QWidget):
         painter.end()
 
     def _paint_shadow(self, painter: QPainter, over: QRectF) -> None:
-        """Many thin boxes on each other: an effect would paint the whole surface again at each key."""
+        # Painted as many thin boxes: QGraphicsDropShadowEffect would repaint the surface on every key.
         steps = SHADOW_PX // 2
         shade = self._theme.colour("shadow")
         shade.setAlphaF(min(1.0, shade.alphaF() * self.strength * 2.2 / steps))
@@ -130,20 +130,20 @@ class Scrim(QWidget):
 
 
 class Overlay(QWidget):
-    """A surface over a window: takes the keyboard, Esc or a press beside it closes it and gives it back.
+    """Sheet over a window: takes the focus; Esc or a click outside closes it and restores the focus.
 
-    Subclasses say in `wanted_size` how large they are, and in `first` where the keyboard goes.
+    Subclasses define the size in `wanted_size` and the initially focused widget in `first`.
     """
 
     closed = Signal()
     top = EDGE
     docks_right = False
-    """Whether it lies at the right edge of the window, where toasts then stand beside it."""
+    """True if it is docked at the right edge of the window; toasts then appear left of it."""
     lies_over_others = False
-    """Whether another one may ask by it: that stays open below, and gets the keyboard back."""
+    """True for sheets opened from another one, which stays open below and gets the focus back."""
 
     def __init__(self, theme: Theme, window: QWidget, name: str) -> None:
-        """An overlay called ``name`` for screen readers; `open` shows it."""
+        # name is read by screen readers; open() shows the overlay.
         super().__init__(window)
         self.theme = theme
         self.setAccessibleName(name)
@@ -163,15 +163,15 @@ class Overlay(QWidget):
         self.hide()
 
     def wanted_size(self, room: QSize) -> QSize:
-        """The size in a window that leaves ``room`` beside and below."""
+        """Return the size for a window with this available space."""
         return self.sizeHint().boundedTo(room)
 
     def first(self) -> QWidget:
-        """Where the keyboard goes."""
+        """Return the widget that gets the focus first."""
         return self
 
     def open(self) -> None:
-        """Show it; nothing moves under reduced motion."""
+        """Open the sheet, without animation under reduced motion."""
         if self.isVisible():
             return
         self._before = QApplication.focusWidget()
@@ -197,7 +197,7 @@ class Overlay(QWidget):
             application.focusChanged.connect(self._focus_changed)
 
     def head(self, heading: QWidget) -> QHBoxLayout:
-        """The row at the top: the heading, which may be long, and a button that closes."""
+        """Return the top row: a heading and a close button."""
         close = IconButton(self.theme, "x", _("Close"), "Esc")
         close.clicked.connect(self.shut)
         row = QHBoxLayout()
@@ -206,7 +206,7 @@ class Overlay(QWidget):
         return row
 
     def shut(self) -> None:
-        """Close it and give the keyboard back to where it was."""
+        """Close the sheet and restore the focus."""
         if not self.isVisible():
             return
         inside = self._has_keyboard()
@@ -225,12 +225,12 @@ class Overlay(QWidget):
         self.closed.emit()
 
     def window_below(self) -> QWidget:
-        """The window that it lies over."""
+        """Return the window below the sheet."""
         parent = self.parentWidget()
         return parent if parent is not None else self
 
     def place(self) -> None:
-        """Go to the middle of the window, `top` below its upper edge, or lower so that no Stop is covered."""
+        """Centre the sheet `top` px below the window's upper edge, or lower if a Stop would be covered."""
         window = self.window_below()
         place = self._placed(self.top)
         stops = [QRect(stop.mapTo(window, QPoint()), stop.size()) for stop in stops_in(window)]
@@ -264,10 +264,10 @@ class Overlay(QWidget):
     def keyPressEvent(self, event: QKeyEvent) -> None:
         if event.key() == Qt.Key.Key_Escape:
             self.shut()
-        event.accept()  # nothing that is typed here is meant for the window below
+        event.accept()  # keys must not reach the window below
 
     def focusNextPrevChild(self, forward: bool) -> bool:
-        """Tab stays inside."""
+        """Keep the focus inside the sheet."""
         focus = QApplication.focusWidget()
         step: QWidget = focus if focus is not None and self.isAncestorOf(focus) else self
         stop = next(tab_stops(self, step, forward=forward), None)

@@ -1,4 +1,4 @@
-"""The sheet Record: what is recorded, how it goes, and the flight recorder."""
+"""Sheet "Record": topics to record, progress, and the flight recorder."""
 
 from __future__ import annotations
 
@@ -50,18 +50,18 @@ if TYPE_CHECKING:
     from nep.recordings.recorder import TopicSelection
 
 WIDE, HIGH, SIDE = 640, 812, 20
-BESIDE_FROM = 1280  # px at 100 % text: from there on it lies over one column, without a scrim
+BESIDE_FROM = 1280  # px at 100 % text; wider windows show it over one column, without a scrim
 BELOW_BARS = 88
 LOOK_MS = 300
 ROWS_HIGH = 170
 LABEL_WIDE, NUMBER_WIDE, BAR_WIDE = 80, 84, 120
 LONG_S = 2 * 86_400.0
-"""When a disk has room for longer, nobody needs to know for how long."""
+"""Above this the remaining recording time of the disk isn't shown."""
 _GB = 1e9
 
 
 class RecordMeter(QWidget):
-    """One figure with its name above and a note below; blank where it is not known."""
+    """A figure with a title above and a note below; blank if unknown."""
 
     def __init__(self, name: str) -> None:
         super().__init__()
@@ -75,7 +75,7 @@ class RecordMeter(QWidget):
         column.addWidget(self.note)
 
     def say(self, value: str, note: str = "", role: str = "textSecondary") -> None:
-        """Show this figure."""
+        """Set figure and note."""
         self.value.setText(value)
         self.note.setText(note)
         set_role(self.note, role)
@@ -83,7 +83,7 @@ class RecordMeter(QWidget):
 
 
 class RecordSheet(Overlay):
-    """What is chosen applies to the next recording, and is kept; the flight recorder follows at once."""
+    """Settings of the next recording, which persist, and of the flight recorder, which apply at once."""
 
     def __init__(
         self,
@@ -93,7 +93,7 @@ class RecordSheet(Overlay):
         keep: Callable[[], None],
         say: ShowToast,
     ) -> None:
-        """``keep`` keeps the last seconds."""
+        # keep saves the flight recorder.
         super().__init__(theme, window, _("Record"))
         self._session, self._recordings, self._say = session, session.recordings, say
         self._seen: object = None
@@ -109,8 +109,6 @@ class RecordSheet(Overlay):
         self._timer.setInterval(LOOK_MS)
         self._timer.timeout.connect(self.show_state)
         self.closed.connect(self._timer.stop)
-
-    # ---- its parts
 
     def _make_meters(self) -> None:
         self.length = RecordMeter(_("Length"))
@@ -280,8 +278,6 @@ class RecordSheet(Overlay):
         whole.addWidget(Separator(self.theme))
         whole.addLayout(foot)
 
-    # ---- where it lies
-
     def first(self) -> QWidget:
         return self.record
 
@@ -307,18 +303,16 @@ class RecordSheet(Overlay):
             self._scrim.setVisible(not self._is_beside())
 
     def _focus_changed(self, old: QWidget | None, new: QWidget | None) -> None:
-        if not self._is_beside():  # else a person works on in the window, and it tells how it goes
+        if not self._is_beside():  # otherwise a person works in the window while the sheet shows the progress
             super()._focus_changed(old, new)
 
     def open(self) -> None:
-        """Show what is chosen and how it goes, as long as it is open."""
+        """Open and update the progress until it is closed."""
         self._show_choice()
         self.show_state()
         self._timer.start()
         super().open()
         self.place()
-
-    # ---- what it shows
 
     def _columns(self) -> tuple[Column[Topic], ...]:
         def figures(topic: Topic) -> Cell:
@@ -358,7 +352,7 @@ class RecordSheet(Overlay):
 
     @property
     def choice(self) -> RecordingChoice:
-        """What is recorded now, else what would be."""
+        """Selection of the current recording, or that of the next one."""
         recordings = self._recordings
         return recordings.recorded if recordings.is_recording else recordings.choice
 
@@ -400,7 +394,7 @@ class RecordSheet(Overlay):
         self.patterns.set_wrong(bool(problem))
 
     def show_state(self) -> None:
-        """Say how it goes now."""
+        """Show the progress."""
         recordings = self._recordings
         going = recordings.is_recording
         self.record.set_word(_("Stop recording") if going else _("Record"))
@@ -453,7 +447,7 @@ class RecordSheet(Overlay):
         self.disk.say(size_words(free), full, "warn" if free < LOW_DISK_BYTES else "textSecondary")
 
     def _show_end(self, end: tuple[float, float] | None) -> None:
-        """How large it will be at its end; only where it has one, and that is known."""
+        # Only for a recording with limits whose rate is known.
         for each in (self._end_line, self.at_end):
             each.setVisible(end is not None)
         if end is not None:
@@ -461,7 +455,7 @@ class RecordSheet(Overlay):
             self.at_end.say(size_words(size_bytes), _("at {time}").format(time=length_words(at_s)))
 
     def _ends_problem(self, sentence: str) -> None:
-        """What is wrong with a limit, else what the two mean."""
+        # Error of a limit, otherwise their meaning.
         both = bool(self.ends_min.text() and self.ends_gb.text())
         none = not (self.ends_min.text() or self.ends_gb.text())
         usual = _("whichever comes first") if both else _("when you stop it") if none else ""
@@ -507,8 +501,6 @@ class RecordSheet(Overlay):
         )
         self.ring_words.setText(words)
 
-    # ---- what a person does
-
     def _choose_mode(self, mode: str) -> None:
         recordings = self._recordings
         choice = replace(recordings.choice, mode=mode)
@@ -519,7 +511,7 @@ class RecordSheet(Overlay):
         self.show_state()
 
     def _toggle(self, topic: str) -> None:
-        """A row was pressed: it is chosen, or not any more."""
+        # Adds or removes the topic of a clicked row.
         recordings = self._recordings
         if recordings.is_recording or recordings.choice.mode != "chosen":
             return
@@ -529,7 +521,7 @@ class RecordSheet(Overlay):
         self.show_state()
 
     def _change(self, **changes: float | None) -> None:
-        """Another limit: it is for the next recording."""
+        # Limits apply to the next recording.
         recordings = self._recordings
         choice = replace(recordings.choice, **changes)  # type: ignore[arg-type]
         if choice != recordings.choice and not recordings.is_recording:
@@ -581,7 +573,6 @@ class RecordSheet(Overlay):
 
 
 def _flow(*widgets: QWidget) -> Flow:
-    """These in a row, or in more where there is too little room."""
     made = Flow(gap=8, row_gap=6)
     for each in widgets:
         made.addWidget(each)

@@ -1,4 +1,4 @@
-"""Report a problem: what goes into the file, what does not, and what happened. Nothing is sent by itself."""
+"""Sheet "Report a problem": the content of the file, what it omits, and a description. Sends nothing."""
 
 from __future__ import annotations
 
@@ -50,13 +50,13 @@ Behaviours = Callable[[], Sequence[ReportedWork]]
 
 
 def documents_folder() -> Path:
-    """Where this computer keeps documents; the person's own folder where it has no such place."""
+    """Return the system's documents folder, or the home folder if there is none."""
     place = QStandardPaths.writableLocation(QStandardPaths.StandardLocation.DocumentsLocation)
     return Path(place) if place and Path(place).is_dir() else Path.home()
 
 
 class ReportSheet(Overlay):
-    """Opened by the command, and by the banner after a crash. What was typed stays until it is written."""
+    """Sheet of the command and of the banner after a crash; keeps typed text until the report is written."""
 
     top = 72
 
@@ -68,14 +68,14 @@ class ReportSheet(Overlay):
         say: Callable[[str], object],
         clock: Callable[[], float],
     ) -> None:
-        """``say`` tells of a report that is done when the sheet is closed; ``clock`` gives epoch seconds."""
+        # say announces a finished report if the sheet is closed; clock returns epoch seconds.
         super().__init__(theme, window, _("Report a problem"))
         self._asks, self._say, self._clock = asks, say, clock
         self._parts: ReportParts | None = None
         self._behaviours: Behaviours = tuple
         self._writer: ReportWriter | None = None
         self.written: Path | None = None
-        """The report that was written last."""
+        """The last report written."""
         self.introduction = label(_(INTRODUCTION), "body", role="textSecondary", wrap=True)
         self.happened = LongText(theme, _("What happened?"))
         self.list = QVBoxLayout()
@@ -144,10 +144,11 @@ class ReportSheet(Overlay):
         inside.addWidget(self.work)
         inside.addWidget(self.names)
 
-    # -- showing ----------------------------------------------------------------------------------
-
     def show_for(self, parts: ReportParts, names: Sequence[str], behaviours: Behaviours) -> None:
-        """Open it; ``names`` are the open behaviours, ``behaviours`` gives them when they are wanted."""
+        """Open the sheet.
+
+        ``names`` are the open behaviours; ``behaviours`` returns their contents if they are included.
+        """
         self._parts, self._behaviours = parts, behaviours
         while (item := self.list.takeAt(0)) is not None:
             line = item.widget()
@@ -181,7 +182,7 @@ class ReportSheet(Overlay):
         return QSize(wide, min(room.height(), high))
 
     def _tell(self, words: str, role: str = "textSecondary", path: Path | None = None) -> None:
-        """What became of it; with a ``path`` there is a file to show."""
+        # With a path the button to show the file appears.
         self.written = path
         set_role(self.state, role)
         self.state.setText(words)
@@ -194,8 +195,6 @@ class ReportSheet(Overlay):
             if words:
                 paint.announce(self.state, words)
 
-    # -- doing ------------------------------------------------------------------------------------
-
     def _ask_where(self) -> None:
         suggestion = documents_folder() / file_name(self._clock())
         self._asks.save_as(_("Write report"), suggestion, (ZIP,), lambda path, _kind: self._begin(path))
@@ -206,7 +205,7 @@ class ReportSheet(Overlay):
             return
         happened = self.happened.text()
         work = tuple(self._behaviours()) if self.work.isChecked() else ()
-        # A copy: the settings of now may change while the thread reads them.
+        # A copy, because settings may change while the thread reads them.
         still = replace(parts, settings=dict(parts.settings))
         self._writer = ReportWriter(path, lambda: make_report(still, happened, work))
         self._tell(_("Writing the report."))
@@ -238,7 +237,7 @@ class ReportSheet(Overlay):
 
 
 class _Line(QWidget):
-    """One thing that is in the file, or is not."""
+    """A line about included or omitted content."""
 
     def __init__(self, theme: Theme, words: str, icon: str) -> None:
         super().__init__()

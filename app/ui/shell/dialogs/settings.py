@@ -1,4 +1,4 @@
-"""The settings: language, look, text, contrast, motion, virtual robots, shortcuts, and where pictures go."""
+"""Sheet of settings: language, theme, text, contrast, motion, robots, shortcuts, folder for images."""
 
 from __future__ import annotations
 
@@ -29,11 +29,11 @@ MODE_WORDS = {
 PREFERENCE_WORDS = {"system": lazy("Match system"), "on": lazy("On"), "off": lazy("Off")}
 TEXT_SIZES = ("100", "125", "150", "175", "200")
 SIDE_BY_SIDE = 3
-"""So many languages stand side by side; more are a list to open."""
+"""Up to this number languages are shown side by side, otherwise as a drop-down list."""
 
 
 class SettingsSheet(Overlay):
-    """Everything is kept, and applies at once but for the language; there is nothing to confirm."""
+    """Settings sheet: changes persist and apply at once, except for the language."""
 
     top = 72
 
@@ -48,10 +48,8 @@ class SettingsSheet(Overlay):
         *,
         restart: Callable[[], object] | None = None,
     ) -> None:
-        """``voice`` says whether robots are heard, and if not, why; it is asked at each opening.
-
-        ``restart`` starts Studio again, with everything that is open; None where that can't be done.
-        """
+        # voice describes the speech output and is called at each opening. restart restarts Studio with all
+        # open documents; None if that is impossible.
         super().__init__(theme, window, _("Settings"))
         self._state, self._settings, self._files, self._voice = state, settings, files, voice
         self.language = self._language_input()
@@ -114,7 +112,6 @@ class SettingsSheet(Overlay):
         column.addWidget(self._area, 1)
 
     def _fill(self, grid: QGridLayout) -> None:
-        """A row for each setting: what it is called, and its control."""
         grid.setContentsMargins(19, 4, 19, 4)
         grid.setHorizontalSpacing(16)
         grid.setVerticalSpacing(12)
@@ -160,7 +157,7 @@ class SettingsSheet(Overlay):
         return QSize(min(room.width(), wide), min(room.height(), high))
 
     def open(self) -> None:
-        """Show what is chosen now."""
+        """Open with the current settings."""
         self.voice.setText(self._voice())
         self._show()
         super().open()
@@ -186,7 +183,7 @@ class SettingsSheet(Overlay):
         self._state.keep_theme(self.theme)
 
     def _chosen_language(self) -> str:
-        """What was chosen here and can be spoken, else what is spoken now."""
+        # The language chosen here if available, otherwise the current one.
         chosen = self._settings.get("language", "")
         return chosen if chosen in dict(i18n.offered()) else i18n.language()
 
@@ -207,11 +204,10 @@ class SettingsSheet(Overlay):
         self._changed(lambda: self.theme.set_motion(wish))
 
     def _choose(self) -> None:
-        """Ask for a folder, while everything else goes on."""
         before = str(snapshots.folder(self._settings))
         self._files.choose_folder(before, self.keep_folder)
 
     def keep_folder(self, folder: Path) -> None:
-        """Keep pictures there from now on."""
+        """Set the folder for images."""
         self._state.keep(snapshots.CHOSEN, str(folder))
         self._show()

@@ -1,4 +1,4 @@
-"""All shortcuts in one table: search, press Enter or click to give a command another key, swap, reset."""
+"""Sheet of all shortcuts: search, change, swap and reset keys."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ HINT = lazy("Press Enter or click to change a shortcut. Press Delete to remove i
 
 
 class ShortcutSheet(Overlay):
-    """The table. While a new key is awaited every key but F12 and Esc is taken as that key."""
+    """Table of shortcuts. While recording, every key except F12 and Esc becomes the new shortcut."""
 
     top = 72
 
@@ -42,7 +42,7 @@ class ShortcutSheet(Overlay):
         super().__init__(theme, window, _("Keyboard shortcuts"))
         self._shortcuts = shortcuts
         self._waiting = ""
-        self._offer: tuple[str, str] | None = None  # a command and the key that another one has
+        self._offer: tuple[str, str] | None = None  # a command, and a key held by another one
         self.field = SearchField(theme, _("Find a command or key"))
         self.rows = EntryList(theme, _("Keyboard shortcuts"))
         self.said = label(_(HINT), "body", role="textSecondary", wrap=True)
@@ -87,19 +87,17 @@ class ShortcutSheet(Overlay):
         return QSize(min(room.width(), round(scaled(WIDE))), min(room.height(), round(scaled(HIGH))))
 
     def open(self) -> None:
-        """Show all of them."""
+        """Open with all shortcuts."""
         self.field.clear()
         self._stop_waiting()
         self._show()
         super().open()
 
     def open_for(self, name: str) -> None:
-        """Show one command and wait for its new key."""
+        """Open with one command selected and record its new key."""
         self.open()
         self._show(f"command:{name}")
         self.record()
-
-    # -- the rows ---------------------------------------------------------------------------------
 
     def _show(self, chosen: str = "") -> None:
         query = self.field.text().strip()
@@ -144,10 +142,8 @@ class ShortcutSheet(Overlay):
         if entry is not None and self.isVisible() and not self._waiting:
             paint.announce(self.field, str(self.rows.currentIndex().data(Qt.ItemDataRole.AccessibleTextRole)))
 
-    # -- a new key --------------------------------------------------------------------------------
-
     def record(self) -> None:
-        """Wait for a new key for the chosen command."""
+        """Record a new key for the selected command."""
         entry = self.rows.entry
         if entry is None:
             return
@@ -179,7 +175,7 @@ class ShortcutSheet(Overlay):
             return super().eventFilter(watched, event)
         if event.type() == QEvent.Type.ShortcutOverride and self._waiting:
             pressed = cast("QKeyEvent", event)
-            if pressed.key() != Qt.Key.Key_F12:  # F12 stops, whatever is awaited
+            if pressed.key() != Qt.Key.Key_F12:  # F12 is Stop even while recording
                 event.accept()
                 return True
         if event.type() == QEvent.Type.KeyPress:

@@ -1,4 +1,4 @@
-"""Studio's own answers to "Which file?": each question is asked by one sheet, made at the first of them."""
+"""File dialogs of Studio, all shown in one sheet that is created on first use."""
 
 from __future__ import annotations
 
@@ -24,18 +24,18 @@ LAYOUT = FileQuestion(
 
 
 class StudioDialogs:
-    """Asks for files by our own sheet, which is made at the first question."""
+    """Asks for files and folders with a `FileSheet`."""
 
     def __init__(self, theme: Theme, window: QWidget, settings: Settings) -> None:
         self._theme, self._window, self._settings = theme, window, settings
         self._sheet: FileSheet | None = None
 
     def open(self, folder: str, take: Callable[[Path], None]) -> None:
-        """Which file to open."""
+        """Ask for a behaviour to open."""
         self._made().ask_open(Path(folder or Path.home()), take)
 
     def save(self, suggestion: str, take: Callable[[Path], None]) -> None:
-        """Where to save."""
+        """Ask where to save a behaviour."""
         self._made().ask_save(Path(suggestion), take)
 
     def save_as(
@@ -45,23 +45,23 @@ class StudioDialogs:
         kinds: Sequence[FileKind],
         take: Callable[[Path, FileKind], None],
     ) -> None:
-        """Where to save something that is no behaviour, and as what."""
+        """Ask where and in which format to save another kind of file."""
         self._made().ask_save_as(title, suggestion, kinds, take)
 
     def open_picture(self, folder: str, take: Callable[[Path], None]) -> None:
-        """Which picture to take."""
+        """Ask for an image."""
         self._made().ask_picture(Path(folder or pictures_folder()), take)
 
     def open_recording(self, folder: str, take: Callable[[Path], None]) -> None:
-        """Which recording to play."""
+        """Ask for a recording."""
         self._made().ask_open(_nearest(folder), take, RECORDING)
 
     def open_layout(self, folder: str, take: Callable[[Path], None]) -> None:
-        """Which layout to show."""
+        """Ask for a layout file."""
         self._made().ask_open(_nearest(folder), take, LAYOUT)
 
     def choose_folder(self, folder: str, take: Callable[[Path], None]) -> None:
-        """Which folder to keep pictures in."""
+        """Ask for a folder."""
         self._made().ask_folder(_nearest(folder), take)
 
     def _made(self) -> FileSheet:
@@ -75,6 +75,6 @@ class StudioDialogs:
 
 
 def _nearest(folder: str) -> Path:
-    """The folder, or the nearest one above it that there is."""
+    # The nearest existing ancestor if the folder is missing.
     wanted = Path(folder)
     return next((each for each in (wanted, *wanted.parents) if each.is_dir()), Path.home())

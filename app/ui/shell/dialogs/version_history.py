@@ -1,4 +1,4 @@
-"""The earlier versions of a behaviour: when each was written, what is different now; one opens as a copy."""
+"""Sheet of a behaviour's earlier versions with their differences; a version opens as a copy."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ SAVE_FIRST = lazy(
 
 
 def difference_words(found: Difference) -> str:
-    """Say "14 blocks; since then 3 added, 1 removed"."""
+    """Return a text such as "14 blocks; since then 3 added, 1 removed"."""
     counts = (
         (found.added, ngettext("{count} added", "{count} added", found.added)),
         (found.removed, ngettext("{count} removed", "{count} removed", found.removed)),
@@ -52,7 +52,7 @@ def difference_words(found: Difference) -> str:
 
 
 class VersionHistorySheet(Overlay):
-    """Opened for one behaviour. What is different is read a version at a time, so that the window goes on."""
+    """Version history of one behaviour; reads a version at a time so that the window stays responsive."""
 
     top = 72
 
@@ -63,7 +63,7 @@ class VersionHistorySheet(Overlay):
         open_copy: Callable[[Path, str], object],
         save: Callable[[], object],
     ) -> None:
-        """``open_copy`` gets a version's file and the name for the copy, ``save`` saves the behaviour."""
+        # open_copy gets the file of a version and a name for the copy.
         super().__init__(theme, window, _("Earlier versions"))
         self._open_copy, self._save = open_copy, save
         self._now: Mapping[str, object] = {}
@@ -101,8 +101,6 @@ class VersionHistorySheet(Overlay):
         column.addWidget(self.empty, 1)
         column.addWidget(self._foot)
 
-    # -- showing ----------------------------------------------------------------------------------
-
     def show_for(
         self,
         name: str,
@@ -111,9 +109,9 @@ class VersionHistorySheet(Overlay):
         now: dt.datetime | None = None,
         title: str = "",
     ) -> None:
-        """Show the versions of a behaviour's file, compared with its blocks as they are now.
+        """Show the versions of a file, compared with the behaviour's current blocks.
 
-        ``title`` is the name with its folder, where another open behaviour has the same name.
+        ``title`` is the name with its folder, used if another open behaviour has the same name.
         """
         self._name, self._now = name, workspace
         moment = now if now is not None else dt.datetime.now().astimezone()
@@ -161,10 +159,7 @@ class VersionHistorySheet(Overlay):
         high = rest + self.rows.height_of_all() + 8
         return QSize(wide, min(room.height(), round(scaled(MOST_HIGH)), high))
 
-    # -- what is different ------------------------------------------------------------------------
-
     def _read_one(self) -> None:
-        """Read one version and say in its row what is different now."""
         if not self._unread or not self.isVisible():
             self._reading.stop()
             return
@@ -179,10 +174,8 @@ class VersionHistorySheet(Overlay):
 
     @property
     def read(self) -> bool:
-        """Whether every row says what is different."""
+        """True once all versions were compared."""
         return not self._unread
-
-    # -- doing ------------------------------------------------------------------------------------
 
     def eventFilter(self, watched: QObject, event: QEvent) -> bool:
         if watched is self.rows and event.type() == QEvent.Type.KeyPress:
@@ -194,7 +187,7 @@ class VersionHistorySheet(Overlay):
         return super().eventFilter(watched, event)
 
     def open_chosen(self) -> None:
-        """Open the chosen version as a copy, unless it can't be read."""
+        """Open the selected version as a copy, unless it can't be read."""
         entry = self.rows.entry
         if entry is None or entry.reason:
             return

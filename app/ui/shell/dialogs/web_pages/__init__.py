@@ -1,6 +1,6 @@
-"""The sheet "Web pages and tablets": who may connect, the QR code, the connected pages, and refusals.
+"""Sheet "Web pages and tablets": permissions, QR code, connected pages, and rejections.
 
-The server itself and its settings are `app.core.network.web_pages`.
+The server and its settings are in `app.core.network.web_pages`.
 """
 
 from app.ui.shell.dialogs.web_pages.sheet import WebPagesSheet as WebPagesSheet

@@ -1,4 +1,4 @@
-"""Where web pages connect: address, token, the network that the server is open to, and the QR code."""
+"""Access to the web server: address, token, the network that it is open to, and the QR code."""
 
 from __future__ import annotations
 
@@ -23,7 +23,10 @@ _END = 4
 
 
 class OpenTo(QWidget):
-    """Choice of this computer or one of its addresses; `chosen` with the address, "" for this computer."""
+    """Choice of this computer or one of its addresses.
+
+    Emits `chosen` with the address, or "" for this computer.
+    """
 
     chosen = Signal(str)
 
@@ -36,8 +39,8 @@ class OpenTo(QWidget):
         self._hosts: tuple[str, ...] = ()
 
     def offer(self, addresses: Sequence[OwnAddress], value: str) -> None:
-        """Offer this computer and its addresses, of which ``value`` is chosen."""
-        if value and value not in {own.host for own in addresses}:  # the address is gone
+        """Offer this computer and its addresses, with ``value`` selected."""
+        if value and value not in {own.host for own in addresses}:  # the computer no longer has this address
             addresses = (*addresses, OwnAddress(value, ""))
         options: list[tuple[str, str, str | None]] = [("", _("This computer"), None)]
         options += [(own.host, address_words(own), None) for own in addresses]
@@ -61,22 +64,22 @@ class OpenTo(QWidget):
 
     @property
     def value(self) -> str:
-        """The chosen address."""
+        """Selected address."""
         return "" if self._choice is None else self._choice.value
 
     def set_value(self, value: str) -> None:
-        """Choose without telling."""
+        """Select an address without emitting `chosen`."""
         if self._choice is not None:
             self._choice.set_value(value)
 
     @property
     def choice(self) -> QWidget | None:
-        """The widget that takes the keyboard."""
+        """Widget that gets the focus."""
         return self._choice
 
 
 class AccessForm(QWidget):
-    """The first part of the form. Signals say what a person wants; `show_state` shows what is so."""
+    """First part of the form: emits signals for requested changes; `show_state` shows the current state."""
 
     copy_address = Signal()
     copy_token = Signal()
@@ -141,7 +144,7 @@ class AccessForm(QWidget):
         self.qr_words.setFixedWidth(round(self._theme.scaled(SIDE)))
 
     def show_state(self, *, is_foxglove: bool) -> None:
-        """Show the server's address, its token, and who can reach it."""
+        """Show the server's address, its token, and its reach."""
         web = self._web
         self.address.show_text(web.url)
         self._show_token()

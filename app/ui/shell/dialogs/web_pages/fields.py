@@ -1,4 +1,4 @@
-"""Fields that show an address or a token, with their buttons inside the frame."""
+"""Read-only fields for an address or a token, with buttons inside the frame."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ _PADDING, _BUTTON = 10, 26
 
 
 class _ReadOnlyLine(QLineEdit):
-    """Ctrl+C copies the whole when nothing is selected, also where only a part can be read."""
+    """Read-only field: without a selection, Ctrl+C copies the full text, even if parts of it are masked."""
 
     copy_wanted = Signal()
     focused = Signal()
@@ -37,12 +37,12 @@ class _ReadOnlyLine(QLineEdit):
 
 
 class CopyField(QWidget):
-    """A text that can be read and copied; `copy_wanted` by its button or Ctrl+C."""
+    """Text to read and copy; emits `copy_wanted` for its button and Ctrl+C."""
 
     copy_wanted = Signal()
 
     def __init__(self, theme: Theme, name: str, copy_words: str, *buttons: IconButton) -> None:
-        """``copy_words`` name the button; ``buttons`` stand before it."""
+        # copy_words is the button's name; buttons are placed before it.
         super().__init__()
         self._theme = theme
         self.line = _ReadOnlyLine()
@@ -66,11 +66,11 @@ class CopyField(QWidget):
         self._set_font()
 
     def text(self) -> str:
-        """Return what can be read."""
+        """Return the visible text."""
         return self.line.text()
 
     def show_text(self, text: str, *, can_copy: bool = True) -> None:
-        """Show another text from its beginning."""
+        """Set the text, scrolled to its start."""
         if text != self.line.text():
             self.line.setText(text)
             self.line.setCursorPosition(0)
@@ -97,18 +97,18 @@ class CopyField(QWidget):
 
 
 class RoleIcon(QWidget):
-    """An icon in the colour of a role, beside words that say the same."""
+    """Icon in the colour of a role; decorates a text with the same meaning."""
 
     def __init__(
         self, theme: Theme, icon: str, role: str = "textSecondary", side: int = 16, *, is_at_top: bool = False
     ) -> None:
-        """With ``is_at_top`` it stands beside the first of several lines."""
+        # is_at_top aligns it with the first of several lines.
         super().__init__()
         self._is_at_top = is_at_top
         self._theme, self._icon, self._role, self._side = theme, icon, role, side
 
     def set(self, icon: str, role: str) -> None:
-        """Show another icon."""
+        """Set icon and role."""
         if (icon, role) != (self._icon, self._role):
             self._icon, self._role = icon, role
             self.update()

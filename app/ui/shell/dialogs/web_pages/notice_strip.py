@@ -1,4 +1,4 @@
-"""The newest refusal or slow page, with the button that helps and one that dismisses it."""
+"""Latest rejection or slow page, with a button for the fix and one to dismiss it."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ _BUTTONS = {
 
 
 class NoticeStrip(AlertBox):
-    """Shows one notice; `helped` when its button is pressed, `dismissed` when its cross is."""
+    """Shows one notice; emits `helped` for its button and `dismissed` for its cross."""
 
     helped = Signal()
     dismissed = Signal()
@@ -42,7 +42,7 @@ class NoticeStrip(AlertBox):
         self.hide()
 
     def show_notices(self, notices: tuple[WebNotice, ...]) -> None:
-        """Show the first; the number of the others follows."""
+        """Show the first notice and the number of further ones."""
         paint.show_when(self, bool(notices))
         if not notices:
             self.notice = None

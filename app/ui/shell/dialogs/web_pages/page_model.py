@@ -1,4 +1,4 @@
-"""Connected pages and their topics as a tree that Qt shows; updated in place."""
+"""Qt model of connected pages and their topics, updated in place."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ _TopicKey = tuple[str, bool]
 
 @dataclass(slots=True)
 class PageRow:
-    """Row of a page; ``place`` is its number."""
+    """Row of a page; ``place`` is its row number."""
 
     listed: ListedPage
     topics: list[PageTopic] = field(default_factory=list)
@@ -37,17 +37,15 @@ class PageRow:
 
 
 class PageTreeModel(QAbstractItemModel):
-    """Pages, each with its topics below it. Rows keep their index while others come and go.
+    """Pages with their topics as children; indexes stay valid while other rows come and go.
 
-    There is one column: for thousands of topics Qt would ask for the size of each cell.
+    It has a single column: with several, Qt would query the size of each cell of thousands of topics.
     """
 
     def __init__(self, parent: QObject | None = None) -> None:
         super().__init__(parent)
         self._rows: list[PageRow] = []
         self._by_id: dict[int, PageRow] = {}
-
-    # -- Qt's questions --------------------------------------------------------------------------------------
 
     def rowCount(self, parent: Index = _ROOT) -> int:
         if not parent.isValid():
@@ -85,8 +83,6 @@ class PageTreeModel(QAbstractItemModel):
         is_title = orientation == Qt.Orientation.Horizontal and role == Qt.ItemDataRole.DisplayRole
         return _("Page and topics") if is_title and section == 0 else None
 
-    # -- what the sheet asks and says ------------------------------------------------------------------------
-
     def page_row(self, index: Index) -> PageRow | None:
         """Return the row of a page, or of the page that a topic belongs to."""
         if not index.isValid():
@@ -97,12 +93,12 @@ class PageTreeModel(QAbstractItemModel):
         return self._rows[index.row()] if index.row() < len(self._rows) else None
 
     def topic(self, index: Index) -> PageTopic | None:
-        """Return the topic of an index, None for a page."""
+        """Return the topic of an index, or None for a page."""
         row = self._by_id.get(index.internalId() - 1) if index.isValid() else None
         return row.topics[index.row()] if row is not None and index.row() < len(row.topics) else None
 
     def show_pages(self, listed: Sequence[ListedPage]) -> None:
-        """Show exactly these pages, which come in the order of their ids."""
+        """Replace the pages, which are sorted by id."""
         wanted = {each.page.id: each for each in listed}
         for place in reversed(range(len(self._rows))):
             if self._rows[place].id not in wanted:
@@ -154,7 +150,7 @@ class PageTreeModel(QAbstractItemModel):
                 self.beginInsertRows(parent, place, place)
                 before.insert(place, each)
                 self.endInsertRows()
-        if len(before) > len(topics):  # the order of topics that stay has changed
+        if len(before) > len(topics):  # remaining topics were reordered
             self.beginRemoveRows(parent, len(topics), len(before) - 1)
             del before[len(topics) :]
             self.endRemoveRows()
@@ -175,6 +171,6 @@ def _key(topic: PageTopic) -> _TopicKey:
 
 
 def sorted_topics(listed: ListedPage) -> ListedPage:
-    """Return the page with its topics in the order of their names, what it reads first."""
+    """Return the page with its topics sorted by name, subscriptions first."""
     topics = tuple(sorted(listed.page.topics, key=lambda each: (each.is_published, each.topic)))
     return dataclasses.replace(listed, page=dataclasses.replace(listed.page, topics=topics))

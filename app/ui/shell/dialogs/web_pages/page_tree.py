@@ -1,4 +1,4 @@
-"""How connected pages look: a row for each page with a button that disconnects it, and one for each topic."""
+"""Tree view of connected pages: a row per page with a disconnect button, and a row per topic."""
 
 from __future__ import annotations
 
@@ -65,7 +65,7 @@ _STRUCK = "textDisabled"
 
 
 class _PageHeader(QHeaderView):
-    """Titles of the columns, which `PageTree` places."""
+    """Titles of the columns that `PageTree` positions."""
 
     def __init__(self, theme: Theme, tree: PageTree) -> None:
         super().__init__(Qt.Orientation.Horizontal, tree)
@@ -109,7 +109,7 @@ class _RowHeights(QStyledItemDelegate):
 
 
 class PageTree(QTreeView):
-    """The tree of pages. `disconnect_wanted` with the id of a page, `copied` with text that was copied."""
+    """Tree of pages; emits `disconnect_wanted` with a page's id, and `copied` with the copied text."""
 
     disconnect_wanted = Signal(int)
     copied = Signal(str)
@@ -141,15 +141,13 @@ class PageTree(QTreeView):
         model.rowsInserted.connect(self._expand_new)
         theme.changed.connect(self._measure)
 
-    # ---- what a person does
-
     def current_page(self) -> ListedPage | None:
         """Return the page of the current row."""
         row = self._pages.page_row(self.currentIndex())
         return None if row is None else row.listed
 
     def disconnect_current(self) -> None:
-        """Ask to disconnect the page of the current row."""
+        """Request to disconnect the page of the current row."""
         listed = self.current_page()
         if listed is not None and listed.gone_s is None:
             self.disconnect_wanted.emit(listed.page.id)
@@ -171,7 +169,7 @@ class PageTree(QTreeView):
         elif event.key() in {Qt.Key.Key_Return, Qt.Key.Key_Enter, Qt.Key.Key_Space}:
             self._toggle(self.currentIndex())
         elif event.key() == Qt.Key.Key_Escape:
-            event.ignore()  # closes the sheet
+            event.ignore()  # the parent closes the sheet
         else:
             super().keyPressEvent(event)
 
@@ -217,20 +215,19 @@ class PageTree(QTreeView):
         self._measure()
 
     def dataChanged(self, first: Index, last: Index, _roles: Sequence[int] = ()) -> None:
-        # Rows keep their height. Qt would ask for the size of each cell that changed: 300 ms for 5000 topics.
+        # Skips QTreeView's size query for each changed cell, which takes 300 ms for 5000 topics; rows have a
+        # fixed height.
         rect = self.visualRect(first).united(self.visualRect(last))
         if not rect.isEmpty():
             rect.setLeft(0)
             rect.setRight(self.viewport().width())
             self.viewport().update(rect)
 
-    # ---- inside
-
     def _expand_new(self, parent: QModelIndex, first: int, last: int) -> None:
         for row in range(first, last + 1) if not parent.isValid() else ():
             self.expand(self._pages.index(row, 0))
         if parent.isValid() and self._pages.rowCount(parent) == last - first + 1:
-            self.expand(parent)  # Qt does not keep a page without topics expanded
+            self.expand(parent)  # Qt doesn't keep a page without topics expanded
 
     def _toggle(self, index: QModelIndex) -> None:
         if index.isValid() and not index.parent().isValid():
@@ -270,8 +267,6 @@ class PageTree(QTreeView):
             self._widths[column] = max(round(self.theme.scaled(wide)), round(words))
         self._heights.measure(self.theme)
 
-    # ---- painting
-
     def drawBranches(self, _painter: QPainter, _rect: QRect, _index: Index) -> None:
         return
 
@@ -309,7 +304,7 @@ class PageTree(QTreeView):
         return left + side + _GAP
 
     def cell(self, column: PageColumn, rect: QRectF) -> QRectF:
-        """Return the inside of a column's cell in a row, whose place is ``rect``."""
+        """Return the content rectangle of a column in the row ``rect``."""
         right = float(self.viewport().width())
         for name in reversed(_WIDTHS):
             if name == column:

@@ -1,4 +1,4 @@
-"""Words of the table of connected pages."""
+"""Texts of the table of connected pages."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
 
 def since_words(listed: ListedPage) -> str:
-    """Say "since 8:32", or "gone 4 s"."""
+    """Return a text such as "since 8:32" or "gone 4 s"."""
     if listed.gone_s is not None:
         return _("gone {seconds} s").format(seconds=int(listed.gone_s))
     then = dt.datetime.fromtimestamp(listed.page.since_s).astimezone()
@@ -24,30 +24,30 @@ def since_words(listed: ListedPage) -> str:
 
 
 def does_words(topic: PageTopic) -> str:
-    """Say whether a page reads or publishes."""
+    """Return "publishes" or "reads"."""
     return _("publishes") if topic.is_published else _("reads")
 
 
 def limit_words(topic: PageTopic) -> str:
-    """Say "at most 15/s"; blank without a limit."""
+    """Return a text such as "at most 15/s", or "" without a limit."""
     limit = topic.at_most_per_s
     return _("at most {rate}/s").format(rate=number(limit, ".3g")) if limit else ""
 
 
 def dropped_words(topic: PageTopic) -> str:
-    """Say which share was dropped: "0", or "0.3 %"."""
+    """Return the dropped share as text, such as "0" or "0.3 %"."""
     if topic.dropped_count <= 0:
         return "0"
     return share_words(dropped_share(topic.sent_count, topic.dropped_count))
 
 
 def page_sentence(listed: ListedPage) -> str:
-    """Say what a screen reader reads for a page."""
+    """Return the text that screen readers read for a page."""
     return ", ".join((page_name(listed.page), where_words(listed.page), since_words(listed)))
 
 
 def topic_sentence(topic: PageTopic) -> str:
-    """Say what a screen reader reads for a topic of a page."""
+    """Return the text that screen readers read for a topic of a page."""
     rate = rate_words(topic.rate)
     words = (
         f"{does_words(topic)} {topic.topic}",

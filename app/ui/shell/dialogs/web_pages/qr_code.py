@@ -1,4 +1,4 @@
-"""A QR code that opens the test page on a tablet, black on white in both themes."""
+"""QR code that opens the test page on a tablet, black on white in both themes."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from nep.system.lazy_import import lazy_module
 
 if TYPE_CHECKING:
     import segno
-else:  # loaded with the first code
+else:  # imported with the first code
     segno = lazy_module("segno")
 
 SIDE = 140
@@ -26,12 +26,12 @@ _PADDING = 12
 
 
 def modules_of(text: str) -> tuple[bytes, ...]:
-    """Return the modules of a text's QR code, 1 for a dark one, without the quiet zone."""
+    """Return the modules of a text's QR code, 1 for dark, without the quiet zone."""
     return tuple(bytes(row) for row in segno.make_qr(text, error="m").matrix)
 
 
 class QrCode(QWidget):
-    """The code of a text, or words in an empty frame while there is none."""
+    """QR code of a text, or a message in an empty frame."""
 
     def __init__(self, theme: Theme) -> None:
         super().__init__()
@@ -43,11 +43,11 @@ class QrCode(QWidget):
 
     @property
     def text(self) -> str:
-        """What the code says; "" while there is none."""
+        """Encoded text, or ""."""
         return self._text
 
     def show_code(self, text: str, address: str) -> None:
-        """Show the code of a text; ``address`` is the part of it that a screen reader says."""
+        """Show the code of a text; screen readers read only ``address``."""
         if text == self._text:
             return
         try:
@@ -62,7 +62,7 @@ class QrCode(QWidget):
         self.update()
 
     def show_words(self, words: str) -> None:
-        """Show why there is no code."""
+        """Show the reason for a missing code."""
         if words != self._words:
             self._text, self._modules, self._words = "", (), words
             self.setAccessibleName(words)
@@ -90,7 +90,7 @@ class QrCode(QWidget):
         count = len(self._modules) + 2 * QUIET_ZONE
         side = (
             max(1, math.floor(whole.width() * ratio / count)) / ratio
-        )  # whole pixels: cameras need sharp edges
+        )  # whole pixels, since cameras need sharp edges
         left = round((whole.width() - side * len(self._modules)) / 2 * ratio) / ratio
         painter.setRenderHint(QPainter.RenderHint.Antialiasing, False)
         for row, modules in enumerate(self._modules):

@@ -1,4 +1,4 @@
-"""The sheet at the right of the window: switches the web server, and shows who is connected."""
+"""Sheet of the web server, docked at the right of the window: switches and connected pages."""
 
 from __future__ import annotations
 
@@ -46,7 +46,7 @@ _MIN_TABLE_HEIGHT = 120
 
 
 class WebPagesSheet(Overlay):
-    """Changes apply at once. It stays open, without a scrim, while a person works in the window."""
+    """Sheet without a scrim that stays open while a person works in the window; changes apply at once."""
 
     top = _BELOW_BARS
     docks_right = True
@@ -60,7 +60,7 @@ class WebPagesSheet(Overlay):
         say: ShowToast,
         open_url: Callable[[QUrl], bool] = open_outside,
     ) -> None:
-        """``robots`` returns the names of connected robots; ``open_url`` opens a page in the browser."""
+        # robots returns the names of connected robots; open_url opens a page in the browser.
         super().__init__(theme, window, _("Web pages and tablets"))
         self._web, self._say, self._open_url = web, say, open_url
         self._dismissed: set[tuple[str, ...]] = set()
@@ -76,8 +76,6 @@ class WebPagesSheet(Overlay):
         self._timer.setInterval(REFRESH_MS)
         self._timer.timeout.connect(self.refresh)
         self.closed.connect(self._timer.stop)
-
-    # ---- its parts
 
     def _make_head(self) -> None:
         theme = self.theme
@@ -207,8 +205,6 @@ class WebPagesSheet(Overlay):
         self.copy_page.clicked.connect(self._copy_page)
         self.test_page.clicked.connect(lambda: self._open_url(QUrl(self._web.local_page_url)))
 
-    # ---- where it lies
-
     def first(self) -> QWidget:
         return self.switch
 
@@ -222,7 +218,7 @@ class WebPagesSheet(Overlay):
         for bar in window.findChildren(QWidget, "statusBar"):
             if bar.isVisible():
                 bottom = min(bottom, bar.mapTo(window, QPoint()).y() - _EDGE)
-        for stop in stops_in(window):  # at the right of a bar, as the sheet is at the right below it
+        for stop in stops_in(window):  # Stop buttons at the right of a bar would overlap the sheet
             top = max(top, stop.mapTo(window, QPoint()).y() + stop.height() + BELOW_STOP)
         size = self.wanted_size(QSize(window.width() - 2 * _EDGE, max(1, bottom - top)))
         return QRect(QPoint(window.width() - size.width() - _EDGE, top), size)
@@ -232,10 +228,10 @@ class WebPagesSheet(Overlay):
         self._scrim.hide()
 
     def _focus_changed(self, _old: QWidget | None, _new: QWidget | None) -> None:
-        return  # a person works on in the window
+        return  # stays open while a person works in the window
 
     def open(self) -> None:
-        """Open the sheet, which follows the server until it is closed."""
+        """Open the sheet and update it until it is closed."""
         self.access.open_to.offer(self._web.addresses(), self._web.host)
         if self._tab not in self._web.protocols and self._web.protocols:
             self.tabs.set_value(next(iter(self._web.protocols)))
@@ -244,14 +240,12 @@ class WebPagesSheet(Overlay):
         super().open()
         self._scrim.hide()
 
-    # ---- what it shows
-
     @property
     def _tab(self) -> WebProtocol:
         return "foxglove" if self.tabs.value == "foxglove" else "rosbridge"
 
     def refresh(self) -> None:
-        """Show the server's state and its pages."""
+        """Show the state of the server and its pages."""
         web, is_foxglove = self._web, self._tab == "foxglove"
         web.refresh()
         self._show_switch()
@@ -308,7 +302,7 @@ class WebPagesSheet(Overlay):
         self.empty.setText(words)
 
     def _order_tabs(self) -> None:
-        # Tab goes as one reads; Qt would put what is made later behind everything else.
+        # Tab order follows the reading order; Qt would append widgets created later.
         access, origins = self.access, self.permissions.origins
         parts = (
             self.switch, self.other_port, self.tabs, access.address, access.token, access.new_token,
@@ -320,8 +314,6 @@ class WebPagesSheet(Overlay):
             self._tab_order = stops
             for before, after in itertools.pairwise(stops):
                 QWidget.setTabOrder(before, after)
-
-    # ---- what a person does
 
     def _do(self, change: Callable[[], object]) -> None:
         change()

@@ -1,4 +1,4 @@
-"""Which origins may connect, and which robots pages may move."""
+"""Form for allowed origins and for the robots that pages may move."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ EXAMPLE = "http://192.168.1.20:8080"
 
 
 class OriginField(TokenField):
-    """Allowed origins as tokens. Text that is none stays as typed and gets the edge of a wrong value."""
+    """Allowed origins as tokens; invalid text stays as typed and is marked as an error."""
 
     def __init__(self, theme: Theme, web: WebPages) -> None:
         super().__init__(theme, _("Origins"), EXAMPLE, _("Add an origin"))
@@ -32,7 +32,7 @@ class OriginField(TokenField):
         self.is_wrong = False
 
     def show_origins(self, origins: Sequence[str]) -> None:
-        """Show these as tokens; what is being typed stays."""
+        """Set the tokens; text being typed stays."""
         if [each.entry for each in self.tokens] == [*origins]:
             return
         for token in self.tokens:
@@ -69,7 +69,7 @@ class OriginField(TokenField):
 
 
 class _Box(QWidget):
-    """A row that only shows something."""
+    """Framed row for read-only content."""
 
     def __init__(self, theme: Theme) -> None:
         super().__init__()
@@ -83,12 +83,12 @@ class _Box(QWidget):
 
 
 class RobotChoice(QWidget):
-    """Names of the robots that pages may move, and check boxes to choose them; `changed` by a person."""
+    """Robots that pages may move, with check boxes; emits `changed` when a person changes them."""
 
     changed = Signal()
 
     def __init__(self, theme: Theme, web: WebPages, robots: Callable[[], tuple[str, ...]]) -> None:
-        """``robots`` returns the names of connected robots."""
+        # robots returns the names of connected robots.
         super().__init__()
         self._theme, self._web, self._robots = theme, web, robots
         self.words = label("", "body", wrap=True)
@@ -118,12 +118,12 @@ class RobotChoice(QWidget):
         self.show_state()
 
     def open_list(self) -> None:
-        """Show the check boxes and give the first one the keyboard."""
+        """Show the check boxes and focus the first one."""
         self.choose.setChecked(True)
         self._open(True)
 
     def show_state(self) -> None:
-        """Show who may be moved, and offer connected and allowed robots."""
+        """Show the allowed robots and offer connected and allowed ones."""
         names = self._web.robots
         said = listed(list(names)) if names else _("none")
         words = _("May command robots: {robots}").format(robots=said)
@@ -166,7 +166,7 @@ class RobotChoice(QWidget):
 
 
 class PermissionForm(QWidget):
-    """The second part of the form: origins and robots, each with a sentence below."""
+    """Second part of the form: origins and robots, each with an explanation."""
 
     def __init__(self, theme: Theme, web: WebPages, robots: Callable[[], tuple[str, ...]]) -> None:
         super().__init__()
@@ -198,11 +198,11 @@ class PermissionForm(QWidget):
 
     def _measure(self) -> None:
         self._grid.setColumnMinimumWidth(0, round(self._theme.scaled(LABEL_WIDE)))
-        for title in self._titles:  # beside the first line of a field that grows
+        for title in self._titles:  # aligned with the first line of a field that grows
             title.setMinimumHeight(round(self._theme.scaled(_FIELD_HIGH)))
 
     def show_state(self) -> None:
-        """Show what is allowed."""
+        """Show the current permissions."""
         self.origins.show_origins(self._web.origins)
         set_role(self.origins_state, "error" if self.origins.is_wrong else "textTertiary")
         self.origins_state.setText(
