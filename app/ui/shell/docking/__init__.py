@@ -1,4 +1,4 @@
-"""The docks of a layout: their frames, places and sizes.
+"""Docks of a layout: frames, positions and sizes.
 
-`Workbench` is one layout; `saved_layouts` keeps what a person made of it for the next start.
+`Workbench` shows one layout; `saved_layouts` saves a person's changes for the next start.
 """

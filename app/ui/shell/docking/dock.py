@@ -1,4 +1,4 @@
-"""A dock with our title and our frame around a panel; "more" floats and closes it."""
+"""Dock with a title and frame around a panel, and a menu to float and close it."""
 
 from __future__ import annotations
 
@@ -31,16 +31,16 @@ from nep.i18n import _
 
 LEAST_BODY = QSize(160, 60)
 RESTS_AFTER_S = 2.0
-"""A panel that is hidden for a moment, by a quick change of tabs, stays subscribed."""
+"""Delay before a hidden panel unsubscribes, so that quick tab changes don't resubscribe."""
 FAULTS = (Exception, SystemExit)
-"""What a panel may raise without ending the window; one of a plug-in may call `sys.exit`."""
+"""Exceptions of panels that are caught; a plug-in's panel may call `sys.exit`."""
 SENTENCE_LIMIT = 400
 
 _log = logging.getLogger(__name__)
 
 
 class _Corner(QWidget):
-    """Rounds one lower corner of a panel over whatever the panel paints."""
+    """Rounds a lower corner of a panel on top of the panel's own painting."""
 
     def __init__(self, theme: Theme, parent: QWidget, right: bool) -> None:
         super().__init__(parent)
@@ -65,7 +65,7 @@ class _Corner(QWidget):
 
 
 class DockBody(QWidget):
-    """The lower half of the frame, around the panel or what is shown in its place."""
+    """Lower part of the frame, around the panel or its replacement."""
 
     def __init__(self, theme: Theme, panel: PanelWidget) -> None:
         super().__init__()
@@ -80,7 +80,7 @@ class DockBody(QWidget):
         self._corners = (_Corner(theme, self, False), _Corner(theme, self, True))
 
     def minimumSizeHint(self) -> QSize:
-        # What does not fit scrolls inside its panel: people decide how large panels are, not contents.
+        # Content scrolls inside the panel, so that its size is up to the person.
         return LEAST_BODY
 
     def resizeEvent(self, _event: object) -> None:
@@ -91,7 +91,7 @@ class DockBody(QWidget):
         right.raise_()
 
     def fail(self, sentence: str, again: Callable[[], object]) -> None:
-        """Show in place of the panel that it failed, with a way to try again."""
+        """Show an error in place of the panel, with a button to retry."""
         if self._failure is None:
             self._failure = EmptyState(self._theme, "circle-x", _("This panel stopped"), sentence)
             self._stack.addWidget(self._failure)
@@ -100,7 +100,7 @@ class DockBody(QWidget):
         self._stack.setCurrentWidget(self._failure)
 
     def show_panel(self) -> None:
-        """Show the panel itself again."""
+        """Show the panel again."""
         self._stack.setCurrentIndex(0)
 
     def paintEvent(self, _event: QPaintEvent) -> None:
@@ -114,9 +114,9 @@ class DockBody(QWidget):
 
 
 class FailedPanel(PanelWidget):
-    """Has the place of a panel that could not be made, and keeps what that is to be given back.
+    """Placeholder for a panel whose creation failed; keeps the state to be restored.
 
-    Its first refresh raises what the making raised; each one after that makes the panel.
+    Its first refresh raises the original error; later ones try to create the panel again.
     """
 
     def __init__(self, context: PanelContext, description: Panel, error: BaseException) -> None:
@@ -125,7 +125,7 @@ class FailedPanel(PanelWidget):
         self._error: BaseException | None = error
         self._state: Mapping[str, object] = {}
         self.take: Callable[[PanelWidget], object] = lambda _panel: None
-        """What is done with the panel when it could be made."""
+        """Called with the panel once its creation succeeds."""
 
     def refresh(self) -> None:
         error, self._error = self._error, None
@@ -143,7 +143,7 @@ class FailedPanel(PanelWidget):
 
 
 class Dock(QDockWidget):
-    """One panel in a workbench: moves, floats, closes, shares its place; `failed` panels are skipped."""
+    """A panel in a workbench that can be moved, floated, closed and tabbed; `failed` panels are skipped."""
 
     another_wanted = Signal(str)
     closed = Signal(str)
@@ -151,7 +151,7 @@ class Dock(QDockWidget):
     def __init__(
         self, theme: Theme, description: Panel, panel: PanelWidget, density: Density, number: int = 1
     ) -> None:
-        """``number`` tells it from others of its kind; `key` is its name among all docks of a workbench."""
+        # number distinguishes docks of the same kind; key is the unique name in a workbench.
         super().__init__(numbered(_(description.title), number))
         self.description, self.panel = description, panel
         self.number, self.key = number, key_of(description.name, number)
@@ -176,12 +176,12 @@ class Dock(QDockWidget):
         self.setWidget(body)
 
     def replace(self, panel: PanelWidget) -> None:
-        """Hold another panel from now on, in the place of one that could not be made."""
+        """Replace a placeholder by its panel."""
         old = (self.title, self.body)
         self._hold(panel)
         for each in old:
             each.deleteLater()
-        self.visibilityChanged.emit(self.front)  # whose tabs are in the new title, too
+        self.visibilityChanged.emit(self.front)  # the new title needs the tabs, too
 
     def _restyle(self) -> None:
         self.panel.setFont(self.panel.text_font())
@@ -191,13 +191,13 @@ class Dock(QDockWidget):
         self.front = visible
 
     def shown(self) -> bool:
-        """Whether a person can see the panel now: it is open, in front, and its window is on the screen."""
+        """Return whether the panel is visible: open, in front, and in a window on the screen."""
         return self.front and self.isVisible() and on_screen(self.window())
 
     def follow(self, now: float) -> str | None:
-        """Let a panel rest that nobody has seen for two seconds, and wake one that is seen; called each tick.
+        """Suspend a panel after two seconds hidden, or resume a visible one; called with every tick.
 
-        ``now`` is monotonic seconds. The sentence of its failure when it just failed.
+        ``now`` is monotonic seconds. Return the error message if the panel has just failed.
         """
         if self.failed:
             return None
@@ -207,13 +207,13 @@ class Dock(QDockWidget):
         return self._try(self.panel.rest) if now - self._seen_s >= RESTS_AFTER_S else None
 
     def refresh(self) -> str | None:
-        """Let the panel show what is new; the sentence of its failure when it just failed."""
+        """Refresh the panel if it is visible; return the error message if it has just failed."""
         if self.failed or not self.shown():
             return None
         return self._try(self.panel.refresh)
 
     def badge(self) -> tuple[str, str] | None:
-        """What its tab says while it stands behind another panel."""
+        """Return the badge of its tab while it is behind another panel."""
         if self.front or self.failed:
             return None
         found: list[tuple[str, str] | None] = []
@@ -223,9 +223,9 @@ class Dock(QDockWidget):
     def _try(self, act: Callable[[], object]) -> str | None:
         try:
             act()
-        except FAULTS as error:  # whatever a panel raises, the window lives on
+        except FAULTS as error:  # no exception of a panel may close the window
             self.failed = True
-            with suppress(*FAULTS):  # it shows nothing now, so it looks at nothing
+            with suppress(*FAULTS):  # a failed panel needs no subscriptions
                 self.panel.rest()
             sentence = error_words(error)[:SENTENCE_LIMIT]
             said = ("the panel '%s' stopped: %s", self.description.name, sentence)
@@ -236,15 +236,15 @@ class Dock(QDockWidget):
         return None
 
     def try_again(self) -> None:
-        """Show a panel that failed again, from the next refresh on; nothing happens to one that did not."""
+        """Show a failed panel again, starting with the next refresh; otherwise do nothing."""
         if self.failed:
             self.failed = False
             self.body.show_panel()
 
     def saved_state(self) -> dict[str, object]:
-        """What the panel wants back at the next start; nothing of one that can't tell.
+        """Return the panel's state for the next start, or {} if that fails.
 
-        What JSON can't say would keep everything else from being kept, too.
+        It must be valid JSON, because settings are saved as a whole.
         """
         try:
             found = self.panel.save_state()
@@ -255,21 +255,21 @@ class Dock(QDockWidget):
         return found
 
     def give_back(self, state: Mapping[str, object]) -> None:
-        """Let the panel be as it was; one that can't does not keep its layout from coming back."""
+        """Restore the panel's state; an error is logged so that the layout is still restored."""
         try:
             self.panel.restore_state(state)
         except FAULTS:
             _log.exception("the panel '%s' can't be as it was", self.description.name)
 
     def shut(self) -> None:
-        """The window closes: the panel ends its watches; one that fails does not keep the window open."""
+        """Dispose of the panel when the window closes; an error is logged."""
         try:
             self.panel.shut()
         except FAULTS:
             _log.exception("the panel '%s' can't end in order", self.description.name)
 
     def keyPressEvent(self, event: QKeyEvent) -> None:
-        """``/`` goes to the panel's filter, Esc leaves a field; also while the panel floats."""
+        """Focus the panel's filter on ``/``, leave a field on Esc; also while floating."""
         if event.text() == "/" and self.panel.focus_filter():
             event.accept()
         elif event.key() == Qt.Key.Key_Escape:
@@ -280,7 +280,7 @@ class Dock(QDockWidget):
             super().keyPressEvent(event)
 
     def menu(self) -> Menu:
-        """The panel's own actions, then floating and closing."""
+        """Return a menu of the panel's actions, followed by float and close."""
         menu = Menu(self._theme, self)
         own: list[QAction] = []
         try:
@@ -300,13 +300,13 @@ class Dock(QDockWidget):
         return menu
 
     def first_stop(self) -> QWidget:
-        """Where the keyboard goes in the panel: what it is about, else the first thing that takes keys."""
+        """Return the widget that gets the focus: the panel's main widget, else its first focusable one."""
         about = proxy_of(self.panel)
         if about is not None and about.isVisible():
             return about
         stops = tab_stops(self.panel, self.panel)
         first = next(stops, self.panel)
-        if isinstance(first, QScrollArea):  # its first row says more than all of them
+        if isinstance(first, QScrollArea):  # the first item inside is a better start than the whole area
             inside = next(stops, None)
             return inside if inside is not None and first.isAncestorOf(inside) else first
         return first
@@ -324,7 +324,7 @@ class Dock(QDockWidget):
             self.closed.emit(self.key)
 
     def _let_go(self) -> None:
-        """Give up the keyboard: Qt would hand it on as by Tab, and the editor then opens a category."""
+        # Clear the focus first: Qt would pass it on as by Tab, and the editor then opens a category.
         focus = QApplication.focusWidget()
         if focus is not None and self.isAncestorOf(focus):
             focus.clearFocus()
@@ -339,12 +339,12 @@ class Dock(QDockWidget):
 
 
 def key_of(name: str, number: int) -> str:
-    """What tells the docks of a workbench apart: "plot" is the first plot, "plot#2" the second one."""
+    """Return the key of a dock in a workbench, such as "plot" or "plot#2"."""
     return name if number < 2 else f"{name}#{number}"
 
 
 def kind_of(key: str) -> tuple[str, int]:
-    """What `key_of` made a key of. Anything else is a name, and the first of its kind."""
+    """Split a key from `key_of` into name and number; other text is a name with number 1."""
     name, _sign, number = key.rpartition("#")
     if name and number.isascii() and number.isdigit() and key_of(name, int(number[:9])) == key:
         return name, int(number)
@@ -352,7 +352,7 @@ def kind_of(key: str) -> tuple[str, int]:
 
 
 def make_dock(description: Panel, context: PanelContext, density: Density, number: int = 1) -> Dock:
-    """A dock with a new panel; when that can't be made, what stands in its place says so when it is seen."""
+    """Return a dock with a new panel, or with a `FailedPanel` if the panel can't be created."""
     try:
         return Dock(context.theme, description, description.make(context), density, number)
     except FAULTS as error:
@@ -364,12 +364,12 @@ def make_dock(description: Panel, context: PanelContext, density: Density, numbe
 
 
 def on_screen(window: QWidget) -> bool:
-    """Whether a window is not minimised, on another desktop, or wholly behind others where systems tell."""
+    """Return False for a window that is minimised, on another desktop, or (where known) fully covered."""
     return not window.isMinimized() and window.windowHandle().isExposed()
 
 
 def fitting(docks: Mapping[str, Dock], names: Iterable[str], kinds: set[str]) -> Dock | None:
-    """The one of these panels that shows such a kind: one made for it before one that shows anything."""
+    """Return the first panel that accepts one of the kinds, preferring specific over general panels."""
     there = [docks[name] for name in names]
     for wanted in (kinds, {ANY_TYPE}):
         for dock in there:

@@ -1,4 +1,4 @@
-"""The title of a dock: name or tabs, what is shown, chips, the panel's own buttons, "more" last."""
+"""Title of a dock: name or tabs, subtitle, chips, the panel's buttons and the menu."""
 
 from __future__ import annotations
 
@@ -18,13 +18,13 @@ from nep.i18n import _
 
 ICON, GAP = 16, 7
 BADGE = 18
-LEAST_NAME = 56  # px at 100 %: in less room the name of the panel in front is an icon, too
+LEAST_NAME = 56  # px at 100 %; with less room the front panel is shown as an icon, too
 
 
 class TitleTab(PaintedButton):
-    """The name of a panel that shares its place with others; a press brings it to the front.
+    """Tab of a panel in a shared place; a click brings the panel to the front.
 
-    In a narrow title only its icon is left, and the name is its tooltip. ``badge``: a count and its status.
+    Narrow titles show only its icon, with the name as tooltip. ``badge`` is a count and its status.
     """
 
     shortens = True
@@ -45,7 +45,7 @@ class TitleTab(PaintedButton):
             self.update()
 
     def show_badge(self, badge: tuple[str, str] | None) -> None:
-        """How many things wait there for a person, and the status of the worst; None for nothing."""
+        """Show a count of pending items and the worst status, or no badge for None."""
         if badge != self.badge:
             self.badge = badge
             self.setAccessibleDescription(badge[0] if badge else "")
@@ -53,7 +53,7 @@ class TitleTab(PaintedButton):
             self.update()
 
     def full_width(self) -> int:
-        """The width with its name."""
+        """Return the width in px with the name."""
         return round(paint.width_of(self._theme.font("title"), self.text()) + 21 + self._badge_room())
 
     def _badge_room(self) -> float:
@@ -64,7 +64,7 @@ class TitleTab(PaintedButton):
         return max(self._theme.scaled(BADGE), paint.width_of(self._theme.font("caption"), words) + 10)
 
     def bare_width(self) -> int:
-        """The width with its icon alone."""
+        """Return the width in px with only the icon."""
         return round(self._theme.scaled(ICON) + 16 + self._badge_room())
 
     def sizeHint(self) -> QSize:
@@ -90,7 +90,7 @@ class TitleTab(PaintedButton):
             side = theme.scaled(ICON)
             square = QRectF(0, 0, side, side)
             square.moveCenter(room.center())
-            if room.width() >= side or not self.badge:  # a count says more than a part of an icon
+            if room.width() >= side or not self.badge:  # the badge is preferred over a clipped icon
                 paint_icon(painter, square, self._icon, ink)
         else:
             paint.words(painter, room, self.text(), theme.font("title"), ink, paint.CENTRE)
@@ -99,7 +99,7 @@ class TitleTab(PaintedButton):
 
     def _paint_badge(self, painter: QPainter, rect: QRectF, words: str, status: str) -> None:
         theme, high, wide = self._theme, self._theme.scaled(BADGE), self._badge_width()
-        left = max(rect.left() + 1, rect.right() - wide - 8)  # squeezed, it is whole all the same
+        left = max(rect.left() + 1, rect.right() - wide - 8)  # the badge stays whole when squeezed
         place = QRectF(left, rect.center().y() - high / 2, min(wide, rect.width() - 2), high)
         look = theme.status(status)
         paint.box(painter, place, high / 2, theme.colour(look.tint or "sunken"), theme.colour(look.colour))
@@ -107,14 +107,14 @@ class TitleTab(PaintedButton):
 
 
 class DockTitle(QWidget):
-    """The title of a dock; it paints the upper half of the panel's frame."""
+    """Title of a dock; paints the upper part of the panel's frame."""
 
     menu_wanted = Signal(object)
 
     def __init__(self, theme: Theme, panel: PanelWidget, density: Density) -> None:
         super().__init__()
         self._theme, self._panel, self._density = theme, panel, density
-        self._least = theme.size("panelTitle", density)  # asked thousands of times while panels are arranged
+        self._least = theme.size("panelTitle", density)  # cached for layouts, which read it often
         self._whole = panel.replaces_title()
         self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Fixed)
         self.name = ElidedLabel("titleLarge" if density == "comfortable" else "title", "textSecondary", 120)
@@ -125,14 +125,14 @@ class DockTitle(QWidget):
         column = QVBoxLayout(self)
         column.setContentsMargins(0, 0, 0, 0)
         column.setSpacing(0)
-        self._shared = QWidget()  # a row of its own for the panels' tabs where the panel has tabs itself
+        self._shared = QWidget()  # a separate row for panel tabs if the panel has tabs of its own
         self._shared_row = QHBoxLayout(self._shared)
         self._shared_row.setContentsMargins(5, 1, 6, 1)
         self._shared_row.setSpacing(8)
         self._shared_row.addStretch(1)
         self._shared.hide()
         column.addWidget(self._shared)
-        own = QWidget()  # not a layout in a layout, which would tell its old size until the next turn
+        own = QWidget()  # a widget: the size of a nested layout is updated late
         own.installEventFilter(self)
         self._row = QHBoxLayout(own)
         column.addWidget(own, 1)
@@ -173,10 +173,10 @@ class DockTitle(QWidget):
         return max(self._least, self._shared_row.sizeHint().height())
 
     def minimumSizeHint(self) -> QSize:
-        return QSize(80, self._height())  # asked as often as the other: not by way of it
+        return QSize(80, self._height())  # doesn't call sizeHint: this is called as often
 
     def show_title(self) -> None:
-        """Take the panel's name and what it shows."""
+        """Update the name and subtitle from the panel."""
         self.name.setText(self._panel.title())
         self._subtitle.setText(self._panel.subtitle())
         paint.show_when(self._subtitle, bool(self._panel.subtitle()) and self._whole is None)
@@ -185,11 +185,11 @@ class DockTitle(QWidget):
                 tab.setText(self._panel.title())
 
     def set_active(self, active: bool) -> None:
-        """The panel has the focus: its name is darker."""
+        """Darken the name while the panel has the focus."""
         set_role(self.name, "text" if active else "textSecondary")
 
     def set_tabs(self, names: Sequence[tuple[str, str, bool, Callable[[], object]]]) -> None:
-        """The panels of one place: (name, icon, whether it is this one, how to bring it to the front)."""
+        """Set the tabs of a shared place: (name, icon, is this panel, callback to bring it to the front)."""
         row = self._tab_row
         for old in self._tabs:
             row.removeWidget(old)
@@ -212,13 +212,13 @@ class DockTitle(QWidget):
 
     @property
     def _tab_row(self) -> QHBoxLayout:
-        """Where the tabs of panels are: never in the row of a panel's own tabs."""
+        # Panel tabs are never in the same row as a panel's own tabs.
         return self._row if self._whole is None else self._shared_row
 
     def fit_tabs(self) -> None:
-        """Where not all names have room, chips lose their words first, then the panels behind their names.
+        """Shorten the row to its width: first the chips, then the tabs of hidden panels become icons.
 
-        In still less room also the panel in front is an icon. A chip whose icon says nothing keeps its words.
+        As a last step the front panel becomes an icon, too. Chips with an unspecific icon keep their text.
         """
         chips = [chip for chip in self._others() if isinstance(chip, Chip) and chip.status != "off"]
         if not self._tabs:
@@ -240,14 +240,13 @@ class DockTitle(QWidget):
             tab.set_bare(bare and (not tab.isChecked() or least))
 
     def _others(self) -> list[QWidget]:
-        """What stands in the row of the tabs beside them and is shown."""
         row = self._tab_row
         items = (row.itemAt(place) for place in range(row.count()))
         widgets = (item.widget() for item in items if item is not None)
         return [each for each in widgets if each and not each.isHidden() and each not in self._tabs]
 
     def _room_for_tabs(self) -> int:
-        """So much is left for the tabs beside chips with all their words, in px."""
+        # In px, with the full text of all chips.
         row, others = self._tab_row, self._others()
         margins, taken = row.contentsMargins(), 0
         for each in others:
@@ -260,7 +259,7 @@ class DockTitle(QWidget):
         return self.width() - margins.left() - margins.right() - taken - gaps
 
     def show_badges(self, badges: Sequence[tuple[str, str] | None]) -> None:
-        """What waits in the panels of this place, one for each tab."""
+        """Set the badges of the panels in this place, one for each tab."""
         for tab, badge in zip(self._tabs, badges, strict=False):
             if badge != tab.badge:
                 tab.show_badge(badge)
@@ -271,7 +270,7 @@ class DockTitle(QWidget):
         self.fit_tabs()
 
     def eventFilter(self, watched: QObject, event: QEvent) -> bool:
-        """A chip says something longer, or a button came: the tabs have less room now."""
+        """Fit the tabs again after a chip or button has changed its size."""
         if event.type() is QEvent.Type.LayoutRequest and watched is not self:
             self.fit_tabs()
         return super().eventFilter(watched, event)
@@ -283,7 +282,7 @@ class DockTitle(QWidget):
 
     @property
     def tabs(self) -> tuple[str, ...]:
-        """The names of the tabs shown; empty when the panel has its place for itself."""
+        """Names of the tabs; empty if the panel doesn't share its place."""
         return tuple(tab.text() for tab in self._tabs)
 
     def contextMenuEvent(self, event: QContextMenuEvent) -> None:

@@ -1,4 +1,4 @@
-"""A layout as a file that others can open: its name, what it arranges, and where its panels are."""
+"""Layout file for exchange: name, base layout and arrangement of panels."""
 
 from __future__ import annotations
 
@@ -21,12 +21,12 @@ MOST_BYTES = 1_000_000
 
 
 class LayoutFileError(AppError):
-    """Why a file is no layout that can be shown, in words without a full stop."""
+    """Reason why a file can't be used as a layout, without a full stop."""
 
 
 @dataclass(frozen=True, slots=True)
 class LayoutFile:
-    """A layout of a file. ``unknown`` are the panels that this Studio does not have: they are left out."""
+    """Content of a layout file; ``unknown`` lists its panels that this installation lacks."""
 
     name: str
     base: str
@@ -35,7 +35,7 @@ class LayoutFile:
 
 
 def layout_bytes(name: str, base: str, saved: Mapping[str, object]) -> bytes:
-    """The file of an arrangement, as `Workbench.save` tells it."""
+    """Return the file content for an arrangement from `Workbench.save`."""
     plain = {
         "format": FORMAT,
         "version": VERSION,
@@ -49,15 +49,21 @@ def layout_bytes(name: str, base: str, saved: Mapping[str, object]) -> bytes:
 
 
 def _sum(saved: Mapping[str, object]) -> str:
-    """Of an arrangement: Qt takes its own part as it is, and may crash on one that is damaged."""
+    # Checksum, because Qt doesn't validate its part of the state and may crash if it is damaged.
     plain = orjson.dumps(dict(saved), option=orjson.OPT_SORT_KEYS | orjson.OPT_NON_STR_KEYS)
     return hashlib.sha256(plain).hexdigest()
 
 
 def read_layout(data: bytes, stem: str, panels: Collection[str]) -> LayoutFile:
-    """What is in a file; ``stem`` names a layout that has no name, ``panels`` are those that there are.
+    """Parse a layout file.
 
-    Raises `LayoutFileError`.
+    Args:
+        data: Content of the file.
+        stem: Name for a layout without one.
+        panels: Names of the available panels.
+
+    Raises:
+        LayoutFileError: The file isn't a valid layout.
     """
     try:
         told = deep_json.loads(data)
@@ -91,7 +97,7 @@ def read_layout(data: bytes, stem: str, panels: Collection[str]) -> LayoutFile:
 
 
 def _name(told: object, stem: str) -> str:
-    """The layout's name as a menu can show it."""
+    # Shortened to a single line for menus.
     for each in (told, stem):
         letters = (
             letter if letter.isprintable() else " " for letter in (each if isinstance(each, str) else "")

@@ -1,4 +1,4 @@
-"""The two arrangements of panels: Behaviour for people, Developer for programmers."""
+"""Built-in layouts: Behaviour for building and running, Developer for programmers."""
 
 from __future__ import annotations
 
@@ -11,9 +11,10 @@ from nep.i18n import lazy
 
 @dataclass(frozen=True)
 class DockColumn:
-    """Panels above each other: (names that share a place, height). ``width`` 0 takes the rest.
+    """Column of panels: (names that share a place, height). ``width`` 0 takes the remaining space.
 
-    The width grows with the text, up to ``most`` of the window's; in a large window it is ``share`` of it.
+    The width grows with the text up to the share ``most`` of the window's width; in a large window it is
+    ``share`` of it.
     """
 
     width: int
@@ -24,9 +25,9 @@ class DockColumn:
 
 @dataclass(frozen=True)
 class Fold:
-    """Panels that become tabs of ``into`` where there is less room than this, in px at 100 % text.
+    """Panels that become tabs of ``into`` below a width or height, in px at 100 % text.
 
-    Its first panel tells a fold from the others of a layout.
+    The first panel identifies the fold within its layout.
     """
 
     into: str
@@ -35,19 +36,20 @@ class Fold:
     below_height: int = 0
 
     def wanted(self, width: float, height: float) -> bool:
-        """Whether a workbench of this size, in px at 100 % text, has too little room."""
+        """Return whether a workbench of this size in px at 100 % text is too small."""
         return width < self.below_width or height < self.below_height
 
 
 @dataclass(frozen=True)
 class Layout:
-    """A layout as it is at first: columns from the left; where there is little room, ``folds`` make tabs.
+    """Default arrangement of a layout: columns from the left, with ``folds`` for little space.
 
-    ``title`` is marked with `lazy`. ``homes`` tells beside which panel another one opens, as a tab; the rest
-    open beside the last panel. ``brings`` tells which panel comes with another one when that is opened; it is
-    ``later``: at first its row is not there. ``below`` has panels that open below all others, as wide as the
-    window, with their heights. ``taller`` is the least height of the place of a panel while it
-    is open.
+    Attributes:
+        title: Marked with `lazy`.
+        homes: Panel next to which another one opens as a tab; others open next to the last panel.
+        brings: Panel that opens together with another one, and isn't open by default.
+        taller: Minimum height of the place of a panel while it is open.
+        below: Heights of panels that open below all others with the window's full width.
     """
 
     name: str
@@ -63,13 +65,13 @@ class Layout:
 
     @property
     def at_first(self) -> tuple[str, ...]:
-        """The panels that are open before a person has opened or closed any."""
+        """Panels that are open by default."""
         names = (name for column in self.columns for names, _height in column.rows for name in names)
         return tuple(name for name in names if name not in self.later)
 
     @property
     def later(self) -> frozenset[str]:
-        """The panels whose rows are not there at first."""
+        """Panels whose rows don't exist by default."""
         return frozenset(self.brings.values())
 
 
@@ -145,5 +147,5 @@ LAYOUTS: tuple[Layout, ...] = (BEHAVIOUR, DEVELOPER)
 
 
 def layout_named(name: str) -> Layout:
-    """The layout of that name; the first when there is none."""
+    """Return the layout with this name, or the first one."""
     return next((layout for layout in LAYOUTS if layout.name == name), LAYOUTS[0])

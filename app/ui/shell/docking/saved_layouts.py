@@ -1,7 +1,7 @@
-"""Layouts that are kept: Behaviour and Developer as a person left them, and layouts with names of their own.
+"""Saved layouts: the last state of Behaviour and Developer, and custom layouts.
 
-A layout of one's own is an arrangement of the panels of Behaviour or Developer (its base). It is kept as it
-was left, as the two built-in ones are. What is kept and does not fit is left out, with a line in the Console.
+A custom layout arranges the panels of Behaviour or Developer, its base. Changes are saved continuously, as
+for the built-in ones. Saved entries that no longer fit are skipped with a line in the Console.
 """
 
 from __future__ import annotations
@@ -20,24 +20,22 @@ LONGEST = 40
 
 @dataclass(frozen=True, slots=True)
 class OwnLayout:
-    """A layout with a name of its own, and the built-in one whose panels it arranges."""
+    """Custom layout, and the built-in layout that it is based on."""
 
     name: str
     base: str
 
 
 class SavedLayouts:
-    """Which arrangement each workbench shows, and the states of all others."""
+    """Current arrangement of each workbench and the saved states of all layouts."""
 
     def __init__(self, state: WindowState, complain: Callable[[str], object]) -> None:
-        """``complain`` is told, in a sentence, what is damaged."""
+        # complain gets a sentence about damaged entries.
         self._state, self._complain = state, complain
         self._current: dict[str, str] = {}
 
-    # -- asking -----------------------------------------------------------------------------------
-
     def all(self) -> tuple[OwnLayout, ...]:
-        """The layouts with names of their own, by name."""
+        """Return the custom layouts, sorted by name."""
         bases = {layout.name for layout in LAYOUTS}
         found = []
         for key, kept in self._state.layouts().items():
@@ -46,11 +44,11 @@ class SavedLayouts:
         return tuple(sorted(found, key=lambda own: own.name.lower()))
 
     def named(self, name: str) -> OwnLayout | None:
-        """The own layout of that name."""
+        """Return the custom layout with this name, or None."""
         return next((own for own in self.all() if own.name == name), None)
 
     def own(self, base: str) -> str:
-        """The name of the own layout that a workbench shows; "" while it shows the built-in one."""
+        """Return the custom layout that a workbench shows, or "" for the built-in one."""
         chosen = self._current.get(base)
         if chosen is None:
             chosen = self._current[base] = self._state.chosen(base)
@@ -58,7 +56,7 @@ class SavedLayouts:
         return chosen if found is not None and found.base == base else ""
 
     def refusal(self, name: str, but: str = "") -> str:
-        """Why a layout can't have that name, in a sentence; "" when it can."""
+        """Return why a name is invalid as a sentence, or ""."""
         name = name.strip()
         if not name:
             return _("A layout needs a name.")
@@ -68,10 +66,8 @@ class SavedLayouts:
         is_taken = name.lower() in taken - {but.lower()}
         return _("“{name}” already exists.").format(name=name) if is_taken else ""
 
-    # -- a workbench ------------------------------------------------------------------------------
-
     def bring_back(self, bench: Workbench, base: str) -> None:
-        """Arrange a workbench as it was left; at first, or when that is damaged, as it is built in."""
+        """Restore the last arrangement of a workbench, or the default if there is none or it is damaged."""
         own = self.own(base)
         saved = self._state.of_layout(OWN + own if own else base)
         if not saved:
@@ -88,31 +84,29 @@ class SavedLayouts:
             self._complain(words.format(name=own or _(layout_named(base).title)))
 
     def keep(self, bench: Workbench, base: str) -> None:
-        """Keep how a workbench looks now, under the name of what it shows."""
+        """Save the arrangement of a workbench under the current layout's name."""
         own = self.own(base)
         self._state.keep_layouts({OWN + own if own else base: {**bench.save(), "base": base}})
 
     def use(self, bench: Workbench, base: str, own: str) -> None:
-        """Show another arrangement ("" is the built-in one); the one that showed is kept."""
+        """Show another layout ("" for the built-in one) after saving the current one."""
         if own == self.own(base):
             return
         self.keep(bench, base)
         self._choose(base, own)
         self.bring_back(bench, base)
 
-    # -- names ------------------------------------------------------------------------------------
-
     def keep_as(self, bench: Workbench, base: str, name: str) -> bool:
-        """Keep what shows under a new name, and show that from now on; the old one stays as it was.
+        """Save the current arrangement as a new custom layout and show it; the old one keeps its state.
 
-        False when it could not be written: it is there until Studio ends.
+        Return False if it couldn't be written and is lost when Studio ends.
         """
         kept = self._state.keep_layouts({OWN + name.strip(): {**bench.save(), "base": base}})
         self._choose(base, name.strip())
         return kept
 
     def fits(self, bench: Workbench, base: str, saved: Mapping[str, object]) -> bool:
-        """Whether an arrangement of others can be shown: tried before anything of it is kept."""
+        """Return whether an imported arrangement can be shown, by trying it before anything is saved."""
         self.keep(bench, base)
         try:
             return bench.restore(saved)
@@ -123,9 +117,9 @@ class SavedLayouts:
             self.bring_back(bench, base)
 
     def take_in(self, name: str, base: str, saved: Mapping[str, object]) -> tuple[str, bool]:
-        """Keep an arrangement that came from a file: its name here, and whether it could be written.
+        """Save an imported arrangement; return its name and whether it was written.
 
-        A name that is taken, or can't be, gets a number.
+        A number is appended if the name is taken or invalid.
         """
         name = name.strip()[:LONGEST].strip()
         free, number = name, 2
@@ -135,7 +129,7 @@ class SavedLayouts:
         return free, self._state.keep_layouts({OWN + free: {**saved, "base": base}})
 
     def rename(self, old: str, new: str) -> None:
-        """Give an own layout another name."""
+        """Rename a custom layout."""
         found = self.named(old)
         if found is None or new.strip() == old:
             return
@@ -146,9 +140,9 @@ class SavedLayouts:
             self._choose(found.base, new.strip())
 
     def delete(self, bench: Workbench | None, name: str) -> tuple[bool, Callable[[], None]]:
-        """Forget an own layout: whether that is kept, and what brings it back.
+        """Delete a custom layout; return whether that was saved, and a function that restores it.
 
-        Its workbench shows the built-in one.
+        Its workbench shows the built-in layout afterwards.
         """
         found = self.named(name)
         if found is None:

@@ -1,8 +1,8 @@
-"""How large the panels of a layout are until a person moves the lines between them.
+"""Default sizes of panels until a person moves the separators.
 
-A column keeps its width and the last panel of a column its height, and so does one with only panels below it
-that come later; what a larger window gives goes to the others. In a small window nothing keeps more than its
-part; a column grows with the text, up to what the layout lets it have.
+A column keeps its width, and the last panel of a column (before panels that open later) its height; the
+others share the additional space of a larger window. In a small window all shrink in proportion. Columns grow
+with the text up to the limit of the layout.
 """
 
 from __future__ import annotations
@@ -18,10 +18,9 @@ LEAST_PX = 120
 
 
 def shares(wanted: Sequence[int], room: int, *, keep: Sequence[bool]) -> list[int]:
-    """Sizes that fill ``room``: those to keep as they are wanted, the others in their proportion.
+    """Return sizes that fill ``room``: fixed ones for ``keep``, the others in proportion.
 
-    Where the others would have less than `LEAST_PX` each, also those to keep have their proportion, and at
-    least that.
+    If less than `LEAST_PX` each were left for the others, all sizes are proportional with this minimum.
     """
     whole = max(1, sum(wanted))
     least = sum(size if kept else LEAST_PX for size, kept in zip(wanted, keep, strict=True))
@@ -47,10 +46,10 @@ def fit(
     *,
     below: int = 0,
 ) -> None:
-    """Give every column and every panel in it the size of the layout, in the room that there is now.
+    """Resize all columns and panels to the layout's proportions in the available space.
 
-    ``scale`` is that of the text; the panels in ``folded`` stand in the place of another column. ``below``
-    px at the bottom belong to a panel that is as wide as the window.
+    ``scale`` is the text size; panels in ``folded`` are in another column. ``below`` px at the bottom belong
+    to a panel of full width.
     """
     columns = []
     before: list[QDockWidget] = []
@@ -102,7 +101,7 @@ def shrink_above(
     *,
     below: int,
 ) -> None:
-    """Give the columns of an area what is left above ``below`` px, each panel its share as it was."""
+    """Shrink the columns of an area to the space above ``below`` px, with unchanged proportions."""
     columns: dict[int, list[QDockWidget]] = {}
     for dock in docks:
         is_seen = not dock.isFloating() and not dock.visibleRegion().isEmpty()
@@ -117,7 +116,7 @@ def shrink_above(
 
 
 def _first(bench: QMainWindow, docks: Mapping[str, QDockWidget], names: Sequence[str]) -> QDockWidget | None:
-    """The first of the panels that share a place and are in it; one that is on its way to another is not."""
+    # Skips a panel that is being moved to another place.
     for name in names:
         dock = docks.get(name)
         if dock is None or dock.isHidden() or dock.isFloating():

@@ -1,4 +1,4 @@
-"""The workbench: the docks of one layout, where a person moves them, and how they come back."""
+"""Workbench: the docks of one layout; saves and restores their arrangement."""
 
 from __future__ import annotations
 
@@ -22,16 +22,16 @@ DOWN = Qt.Orientation.Vertical
 AREA = Qt.DockWidgetArea.LeftDockWidgetArea
 BELOW = Qt.DockWidgetArea.BottomDockWidgetArea
 MOST_BELOW = 0.42
-"""Of the window's height."""
-STATE_VERSION = 1  # with another one, app.core.storage.settings.FORMAT is another one, too
+"""Share of the window's height."""
+STATE_VERSION = 1  # when it changes, app.core.storage.settings.FORMAT must change, too
 MOST_OF_A_KIND = 8
 
 
 class Workbench(QMainWindow):
-    """The docks of one layout, by their keys. Panels are made when they are first opened.
+    """Docks of one layout by key; panels are created when first opened.
 
-    One that is closed is kept as it is. Of a kind of which several may be open the others end when they are
-    closed: whoever made many plots does not pay for those that are gone.
+    Closed panels are kept. Additional panels of a kind are deleted when closed, so that they use no
+    resources.
     """
 
     panel_failed = Signal(str, str)
@@ -46,21 +46,21 @@ class Workbench(QMainWindow):
         super().__init__()
         self._theme, self._layout, self._panels, self._context = theme, layout, panels, context
         self.docks: dict[str, Dock] = {}
-        self._ahead: dict[str, Dock] = {}  # made before anybody opened them
+        self._ahead: dict[str, Dock] = {}  # created in advance
         self._floating: list[Dock] = []
-        self._sharing: dict[Dock, list[Dock]] = {}  # the panels of a place, in the order of its tabs
-        self._folded: tuple[Fold, ...] = ()  # which panels a small window, or large text, made tabs of
-        self._wide = QByteArray()  # the state before that
+        self._sharing: dict[Dock, list[Dock]] = {}  # panels of a shared place in tab order
+        self._folded: tuple[Fold, ...] = ()  # folds that are active because of a small window or large text
+        self._wide = QByteArray()  # state before folding
         self._arranged = False
-        self._moved = False  # a person moved the lines between panels
-        self._used: list[str] = []  # the panels that had the keyboard, the last one at the end
-        self._halves: tuple[Dock, Dock] | None = None  # to be made equally large
-        self._heights: dict[str, int] = {}  # of panels below all others, as they were closed
-        self._set_aside: dict[str, Mapping[str, object]] = {}  # of panels that ended when all were put back
-        self._reopened: Dock | None = None  # to have its height again
+        self._moved = False  # the user has moved a separator
+        self._used: list[str] = []  # panels by last focus, latest last
+        self._halves: tuple[Dock, Dock] | None = None  # two docks to be resized to equal sizes
+        self._heights: dict[str, int] = {}  # last heights of closed panels below all others
+        self._set_aside: dict[str, Mapping[str, object]] = {}  # states of panels deleted by a reset
+        self._reopened: Dock | None = None  # its height is to be restored
         self.setWindowFlags(Qt.WindowType.Widget)
         self.setProperty("density", layout.density)
-        # the width of the gaps was asked for before the property was there, and is remembered
+        # the style caches the separator width from before the property was set
         self.style().unpolish(self)
         QApplication.sendEvent(self, QEvent(QEvent.Type.StyleChange))
         self.setAccessibleName(_("{layout} layout").format(layout=_(layout.title)))
@@ -71,7 +71,7 @@ class Workbench(QMainWindow):
         self._tabs_timer = QTimer(self)
         self._tabs_timer.setSingleShot(True)
         self._tabs_timer.timeout.connect(self._show_tabs)
-        self._size_timer = QTimer(self)  # sizes hold only when Qt has laid the docks out
+        self._size_timer = QTimer(self)  # resizing works only after Qt has laid out the docks
         self._size_timer.setSingleShot(True)
         self._size_timer.timeout.connect(self._size)
         self._fold_timer = QTimer(self)
@@ -79,26 +79,24 @@ class Workbench(QMainWindow):
         self._fold_timer.timeout.connect(self._adapt)
         theme.changed.connect(self._text_changed)
 
-    # -- opening ----------------------------------------------------------------------------------
-
     def make_ahead(self, name: str) -> None:
-        """Make a panel before it is opened, so that nobody waits for it then; it rests until it is seen."""
+        """Create a panel before it is opened, to avoid a delay; it is suspended until visible."""
         description = self._panels.get(name)
         if description is not None and name not in self.docks and name not in self._ahead:
             self._ahead[name] = made = make_dock(description, self._context, self._layout.density)
             made.follow(0.0)
 
     def arrange(self) -> None:
-        """Put the panels where the layout has them at first; what a person moved is put back."""
+        """Restore the default arrangement, discarding a person's changes."""
         for old in list(self.docks.values()):
             old.setFloating(False)
             self.removeDockWidget(old)
             if old.description.several and old.key not in self._layout.at_first:
                 if old.number == 1:
                     self._set_aside[old.key] = old.saved_state()
-                self._end(old)  # a plot would go on to look at its topics
+                self._end(old)  # otherwise a plot would keep its subscriptions
         self._halves = None
-        # All columns first, then what is below in each: the other way round the rows would cross the columns.
+        # All columns first, then the rows of each: otherwise the rows would extend across the columns.
         waiting: list[tuple[Dock, list[tuple[str, ...]]]] = []
         last: Dock | None = None
         for column in self._layout.columns:
@@ -118,7 +116,7 @@ class Workbench(QMainWindow):
         self._adapt()
 
     def _put(self, names: Sequence[str], above: Dock | None, left: Dock | None) -> Dock | None:
-        """Put panels that share a place below ``above``, or right of ``left``."""
+        # names share a place below "above" or right of "left".
         first: Dock | None = None
         for name in names:
             dock = self._dock(name)
@@ -139,7 +137,7 @@ class Workbench(QMainWindow):
         return first
 
     def _size(self) -> None:
-        """Give everything its size, unless a person moved the lines between the panels."""
+        # Does nothing if the user has moved a separator.
         halves, self._halves = self._halves, None
         if halves is not None:
             way = ACROSS if halves[0].y() == halves[1].y() else DOWN
@@ -155,7 +153,7 @@ class Workbench(QMainWindow):
             fit(self, self._layout, self.docks, gap, scale, self._behind(), below=below + gap if below else 0)
 
     def _size_below(self, scale: float) -> int:
-        """Give what stands below all others its height, which is told."""
+        # Returns the height.
         for name, height in self._layout.below.items():
             dock = self.docks.get(name)
             if dock is None or dock.isHidden() or dock.isFloating() or self.dockWidgetArea(dock) != BELOW:
@@ -172,7 +170,7 @@ class Workbench(QMainWindow):
         return super().event(event)
 
     def _dock(self, key: str) -> Dock | None:
-        """The dock of a panel, made when it is the first time; None when there is no such panel."""
+        # Creates the dock on first use.
         if key in self.docks:
             return self.docks[key]
         name, number = kind_of(key)
@@ -194,9 +192,9 @@ class Workbench(QMainWindow):
         return dock
 
     def open(self, name: str) -> Dock | None:
-        """Show a panel, in front and where it was; None when there is no such panel.
+        """Show a panel in front at its last position; return None if the name is unknown.
 
-        The first time it brings the panel that belongs to it.
+        When opened for the first time it opens its associated panel, too.
         """
         brought = self._layout.brings.get(name, "")
         if brought and name not in self.docks and brought not in self.docks:
@@ -207,7 +205,7 @@ class Workbench(QMainWindow):
         if dock.parent() is not self or self.dockWidgetArea(dock) == Qt.DockWidgetArea.NoDockWidgetArea:
             join(self, self._layout, self.docks, dock)
             self._size_timer.start(0)
-        if dock.isHidden() and name in self._layout.below:  # Qt gives it half of what it had
+        if dock.isHidden() and name in self._layout.below:  # Qt gives it half of its previous height
             self._reopened = dock
             self._size_timer.start(0)
         dock.try_again()
@@ -217,11 +215,11 @@ class Workbench(QMainWindow):
         return dock
 
     def open_latest(self, name: str) -> Dock | None:
-        """Show, of the panels of a kind that are open, the one that a person used last; else the first."""
+        """Show the last used open panel of a kind, or the first one."""
         return self.open(next((key for key in self.by_use() if kind_of(key)[0] == name), name))
 
     def open_another(self, key: str) -> Dock | None:
-        """Open one more panel of a kind, beside the one that is there; None when there can't be one more."""
+        """Open an additional panel of a kind next to an existing one; return None at the limit."""
         name = kind_of(key)[0]
         free = (number for number in range(1, MOST_OF_A_KIND + 1) if not self._is_open(key_of(name, number)))
         number = next(free, 0)
@@ -248,22 +246,22 @@ class Workbench(QMainWindow):
         return key in self.docks and not self.docks[key].isHidden()
 
     def source_changed(self) -> None:
-        """Tell all panels, also those that are closed, that another source is shown."""
+        """Notify all panels, including closed ones, that another source is shown."""
         for dock in (*self.docks.values(), *self._ahead.values()):
             dock.panel.source_changed()
 
     def used(self, dock: Dock) -> None:
-        """A panel has the keyboard now."""
+        """Record that a panel got the focus."""
         if self._used[-1:] != [dock.key]:
             self._used = [*(key for key in self._used if key != dock.key), dock.key]
 
     def by_use(self) -> tuple[str, ...]:
-        """The panels that are open, those that had the keyboard last first."""
+        """Return the open panels, last focused first."""
         opened = self.open_names()
         return tuple(sorted(opened, key=lambda key: -self._used.index(key) if key in self._used else 1))
 
     def _closed(self, key: str) -> None:
-        """A panel was closed: one beside the first of its kind ends, unless it is wanted back at once."""
+        # An additional panel is deleted, unless it is reopened immediately.
         dock = self.docks.get(key)
         if dock is not None and key in self._layout.below and not dock.isFloating():
             self._heights[key] = dock.height()
@@ -295,10 +293,8 @@ class Workbench(QMainWindow):
         dock.deleteLater()
 
     def open_names(self) -> tuple[str, ...]:
-        """The panels that are open, also those behind a tab."""
+        """Return the open panels, including those behind other tabs."""
         return tuple(name for name, dock in self.docks.items() if not dock.isHidden())
-
-    # -- tabs in the titles -----------------------------------------------------------------------
 
     def _tabs_soon(self, *_what: object) -> None:
         self._tabs_timer.start(0)
@@ -324,27 +320,25 @@ class Workbench(QMainWindow):
                 )
             self._sharing[dock] = together
 
-    # -- little room ------------------------------------------------------------------------------
-
     def resizeEvent(self, event: QResizeEvent) -> None:
         super().resizeEvent(event)
         self._adapt()
         self._size()
 
     def _text_changed(self) -> None:
-        """Larger text leaves less room."""
+        # Larger text leaves less room.
         self._adapt()
         self._size_timer.start(0)
 
     def _adapt(self) -> None:
-        """Make tabs of panels where there is too little room for all, and end that where there is enough."""
+        # Folds and unfolds panels by the available space.
         scale = self._theme.scaled(1)
         room = self.width() / scale, self.height() / scale
         wanted = tuple(fold for fold in self._layout.folds if fold.wanted(*room) and self._can(fold))
         if not self._arranged or wanted == self._folded or self._fold_timer.isActive():
             return
         if set(self._folded) - set(wanted):
-            self._fold_timer.start(0)  # Qt makes no tabs in the turn in which it puts docks back
+            self._fold_timer.start(0)  # Qt creates no tabs in the event loop turn in which it restores docks
             self._unfold()
             return
         if not self._folded and wanted:
@@ -357,14 +351,14 @@ class Workbench(QMainWindow):
         self._tabs_soon()
 
     def _can(self, fold: Fold) -> bool:
-        """Whether the panels are there for a fold: what was folded stays so wherever a person put it then."""
+        # A fold that was active stays valid wherever its panels were moved.
         if fold in self._folded:
             return True
         docks = [self.docks.get(name) for name in (fold.into, *fold.panels)]
         return all(dock is not None and not dock.isFloating() for dock in docks)
 
     def _fold(self, fold: Fold) -> None:
-        """Make these panels, with those that share their place, tabs of another one, which stays in front."""
+        # Moves the panels with those that share their places; the target stays in front.
         into = self.docks[fold.into]
         for name in fold.panels:
             dock = self.docks[name]
@@ -375,7 +369,6 @@ class Workbench(QMainWindow):
         into.raise_()
 
     def _behind(self) -> set[str]:
-        """The panels that a fold made tabs of, and that a person left there."""
         return {
             name
             for fold in self._folded
@@ -384,7 +377,7 @@ class Workbench(QMainWindow):
         }
 
     def _unfold(self) -> None:
-        """Put back what was before the tabs: Qt makes a tab of whatever is split off a tab."""
+        # Restores the state before folding: splitting a dock off a tab would create a new tab.
         self._folded = ()
         opened = self.open_names()
         if not self.restoreState(self._wide, STATE_VERSION):
@@ -409,23 +402,21 @@ class Workbench(QMainWindow):
             dock.show()
         self._floating = []
 
-    # -- the tick ---------------------------------------------------------------------------------
-
     def follow(self, now: float) -> None:
-        """Panels that nobody can see rest, others wake; called with every tick, also while it is hidden."""
+        """Suspend hidden panels and resume visible ones; called with every tick, even while hidden."""
         for name, dock in list(self.docks.items()):
             self._tell_failure(name, dock.follow(now))
 
     def shown_panels(self) -> list[PanelWidget]:
-        """The panels that can be seen now."""
+        """Return the visible panels."""
         return [dock.panel for dock in self.docks.values() if dock.shown()]
 
     def shows_pictures(self) -> bool:
-        """Whether a person sees a panel of pictures, which want to be refreshed twice as often."""
+        """Return whether an image panel is visible, which is refreshed at twice the rate."""
         return any(dock.panel.shows_pictures and dock.shown() for dock in self.docks.values())
 
     def refresh(self, *, pictures: bool = False) -> None:
-        """Let every panel that can be seen show what is new, or only those with ``pictures``."""
+        """Refresh all visible panels, or only image panels with ``pictures``."""
         for name, dock in list(self.docks.items()):
             if pictures and not dock.panel.shows_pictures:
                 continue
@@ -438,23 +429,21 @@ class Workbench(QMainWindow):
             self.panel_failed.emit(name, sentence)
 
     def focus_home(self) -> None:
-        """Give the keyboard to the panel that the layout is about: the first that shows."""
+        """Focus the main panel of the layout: the first open one."""
         dock = next((dock for dock in self.docks.values() if not dock.isHidden()), None)
         if dock is not None:
             dock.first_stop().setFocus(Qt.FocusReason.OtherFocusReason)
 
     def focus_panel(self, dock: Dock) -> None:
-        """Bring a panel to the front and give it the keyboard."""
+        """Bring a panel to the front and focus it."""
         dock.show()
         dock.raise_()
         if dock.isFloating():
             dock.activateWindow()
         dock.first_stop().setFocus(Qt.FocusReason.ShortcutFocusReason)
 
-    # -- kept between starts ----------------------------------------------------------------------
-
     def save(self) -> dict[str, object]:
-        """Where everything is, for `restore`."""
+        """Return the arrangement for `restore`."""
         return {
             "open": [
                 name for name, dock in self.docks.items() if not dock.isHidden() or dock in self._floating
@@ -467,7 +456,7 @@ class Workbench(QMainWindow):
         }
 
     def restore(self, saved: Mapping[str, object]) -> bool:
-        """Put everything where `save` found it; False (and the first arrangement) if it does not fit."""
+        """Restore an arrangement from `save`; return False and show the default if it doesn't fit."""
         self.arrange()
         names, panels = saved.get("open"), saved.get("panels")
         if not isinstance(names, list):
@@ -478,26 +467,26 @@ class Workbench(QMainWindow):
         if not self.restoreState(state_of(saved.get("docks")), STATE_VERSION):
             self.arrange()
             return False
-        self._size_timer.stop()  # a person's sizes, not those of `arrange`
+        self._size_timer.stop()  # keep the saved sizes instead of those of `arrange`
         self._wide = state_of(saved.get("wide"))
         self._folded, self._moved = self._folds_of(saved), saved.get("moved") is True
         for name, dock in self.docks.items():
             kept = panels.get(name) if isinstance(panels, Mapping) else None
             if isinstance(kept, Mapping):
                 dock.give_back(kept)
-        self._adapt()  # the window, or its text, may have another size than then
+        self._adapt()  # size of the window or text may have changed
         self._tabs_soon()
         return True
 
     def _folds_of(self, saved: Mapping[str, object]) -> tuple[Fold, ...]:
-        """What was folded when that was saved; older settings know the first fold alone, as "narrow"."""
+        # Older settings contain only the first fold, as "narrow".
         names = saved.get("folds")
         if not isinstance(names, list):
             return self._layout.folds[:1] if saved.get("narrow") is True else ()
         return tuple(fold for fold in self._layout.folds if fold.panels[0] in names)
 
     def shut(self) -> None:
-        """The window closes: every panel ends its watches."""
+        """Dispose of all panels when the window closes."""
         for dock in (*self.docks.values(), *self._ahead.values()):
             dock.shut()
 
@@ -511,7 +500,7 @@ def _raiser(dock: Dock) -> Callable[[], object]:
 
 
 def join(bench: QMainWindow, layout: Layout, docks: Mapping[str, Dock], dock: Dock) -> None:
-    """Give a panel a place: below the row above its own, beside its home, else beside the last panel."""
+    """Place a panel: below the row above its own, as a tab of its home, or next to the last panel."""
     name = dock.description.name
     placed = {
         other.key: other
@@ -536,13 +525,13 @@ def join(bench: QMainWindow, layout: Layout, docks: Mapping[str, Dock], dock: Do
 def put_beside(
     bench: QMainWindow, layout: Layout, docks: Mapping[str, Dock], dock: Dock, other: Dock | None
 ) -> None:
-    """Give a panel half the place of another one, along its longer side, also where that has tabs."""
+    """Give a panel half the place of another one, split along its longer side, even if that has tabs."""
     if other is None or other.isHidden() or other.isFloating():
         join(bench, layout, docks, dock)
         return
     ways = (ACROSS, DOWN) if other.width() >= other.height() else (DOWN, ACROSS)
-    # Qt makes a tab of whatever is split off a tab: for a moment the place has one panel only. Along one of
-    # the two ways that is still a place with tabs for Qt; where both are so, one more tab is what remains.
+    # Qt adds a tab when a tabbed dock is split, so the place is reduced to one panel for a moment. In one
+    # direction Qt may still see tabs; if in both, an additional tab is the result.
     together = [each for each in bench.tabifiedDockWidgets(other) if isinstance(each, Dock)]
     shown = [each for each in together if not each.isHidden()]
     for way in ways:
@@ -562,7 +551,7 @@ def put_beside(
 
 
 def _above(layout: Layout, name: str) -> str:
-    """The panel of the row above that of one which comes later."""
+    # The panel in the row above one that opens later.
     if name in layout.later:
         for column in layout.columns:
             for (names, _), (below, _) in zip(column.rows, column.rows[1:], strict=False):
@@ -572,12 +561,12 @@ def _above(layout: Layout, name: str) -> str:
 
 
 def state_text(state: QByteArray) -> str:
-    """Qt's state of the docks as text for the settings."""
+    """Encode Qt's dock state as text for the settings."""
     return base64.b64encode(state.data()).decode("ascii")
 
 
 def state_of(text: object) -> QByteArray:
-    """What `state_text` made of a state; empty when it is something else."""
+    """Decode a state from `state_text`; empty if the text is invalid."""
     if not isinstance(text, str):
         return QByteArray()
     try:
