@@ -1,4 +1,4 @@
-"""The start page: its cards, pictures and previews of behaviours.
+"""Start page with its cards, images and previews of behaviours.
 
-`StartPage` tells by signals what a person chose.
+`StartPage` emits signals for a person's choices.
 """

@@ -1,4 +1,4 @@
-"""Parts of the start page: a card with a picture, an example, a recent file, the developers' line."""
+"""Parts of the start page: cards, examples, recent files and the line for developers."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ TILE = 30
 
 
 class CardTitle(QLabel):
-    """As wide as its words, so that a chip stands beside them; wraps where there is too little room."""
+    """Heading as wide as its text, followed by a chip; wraps if there is too little room."""
 
     def __init__(self, text: str) -> None:
         super().__init__(text)
@@ -40,7 +40,7 @@ class CardTitle(QLabel):
 
 
 class BigCard(Card):
-    """A picture, a heading with perhaps a chip, one or two lines, and buttons."""
+    """Card with an image, a heading with an optional chip, text, and buttons."""
 
     def __init__(self, theme: Theme, art: Art, title: str, text: str, buttons: list[Button]) -> None:
         super().__init__(theme)
@@ -74,20 +74,20 @@ class BigCard(Card):
         column.addLayout(body, 1)
 
     def say(self, title: str, text: str) -> None:
-        """Another heading, and other words below it."""
+        """Set heading and text."""
         self.title.setText(title)
         self.text.setText(text)
 
 
 class ExampleCard(PaintedButton):
-    """An example: its blocks from afar, its name, and what it does. The whole card is the button."""
+    """Card of an example that acts as a button: preview of its blocks, name and description."""
 
     def __init__(self, theme: Theme, path: Path, name: str, text: str, rows: tuple[Row, ...]) -> None:
         super().__init__(theme, radius="card")
         self._text, self._rows = text, rows
         self.path = path
         self.say(name, _("Open the example {name}. {description}").format(name=name, description=text))
-        self.setToolTip(plain.tip(text))  # a narrow card shortens it
+        self.setToolTip(plain.tip(text))  # a narrow card elides the text
         self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Fixed)
 
     def _fonts(self) -> tuple[float, float]:
@@ -117,7 +117,7 @@ class ExampleCard(PaintedButton):
 
 
 class RecentRow(PaintedButton):
-    """A file opened lately: its tile, its name, and when."""
+    """Row of a recent file: icon, name and time."""
 
     def __init__(self, theme: Theme, recent: RecentFile, now: dt.datetime) -> None:
         super().__init__(theme, radius="panel")
@@ -148,7 +148,7 @@ class RecentRow(PaintedButton):
 
 
 class _Key(QWidget):
-    """A command to type, on a key's surface."""
+    """A shell command with the background of a key."""
 
     def __init__(self, theme: Theme, text: str) -> None:
         super().__init__()
@@ -170,7 +170,7 @@ class _Key(QWidget):
 
 
 class DevelopersLine(QWidget):
-    """The last line: where people who write programs begin."""
+    """Last line of the page, with the entry point for programmers."""
 
     developer_pressed = Signal()
 

@@ -1,4 +1,4 @@
-"""The open behaviours on the start page: each a row that leads back to it."""
+"""Rows of the open behaviours on the start page."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ DOT = 7.0
 
 @dataclass(frozen=True)
 class OpenWork:
-    """One open behaviour: ``key`` of its tab, whether it is unsaved, whether it runs, its file or ""."""
+    """An open behaviour: ``key`` of its tab, and its file or ""."""
 
     key: str
     name: str
@@ -34,7 +34,7 @@ class OpenWork:
 
 
 def open_work(session: Session) -> tuple[OpenWork, ...]:
-    """What is open and has something in it, what was worked on last first."""
+    """Return the open behaviours that aren't empty, the current one first."""
     current, runs = session.document, session.runs
     documents = sorted(session.documents, key=lambda each: each is not current)
     return tuple(
@@ -51,7 +51,7 @@ def open_work(session: Session) -> tuple[OpenWork, ...]:
 
 
 class OpenRow(PaintedButton):
-    """An open behaviour: its tile, its name with a dot while it is unsaved, and "Go on"."""
+    """Row of an open behaviour: icon, name with a dot while unsaved, and "Continue"."""
 
     def __init__(self, theme: Theme, work: OpenWork) -> None:
         super().__init__(theme, radius="panel")
@@ -104,7 +104,7 @@ class OpenRow(PaintedButton):
 
 
 def state_words(work: OpenWork) -> str:
-    """Whether it runs, and whether it is saved; an example that nobody changed needs no saving."""
+    """Return the state as text; an unchanged example needs no saving."""
     if work.runs:
         return _("running")
     if work.unsaved:
@@ -113,7 +113,7 @@ def state_words(work: OpenWork) -> str:
 
 
 class OpenWorkList(QWidget):
-    """The heading and the rows; not there without open work."""
+    """Heading and rows; hidden without open work."""
 
     chosen = Signal(str)
 
@@ -135,7 +135,7 @@ class OpenWorkList(QWidget):
         self.hide()
 
     def show_work(self, work: Sequence[OpenWork]) -> None:
-        """Show these; the same again costs nothing."""
+        """Set the rows; does nothing if they are unchanged."""
         if tuple(work) == self._shown:
             return
         self._shown = tuple(work)

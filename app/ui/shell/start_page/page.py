@@ -1,4 +1,4 @@
-"""The start page: go on with open work, use a robot, make a behaviour, open an example or a recent file."""
+"""Start page: continue open work, use a robot, create a behaviour, open an example or recent file."""
 
 from __future__ import annotations
 
@@ -38,10 +38,11 @@ from nep.i18n import _, lazy, ngettext, translate
 WIDTH, MARGIN, CARD_GAP = 1080, 24, 16
 TOP = 35
 BANNER_ROOM, HIGH, BANNER_GAP, BANNER_LINE = 40, 640, 6, 29
-"""More room above the question, where the page is high enough: an alert covers no words there. In a low page
-it has one line (px at 100 % text)."""
+"""Additional space above the question, so that an alert covers no text. A low page has space for one line (px
+at 100 % text).
+"""
 EXAMPLES_SHOWN = 4
-EXAMPLES_MARGIN = 60  # so much around them, that their heading is in sight, too
+EXAMPLES_MARGIN = 60  # margin in px when scrolling to the examples, so that their heading is visible
 ALL_WORDS = {
     5: lazy("All five examples"),
     6: lazy("All six examples"),
@@ -50,9 +51,9 @@ ALL_WORDS = {
     9: lazy("All nine examples"),
     10: lazy("All ten examples"),
 }
-"""In words, where a person reads them more easily than a figure."""
+"""Spelled out, which is easier to read than a figure."""
 RECENT_SHOWN = 3
-FIRST, OTHER = 408, 318  # how wide the first card and the others are, in parts
+FIRST, OTHER = 408, 318  # relative widths of the first card and the others
 LEARN = (
     lazy("Learn in five minutes"),
     lazy("Six steps to a robot that speaks and turns. Each is checked as you go."),
@@ -65,7 +66,7 @@ OFFER = (
 
 @dataclass(frozen=True)
 class Example:
-    """A behaviour that Studio ships: its file, its name, what it does, and its first blocks."""
+    """An example shipped with Studio: file, name, description and first blocks."""
 
     path: Path
     name: str
@@ -74,7 +75,7 @@ class Example:
 
 
 def read_examples(folder: Path) -> tuple[Example, ...]:
-    """The examples in a folder by file name; files that are no behaviours are left out."""
+    """Return the examples of a folder, sorted by file name; invalid files are skipped."""
     found = []
     for path in sorted(folder.glob("*.nepb")) if folder.is_dir() else []:
         try:
@@ -90,14 +91,14 @@ def read_examples(folder: Path) -> tuple[Example, ...]:
 
 
 def all_words(count: int) -> str:
-    """The words of the link that shows every example."""
+    """Return the text of the link that shows all examples."""
     if count in ALL_WORDS:
         return _(ALL_WORDS[count])
     return ngettext("The only example", "All {count} examples", count).format(count=count)
 
 
 class StartPage(QWidget):
-    """The page that asks what you would like to do."""
+    """Start page."""
 
     virtual_robot = Signal()
     new_behaviour = Signal()
@@ -107,7 +108,7 @@ class StartPage(QWidget):
     open_pressed = Signal()
     developer_pressed = Signal()
     work_chosen = Signal(str)
-    left = Signal()  # Esc
+    left = Signal()  # Esc was pressed
 
     def __init__(self, theme: Theme, examples: Sequence[Example]) -> None:
         super().__init__()
@@ -155,7 +156,7 @@ class StartPage(QWidget):
         self._restyle()
 
     def _restyle(self) -> None:
-        # the sheet gives size and weight; letter spacing is beyond it
+        # the style sheet sets size and weight, but can't set letter spacing
         self._question.setFont(self._theme.font("display"))
 
     def _build(self, examples: Sequence[Example]) -> None:
@@ -196,7 +197,7 @@ class StartPage(QWidget):
         self._frame(content)
 
     def _frame(self, content: QWidget) -> None:
-        """The content in the middle of a page that scrolls, with the developers' line below."""
+        # Centred in a scroll area, with the developers' line below.
         middle = QWidget()
         middle.setProperty("bare", "true")
         row = QHBoxLayout(middle)
@@ -219,7 +220,7 @@ class StartPage(QWidget):
         whole.addWidget(line)
 
     def banner_area(self) -> QRect:
-        """Return where an alert may lie: above the question, as it is before anybody scrolls."""
+        """Return the area for an alert: above the question, at scroll position 0."""
         high = TOP + self._banner_room.sizeHint().height() - 2 * BANNER_GAP
         return QRect(BANNER_GAP, BANNER_GAP, self.width() - 2 * BANNER_GAP, high)
 
@@ -242,10 +243,7 @@ class StartPage(QWidget):
             self._content.invalidate()
 
     def _fit_cards(self) -> None:
-        """Large text in a small window: the cards stand below each other, in a low one without pictures.
-
-        What to press first is to be seen at once.
-        """
+        # With little room, cards are stacked, then lose their images, so that the first button is visible.
         cards = (self.robot_card, self.new_card, self.learn_card)
         needed = sum(card.minimumSizeHint().width() for card in cards) + CARD_GAP * (len(cards) - 1)
         beside = needed <= min(WIDTH, self.width() - 2 * MARGIN)
@@ -256,18 +254,18 @@ class StartPage(QWidget):
             card.art.setVisible(beside or self.height() >= HIGH)
 
     def _order_of_cards(self) -> list[BigCard]:
-        """What most people want stands first: it is the widest, and has the filled button."""
+        # The first card is the widest and has the primary button.
         cards = [self.robot_card, self.new_card]
         cards.insert(0 if self._offers else len(cards), self.learn_card)
         return cards
 
     @property
     def offers_first_steps(self) -> bool:
-        """Whether the first steps are offered before all else."""
+        """True while the first steps are the primary card."""
         return self._offers
 
     def offer_first_steps(self, offers: bool = True) -> None:
-        """Offer the first steps before all else, or as one of three from now on."""
+        """Make the first steps the primary card, or one of three cards."""
         if offers == self._offers:
             return
         self._offers = offers
@@ -316,7 +314,7 @@ class StartPage(QWidget):
         return grid
 
     def show_all(self, shown: bool) -> None:
-        """All examples, or the first row of them."""
+        """Show all examples or only the first row."""
         self._shows_all = shown
         for card in self.example_cards[EXAMPLES_SHOWN:]:
             paint.show_when(card, shown)
@@ -325,20 +323,20 @@ class StartPage(QWidget):
         self._all.set_word(words, None if shown else "arrow-right")
 
     def focus_examples(self) -> None:
-        """Show all examples, and give the keyboard to the first."""
+        """Show all examples and focus the first."""
         self.show_all(True)
         if self.example_cards:
             self.example_cards[0].setFocus(Qt.FocusReason.OtherFocusReason)
-            # Later: the cards that came, and a page that showed only now, have no place before.
+            # Deferred, because cards and page have no geometry before they are shown.
             QTimer.singleShot(0, self, self._scroll_to_examples)
 
     def _scroll_to_examples(self) -> None:
-        """Have as many of the examples in sight as there is room for, the first ones above all."""
+        # Prefers the first rows if not all examples fit.
         for card in (self.example_cards[-1], self.example_cards[0]):
             self._area.ensureWidgetVisible(card, 0, EXAMPLES_MARGIN)
 
     def show_recent(self, recent: Sequence[RecentFile], now: dt.datetime | None = None) -> None:
-        """The files opened lately; without any the section is not there."""
+        """Set the recent files; the section is hidden without any."""
         moment = now if now is not None else dt.datetime.now().astimezone()
         layout = self._recent_box.layout()
         if layout is None:
@@ -370,20 +368,20 @@ class StartPage(QWidget):
         layout.addWidget(holder)
 
     def show_robot(self, chip: str, status: str) -> None:
-        """The connected robot's chip beside "Connect a robot"; nothing when there is none."""
+        """Set the chip with the connected robot on the card "Connect a robot"."""
         self.robot_card.chip.set(chip, status)
 
     def show_open(self, work: Sequence[OpenWork]) -> None:
-        """The behaviours that are open; without any the section is not there.
+        """Set the open behaviours; the section is hidden without any.
 
-        Who has begun something is not offered the first steps before it.
+        With open work the first steps are no longer the primary card.
         """
         self.open_work.show_work(work)
         if work:
             self.offer_first_steps(False)
 
     def focus_first(self) -> None:
-        """Give the keyboard to the button that most people want; the page begins at its top."""
+        """Focus the primary button and scroll to the top."""
         self._area.verticalScrollBar().setValue(0)
         rows = self.open_work.rows
         first = self._learn if self._offers else self._use

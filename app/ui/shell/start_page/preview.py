@@ -1,4 +1,4 @@
-"""A behaviour seen from afar: its first blocks as coloured bars, read from the workspace's JSON."""
+"""Preview of a behaviour: its first blocks as coloured bars, read from the workspace JSON."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ _LAST_WORD = {"do": "robot", "get": "sensors", "when": "events"}
 
 @dataclass(frozen=True)
 class Row:
-    """One block: how deep it stands in others, its category, and how long its words and its values are."""
+    """A block: nesting depth, category, and the numbers of words and values."""
 
     depth: int
     category: str
@@ -31,7 +31,7 @@ class Row:
 
 
 def category_of(block_type: str) -> str:
-    """The category of a block type: ``robot_pepper_do_say`` is a robot's, ``control_wait`` is control."""
+    """Return the category of a block type, such as "robot" for ``robot_pepper_do_say``."""
     parts = block_type.split("_")
     if parts[0] == "robot":
         return next((_LAST_WORD[part] for part in parts[1:] if part in _LAST_WORD), "robot")
@@ -39,7 +39,7 @@ def category_of(block_type: str) -> str:
 
 
 def rows(workspace: Mapping[str, object]) -> tuple[Row, ...]:
-    """The first rows of the largest script; none for an empty workspace."""
+    """Return the first rows of the largest script; empty for an empty workspace."""
     blocks = workspace.get("blocks")
     tops = blocks.get("blocks") if isinstance(blocks, Mapping) else None
     if not isinstance(tops, list):
@@ -77,7 +77,7 @@ def _child(link: object) -> Mapping[str, object] | None:
 
 
 def block_path(rect: QRectF, *, radius: float = 4.0, notch: float = 11.0) -> QPainterPath:
-    """The outline of a block: a notch above, a tab below."""
+    """Return the outline of a block with a notch at the top and a tab at the bottom."""
     left, top, right, bottom = rect.left(), rect.top(), rect.right(), rect.bottom()
     wide, deep = notch, notch * 0.36
     path = QPainterPath(QPointF(left + radius, top))
@@ -102,7 +102,7 @@ def block_path(rect: QRectF, *, radius: float = 4.0, notch: float = 11.0) -> QPa
 
 
 def paint_rows(painter: QPainter, area: QRectF, theme: Theme, found: tuple[Row, ...]) -> None:
-    """Paint rows from the top of ``area``; what does not fit is cut by the painter's clip."""
+    """Paint rows from the top of ``area``; the painter must clip the overflow."""
     painter.setRenderHint(QPainter.RenderHint.Antialiasing)
     top = area.top()
     for row in found:
@@ -135,7 +135,7 @@ def _paint_words(painter: QPainter, rect: QRectF, theme: Theme, row: Row) -> Non
 
 
 def paint_grid(painter: QPainter, area: QRectF, theme: Theme, step: float = 24.0) -> None:
-    """The dots of the workspace."""
+    """Paint the dot grid of the canvas."""
     painter.fillRect(area, theme.colour("workspace"))
     painter.setPen(Qt.PenStyle.NoPen)
     painter.setBrush(theme.colour("grid"))
