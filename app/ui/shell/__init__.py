@@ -1,4 +1,4 @@
-"""The window around the panels: `main_window` puts together bars, layouts, dialogs and commands.
+"""The window around the panels; `main_window` combines bars, layouts, dialogs and commands.
 
-Its parts do not know it: commands know it as a `Shell`, panels as a `PanelContext`.
+Its parts don't import it: commands use it as a `Shell`, panels as a `PanelContext`.
 """

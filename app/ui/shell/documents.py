@@ -1,4 +1,4 @@
-"""Opening, saving, closing and putting back behaviours; nothing is lost, so nothing asks."""
+"""Opens, saves, closes and recovers behaviours. All of it can be undone, so there are no questions."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ RECORDING, LAYOUT = OTHERS = (".mcap", ".nep-layout")
 
 @runtime_checkable
 class SupportsFlush(Protocol):
-    """A panel that may hold an edit which the document has not seen yet."""
+    """A panel that may hold an edit that isn't in the document yet."""
 
     def flush(self, done: Callable[[], None]) -> None:
         """Call ``done`` once the newest edit is in the document."""
@@ -38,11 +38,11 @@ class SupportsShowCurrent(Protocol):
     """A panel that shows the current behaviour."""
 
     def show_current(self) -> None:
-        """Show it at once."""
+        """Show the current behaviour immediately."""
 
 
 class Closed:
-    """A tab that was closed: what to say of it, and how its file was before, if it was written over."""
+    """A closed tab: text for the toast, and the previous version of its file if it was overwritten."""
 
     def __init__(self, document: Document, words: str = "", earlier: Earlier | None = None) -> None:
         self.words, self.earlier = words, earlier
@@ -51,7 +51,10 @@ class Closed:
 
 
 class DocumentController:
-    """The open behaviours' files. ``say`` is the toast, ``shown`` is called when another one shows."""
+    """Files of the open behaviours.
+
+    ``say`` shows a toast; ``shown`` is called when another behaviour is shown.
+    """
 
     def __init__(
         self,
@@ -62,27 +65,27 @@ class DocumentController:
         editor: Callable[[], object],
         clock: Callable[[], float] = time.time,
     ) -> None:
-        """``editor`` gives the behaviour panel, or None while there is none."""
+        # editor returns the behaviour panel, or None before it exists.
         self._session, self.asks, self._say, self._shown = session, asks, say, shown
         self._documents = session.documents
         self._editor, self._clock = editor, clock
         self.open_recording: Callable[[Path], object] = lambda _path: None
-        """What opens a recording that came from outside."""
+        """Opens a recording that was dropped or passed at start."""
         self.open_layout: Callable[[Path], object] = lambda _path: None
-        """What shows a layout that came from outside."""
+        """Opens a layout file that was dropped or passed at start."""
 
     def new(self) -> None:
-        """Begin an empty behaviour in a tab of its own."""
+        """Create an empty behaviour in a new tab."""
         self.with_newest(lambda: self._show(self._documents.new))
 
     def ask_open(self) -> None:
-        """Let a person choose a file and open it."""
+        """Ask for a file and open it."""
         self._session.alerts.resolve("strange")
         path = self._session.document.path
         self.asks.open(str(path.parent if path is not None else Path.home()), self.open)
 
     def open(self, path: Path) -> None:
-        """Open a behaviour file in a tab; what is wrong with it becomes an alert."""
+        """Open a behaviour file in a tab; errors become alerts."""
 
         def opened() -> None:
             self._documents.open(path)
@@ -91,9 +94,9 @@ class DocumentController:
         self.with_newest(lambda: self._show(opened))
 
     def open_all(self, paths: Sequence[Path]) -> None:
-        """Open files that came from outside: the command line, a drop, another start.
+        """Open files from the command line, a drop, or a later start.
 
-        Those that are neither behaviours nor recordings nor layouts become one alert, the others open.
+        Files of unknown types are listed in one alert; the others open.
         """
         self._session.alerts.resolve("strange")
         strange = [path for path in paths if path.suffix.lower() not in {SUFFIX, *OTHERS}]
@@ -101,7 +104,7 @@ class DocumentController:
             if path.suffix.lower() == SUFFIX:
                 self.open(path)
         for kind, show in ((LAYOUT, self.open_layout), (RECORDING, self.open_recording)):
-            for path in [each for each in paths if each.suffix.lower() == kind][-1:]:  # one of them is shown
+            for path in [each for each in paths if each.suffix.lower() == kind][-1:]:  # only one is shown
                 show(path)
         if strange:
             self._complain(strange_words(strange), "file.open", _("Open another file"), alert="strange")
@@ -111,7 +114,7 @@ class DocumentController:
         self.with_newest(lambda: self._show(lambda: self._documents.example(path)))
 
     def copy(self, path: Path, name: str) -> None:
-        """Open an earlier version as a new behaviour of that name; no file is written."""
+        """Open an earlier version as a new behaviour with this name, without writing a file."""
 
         def opened() -> None:
             self._documents.copy(path, name)
@@ -120,13 +123,13 @@ class DocumentController:
         self.with_newest(lambda: self._show(opened))
 
     def recover(self, left: Sequence[Unsaved]) -> None:
-        """Put back what a Studio that died left behind, each in its tab; the one that was worked on shows."""
+        """Recover unsaved behaviours after a crash, each in its tab, and show the last used one."""
         self.with_newest(lambda: self._show(lambda: self._session.tabs.recover(left)))
 
     def close(self, *documents: Document) -> None:
-        """Close tabs. Their programs are stopped; unsaved work goes to its file, or where Recent finds it.
+        """Close tabs: stop their programs and save unsaved work to its file or to Recent.
 
-        What was written over can be put back.
+        Overwritten files can be restored.
         """
 
         def closed() -> None:
@@ -146,7 +149,7 @@ class DocumentController:
         self.with_newest(closed)
 
     def reopen(self) -> None:
-        """Open the tab that was closed last."""
+        """Reopen the tab closed last."""
 
         def reopened() -> None:
             if self._documents.reopen() is None:
@@ -155,7 +158,7 @@ class DocumentController:
         self.with_newest(lambda: self._show(reopened))
 
     def show(self, document: Document) -> None:
-        """Show an open behaviour's tab, before the next tick; which tab shows is kept a little later."""
+        """Show the tab of an open behaviour immediately; the choice is saved later."""
         self._documents.show(document)
         editor = self._editor()
         if isinstance(editor, SupportsShowCurrent):
@@ -166,7 +169,7 @@ class DocumentController:
         self.with_newest(lambda: self._show(lambda: self._documents.duplicate(document)))
 
     def rename(self, document: Document, name: str) -> bool:
-        """Give a behaviour another name, and its file; it can be taken back. False when that fails."""
+        """Rename a behaviour and its file, with undo; return False on failure."""
         before, old = document.name, document.path
         if name.strip() == before:
             return True
@@ -186,19 +189,19 @@ class DocumentController:
         return True
 
     def move(self, document: Document, place: int) -> None:
-        """Put a tab to another place."""
+        """Move a tab to another position."""
         self._documents.move(document, place)
         self._session.tabs.keep()
 
     def save(self) -> None:
-        """Save, or ask where when the behaviour has no file yet."""
+        """Save, or ask where if the behaviour has no file yet."""
         if self._session.document.path is None:
             self.save_as()
         else:
             self.with_newest(lambda: self._save(None))
 
     def save_as(self) -> None:
-        """Ask where, then save there."""
+        """Ask where, then save."""
         document = self._session.document
         own = document.path
         folder = own.parent if own is not None and own.parent != kept_folder() else Path.home()
@@ -206,7 +209,7 @@ class DocumentController:
         self.asks.save(suggestion, lambda path: self.with_newest(lambda: self._save(path)))
 
     def mend(self, action: str) -> bool:
-        """Change the blocks as a problem's button says; False when it says nothing about blocks."""
+        """Apply a problem's fix to the blocks; return False if the action isn't a fix."""
         document = self._session.document
         if deep_json.deeply(lambda: mend(document.workspace, action)) is None:
             return False
@@ -218,7 +221,7 @@ class DocumentController:
         return True
 
     def with_newest(self, then: Callable[[], None]) -> None:
-        """Do something once the editor's newest edit is in the document."""
+        """Call a function once the editor's newest edit is in the document."""
         editor = self._editor()
         if isinstance(editor, SupportsFlush):
             editor.flush(then)
@@ -246,11 +249,9 @@ class DocumentController:
         self._say(said, _("Open"), lambda: self.copy(earlier.copy, then))
 
     def _kept_before(self, document: Document, path: Path | None) -> tuple[Earlier | None, str]:
-        """What of others the file says that is written over, and the words for it, with the hole ``name``.
-
-        Raises DocumentError when that can't be kept. What Studio itself wrote there before is kept too, if it
-        can be, without words.
-        """
+        # Backs up a file before it is overwritten; returns the text for the toast with the placeholder
+        # "name". Raises DocumentError if content from elsewhere can't be backed up; Studio's own content is
+        # backed up without text if possible.
         own = document.path
         if path is not None and (own is None or path.resolve() != own.resolve()):
             return keep_earlier(path), _("Saved {name}. The previous file is under Earlier versions.")
@@ -267,7 +268,6 @@ class DocumentController:
         return None, ""
 
     def _show(self, act: Callable[[], object]) -> None:
-        """Show another tab."""
         try:
             act()
         except AppError as error:
@@ -278,7 +278,7 @@ class DocumentController:
         self._shown()
 
     def _keep(self, document: Document) -> Closed | None:
-        """Save what is not saved yet; None, and an alert, when that can't be done."""
+        # Returns None and shows an alert if saving fails.
         if not document.dirty:
             return Closed(document)
         name, path = document.name, document.path
@@ -298,7 +298,7 @@ class DocumentController:
         return Closed(document, words.format(name=name), earlier)
 
     def _tell_closed(self, closed: Sequence[Closed]) -> None:
-        """Say which unsaved work was saved, and offer to take it back."""
+        # Shows a toast with undo for the work that was saved.
         if not closed:
             return
         words = closed[0].words
@@ -312,15 +312,15 @@ class DocumentController:
             self._say(words)
 
     def _take_back(self, closed: Sequence[Closed]) -> None:
-        """Let the files say what they said before, and open the tabs again, with their work unsaved."""
+        # Restores the files and reopens the tabs with unsaved work.
         for each in closed:
             if each.earlier is None:
                 continue
             if stamp_of(each.earlier.path) != each.stamp:
                 name = _("{name}, before").format(name=each.earlier.path.stem)
-                self._documents.copy(each.earlier.copy, name)  # somebody wrote the file meanwhile: it stays
+                self._documents.copy(each.earlier.copy, name)  # the file was changed since then
                 continue
-            there = self._documents.with_path(each.earlier.path)  # opened again before "Undo" was pressed
+            there = self._documents.with_path(each.earlier.path)  # reopened before "Undo" was pressed
             each.earlier.put_back()
             if there is not None:
                 there.file_went_back()
@@ -341,23 +341,23 @@ class DocumentController:
 
 
 class AlertText(NamedTuple):
-    """What an alert says: what is wrong, and what to do."""
+    """Text of an alert: the problem and what to do."""
 
     title: str
     detail: str
 
 
 def words_of(error: Exception) -> AlertText:
-    """What is wrong with a file, and what to do."""
+    """Return the alert text for a file error."""
     if not isinstance(error, DocumentError):
         return AlertText(_sentence(str(error)), "")
-    named = error.path is not None and error.reason.startswith(error.path.name)  # a name stays as it is
+    named = error.path is not None and error.reason.startswith(error.path.name)  # not capitalised
     title = f"{error.reason}." if named else _sentence(error.reason)
     return AlertText(title, _sentence(error.advice))
 
 
 def strange_words(paths: Sequence[Path]) -> AlertText:
-    """What is wrong with files that are no behaviours, and what behaviours are."""
+    """Return the alert text for files of unknown types."""
     names = [path.name or str(path) for path in paths]
     words, others = _("{file} is not a behaviour"), len(names) - 1
     if others:
@@ -372,19 +372,19 @@ def _sentence(words: str) -> str:
 
 
 class FlushBeforeClose(QObject):
-    """Before the window closes: takes over the newest edit, which the block editor tells a moment late.
+    """Fetches the newest edit before the window closes.
 
-    Waits for the editor, half a second at most: an editor that hangs does not keep the window open.
+    Waits up to half a second for the block editor, so that an unresponsive one doesn't keep the window open.
     """
 
     def __init__(self, parent: QObject, editor: Callable[[], object], close: Callable[[], object]) -> None:
-        """``close`` closes the window; it is called once, when `ready` had to wait."""
+        # close is called once if ready() had to wait.
         super().__init__(parent)
         self._editor, self._close = editor, close
         self._asked = self._ready = self._waits = False
 
     def ready(self) -> bool:
-        """Whether the window may close now; if not, it is closed as soon as it may."""
+        """Return whether the window may close now; otherwise it is closed when it may."""
         if not self._asked:
             self._asked, self._ready = True, False
             editor = self._editor()
@@ -398,7 +398,7 @@ class FlushBeforeClose(QObject):
         return self._ready
 
     def stay(self) -> None:
-        """The window stays open after all: the next time the editor is asked anew."""
+        """Reset after closing was cancelled."""
         self._asked = self._ready = self._waits = False
 
     def _go_on(self) -> None:

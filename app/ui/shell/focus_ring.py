@@ -1,8 +1,8 @@
-"""The focus ring: 2 px wide, 2 px outside the control, only while the keyboard is used.
+"""Focus ring, 2 px wide and 2 px outside the control, shown only for keyboard use.
 
-Style sheets cannot move an outline outwards, so one small overlay follows the widget that has the focus.
-Qt's QFocusFrame does not serve: it becomes a child of the scroll area around the widget and is deleted with
-it, and its distance is the style's, one for all widgets.
+Style sheets can't draw an outline outside a widget, so an overlay follows the focused widget. QFocusFrame is
+unsuitable: it becomes a child of the surrounding scroll area and is deleted with it, and its margin is one
+value of the style for all widgets.
 """
 
 from __future__ import annotations
@@ -38,17 +38,17 @@ _LEADING = frozenset(
         _Key.Key_PageDown, _Key.Key_Left, _Key.Key_Right, _Key.Key_Up, _Key.Key_Down,
     }
 )  # fmt: skip
-"""Keys that move the focus; whoever types, or presses Ctrl+S, may use the mouse for everything else."""
+"""Keys that move the focus. Typing or Ctrl+S doesn't imply keyboard navigation."""
 
 
 class FocusRing(QWidget):
-    """One ring for a window and the panels that float over it; ``focusRadius`` tells a widget's corners.
+    """One ring for a window and its floating panels; ``focusRadius`` sets the corners.
 
-    Whether the keyboard is used is told by the newest key that moves the focus, or mouse button: Qt's reason
-    of a focus says "Tab" too when a widget with the focus is hidden and the next one gets it.
+    Keyboard use is detected by the last focus-moving key or mouse button: Qt's focus reason is also Tab when
+    a focused widget is hidden.
 
-    Widgets with the property ``ownFocus`` (and tables and trees) draw their focus themselves; ``focusInset``
-    is the margin between a widget's edge and what it paints.
+    Widgets with the property ``ownFocus`` (and tables and trees) draw their own focus; ``focusInset`` is the
+    margin between a widget's edge and its painted shape.
     """
 
     def __init__(self, theme: Theme, window: QWidget) -> None:
@@ -67,15 +67,15 @@ class FocusRing(QWidget):
             application.focusChanged.connect(self._focus_changed)
             application.focusWindowChanged.connect(self._window_changed)
         self._window_changed(window.windowHandle())
-        window.installEventFilter(self)  # its handle is made when it is first shown
+        window.installEventFilter(self)  # the native window is created when it is first shown
 
     @property
     def target(self) -> QWidget | None:
-        """The widget that is ringed now."""
+        """Widget with the ring, or None."""
         return self._target
 
     def _window_changed(self, window: QWindow | None) -> None:
-        """Listen to the keys and buttons of every window of ours that a person uses."""
+        # Filters the events of every window of the application that becomes active.
         if window is not None:
             window.removeEventFilter(self)
             window.installEventFilter(self)
@@ -96,14 +96,14 @@ class FocusRing(QWidget):
         if not ours or widget is window or widget.property("ownFocus"):
             return False
         parent = widget.parentWidget()
-        if parent is not None and parent.inherits("QWebEngineView"):  # the page shows its own focus
+        if parent is not None and parent.inherits("QWebEngineView"):  # the page draws its own focus
             return False
         own = QAbstractItemView | QAbstractScrollArea | QMainWindow | QMenu | QMenuBar
         return not isinstance(widget, own)
 
     def _follow(self, target: QWidget | None) -> None:
         for widget in self._chain:
-            if isValid(widget):  # the focus also moves on because a widget is being deleted
+            if isValid(widget):  # the focus also changes because a widget is being deleted
                 widget.removeEventFilter(self)
         self._chain = []
         self._target = target
@@ -125,7 +125,7 @@ class FocusRing(QWidget):
                 self._follow(None)
             elif kind == QEvent.Type.KeyPress and _leads(cast("QKeyEvent", event)) and not keyboard_leads():
                 set_keyboard_leads(True)
-                QTimer.singleShot(0, self, self._ring_here)  # the key may move the focus first
+                QTimer.singleShot(0, self, self._ring_here)  # after the key may have moved the focus
         elif kind == QEvent.Type.Show and watched is self._home:
             self._window_changed(self._home.windowHandle())
         elif kind in _MOVES:
@@ -133,7 +133,6 @@ class FocusRing(QWidget):
         return super().eventFilter(watched, event)
 
     def _ring_here(self) -> None:
-        """Ring what has the focus already."""
         if self._target is None:
             self._focus_changed(None, QApplication.focusWidget())
 
@@ -175,6 +174,6 @@ class FocusRing(QWidget):
 
 
 def _leads(event: QKeyEvent) -> bool:
-    """Whether a key moves the focus: Tab, the arrows, F6, and Ctrl+1 to Ctrl+9, which go to a panel."""
+    # Tab, arrows, F6, and Ctrl+1 to Ctrl+9, which focus a panel.
     to_panel = _Key.Key_1 <= event.key() <= _Key.Key_9
     return event.key() in _LEADING or (to_panel and event.modifiers() == Qt.KeyboardModifier.ControlModifier)

@@ -1,4 +1,4 @@
-"""A ring round a button that a person is shown: until the button or Esc is pressed, or for a while."""
+"""Ring that highlights a button until it or Esc is pressed, or a timeout."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ SHOWN_MS = 15_000
 
 
 class HintRing(QWidget):
-    """Lies over the window and takes no mouse; a button is known by the command that it does."""
+    """Overlay that ignores the mouse; the button is identified by its command."""
 
     def __init__(self, theme: Theme, window: QWidget) -> None:
         super().__init__(window)
@@ -37,7 +37,7 @@ class HintRing(QWidget):
         self.hide()
 
     def point_at(self, command: str) -> bool:
-        """Ring the button that does this command; False when none can be seen."""
+        """Highlight the button of a command; return False if none is visible."""
         self.forget()
         buttons = self._window.findChildren(QAbstractButton)
         found = (each for each in buttons if each.isVisible() and each.property("command") == command)
@@ -54,7 +54,7 @@ class HintRing(QWidget):
         return True
 
     def forget(self) -> None:
-        """Point at nothing."""
+        """Remove the highlight."""
         if self.target is not None and isValid(self.target):
             self.target.clicked.disconnect(self.forget)
         if self._listens_to is not None and isValid(self._listens_to):

@@ -1,4 +1,4 @@
-"""Which panel has the keyboard, and how it goes from one to the next."""
+"""Keyboard focus of panels: the focused panel and navigation between panels."""
 
 from __future__ import annotations
 
@@ -13,10 +13,10 @@ from app.ui.widgets.keyboard import tab_stops
 
 
 class PanelFocus(QObject):
-    """Gives the keyboard to panels of the workbench that shows; marks the title of who has it."""
+    """Moves the focus between panels of the current workbench and marks the focused panel's title."""
 
     def __init__(self, bench: Callable[[], Workbench | None], parent: QObject) -> None:
-        """``bench`` gives the workbench that shows, None when there is none."""
+        # bench returns the current workbench, or None.
         super().__init__(parent)
         self._bench = bench
         application = QApplication.instance()
@@ -24,7 +24,7 @@ class PanelFocus(QObject):
             application.focusChanged.connect(self._changed)
 
     def next(self, step: int) -> None:
-        """Give the keyboard to the next panel that can be seen, or the one before."""
+        """Focus the next visible panel, or the previous one for -1."""
         bench = self._bench()
         docks = [dock for dock in bench.docks.values() if dock.shown()] if bench is not None else []
         if bench is None or not docks:
@@ -34,22 +34,22 @@ class PanelFocus(QObject):
         bench.focus_panel(docks[(place + step) % len(docks)])
 
     def number(self, number: int) -> None:
-        """Give the keyboard to the n-th open panel, from 1."""
+        """Focus the n-th open panel, counted from 1."""
         bench = self._bench()
         names = bench.open_names() if bench is not None else ()
         if bench is not None and 0 < number <= len(names):
             bench.focus_panel(bench.docks[names[number - 1]])
 
     def give(self, dock: Dock | None) -> None:
-        """Bring a panel to the front and give it the keyboard."""
+        """Bring a panel to the front and focus it."""
         bench = self._bench()
         if bench is not None and dock is not None:
             bench.focus_panel(dock)
 
     def skip_hidden(self, window: QWidget, *, forward: bool) -> bool:
-        """Go on by Tab past what Qt takes for visible and nobody sees; False: none of it comes.
+        """Move the focus by Tab past widgets that aren't really visible; return False if not needed.
 
-        That is what stands behind another panel, and Qt's own tab bars, in whose place titles have tabs.
+        These are widgets behind another tab, and Qt's own tab bars, which titles replace.
         """
         focus = QApplication.focusWidget()
         if focus is None:
@@ -70,7 +70,7 @@ class PanelFocus(QObject):
         return any(dock.isAncestorOf(widget) and not dock.front for dock in docks)
 
     def dock(self) -> Dock | None:
-        """The panel that has the keyboard."""
+        """Return the panel that has the focus, or None."""
         focus, bench = QApplication.focusWidget(), self._bench()
         if bench is None or focus is None:
             return None

@@ -1,4 +1,4 @@
-"""The window: bars, banner, the start page and one workbench for each layout, refreshed 30 times a second."""
+"""Main window: bars, banner, start page and a workbench per layout, refreshed 30 times a second."""
 
 from __future__ import annotations
 
@@ -47,9 +47,9 @@ from app.ui.widgets.file_dialogs import FileDialogs, SystemDialogs
 from nep.i18n import _, lazy
 
 TICK_MS = 33
-SMALLEST = QSize(960, 540)  # on a screen of 1024 x 600 the system's own bars take some
+SMALLEST = QSize(960, 540)  # leaves room for the system's bars on a screen of 1024 x 600
 FIRST_SIZE = QSize(1440, 900)
-FACTS_EVERY = 8  # ticks
+FACTS_EVERY = 8  # ticks between refreshes
 OPEN_ALERTS = "panel:alerts"
 BLOCK_KEYS = {
     QKeySequence.StandardKey.Copy: "copy",
@@ -65,14 +65,14 @@ OTHER_SOON_WORDS = lazy("Loading panels.")
 
 @runtime_checkable
 class SupportsFields(Protocol):
-    """A panel that shows fields of topics over time."""
+    """A panel that plots fields of topics."""
 
     def plot_field(self, topic: str, path: str) -> None:
-        """Show one more; without a path a person is asked which."""
+        """Add a field; an empty path lets the person choose it."""
 
 
 class MainWindow(QMainWindow):
-    """One session in one window, and what is in it; for its commands it is a `Shell`."""
+    """One session in one window; implements `Shell` for its commands."""
 
     bench_made = Signal()
 
@@ -86,10 +86,8 @@ class MainWindow(QMainWindow):
         asks: FileDialogs | None = None,
         clock: Callable[[], float] = time.monotonic,
     ) -> None:
-        """``asks`` asks for files, by dialogs if it is None.
-
-        ``clock`` gives monotonic seconds: how long a panel has not been seen.
-        """
+        # asks opens file dialogs, by default those of the system or Studio. clock returns monotonic seconds,
+        # for the time that a panel has been hidden.
         super().__init__()
         self._clock = clock
         self.session, self.theme, self.panels = session, theme, panels
@@ -99,12 +97,12 @@ class MainWindow(QMainWindow):
         self.can_restart = self.wants_restart = False
         self._showing = self._left = ""
         self.benches: dict[str, Workbench] = {}
-        self._ahead: dict[str, Workbench] = {}  # with panels, for layouts that nobody has gone to yet
+        self._ahead: dict[str, Workbench] = {}  # workbenches with panels created in advance
         self._facts = StatusFacts(session)
         self._alerts_seen = (-1, False)
         self._source_seen = session.sources_shown
         self._ticks = self._halves = 0
-        self._twice = False  # the timer runs twice as often as the tick
+        self._twice = False  # the timer runs at twice the tick rate
         self._shut = False
         self._flush_before_close = FlushBeforeClose(self, self.editor, self.close)
         self._build(examples)
@@ -152,7 +150,7 @@ class MainWindow(QMainWindow):
             column.addWidget(widget)
         column.addWidget(self.pages, 1)
         column.addWidget(self.status)
-        self.banner.setParent(middle)  # over a bar's free area: in no layout, so it moves nothing
+        self.banner.setParent(middle)  # in no layout, because it floats over the free area of a bar
         self.setCentralWidget(middle)
         self.toast = Toast(theme, self)
         self.asked = QuestionCard(theme, self, self.session.runs.asking.answer)
@@ -199,34 +197,30 @@ class MainWindow(QMainWindow):
             return SystemDialogs(self)
         return StudioDialogs(self.theme, self, self.session.settings)
 
-    # -- what its commands may use ----------------------------------------------------------------
-
     @property
     def showing(self) -> str:
-        """The name of the layout that shows, or `START`."""
+        """Name of the current layout, or `START`."""
         return self._showing
 
     @property
     def surface(self) -> QWidget:
-        """The widget over which sheets and menus open, and in which keys work."""
+        """Parent of sheets and menus, in which shortcuts work."""
         return self
 
     @property
     def menu_bar(self) -> QMenuBar:
-        """Where the menus are."""
+        """Menu bar of the window."""
         return self.bar.menus
 
     @property
     def say(self) -> ShowToast:
-        """Says for some seconds what the person just did."""
+        """Function that shows a toast."""
         return self.toast.say
 
     @property
     def examples(self) -> Sequence[Example]:
-        """The examples of the start page."""
+        """Examples of the start page."""
         return self.start.examples
-
-    # -- what shows -------------------------------------------------------------------------------
 
     def show_start(self) -> None:
         """Show the start page."""
@@ -240,7 +234,7 @@ class MainWindow(QMainWindow):
 
     @property
     def left(self) -> str:
-        """The layout that leads back from the start page to the work; "" when there is none."""
+        """Layout to return to from the start page, or ""."""
         if self._left:
             return self._left
         return "behaviour" if any(not each.blank for each in self.session.documents) else ""
@@ -250,19 +244,19 @@ class MainWindow(QMainWindow):
         self._run("layout.behaviour")
 
     def show_examples(self) -> None:
-        """Show all examples of the start page, and give the keyboard to the first."""
+        """Show all examples on the start page and focus the first."""
         self.start.focus_examples()
 
     def show_recent(self) -> None:
-        """Show on the start page which files were opened lately."""
+        """Update the recent files on the start page."""
         self.start.show_recent(recent_titles(self.session.settings.recent))
 
     def complain(self, sentence: str) -> None:
-        """Say in the Console what went wrong and needs nobody's hand."""
+        """Log a problem in the Console that needs no action."""
         self.session.console.add("warn", "studio", sentence)
 
     def show_layout(self, name: str) -> Workbench:
-        """Show a layout; it is made, as it was left, when it is the first time."""
+        """Show a layout, creating it in its last state on first use."""
         layout = layout_named(name)
         if layout.name not in self.benches:
             self.benches[layout.name] = bench = self._new_bench(layout)
@@ -276,14 +270,14 @@ class MainWindow(QMainWindow):
         inside = focus is None or self.pages.isAncestorOf(focus)
         self._showing = layout.name
         self.pages.setCurrentWidget(bench)
-        if inside:  # not from the switch or a menu, which people go on using
+        if inside:  # focus the layout only if the focus was in it, not in the switch or a menu
             bench.focus_home()
         self._show_bars(layout.name)
         self.state.keep_layout(layout.name)
         return bench
 
     def _new_bench(self, layout: Layout) -> Workbench:
-        """The workbench of a layout, with what was made of it ahead."""
+        # Uses the workbench created in advance, if any.
         bench = self._ahead.get(layout.name)
         if bench is None:
             bench = Workbench(self.theme, layout, self.panels, self.context)
@@ -291,7 +285,7 @@ class MainWindow(QMainWindow):
         return bench
 
     def steps_ahead(self) -> list[Callable[[], object]]:
-        """What makes the panels of the layouts that nobody has gone to yet, one panel in a step."""
+        """Return steps that create the panels of unopened layouts, one panel per step."""
 
         def make(layout: Layout, name: str) -> None:
             if not self._shut and layout.name not in self.benches:
@@ -301,7 +295,7 @@ class MainWindow(QMainWindow):
         return [partial(make, layout, name) for layout in LAYOUTS for name in layout.at_first]
 
     def expect(self, layout: str) -> None:
-        """Show the bars of a layout, and in its place that it is made in a moment."""
+        """Show the bars of a layout with a placeholder until it is created."""
         self._showing = layout
         placeholder = Placeholder(layout)
         self.pages.addWidget(placeholder)
@@ -320,24 +314,24 @@ class MainWindow(QMainWindow):
 
     @property
     def bench(self) -> Workbench | None:
-        """The workbench that shows; None on the start page."""
+        """Current workbench, or None on the start page."""
         return self.benches.get(self.showing)
 
     def editor(self) -> object:
-        """The panel of behaviours; None until it was first shown."""
+        """Return the panel of behaviours, or None before it was first shown."""
         bench = self.benches.get("behaviour")
         dock = bench.docks.get("behaviour") if bench is not None else None
         return dock.panel if dock is not None else None
 
     def open_panel(self, name: str) -> Dock | None:
-        """Show a panel in this layout; "behaviour" in its own layout only."""
+        """Show a panel in the current layout; "behaviour" only in its own layout."""
         wanted = "behaviour" if name == "behaviour" or self.bench is None else self.showing
         return self.show_layout(wanted).open(name)
 
     def open_topic(self, topic: str, *, beside: bool = False) -> None:
-        """Show a topic in the open panel that fits it best, else in the inspector.
+        """Show a topic in the open panel that suits it best, otherwise in the Inspector.
 
-        ``beside``: in one more panel of that kind, unless the one that is there shows nothing yet.
+        With ``beside`` open an additional panel, unless the existing one is still empty.
         """
         known = self.session.topic(topic)
         kinds = {known.codec, known.msg_type} if known is not None else set()
@@ -354,7 +348,7 @@ class MainWindow(QMainWindow):
             dock.panel.show_topic(topic)
 
     def plot(self, topic: str, path: str) -> None:
-        """Plot a field of a topic; without a path the plot asks which."""
+        """Plot a field of a topic; an empty path lets the person choose it."""
         bench = self.bench if self.bench is not None else self.show_layout("developer")
         dock = bench.open_latest("plot")
         if dock is not None and isinstance(dock.panel, SupportsFields):
@@ -364,7 +358,7 @@ class MainWindow(QMainWindow):
         self.commands.run(name)
 
     def keyPressEvent(self, event: QKeyEvent) -> None:
-        """A key that nobody else wanted: blocks are copied and pasted wherever a click has left the keys."""
+        """Handle keys that no widget has accepted: copy and paste blocks wherever the focus is."""
         what = next((what for key, what in BLOCK_KEYS.items() if event.matches(key)), "")
         if event.keyCombination() == DUPLICATE:
             what = "duplicate"
@@ -375,7 +369,7 @@ class MainWindow(QMainWindow):
         elif event.keyCombination() == BOOKMARK and self.session.replay is not None:
             self._run("replay.bookmark")
         elif event.keyCombination() == MENU and (focus := QApplication.focusWidget()) is not None:
-            # Qt itself knows only the key with a menu on it, which many keyboards lack.
+            # Qt itself handles only the Menu key, which many keyboards lack.
             place = focus.rect().center()
             asked = QContextMenuEvent.Reason.Keyboard
             QApplication.sendEvent(focus, QContextMenuEvent(asked, place, focus.mapToGlobal(place)))
@@ -383,16 +377,12 @@ class MainWindow(QMainWindow):
             super().keyPressEvent(event)
 
     def focusNextPrevChild(self, forward: bool) -> bool:
-        """Tab leads only to what a person can see."""
+        """Move the focus by Tab only to visible widgets."""
         return self.panel_focus.skip_hidden(self, forward=forward) or super().focusNextPrevChild(forward)
 
-    # -- the tick ---------------------------------------------------------------------------------
-
     def _half_tick(self) -> None:
-        """60 times a second for pictures: at 30 every tenth or so would come twice within one and be lost.
-
-        While nobody sees a picture, the timer has half the pace, and each of its turns is a tick.
-        """
+        # Runs 60 times a second while images are visible: at 30 Hz about every tenth image would arrive
+        # together with another one and be dropped. Otherwise it runs at 30 Hz, as the tick.
         self._halves += 1
         if self._halves % 2 or not self._twice:
             self.tick()
@@ -401,14 +391,14 @@ class MainWindow(QMainWindow):
         self.tools.follow()
 
     def _follow_source(self) -> None:
-        """Let all panels begin anew when another source is shown."""
+        # Resets all panels when another source is shown.
         if self._source_seen != self.session.sources_shown:
             self._source_seen = self.session.sources_shown
             for bench in (*self.benches.values(), *self._ahead.values()):
                 bench.source_changed()
 
     def _follow_panels(self) -> None:
-        """Let panels that nobody can see rest, and the timer run no faster than they need."""
+        # Suspends hidden panels and adapts the timer rate.
         now = self._clock()
         for bench in self.benches.values():
             bench.follow(now)
@@ -418,7 +408,7 @@ class MainWindow(QMainWindow):
             self.timer.setInterval(TICK_MS // 2 if twice else TICK_MS)
 
     def tick(self) -> None:
-        """Take what is new, and let everything that can be seen show it."""
+        """Process new data and refresh everything that is visible."""
         began = time.perf_counter()
         self._ticks += 1
         guarded = self.session.guarded
@@ -463,7 +453,7 @@ class MainWindow(QMainWindow):
             self._show_alerts()
 
     def _show_facts(self) -> None:
-        """Figures that nobody can read 30 times a second."""
+        # Less often than the tick: figures can't be read at 30 Hz.
         facts, document = self._facts, self.session.document
         alerts = facts.alerts(for_developers=self.showing == "developer")
         web = facts.web_pages()
@@ -504,12 +494,12 @@ class MainWindow(QMainWindow):
         return self.session.runs.active or any(link.state in moves for link in self.session.fleet.links)
 
     def _may_move(self) -> bool:
-        """Whether a program, or a robot that did not stop, may move something now."""
+        # Also true for a robot that hasn't confirmed Stop.
         is_open = self.session.runs.view().stop_word != "Stop"
         return is_open or self._moves() or any(link.state == NOT_STOPPED for link in self.session.fleet.links)
 
     def _show_alerts(self) -> None:
-        """Show the alerts for whoever uses this layout, in the free area of its bar."""
+        # Filtered for the current layout, shown in the free area of its bar.
         alerts, is_developer = self.session.alerts, self.showing == "developer"
         if (alerts.revision, is_developer) != self._alerts_seen:
             self._alerts_seen = (alerts.revision, is_developer)
@@ -524,8 +514,6 @@ class MainWindow(QMainWindow):
     def _panel_failed(self, name: str, sentence: str) -> None:
         self.session.console.add("error", f"panel {name}", sentence)
 
-    # -- beginning and end ------------------------------------------------------------------------
-
     def begin(self) -> None:
         """Start the session and the tick."""
         self.session.start()
@@ -535,7 +523,7 @@ class MainWindow(QMainWindow):
         self.bench_made.connect(self.gc_freeze.start)
 
     def restart(self) -> str:
-        """Close the window and start Studio again; why that can't be done now, "" when it is done."""
+        """Close the window and restart Studio; return why that is impossible, or ""."""
         if self._may_move():
             return _("Press Stop first. Studio can restart when no program is running and no robot is moving")
         self.wants_restart = True
@@ -545,7 +533,7 @@ class MainWindow(QMainWindow):
     def closeEvent(self, event: QCloseEvent) -> None:
         if not self._shut:
             if self._moves():
-                self.session.runs.stop()  # told now, answered while the session closes
+                self.session.runs.stop()  # sent now; replies arrive while the session closes
             if not self._flush_before_close.ready():
                 event.ignore()
                 return
@@ -566,7 +554,7 @@ class MainWindow(QMainWindow):
         super().closeEvent(event)
 
     def _may_lose_work(self) -> bool:
-        """Whether no unsaved work is lost with the window, or a person who was told closes it anyway."""
+        # True if no unsaved work would be lost, or the person has confirmed its loss.
         unkept = self.session.documents.unkept()
         if not unkept or self.session.gives_up(unkept[0]):
             return True
@@ -583,13 +571,13 @@ class MainWindow(QMainWindow):
 
 
 class Placeholder(QWidget):
-    """One quiet sentence in place of a layout that is made in a moment: no start waits for its panels."""
+    """Sentence in place of a layout that is being created, so that startup doesn't wait for panels."""
 
     def __init__(self, layout: str) -> None:
         super().__init__()
         words = _(SOON_WORDS.get(layout, OTHER_SOON_WORDS))
         self.setAccessibleName(words)
         self.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
-        self.setProperty("ownFocus", True)  # it only keeps the keyboard; there is nothing to ring
+        self.setProperty("ownFocus", True)  # it only holds the focus, so there is nothing to highlight
         column = QVBoxLayout(self)
         column.addWidget(label(words, "bodyLarge", role="textSecondary"), 1, Qt.AlignmentFlag.AlignCenter)

@@ -1,4 +1,4 @@
-"""Stop's keys and buttons work whatever is open: menus, lists, dialogs, sheets, and panels that float."""
+"""Keys and buttons of Stop that work with open menus, lists, dialogs, sheets and floating panels."""
 
 from __future__ import annotations
 
@@ -14,16 +14,16 @@ _KINDS = frozenset({QEvent.Type.ShortcutOverride, QEvent.Type.KeyPress})
 
 
 class StopKeys(QObject):
-    """Hears the keys of every window of ours that has had the keyboard, before anything in it does.
+    """Event filter on every window that gets the focus, called before its widgets.
 
-    A shortcut is not enough: an open menu or list, a page or a field that claims the key would have it.
-    A button is not enough either: while a menu or a list is open, the press beside it only closes it.
+    Shortcuts alone don't suffice, since open menus, lists, pages and fields can consume the key. Buttons
+    don't either: a click outside an open menu or list only closes that.
     """
 
     def __init__(
         self, parent: QObject, keys: Callable[[], Collection[str]], stop: Callable[[], object]
     ) -> None:
-        """``keys`` are Stop's keys of the moment, as `QKeySequence` spells them; ``stop`` is done at once."""
+        # keys returns the current keys of Stop in QKeySequence's portable spelling; stop is called at once.
         super().__init__(parent)
         self._keys, self._stop = keys, stop
         application = QApplication.instance()
@@ -32,7 +32,7 @@ class StopKeys(QObject):
         self._listen_to(QGuiApplication.focusWindow())
 
     def _listen_to(self, window: QWindow | None) -> None:
-        """Also to those that open later: menus, dialogs, and panels that float."""
+        # Includes windows that open later: menus, dialogs, floating panels.
         if window is not None:
             window.removeEventFilter(self)
             window.installEventFilter(self)
@@ -50,7 +50,7 @@ class StopKeys(QObject):
         return super().eventFilter(watched, event)
 
     def _pressed(self, event: QMouseEvent) -> bool:
-        """Whether a press beside what pops up was on a button that stops, and is done with."""
+        # A click outside a popup: stops and consumes the event if it hits a Stop button.
         if event.button() != Qt.MouseButton.LeftButton or QApplication.activePopupWidget() is None:
             return False
         return press_stop(event.globalPosition().toPoint())
