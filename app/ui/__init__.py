@@ -1,8 +1,8 @@
-"""Widgets and the web view: the only package that imports PySide6.
+"""Widgets and the web view; the only package that imports PySide6.
 
-`application` starts it. Rooms import downward: shell, panels, what several panels use, widgets, theme.
+`application` starts it. Layers import downward: shell, panels, code shared by panels, widgets, theme.
 """
 
 from app.ui import overrides
 
-overrides.guard_all()  # before any class of ours is made
+overrides.guard_all()  # must precede the definition of any Qt subclass

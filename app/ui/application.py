@@ -1,4 +1,4 @@
-"""Brings the window up: scheme, fonts, theme, session, panels, commands; and takes it down in order."""
+"""Startup and shutdown of the window: scheme, fonts, theme, session, panels, commands."""
 
 from __future__ import annotations
 
@@ -46,22 +46,22 @@ from nep.i18n import ENGLISH, _, language, listed
 
 LOG_EVERY_MS = 500
 RESTART = -1
-"""What `run` returns when a person asked for a restart."""
-BEGUN = "begun"  # kept since the first start
+"""Result of `run` when a restart was requested."""
+BEGUN = "begun"  # key of the setting that marks the first start as done
 WEB_VIEW = "app.ui.blockly.view"
 SOON = (
     "app.ui.shell.dialogs.command_palette",
     "app.ui.shell.dialogs.settings",
     "app.ui.shell.dialogs.shortcuts",
 )
-"""Imported after the first paint, as is the block editor, though nobody has asked for them yet."""
+"""Modules imported in advance after the first paint, like the block editor."""
 
 _log = logging.getLogger(__name__)
 
 
 @dataclass(frozen=True)
 class Options:
-    """What the command line asks of the window."""
+    """Command-line options of the window."""
 
     files: tuple[Path, ...] = ()
     demo: bool = False
@@ -69,18 +69,18 @@ class Options:
     self_drive: Path | None = None
     new_window: bool = False
     drive: Callable[[MainWindow], SelfDrive] | None = None
-    """Drives the window, from before it is shown until it closes, and tells whether all went well."""
+    """Creates a driver of the window, used from before it is shown until it closes."""
     web: bool = True
-    """Whether the block editor's page is wanted: without, nothing of the web engine is loaded."""
+    """Load the block editor's web page; False avoids loading the web engine."""
 
     @property
     def alone(self) -> bool:
-        """Whether this window shares nothing with others: neither files of later starts nor tabs."""
+        """True if the window shares neither later starts nor tabs with other windows."""
         return self.new_window or self.self_drive is not None or self.drive is not None
 
 
 def make_application() -> QApplication:
-    """The one QApplication, with our name and our fonts."""
+    """Return the QApplication, creating it with name and fonts on first use."""
     existing = QApplication.instance()
     if isinstance(existing, QApplication):
         return existing
@@ -101,7 +101,7 @@ def make_application() -> QApplication:
 
 
 def translate_qt(application: QCoreApplication) -> QTranslator | None:
-    """Let Qt's own words, as in its dialogs for files, be in the language of ours; None where it has none."""
+    """Load Qt's own translations for the current language; return None if there are none."""
     if language() == ENGLISH:
         return None
     translator = QTranslator(application)
@@ -113,7 +113,7 @@ def translate_qt(application: QCoreApplication) -> QTranslator | None:
 
 
 def steps_after(window: MainWindow, *, web: bool = True) -> list[Callable[[], object]]:
-    """What a person needs a moment later: the panels, and the editor, which has then only to be started."""
+    """Return deferred startup steps: create panels and import modules and the block editor."""
     panels = window.panels.steps() if isinstance(window.panels, PanelRegistry) else ()
     modules = (partial(importlib.import_module, name) for name in SOON)
     view = (partial(import_web_view, window.session.alerts),) if web else ()
@@ -121,7 +121,7 @@ def steps_after(window: MainWindow, *, web: bool = True) -> list[Callable[[], ob
 
 
 def import_web_view(alerts: Alerts) -> None:
-    """Import the block editor, or say which system libraries it lacks."""
+    """Import the block editor, or report the system libraries that it lacks."""
     try:
         importlib.import_module(WEB_VIEW)
     except ImportError as error:
@@ -133,9 +133,9 @@ def import_web_view(alerts: Alerts) -> None:
 
 
 def make_window(session: Session, options: Options) -> MainWindow:
-    """The window as it was left; nothing runs yet."""
+    """Create the window in its last state; nothing runs yet."""
     theme = Theme("light")
-    # first of all: until Qt's event loop runs, it tells no widget that the application's font is another one
+    # must come first: before the event loop runs, Qt doesn't notify widgets of a changed font
     WindowState(session.settings, _log.warning).apply_theme(theme)
     chosen = next((mode for mode in MODES if mode == options.theme), None)
     if chosen is not None:
@@ -151,7 +151,7 @@ def make_window(session: Session, options: Options) -> MainWindow:
 
 
 def tell_of_what_was_found(session: Session) -> None:
-    """Say what of the kept files this Studio can't use: settings, and unsaved work of a newer one."""
+    """Show alerts for stored files that can't be used: settings, and unsaved work of a newer version."""
     if session.settings.notice:
         session.alerts.put("settings:notice", "warn", session.settings.notice)
     names = of_newer()
@@ -167,7 +167,7 @@ def tell_of_what_was_found(session: Session) -> None:
 
 
 def tell_of_crashes(session: Session, this_run: StudioRun) -> None:
-    """Report the runs that did not end in order, and offer once what crashed since the last start."""
+    """Record runs that crashed and offer a report once for those since the last start."""
     reports = CrashReports()
     for crash in this_run.left():
         reports.add(crash)
@@ -175,7 +175,7 @@ def tell_of_crashes(session: Session, this_run: StudioRun) -> None:
 
 
 def keep_version(window: MainWindow, now_s: float) -> None:
-    """Keep that this version runs here, when another one did so last: a report of a problem tells it."""
+    """Record the version in the settings if it has changed, for problem reports."""
     settings = window.session.settings
     kept = studio_versions.with_this_version(settings.all(), now_s, is_first=settings.are_new)
     if kept is not None:
@@ -183,7 +183,7 @@ def keep_version(window: MainWindow, now_s: float) -> None:
 
 
 def close_when_asked(window: MainWindow, this_run: StudioRun) -> None:
-    """End in order on Ctrl+C, when the system asks for it, and with the terminal or the session."""
+    """Close the window on SIGINT, SIGTERM and SIGHUP."""
 
     def close(_number: int, _frame: FrameType | None) -> None:
         this_run.expect_end()
@@ -191,7 +191,7 @@ def close_when_asked(window: MainWindow, this_run: StudioRun) -> None:
 
     for name in ("SIGINT", "SIGTERM", "SIGHUP"):
         number = getattr(signal, name, None)
-        # who starts it with nohup wants it to outlive the terminal
+        # nohup ignores SIGHUP so that the process outlives the terminal
         if number is not None and (name != "SIGHUP" or signal.getsignal(number) == signal.SIG_DFL):
             signal.signal(number, close)
     application = QApplication.instance()
@@ -202,7 +202,7 @@ def close_when_asked(window: MainWindow, this_run: StudioRun) -> None:
 
 
 def open_asked(window: MainWindow, asked: StartRequest) -> None:
-    """Do what a start asks, this one or a later one that found this window."""
+    """Execute a start request of this or a later process."""
     if asked.files:
         window.commands.files.open_all(asked.files)
     elif asked.demo:
@@ -214,17 +214,17 @@ def open_asked(window: MainWindow, asked: StartRequest) -> None:
 
 
 def layout_left(window: MainWindow) -> str:
-    """The layout that a person worked in last, if there is something in it; "" for the start page."""
+    """Return the last layout if it has content, or "" for the start page."""
     last = window.state.layout
     there = {"developer": True, "behaviour": any(not each.blank for each in window.session.documents)}
     return last if there.get(last, False) else ""
 
 
 def offer_first_steps(window: MainWindow, *, asked: bool) -> None:
-    """At the very first start, offer the first steps on the start page.
+    """Offer the first steps at the very first start.
 
-    Not where something was ``asked`` of Studio, nor in front of work that a Studio left behind. That it was
-    the first start is kept at once: the next one is the second, however this one ends.
+    Skipped if files were ``asked`` for or unsaved work is offered. The first start is recorded immediately,
+    so that it counts even after a crash.
     """
     if not window.session.settings.are_new:
         return
@@ -235,12 +235,12 @@ def offer_first_steps(window: MainWindow, *, asked: bool) -> None:
 
 
 def first_steps(window: MainWindow, options: Options) -> list[Callable[[], object]]:
-    """Let the window say what comes (what was asked, or left); what brings it after the first paint."""
+    """Show the first page; return the steps that complete it after the first paint."""
     left = "" if options.alone else layout_left(window)
     asked = bool(options.files or options.demo)
     if options.self_drive is not None:
         window.begin()
-        # It begins the demonstration itself, after the start page: twice would be two robots' worth of tabs.
+        # The self-drive starts the demonstration itself.
         open_asked(window, StartRequest(options.files, demo=False))
         return []
     offer_first_steps(window, asked=asked)
@@ -252,7 +252,7 @@ def first_steps(window: MainWindow, options: Options) -> list[Callable[[], objec
             open_asked(window, StartRequest(options.files, options.demo))
         else:
             window.commands.view.show_layout(left)
-        if window.bench is None:  # what was asked can't be opened; an alert says so
+        if window.bench is None:  # the file can't be opened, which an alert explains
             window.show_start()
 
     window.expect("behaviour" if asked else left)
@@ -260,9 +260,12 @@ def first_steps(window: MainWindow, options: Options) -> list[Callable[[], objec
 
 
 def why_not(environ: Mapping[str, str], platform: str, user: int) -> str:
-    """Why no window can open here, and what to do, in a sentence; "" when one can.
+    """Return why no window can be opened and what to do, or "".
 
-    ``platform`` as `sys.platform` says it, ``user`` the number of the user (0 is root).
+    Args:
+        environ: Environment variables.
+        platform: Value of `sys.platform`.
+        user: Id of the user; 0 is root.
     """
     if not platform.startswith("linux"):
         return ""
@@ -280,7 +283,7 @@ def why_not(environ: Mapping[str, str], platform: str, user: int) -> str:
 
 
 def run(options: Options) -> int:
-    """Show the window until it is closed; 0 when that was in order, 2 when none can open, or `RESTART`."""
+    """Show the window until it is closed; return 0, 2 if no window can be opened, or `RESTART`."""
     bring_here()
     meeting_place = single_instance.place(home())
     turn = FileLock(home() / "starting")
@@ -310,12 +313,12 @@ def _show(
     single: tuple[str, FileLock],
     trial: sandbox.SandboxTrial | None,
 ) -> int:
-    """Show the window until it is closed; the exit code."""
+    # Returns the exit code.
     session = Session()
     window = make_window(session, options)
     application.setQuitOnLastWindowClosed(False)
     window.on_shut = lambda: QTimer.singleShot(0, application.quit)
-    window.can_restart = not options.alone  # another window has no tabs of its own at the next start
+    window.can_restart = not options.alone  # other windows don't restore their tabs
     close_when_asked(window, this_run)
     hearing = QTimer(window)
     hearing.timeout.connect(lambda: log.take(session.console.add))
@@ -324,7 +327,7 @@ def _show(
     soon = DeferredSteps(window, steps_after(window, web=options.web))
     driver = options.drive(window) if options.drive is not None else None
     window.show()
-    window.activateWindow()  # keys go there at once, also where no window manager sees to it
+    window.activateWindow()  # without a window manager the window would get no focus
     first = first_steps(window, options)
     if options.self_drive is None:
         first.append(partial(tell_of_crashes, session, this_run))
@@ -342,7 +345,7 @@ def _show(
         application.open_files_with(window.commands.files.open_all)
     if driver is None and options.self_drive is not None:
         driver = SelfDrive(window, options.self_drive)
-    sandbox.fit_sandbox(os.environ, trial)  # the page is made by the event loop
+    sandbox.fit_sandbox(os.environ, trial)  # requires the event loop, which creates the page
     code = application.exec()
     speaker.close()
     if driver is not None and not driver.well:

@@ -1,4 +1,4 @@
-"""Folders and pages that other programs of the computer open: its file manager, its browser."""
+"""Opens folders and web pages in the system's file manager and browser."""
 
 from __future__ import annotations
 
@@ -17,10 +17,10 @@ _FREEZERS = "_PYI_"
 
 @contextmanager
 def outside(environ: MutableMapping[str, str], *, is_frozen: bool) -> Iterator[None]:
-    """As long as it lasts ``environ`` is what it was before a frozen Studio began.
+    """Restore the original environment of a frozen Studio within the context.
 
-    The freezer's loader names Studio's own libraries there, for Studio and its processes. Another program
-    that inherits this would load ours in the place of its own, and may not start.
+    The loader sets the library path to Studio's bundled libraries. Another program that inherits it would
+    load those instead of its own and may fail to start.
     """
     kept = {
         name: value
@@ -40,6 +40,6 @@ def outside(environ: MutableMapping[str, str], *, is_frozen: bool) -> Iterator[N
 
 
 def open_outside(url: QUrl) -> bool:
-    """Open a folder or a page in the program that the computer has for it; whether there was one."""
+    """Open a folder or page in the system's default program; return whether that succeeded."""
     with outside(os.environ, is_frozen=bool(getattr(sys, "frozen", False))):
         return QDesktopServices.openUrl(url)

@@ -1,8 +1,8 @@
-"""What Qt calls in our widgets, layouts and models never raises into Qt.
+"""Guards that keep exceptions of overridden Qt methods from propagating into Qt.
 
-With PySide 6.11 and Python before 3.12 an error that comes out of such an override, as ``int("x")`` or a
-deleted object makes it, ends the process (ADR 0018). So every class below QObject has its overrides guarded:
-what goes wrong is told to `sys.excepthook`, and Qt gets an answer that changes nothing.
+With PySide 6.11 and Python before 3.12 an exception from an override ends the process (ADR 0018). Therefore
+the overrides of every QObject subclass are wrapped: exceptions are passed to `sys.excepthook`, and Qt gets a
+neutral return value.
 """
 
 from __future__ import annotations
@@ -18,7 +18,6 @@ from PySide6.QtGui import QPixmap
 
 NOTHING: Callable[[], object] = type(None)
 ANSWERS: dict[str, Callable[[], object]] = {
-    # widgets
     "event": bool,
     "eventFilter": bool,
     "viewportEvent": bool,
@@ -32,12 +31,12 @@ ANSWERS: dict[str, Callable[[], object]] = {
     "showPopup": NOTHING,
     "scrollContentsBy": NOTHING,
     "highlightBlock": NOTHING,
-    # the page of the block editor; a request that can't be judged is not let through by its override
+    # block editor page; the override of interceptRequest itself blocks requests it can't judge
     "acceptNavigationRequest": bool,
     "javaScriptConsoleMessage": NOTHING,
     "interceptRequest": NOTHING,
     "requestStarted": NOTHING,
-    # texts: a picture that can't be read is an empty one
+    # texts; a failed image is empty
     "loadResource": NOTHING,
     # delegates and views
     "paint": NOTHING,
@@ -48,7 +47,6 @@ ANSWERS: dict[str, Callable[[], object]] = {
     "drawRow": NOTHING,
     "drawBranches": NOTHING,
     "dataChanged": NOTHING,
-    # layouts
     "addItem": NOTHING,
     "count": int,
     "itemAt": NOTHING,
@@ -56,7 +54,6 @@ ANSWERS: dict[str, Callable[[], object]] = {
     "minimumSize": QSize,
     "setGeometry": NOTHING,
     "expandingDirections": lambda: Qt.Orientation(0),
-    # models
     "rowCount": int,
     "columnCount": int,
     "data": NOTHING,
@@ -69,11 +66,11 @@ ANSWERS: dict[str, Callable[[], object]] = {
     "canFetchMore": bool,
     "fetchMore": NOTHING,
 }
-"""What an override that failed answers, by its name; handlers of events (``...Event``) answer nothing."""
+"""Return value of a failed override, by name; event handlers (``...Event``) return None."""
 
 
 def guard(cls: type) -> type:
-    """Guard the overrides that a class defines; the class itself is changed, and given back."""
+    """Guard the overrides defined in a class, in place, and return the class."""
     for name, made in list(vars(cls).items()):
         answer = ANSWERS.get(name, NOTHING if name.endswith("Event") else None)
         if answer is not None and isinstance(made, FunctionType) and _is_of_qt(cls, name):
@@ -86,7 +83,7 @@ def _is_of_qt(cls: type, name: str) -> bool:
 
 
 def guarded(made: Callable[..., object], answer: Callable[[], object]) -> Callable[..., object]:
-    """A function that answers ``answer()`` when the one it stands for raises, and tells what was raised."""
+    """Wrap a function so that exceptions are reported and ``answer()`` is returned instead."""
 
     @functools.wraps(made)
     def override(*given: object, **named: object) -> object:
@@ -94,14 +91,14 @@ def guarded(made: Callable[..., object], answer: Callable[[], object]) -> Callab
             return made(*given, **named)
         except (Exception, SystemExit) as error:  # noqa: BLE001  whatever it is, it ends the process if Qt gets it
             sys.excepthook(type(error), error, error.__traceback__)
-            traceback.clear_frames(error.__traceback__)  # a painter that is kept would paint for ever
+            traceback.clear_frames(error.__traceback__)  # a live frame keeps its QPainter active
             return answer()
 
     return override
 
 
 def guard_all() -> None:
-    """Guard every class below QObject that is made from now on, also those of plug-ins."""
+    """Guard all QObject subclasses defined from now on, including those of plug-ins."""
 
     def begin(cls: type, /, **more: object) -> None:
         super(QObject, cls).__init_subclass__(**more)  # type: ignore[misc]  # cls is below QObject

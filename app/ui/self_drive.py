@@ -1,6 +1,6 @@
-"""Drives the real window through the main job, with nobody there: each step waits for what it must see.
+"""Drives the real window unattended through its main use; each step waits for its expected result.
 
-Screenshots of every station go to a folder; a step that sees nothing in time ends it with what was missing.
+Saves a screenshot for each step. A step that isn't completed in time ends the run with an explanation.
 """
 
 from __future__ import annotations
@@ -24,10 +24,14 @@ SETTLE_S = 0.6
 
 @dataclass(frozen=True)
 class Step:
-    """What to do, what must be seen afterwards, within which time, and the picture's name ("": none).
+    """An action, its expected result, a timeout, and the name of its screenshot ("" for none).
 
-    ``wrong`` says why it can't be seen any more, "" while it can: then nobody waits for the rest of the time.
-    ``said`` tells what exactly was seen, ``name`` is what a report calls the step.
+    Attributes:
+        what: Description of the expected result.
+        seen: Returns True once the result is visible.
+        wrong: Returns why the result can't occur any more, which ends the wait, or "".
+        said: Returns details for the report.
+        name: Name of the step in the report.
     """
 
     what: str
@@ -42,34 +46,34 @@ class Step:
 
 
 class Listener(Protocol):
-    """Who is told how the steps go."""
+    """Receives the progress of the steps."""
 
     def begun(self, step: Step) -> None:
-        """This step is taken now."""
+        """A step has started."""
 
     def seen(self, step: Step) -> None:
-        """What it must show was seen, and is in its picture."""
+        """The result of a step is visible and its screenshot is saved."""
 
     def ended(self, well: bool, words: str) -> None:
-        """All were seen, or one was not and ``words`` say which; the window closes now."""
+        """All steps have succeeded, or ``words`` describe the failure; the window closes now."""
 
 
 class SaysEnd:
-    """Says at the end how it went, where a command says such things."""
+    """Listener that prints the outcome."""
 
     def begun(self, step: Step) -> None:
-        """Nothing is said of single steps."""
+        """Print nothing for single steps."""
 
     def seen(self, step: Step) -> None:
-        """Nothing is said of single steps."""
+        """Print nothing for single steps."""
 
     def ended(self, well: bool, words: str) -> None:
-        """The line on stdout, or on stderr."""
+        """Print the outcome to stdout, or a failure to stderr."""
         (sys.stdout if well else sys.stderr).write(words + "\n")
 
 
 class SelfDrive(QObject):
-    """Does the steps one after the other, then closes the window; ``well`` tells whether all were seen."""
+    """Runs the steps in order, then closes the window; ``well`` is True if all of them succeeded."""
 
     def __init__(
         self,
@@ -79,10 +83,8 @@ class SelfDrive(QObject):
         listener: Listener | None = None,
         failed_picture: str = "failed",
     ) -> None:
-        """Begin at once; ``steps`` replace the main job. ``listener`` is told, by default who reads stdout.
-
-        ``failed_picture`` is the name of the picture of a step that was not seen.
-        """
+        # Starts at once. steps replace the default ones; failed_picture names the screenshot of a failed
+        # step.
         super().__init__(window)
         self._window, self._commands, self._folder = window, window.commands, folder
         self._listener = listener if listener is not None else SaysEnd()
@@ -212,7 +214,7 @@ class SelfDrive(QObject):
         self._step = None
         try:
             self._listener.ended(well, words)
-        finally:  # whatever is said of it: nobody is there to close the window
+        finally:  # close the window even if the listener fails
             for widget in QApplication.topLevelWidgets():
                 if widget is self._window:
                     widget.close()

@@ -1,7 +1,7 @@
-"""What the self-test does in the real window: a robot, the greeting, its run, Stop, a picture; then the end.
+"""Self-test in the real window: robot, greeting, run, Stop, screenshot, close.
 
-Each step is seen in what a person relies on: the window was painted, the page has drawn the blocks, the robot
-itself says that it moves, and that it stands still. Without the web view the Developer layout shows all this.
+Each step checks what a person relies on: the painted window, the drawn blocks, and the robot's own reports
+that it moves and has stopped. Without the web view the Developer layout is used.
 """
 
 from __future__ import annotations
@@ -28,28 +28,28 @@ from nep.i18n import _
 ROBOT = "Pepper"
 STATE = f"/{ROBOT}/state"
 POSE = ("theta_deg", "head_", "arm_", "elbow_")
-"""How the names of what turns begin, in the robot's state."""
+"""Prefixes of joint names in the robot's state."""
 SETTLE_S = 1.0
-"""So long nothing is asked before the picture: what just changed is painted then."""
+"""Pause before the screenshot, so that recent changes are painted."""
 COMPLAINTS, COMPLAINTS_KEPT = ("warn", "error"), 40
-"""What of the Console is in the report."""
+"""Levels and number of Console lines in the report."""
 FEWEST_COLOURS = 24
-"""A window that was painted has more; an empty or a torn one has few."""
+"""A painted window has more colours than an empty or incomplete one."""
 
 
 @runtime_checkable
 class SupportsPictures(Protocol):
-    """A panel with a block editor: it can draw its blocks."""
+    """A panel with a block editor that can render its blocks."""
 
     def picture(self, kind: str, white: bool, done: Callable[[bytes], None]) -> None:
-        """Draw all blocks; b"" while there is no page, or nothing in it."""
+        """Render all blocks; ``done`` gets b"" without a page or blocks."""
 
 
 class FirstPaint(QObject):
-    """Tells once, after the first paint of a window, that it can be seen."""
+    """Calls a function once, after the first paint of a window."""
 
     def __init__(self, window: MainWindow, done: Callable[[], object]) -> None:
-        """``done`` is called when what the paint began is through."""
+        # done is called in the event loop turn after the paint event.
         super().__init__(window)
         self._window, self._done = window, done
         window.installEventFilter(self)
@@ -62,10 +62,10 @@ class FirstPaint(QObject):
 
 
 class WindowSteps:
-    """The steps of one self-test, and what they look at in the window."""
+    """Steps of a self-test and their checks."""
 
     def __init__(self, window: MainWindow, test: SelfTest, *, web: bool) -> None:
-        """``web``: with the block editor's page."""
+        # web: the block editor's page is loaded.
         self._window, self._session, self._test, self._web = window, window.session, test, web
         self._painted = False
         self._drawn = b""
@@ -77,7 +77,7 @@ class WindowSteps:
         FirstPaint(window, self._paint_seen)
 
     def all(self) -> list[Step]:
-        """The steps in their order."""
+        """Return the steps in order."""
         made = [
             self._step("window", _("the window"), lambda: None, lambda: self._painted),
             self._step("master", _("the master"), lambda: None, self._has_master, self._master_wrong),
@@ -124,7 +124,7 @@ class WindowSteps:
         )
 
     def _said(self, name: str) -> str:
-        """What exactly was seen, for the report."""
+        # Details for the report.
         session = self._session
         link = session.fleet.link(ROBOT)
         match name:
@@ -143,8 +143,6 @@ class WindowSteps:
             case "stop":
                 return session.runs.view().result or ""
         return ""
-
-    # -- what is seen ---------------------------------------------------------------------------------
 
     def _paint_seen(self) -> None:
         self._painted = True
@@ -230,7 +228,7 @@ class WindowSteps:
         return topic.newest if topic is not None else None
 
     def _state(self) -> Mapping[str, object]:
-        """What the robot said of itself last."""
+        # Last state published by the robot.
         topic = self._session.topics.get(STATE)
         payload = topic.newest.payload if topic is not None and topic.newest is not None else None
         return payload if isinstance(payload, Mapping) else {}
@@ -241,17 +239,17 @@ class WindowSteps:
 
 
 class Told:
-    """Tells the self-test how the steps in the window go."""
+    """Reports the steps in the window to the self-test."""
 
     def __init__(self, test: SelfTest, session: Session) -> None:
         self._test, self._session = test, session
 
     def begun(self, step: Step) -> None:
-        """It has so much time from now on."""
+        """Start the step's time limit."""
         self._test.begin(step.name, step.what)
 
     def seen(self, step: Step) -> None:
-        """It is in the report; so is a picture on which there is nothing."""
+        """Report the step; an empty screenshot fails the test."""
         if not step.picture:
             self._test.seen(step.said())
             return
@@ -262,7 +260,7 @@ class Told:
             self._test.seen(_("{count} colours").format(count=shown))
 
     def ended(self, well: bool, words: str) -> None:
-        """What was not seen is why the test fails; then the window closes, which takes its time, too."""
+        """Report the failure, if any; then the closing of the window is timed as the last step."""
         complaints = [each for each in self._session.console.records if each.level in COMPLAINTS]
         self._test.report.tell(
             console=[f"{each.level} {each.origin}: {each.text}" for each in complaints[-COMPLAINTS_KEPT:]]
@@ -273,14 +271,17 @@ class Told:
 
 
 def colours(picture: QImage) -> int:
-    """How many colours a picture has, as far as some of its dots tell; 0 when there is none."""
+    """Return the number of colours in a sample of pixels; 0 for an empty image."""
     return len(
         {picture.pixel(x, y) for x in range(0, picture.width(), 7) for y in range(0, picture.height(), 7)}
     )
 
 
 def show_steps(test: SelfTest, *, web: bool) -> int:
-    """Show the window and take the steps in it; the exit code of the window. ``web``: with the page."""
+    """Show the window and run the steps in it; return the exit code of the window.
+
+    ``web``: load the block editor's page.
+    """
     refused = why_not(os.environ, sys.platform, os.geteuid() if hasattr(os, "geteuid") else 1)
     if refused:
         test.fail(refused)

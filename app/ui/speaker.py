@@ -1,7 +1,7 @@
-"""Makes robots heard through Qt: its text to speech and its sound, in a thread of their own.
+"""Speech and tones of robots through Qt, in a separate thread.
 
-Both are imported at the first word or tone, and may take seconds to begin; the window never waits for them.
-A voice is code of the system or of others: run as a process, this module tries whether it can be made.
+Qt's modules are imported on first use and may take seconds to start; the window never waits for them. A voice
+is third-party code that may crash: run as a process, this module tests whether one can be created.
 """
 
 from __future__ import annotations
@@ -44,24 +44,24 @@ ADVICE = {
         "Add a voice in System Settings, under “Accessibility” and “Spoken Content”, then start Studio again."
     ),
 }
-"""What gives a computer a voice, by `sys.platform`."""
+"""Instructions to install a voice, by `sys.platform`."""
 MOST_TONES = 4
 RATE_HZ, EDGE_S, LOUDNESS = 44_100, 0.006, 0.5
 JOIN_S = 0.5
 TRIAL_S = 20.0
-"""How long a process may take to make a voice; one that takes longer hangs, and would hang here, too."""
+"""Time limit for the test process; a voice that takes longer hangs and would hang here, too."""
 Order: TypeAlias = tuple[str, tuple[Any, ...], int]
 _log = logging.getLogger(__name__)
 
 
 def no_voice(language: str) -> str:
-    """The sentence that says that nobody here speaks a language."""
+    """Return the sentence that no voice for a language is installed."""
     name = _(LANGUAGES[language]) if language in LANGUAGES else QLocale(language).nativeLanguageName()
     return _("This computer has no voice for {language}.").format(language=name or language)
 
 
 def has_voice_engine() -> bool:
-    """Whether Qt knows a program here that speaks; none is started."""
+    """Return whether Qt finds a speech engine, without starting it."""
     try:
         from PySide6.QtTextToSpeech import QTextToSpeech  # noqa: PLC0415 (heavy, and needs a sound system)
     except (ImportError, RuntimeError) as error:
@@ -71,18 +71,18 @@ def has_voice_engine() -> bool:
 
 
 def try_voice() -> int:
-    """Make a voice and ask what it speaks, as `QtEngine` does: the work of the process that tries it.
+    """Create a voice and query its languages, as `QtEngine` does; run in the test process.
 
-    The exit code is 0 when all went well; a voice that can't be made may end the process in any way.
+    Return the exit code, 0 on success. A faulty voice may end the process in any way.
     """
     with Path(os.devnull).open("w", encoding="utf-8") as nowhere:
-        faulthandler.dump_traceback_later(TRIAL_S, exit=True, file=nowhere)  # also when nobody waits for it
+        faulthandler.dump_traceback_later(TRIAL_S, exit=True, file=nowhere)  # even without a parent
         return _make_voice()
 
 
 def _make_voice() -> int:
     if sys.platform == "win32":
-        # A crash ends it at once, with no dialog and no debugger.
+        # Terminate on a crash without a dialog or debugger.
         kernel = ctypes.windll.kernel32
         kernel.SetUnhandledExceptionFilter.argtypes = [ctypes.c_void_p]
         kernel.SetUnhandledExceptionFilter(ctypes.cast(kernel.ExitProcess, ctypes.c_void_p))
@@ -96,9 +96,9 @@ def _make_voice() -> int:
 
 
 def outlives_trial(command: Sequence[str] = ()) -> bool:
-    """Whether another process made a voice and is well: a voice that crashes would end Studio with it.
+    """Return whether a test process could create a voice; a faulty one would crash Studio.
 
-    ``command`` tries it, by default this module. Waits for it, for at most `TRIAL_S`.
+    ``command`` runs the test, by default this module. Blocks for up to `TRIAL_S`.
     """
     try:
         done = subprocess.run(
@@ -119,9 +119,9 @@ def outlives_trial(command: Sequence[str] = ()) -> bool:
 
 
 def voice_words(problem: str, *, has_engine: bool, platform: str = sys.platform) -> str:
-    """Whether robots are heard on this computer; if not, why, and what to install.
+    """Return a text about the speech output: that it works, or the error and what to install.
 
-    ``problem`` is why the last words were not heard, "" when they were.
+    ``problem`` is the error of the last speech, "" for none.
     """
     if has_engine and not problem:
         return _("Robots speak with the voice of this computer.")
@@ -130,8 +130,8 @@ def voice_words(problem: str, *, has_engine: bool, platform: str = sys.platform)
 
 
 def samples(notes: Notes, volume: float, rate_hz: int = RATE_HZ) -> bytes:
-    """Tones as 16 bit samples of one channel, soft at both ends of each so that nothing clicks."""
-    import numpy as np  # noqa: PLC0415 (heavy; only who plays a tone needs it)
+    """Return tones as 16-bit mono samples, faded in and out to avoid clicks."""
+    import numpy as np  # noqa: PLC0415 (heavy; needed for tones only)
 
     made = []
     for hz, seconds in notes:
@@ -148,23 +148,23 @@ def samples(notes: Notes, volume: float, rate_hz: int = RATE_HZ) -> bytes:
 
 
 class Engine(Protocol):
-    """What makes the noise; used in one thread only, which has an event loop of Qt."""
+    """Speech and audio output; used in one thread that runs a Qt event loop."""
 
     def say(self, words: str, language: str, volume: float, ended: Callable[[], None]) -> str:
-        """Begin to say it; `ended` is called once when it is said. A sentence why not, else ""."""
+        """Start speaking; `ended` is called once at the end. Return an error sentence, or ""."""
 
     def play(self, notes: Notes, volume: float) -> str:
-        """Begin to play it; a sentence why not, else ""."""
+        """Start playing; return an error sentence, or ""."""
 
     def stop_voice(self) -> None:
-        """End the voice."""
+        """Stop speaking."""
 
     def stop_tones(self) -> None:
-        """End the tones."""
+        """Stop all tones."""
 
 
 class QtEngine:
-    """Qt's text to speech and audio output; each is made when it is first needed."""
+    """Qt's text to speech and audio output, each created on first use."""
 
     def __init__(self) -> None:
         self._voice: QTextToSpeech | None = None
@@ -194,7 +194,7 @@ class QtEngine:
             ended()
 
     def say(self, words: str, language: str, volume: float, ended: Callable[[], None]) -> str:
-        """Say it, if there is a voice."""
+        """Start speaking if there is a voice for the language."""
         voice = self._found_voice()
         locales = voice.availableLocales() if voice is not None else []
         locale = next((each for each in locales if each.name().split("_")[0] == language), None)
@@ -210,7 +210,7 @@ class QtEngine:
         return ""
 
     def play(self, notes: Notes, volume: float) -> str:
-        """Play it on the output that the computer uses now, if there is one."""
+        """Start playing on the default audio output, if there is one."""
         try:
             from PySide6.QtMultimedia import QAudioFormat, QAudioSink, QMediaDevices  # noqa: PLC0415 (heavy)
         except (ImportError, RuntimeError) as error:
@@ -234,24 +234,24 @@ class QtEngine:
         return ""
 
     def stop_voice(self) -> None:
-        """End the voice in the middle of the word."""
+        """Stop speaking immediately, even within a word."""
         self._ended = None
         if self._voice is not None:
             self._voice.stop(self._voice.BoundaryHint.Immediate)
 
     def stop_tones(self) -> None:
-        """End all tones."""
+        """Stop all tones."""
         for sink, _buffer in self._sinks:
             sink.stop()
         self._sinks.clear()
 
 
 class _Desk(QObject):
-    """Takes orders in the thread of the engine; those from before a stop are not carried out any more."""
+    """Executes requests in the engine's thread; those before a stop are skipped."""
 
     woken = Signal()
     ended = Signal(int)
-    told = Signal(str, str)  # what it is about, the sentence (empty: all is well)
+    told = Signal(str, str)  # kind of output, error sentence or ""
 
     def __init__(self, make: Callable[[], Engine], orders: deque[Order], speaker: QtSpeaker) -> None:
         super().__init__()
@@ -261,7 +261,6 @@ class _Desk(QObject):
         self.woken.connect(self.take, Qt.ConnectionType.QueuedConnection)
 
     def take(self) -> None:
-        """Carry out what waits."""
         while self._orders:
             what, given, turn = self._orders.popleft()
             if what == "end":
@@ -286,7 +285,7 @@ class _Desk(QObject):
         try:
             if self._engine is None:
                 self._engine = self._make()
-            if not self._speaker.counts(what, turn):  # it took so long that a stop came
+            if not self._speaker.counts(what, turn):  # a stop arrived meanwhile
                 return
             if what == "say":
                 language, volume = others
@@ -301,10 +300,10 @@ class _Desk(QObject):
 
 
 class QtSpeaker(QObject):
-    """The speaker of a window: tells its thread what to do, and never waits for it."""
+    """Speaker of a window; queues requests for its thread and never blocks."""
 
     def __init__(self, make: Callable[[], Engine] = QtEngine, parent: QObject | None = None) -> None:
-        """``make`` makes the engine, in the thread, at the first word."""
+        # make creates the engine in its thread on first use.
         super().__init__(parent)
         self._make = make
         self._orders: deque[Order] = deque()
@@ -317,37 +316,37 @@ class QtSpeaker(QObject):
 
     @property
     def busy(self) -> bool:
-        """Whether a voice still speaks, or is about to."""
+        """True while a voice speaks or is about to."""
         return self._busy
 
     @property
     def problem(self) -> str:
-        """Why robots are not heard; empty when they are, or nobody tried."""
+        """Error of the last output, or ""."""
         return self._problems.get("say", "") or self._problems.get("play", "")
 
     def counts(self, what: str, turn: int) -> bool:
-        """Whether an order has not been overtaken by a stop; in any thread."""
+        """Return whether a request is still valid, i.e. not cancelled by a stop. Thread-safe."""
         return not self._closed and turn >= self._turns[what]
 
     def say(self, words: str, language: str, volume: float) -> None:
-        """Say this."""
+        """Queue a text to speak."""
         self._turns["say"] += 1
         self._busy = True
         self._order("say", words, language, volume)
 
     def play(self, notes: Notes, volume: float) -> None:
-        """Play these tones; none ends those that are played."""
+        """Queue tones to play; an empty sequence stops the tones."""
         if notes:
             self._order("play", tuple(notes), volume)
         else:
             self._stop("tones")
 
     def stop_voice(self) -> None:
-        """End the voice."""
+        """Stop speaking."""
         self._stop("voice")
 
     def stop(self) -> None:
-        """Be silent."""
+        """Stop all output."""
         self._stop("all")
 
     def _stop(self, which: str) -> None:
@@ -360,7 +359,7 @@ class QtSpeaker(QObject):
             self._order("stop", which)
 
     def close(self) -> None:
-        """End the thread; one that the system's sound holds up is left behind."""
+        """Stop the thread; it is abandoned if the audio system blocks it."""
         self.stop()
         if self._thread is not None:
             self._order("end")
