@@ -1,1 +1,1 @@
-"""What the project itself needs: checks, benchmarks, pictures, environment. No part of what is installed."""
+"""Development tools: checks, benchmarks, images, environments. Not part of the installed packages."""

@@ -1,9 +1,9 @@
-"""The benchmarks, one after the other.
+"""Run the benchmarks one after the other.
 
-    python tools/bench.py                       all of them but those of ASKED, such as nep_tail and film
-    python tools/bench.py nep_rate -- ARGS      one; what comes after -- goes to it
+    python tools/bench.py                   all except those of ASKED, such as nep_tail and film
+    python tools/bench.py nep_rate -- ARGS  one; arguments after -- are passed on to it
 
-Exit code 1 when a run does not count because the computer was busy. See `bench/README.md`.
+Exits with 1 if a result is invalid because the computer was busy. See `bench/README.md`.
 """
 
 from __future__ import annotations
@@ -36,11 +36,11 @@ NAMES = (
     "studio_tabs",
 )
 ASKED = ("nep_clients", "nep_tail", "nep_ros", "paper", "soak", "ways", "film", "package_start", "recorder")
-"""Run only by name: they take long, need ROS 1, Node.js or a package, or measure no time."""
+"""Run only by name: they take long, need ROS 1, Node.js or a package, or don't measure time."""
 
 
 def main() -> int:
-    """Run what was asked for."""
+    """Run the requested benchmarks."""
     own, dashes, rest = " ".join(sys.argv[1:]).partition("--")
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter

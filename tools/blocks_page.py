@@ -1,6 +1,6 @@
-"""Write the tables of blocks in docs/blocks.md from the blocks' own descriptions.
+"""Write the tables of blocks in docs/blocks.md from the block definitions.
 
-``python tools/blocks_page.py`` after a block was added or changed; a test says when that was forgotten.
+Run ``python tools/blocks_page.py`` after a change of blocks; a test fails if the page is out of date.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ _HOLE = re.compile(r"%([A-Z_]+)")
 
 
 def tables() -> str:
-    """Every category's blocks: what stands on them, what they do, their Python."""
+    """Return the tables of all categories: the block's text, its description, its Python code."""
     parts = []
     for category in categories():
         if category.blocks:
@@ -33,7 +33,7 @@ def tables() -> str:
 
 
 def page(text: str) -> str:
-    """The page with its tables made anew."""
+    """Return the page with new tables."""
     before, _, rest = text.partition(BEGIN)
     _, _, after = rest.partition(END)
     return f"{before}{BEGIN}\n\n{tables()}\n{END}{after}"

@@ -1,12 +1,12 @@
-"""Every check of the project, in the order that finds mistakes cheapest first.
+"""Run all checks of the project, cheapest first.
 
-    python tools/check.py            ruff, format, mypy, lint-imports, that all tests can be read, pytest
-    python tools/check.py --fast     the same without pytest
-    python tools/check.py -- ARGS    what comes after -- goes to pytest
+    python tools/check.py          ruff, format, mypy, lint-imports, test collection, pytest
+    python tools/check.py --fast   the same without pytest
+    python tools/check.py -- ARGS  arguments after -- are passed on to pytest
 
-Everything runs, also after a failure; the exit code is 1 if anything failed. Reading the tests makes pytest
-write down their compiled form, as Python does with ours: else each of its processes would compile them all.
-It takes as long as mypy, which keeps one processor busy, and so runs beside it.
+All checks run, even after a failure; the exit code is 1 if any has failed. Collecting the tests writes
+pytest's compiled files, which otherwise each of its processes would compile. Collection takes as long as
+mypy, which uses a single core, so it runs in parallel.
 """
 
 from __future__ import annotations
@@ -27,9 +27,9 @@ MOST_WORKERS = 6
 
 
 class Check(NamedTuple):
-    """One check: what it is called, and the command that decides it.
+    """A check: its name and command.
 
-    ``is_beside``: it runs beside the others, and what it prints is shown when it failed.
+    ``is_beside``: run it in parallel with the others and show its output only if it fails.
     """
 
     name: str
@@ -38,7 +38,7 @@ class Check(NamedTuple):
 
 
 class Outcome(NamedTuple):
-    """How one check ended."""
+    """Result of a check."""
 
     name: str
     passed: bool
@@ -46,7 +46,7 @@ class Outcome(NamedTuple):
 
 
 def checks(*, fast: bool, pytest_arguments: Sequence[str] = ()) -> tuple[Check, ...]:
-    """All checks, cheapest first; `fast` leaves the tests out."""
+    """Return all checks, cheapest first; `fast` omits the tests."""
     python = sys.executable
     lint_imports = str(Path(sysconfig.get_path("scripts")) / "lint-imports")
     found = (
@@ -59,24 +59,24 @@ def checks(*, fast: bool, pytest_arguments: Sequence[str] = ()) -> tuple[Check, 
     )
     if fast:
         return found[:-2]
-    return (*found[:-2], found[-1]) if pytest_arguments else found  # few tests are read as quickly
+    return (*found[:-2], found[-1]) if pytest_arguments else found  # a few tests are collected quickly anyway
 
 
 def side_by_side() -> tuple[str, ...]:
-    """Options of pytest-xdist: two processes more than processors, six at most; see tests/conftest.py.
+    """Return options of pytest-xdist: two workers more than cores, at most six; see tests/conftest.py.
 
-    Many tests wait for processes and windows: on two processors, with one more a fifth of the time is idle.
-    With two more some tests would wait too long for a robot or a page, so the last one opens no windows.
+    Many tests wait for processes and windows: on two cores, one worker more leaves a fifth of the time idle.
+    With two more, some tests would wait too long for a robot or a page, so the last worker opens no windows.
     """
     workers = min(MOST_WORKERS, (os.cpu_count() or 1) + 2)
     return ("-n", str(workers), "--dist", "loadfile")
 
 
 def run(check: Check) -> Outcome:
-    """Run one check with its output on ours, and tell how it ended."""
+    """Run a check and return its result."""
     if not check.is_beside:
         print(f"\n=== {check.name}", flush=True)
-    # Also where this is set, as it is in many containers: what is compiled is under .gitignore.
+    # Many containers set it; compiled files are ignored by git.
     environ = {name: value for name, value in os.environ.items() if name != "PYTHONDONTWRITEBYTECODE"}
     begin = time.monotonic()
     out, errors = (subprocess.PIPE, subprocess.STDOUT) if check.is_beside else (None, None)
@@ -96,14 +96,14 @@ def run(check: Check) -> Outcome:
 
 
 def run_all(found: Sequence[Check]) -> list[Outcome]:
-    """Run the checks in their order: those beside others begin with the first, and end before the last."""
+    """Run the checks in order; parallel ones start with the first and are awaited last."""
     with ThreadPoolExecutor() as pool:
         beside = {check: pool.submit(run, check) for check in found if check.is_beside}
         return [beside[check].result() if check.is_beside else run(check) for check in found]
 
 
 def summary(outcomes: Sequence[Outcome]) -> str:
-    """A short table of all outcomes."""
+    """Return a table of the results."""
     width = max(len(outcome.name) for outcome in outcomes)
     return "\n".join(
         f"  {outcome.name:<{width}}  {'ok    ' if outcome.passed else 'FAILED'}  {outcome.elapsed_s:6.1f} s"
@@ -112,7 +112,7 @@ def summary(outcomes: Sequence[Outcome]) -> str:
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Run the checks; 0 if all passed, 1 if not, 130 after Ctrl+C."""
+    """Run the checks; return 0 if all passed, 1 if not, 130 after Ctrl+C."""
     parser = argparse.ArgumentParser(description="Run every check of the project.")
     parser.add_argument("--fast", action="store_true", help="leave the tests out")
     parser.add_argument("pytest_arguments", nargs="*", help="arguments for pytest, after --")
@@ -122,7 +122,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except KeyboardInterrupt:
         print("\nstopped", flush=True)
         return 130
-    # On stderr, so that pytest's own closing line stays the last one of the output.
+    # To stderr, so that pytest's summary remains the last line of stdout.
     print("\n" + summary(outcomes), file=sys.stderr, flush=True)
     return 0 if all(outcome.passed for outcome in outcomes) else 1
 

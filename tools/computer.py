@@ -1,4 +1,4 @@
-"""The computer that dev.py runs on, and the only way that it touches it. Standard library only."""
+"""Interface of dev.py to the computer that it runs on. Uses only the standard library."""
 
 from __future__ import annotations
 
@@ -19,11 +19,11 @@ END_S = 10.0
 
 
 class Trouble(Exception):  # noqa: N818 (not a fault of this program, but of the computer it runs on)
-    """Something is missing that a person must bring; its text says what to do."""
+    """Error for a missing requirement; its text contains the solution."""
 
 
 def _ask(command: Sequence[str]) -> str:
-    """What a command prints in English; nothing when it cannot run."""
+    # Returns the output in English, or "" if the command can't run.
     try:
         done = subprocess.run(
             command, capture_output=True, text=True, check=False, env={**os.environ, "LC_ALL": "C"}
@@ -34,9 +34,9 @@ def _ask(command: Sequence[str]) -> str:
 
 
 def watch(command: Sequence[str], environ: Mapping[str, str], log: Path | None = None) -> int:
-    """Run a command to its end and return its exit code; what it says goes to the person, or into `log`.
+    """Run a command and return its exit code; its output goes to the terminal or to `log`.
 
-    Ctrl+C reaches the command too (it is in our terminal's group): it may end in its own order, but must end.
+    Ctrl+C also reaches the command, which is in the same process group; it gets time to end by itself.
     """
     with open(log, "ab") if log else contextlib.nullcontext() as output:  # noqa: PTH123 (a path or nothing)
         process = subprocess.Popen(command, cwd=ROOT, env=dict(environ), stdout=output, stderr=output)
@@ -48,7 +48,7 @@ def watch(command: Sequence[str], environ: Mapping[str, str], log: Path | None =
 
 
 def end(process: subprocess.Popen[bytes]) -> None:
-    """See a process end: by itself, else asked, else killed; END_S in all."""
+    """Wait for a process, then terminate and finally kill it; takes at most END_S."""
     for harder in (process.terminate, process.kill):
         with contextlib.suppress(subprocess.TimeoutExpired):
             process.wait(END_S / 2)
@@ -58,7 +58,7 @@ def end(process: subprocess.Popen[bytes]) -> None:
 
 @dataclass(frozen=True)
 class Computer:
-    """What we run on, and the only way that we touch it."""
+    """Computer with its properties and the functions that run commands."""
 
     platform: str = sys.platform
     machine: str = machine()
@@ -72,25 +72,25 @@ class Computer:
 
     @property
     def has_apt(self) -> bool:
-        """Whether this is Debian, Ubuntu or a relative."""
+        """True for Debian, Ubuntu and derivatives."""
         return self.platform == "linux" and bool(self.which("apt-get") and self.which("dpkg-query"))
 
     @property
     def has_screen(self) -> bool:
-        """Whether windows can be shown to a person (Windows and macOS: always)."""
+        """True if windows can be displayed; always on Windows and macOS."""
         return self.platform != "linux" or bool(
             self.environ.get("DISPLAY") or self.environ.get("WAYLAND_DISPLAY")
         )
 
 
 def venv_python(folder: Path, platform: str) -> Path:
-    """The interpreter in a virtual environment."""
+    """Return the interpreter of a virtual environment."""
     return folder / ("Scripts/python.exe" if platform == "win32" else "bin/python")
 
 
 @contextlib.contextmanager
 def timed(what: str) -> Iterator[None]:
-    """Say what is being done, and how long it took."""
+    """Print a description and then the elapsed time."""
     print(f"· {what} …", flush=True)
     begin = time.monotonic()
     yield

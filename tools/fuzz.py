@@ -1,14 +1,13 @@
-"""Strange bytes for every parser, by atheris: `python3 dev.py fuzz`. Standard library only.
+"""Fuzz all parsers with atheris: `python3 dev.py fuzz`. Uses only the standard library.
 
-    python3 dev.py fuzz                          a quarter of an hour for all targets together
-    python3 dev.py fuzz -- --minutes 60          an hour
-    python3 dev.py fuzz -- json_codec keys       these targets; --list names all
-    python3 dev.py fuzz -- --again FILE          what a finding was
+    python3 dev.py fuzz                        all targets, 15 minutes in total
+    python3 dev.py fuzz -- --minutes 60        an hour
+    python3 dev.py fuzz -- json_codec keys     only these targets; --list prints all
+    python3 dev.py fuzz -- --again FILE        reproduce a finding
 
-Makes an environment in `build/fuzz` of pinned packages, without Qt. What atheris found interesting is kept
-in `build/fuzz/corpus` and begun with the next time; each finding is a file in `build/fuzz/findings` with what
-was raised beside it. Exit code 1 when there is any. Then: mend the library, and add the bytes to
-`tests/fuzz/cases.py`. See docs/fuzzing.md.
+Creates an environment in `build/fuzz` with pinned packages, without Qt. The corpus in `build/fuzz/corpus` is
+reused by later runs; each finding is a file in `build/fuzz/findings` next to its traceback. Exits with 1 if
+there are any. Then fix the library and add the bytes to `tests/fuzz/cases.py`. See docs/fuzzing.md.
 """
 
 from __future__ import annotations
@@ -27,23 +26,23 @@ FOLDER = ROOT / "build" / "fuzz"
 HARNESS = "tests/fuzz/harness.py"
 MINUTES = 15.0
 LEAST_S = 1
-"""A target has so long at least."""
+"""Minimum time for a target."""
 
 
 def seconds_each(weights: Mapping[str, int], minutes: float) -> dict[str, int]:
-    """How long each target is tried: what is slower gets twice as long."""
+    """Return the time in seconds for each target; slow ones get twice as long."""
     shares = {name: 2 if weight > 1 else 1 for name, weight in weights.items()}
     one = minutes * 60 / max(1, sum(shares.values()))
     return {name: max(LEAST_S, round(one * share)) for name, share in shares.items()}
 
 
 def findings_in(folder: Path) -> list[Path]:
-    """Files of bytes that a parser could not bear; what was raised is beside each."""
+    """Return the files with inputs that made a parser fail; each has a traceback next to it."""
     return sorted(path for path in folder.glob("*") if path.suffix != ".txt") if folder.is_dir() else []
 
 
 def fuzz(computer: Computer, given: Sequence[str], folder: Path = FOLDER) -> int:
-    """Try what was asked for; 0 when nothing was found, 1 when something was."""
+    """Fuzz the requested targets; return 1 if there are findings, else 0."""
     parser = argparse.ArgumentParser(
         prog="dev.py fuzz", description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
@@ -76,7 +75,7 @@ def fuzz(computer: Computer, given: Sequence[str], folder: Path = FOLDER) -> int
 
 
 def _targets(computer: Computer, command: Sequence[str]) -> dict[str, int]:
-    """All targets, with how slow they are."""
+    # With their relative slowness.
     try:
         weights: dict[str, int] = json.loads(computer.ask([*command, "--list"]))
     except ValueError:
@@ -85,7 +84,7 @@ def _targets(computer: Computer, command: Sequence[str]) -> dict[str, int]:
 
 
 def _told(folder: Path) -> int:
-    """Say what was found; 1 when there is anything."""
+    # Prints the findings; returns 1 if there are any.
     found = findings_in(folder)
     for path in found:
         beside = path.with_suffix(".txt")

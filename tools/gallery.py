@@ -1,4 +1,4 @@
-"""Show every widget of the design in light and dark; with a file name, take a picture of it and end.
+"""Show all widgets in the light and dark theme, or save an image of them.
 
 Usage: python tools/gallery.py [PICTURE.png] [--text PERCENT]
 """
@@ -43,7 +43,7 @@ WAVE = (1.0, 3.0, 2.0, 5.0, 4.0, 6.0, 2.0, 3.0, 1.0, 4.0)
 
 
 def row(*widgets: QWidget) -> QWidget:
-    """Widgets side by side."""
+    """Return a widget with the given ones side by side."""
     made = QWidget()
     line = QHBoxLayout(made)
     line.setContentsMargins(0, 0, 0, 0)
@@ -134,7 +134,7 @@ def _rest(theme: Theme) -> list[QWidget]:
 
 
 def page(theme: Theme) -> QWidget:
-    """Every widget once."""
+    """Return a page with all widgets."""
     made = QWidget()
     made.setAutoFillBackground(True)
     column = QVBoxLayout(made)
@@ -146,7 +146,7 @@ def page(theme: Theme) -> QWidget:
 
 
 def pictures(percent: int) -> QPixmap:
-    """The page in light and in dark, side by side."""
+    """Return an image of the page in both themes side by side."""
     shots = []
     for mode in ("light", "dark"):
         theme = Theme("light" if mode == "light" else "dark")
@@ -169,7 +169,7 @@ def pictures(percent: int) -> QPixmap:
 
 
 def main() -> int:
-    """Show the gallery or save its picture."""
+    """Show the gallery or save its image."""
     asked = argparse.ArgumentParser(description=__doc__)
     asked.add_argument("picture", nargs="?", type=Path)
     asked.add_argument("--text", type=int, default=100)

@@ -1,10 +1,9 @@
-"""The pictures of the guide: drive the real window and write resources/guide/LANGUAGE/{light,dark}/*.png.
+"""Create the guide's images from the real window: resources/guide/LANGUAGE/{light,dark}/*.png.
 
     python3 dev.py guide-pictures [FOLDER]
 
-Each is taken in every language that has a guide, in light and in dark. Studio has settings of its own
-meanwhile, and a process of its own for each language, as a person has. A screen is needed; dev.py makes a
-virtual one.
+Images are created for each language of the guide in the light and dark theme, in a process per language with
+settings of its own. Needs a screen; dev.py provides a virtual one.
 """
 
 from __future__ import annotations
@@ -36,34 +35,31 @@ from tools.small_png import shrink
 
 ROOT = Path(__file__).resolve().parent.parent
 FOLDER = ROOT / "resources" / "guide"
-COLOURS = 128  # enough for flat surfaces, and a sixth less to download than 256
-WAY = 10  # pieces of the mouse's way
+COLOURS = 128  # sufficient for flat surfaces, and a sixth smaller than with 256
+WAY = 10  # steps of a mouse movement
 THEMES = ("light", "dark")
 WIDE = 640
-"""How wide a picture is at most, in the guide; a picture of a whole window is made smaller."""
+"""Maximum width of an image in the guide; images of the whole window are scaled down."""
 WINDOW, WHOLE = QSize(1280, 800), QSize(1200, 740)
 ARROW = ((0, 0), (0, 17), (4, 13.3), (6.8, 19.5), (9.6, 18.2), (6.9, 12.2), (12.3, 12))
 TAB = "document.querySelector('.nepTab:not([hidden])')"
-TALK, SWING = "talk", "swing"  # the blocks that glow in the pictures
-
-
-# ---- the behaviours ----------------------------------------------------------------------------------
+TALK, SWING = "talk", "swing"  # blocks highlighted in the images
 
 
 def variable(kind: str, *, id: str = "", **given: object) -> Block:
-    """A block about the variable that counts touches."""
+    """Return a block that uses the variable "points"."""
     made = block(kind, id=id, **given)
     made["fields"] = {"VAR": {"id": "points"}}
     return made
 
 
 def placed(x: int, y: int, script: Block) -> Block:
-    """A script at this place of the page."""
+    """Return a script at a position of the page."""
     return {**script, "x": x, "y": y}
 
 
 def hello() -> list[Block]:
-    """What a person builds first."""
+    """Return the first behaviour of the guide."""
     swing = chain(
         pepper("do_turn", id=SWING, DIRECTION="left", ANGLE=number(30)),
         pepper("do_turn", DIRECTION="right", ANGLE=number(30)),
@@ -77,13 +73,13 @@ def hello() -> list[Block]:
 
 
 def beginning() -> list[Block]:
-    """A start, and the first block below it."""
+    """Return a start block with one block below it."""
     say = pepper("do_say", id=TALK, TEXT=text("Hello! I am Pepper."))
     return [placed(28, 28, chain(block("events_started"), say))]
 
 
 def counting() -> list[Block]:
-    """A variable that counts."""
+    """Return scripts that count with a variable."""
     start = chain(
         block("events_started"),
         variable("variables_set", VALUE=number(3)),
@@ -98,7 +94,7 @@ def counting() -> list[Block]:
 
 
 def wrong() -> list[Block]:
-    """A block that nothing starts, and two scripts that both move the robot."""
+    """Return a block without a start and two scripts that both move the robot."""
     first = chain(block("events_started"), pepper("do_turn", DIRECTION="left", ANGLE=number(90)))
     second = chain(block("events_started"), pepper("do_walk", DISTANCE=number(0.3)))
     loose = pepper("do_say", TEXT=text("Nice to see you."))
@@ -111,11 +107,11 @@ SCRIPTS = {
     "Reaction to touch": counting,
     "A careful walk": wrong,
 }
-"""By their names, which examples have, too: so they are translated."""
+"""Scripts by name; the examples have the same names, so these are translated."""
 
 
 def write_behaviour(folder: Path, name: str) -> Path:
-    """One of them as an example: its words are translated when it is opened."""
+    """Write a behaviour like an example, whose texts are translated when opened."""
     content = {
         "format": "nep-behaviour",
         "version": 1,
@@ -131,11 +127,8 @@ def write_behaviour(folder: Path, name: str) -> Path:
     return path
 
 
-# ---- the pictures ------------------------------------------------------------------------------------
-
-
 class GuidePictures(SelfDrive):
-    """The stations of the guide, in the colours of one theme."""
+    """Steps of the guide in one theme."""
 
     def __init__(self, window: MainWindow, folder: Path, home: Path, theme: str) -> None:
         self._home, self._theme = home, theme
@@ -147,8 +140,8 @@ class GuidePictures(SelfDrive):
             "backpack": lambda: self._place_of("behaviour"),
             "room": lambda: self._place_of("robot"),
         }
-        self._mouse: QPoint | None = None  # where the picture shows it, in the window
-        self._way: list[QPoint] = []  # of the mouse, that it still has to go
+        self._mouse: QPoint | None = None  # where the image shows it, in window coordinates
+        self._way: list[QPoint] = []  # remaining points of a mouse movement
         self._answers: dict[str, object] = {}
         super().__init__(window, folder)
 
@@ -190,8 +183,6 @@ class GuidePictures(SelfDrive):
             Step("the list", lambda: run("panel:topics"), lambda: True, 20, "developer", 3.0),
         ]
 
-    # -- stations -----------------------------------------------------------------------------------
-
     def _open(self, name: str) -> list[Step]:
         path = write_behaviour(self._home, name)
         files, page = self._commands.files, self._page_is_there
@@ -204,7 +195,7 @@ class GuidePictures(SelfDrive):
         return [stopped, Step("its place", lambda: world("Pepper", {"reset": True}), self._robot_there)]
 
     def _drag_out(self) -> list[Step]:
-        """Hold a block of the toolbox over the page, at the end of what is there."""
+        # Drags a block from the toolbox to the end of the script.
         labels = f"[...{TAB}.querySelectorAll('.blocklyToolboxCategoryLabel')]"
         movement = f"{labels}.find(e => e.textContent === {json.dumps(translate('category', 'Movement'))})"
         turn = f"{TAB}.querySelector('.blocklyFlyout .robot_pepper_do_turn')"
@@ -221,7 +212,7 @@ class GuidePictures(SelfDrive):
             self._way = [start + (end + QPoint(36, 34) - start) * part / WAY for part in range(1, WAY + 1)]
 
         def move() -> bool:
-            """One piece of the way with each look: the page paints in between."""
+            # One step per call, so that the page repaints in between.
             if self._way:
                 at = self._way.pop(0)
                 QTest.mouseMove(self._target, at)
@@ -240,7 +231,7 @@ class GuidePictures(SelfDrive):
         self._mouse = None
 
     def _pack(self) -> list[Step]:
-        """Put a stack into the backpack and open it."""
+        # Adds a stack to the backpack and opens it.
         button = "[...document.querySelectorAll('.nepBackpack')].find(e => e.offsetParent)"
         sheet = f"{TAB}.querySelector('.blocklyFlyout.nepPacked .blocklyBlock')"
         first = f"{TAB}.querySelector('.blocklyBlockCanvas .robot_pepper_do_turn > .blocklyPath')"
@@ -270,8 +261,6 @@ class GuidePictures(SelfDrive):
     def _two_robots(self) -> bool:
         return sum(link.state in {"ready", "busy"} for link in self._window.session.fleet.links) > 1
 
-    # -- the page -----------------------------------------------------------------------------------
-
     @property
     def _editor(self) -> BlocklyView:
         editor = getattr(self._window.editor(), "editor", None)
@@ -281,7 +270,7 @@ class GuidePictures(SelfDrive):
 
     @property
     def _target(self) -> QWidget:
-        """The widget that mouse and keys go to."""
+        # The widget that receives mouse and key events.
         web = self._editor.web
         found = web.keyboard() if web is not None else None
         if not isinstance(found, QWidget):
@@ -292,12 +281,12 @@ class GuidePictures(SelfDrive):
         return getattr(getattr(self._window.editor(), "editor", None), "is_ready", False)
 
     def _is_there(self, element: str) -> bool:
-        """Whether the page has this element; where it is is asked anew with each call."""
+        # True if the page contains the element; each call queries its position again.
         self._ask(element)
         return self._answers.get(element) is not None
 
     def _place(self, element: str) -> QRect:
-        """Where it was when it was asked for last."""
+        # The last known position.
         place = self._answers[element]
         if not isinstance(place, list):
             raise TypeError(f"{element} is not there")
@@ -314,8 +303,6 @@ class GuidePictures(SelfDrive):
 
         if self._page_is_there() and self._editor.web is not None:
             self._editor.web.page.runJavaScript(script, take)
-
-    # -- what of the window -------------------------------------------------------------------------
 
     def _place_of(self, panel: str) -> QRect:
         bench = self._window.bench
@@ -342,7 +329,7 @@ class GuidePictures(SelfDrive):
 
 
 def paint_mouse(picture: QPixmap, tip: QPoint) -> None:
-    """Paint the mouse's arrow: what is grabbed of a window is without it."""
+    """Paint the mouse pointer, which grabbed images don't contain."""
     painter = QPainter(picture)
     painter.setRenderHint(QPainter.RenderHint.Antialiasing)
     painter.setPen(QPen(QColor("white"), 1.4))
@@ -352,7 +339,7 @@ def paint_mouse(picture: QPixmap, tip: QPoint) -> None:
 
 
 def take(folder: Path, theme: str) -> int:
-    """Take the pictures in the language of this process; 0 when every station was seen."""
+    """Create the images in the language of this process; return 0 if all steps succeeded."""
     with tempfile.TemporaryDirectory(prefix="nep-guide-") as home:
         free = next(port for port in PORTS if not is_running(f"127.0.0.1:{port}", 0.2))
         os.environ.update(NEP_STUDIO_HOME=home, NEP_MASTER=f"127.0.0.1:{free}", NEP_GATEWAY="0")
@@ -370,7 +357,7 @@ def take(folder: Path, theme: str) -> int:
 
 
 def take_all(folder: Path) -> int:
-    """Take them in every language of the guide and in both themes; 0 when all are there."""
+    """Create the images in all languages of the guide and both themes; return 0 on success."""
     languages = sorted(each.name for each in FOLDER.iterdir())
     failed = 0
     for language in languages:
@@ -383,7 +370,7 @@ def take_all(folder: Path) -> int:
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Run as a program."""
+    """Run the command line."""
     parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
     parser.add_argument("folder", nargs="?", type=Path, default=FOLDER)
     parser.add_argument("--theme", choices=THEMES, help="only these colours, in the language of now")

@@ -1,9 +1,9 @@
-"""Make resources/icons/lucide.txt, the one file of all icons, from the npm package lucide-static.
+"""Create resources/icons/lucide.txt, a file with all icons, from the npm package lucide-static.
 
     npm pack lucide-static@1.62.0 && tar xzf lucide-static-1.62.0.tgz
     python3 tools/icons.py package
 
-A line is the name of an icon, a tab, and what stands inside its <svg>; lines are sorted by name.
+Each line contains an icon's name, a tab and the content of its <svg>, sorted by name.
 """
 
 from __future__ import annotations
@@ -17,7 +17,11 @@ HEAD = re.compile(r"\s*(?:<!--.*?-->\s*)?<svg\b[^>]*>(.*)</svg>\s*", re.DOTALL)
 
 
 def inside(svg: str) -> str:
-    """What stands inside <svg>, in one line. ValueError when it is not an icon of Lucide."""
+    """Return the content of <svg> in one line.
+
+    Raises:
+        ValueError: The text isn't a Lucide icon.
+    """
     found = HEAD.fullmatch(svg)
     if found is None:
         raise ValueError("no svg element")
@@ -25,7 +29,7 @@ def inside(svg: str) -> str:
 
 
 def main(package: Path) -> int:
-    """Write the file and the licence; the exit code."""
+    """Write the file and the licence; return the exit code."""
     lines = [
         f"{path.stem}\t{inside(path.read_text('utf-8'))}\n"
         for path in sorted((package / "icons").glob("*.svg"))

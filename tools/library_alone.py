@@ -1,10 +1,9 @@
-"""What an installation of nep without any extra must do; exit code 1 and a sentence when it does not.
+"""Test an installation of nep without extras; exits with 1 and prints the failures.
 
-    python -I tools/library_alone.py     run by `python3 dev.py versions`; -I keeps this folder's sources out
+    python -I tools/library_alone.py        run by `python3 dev.py versions`; -I excludes local sources
 
-Messages of each plain type over a master of its own and without one, a service, a picture that asks for its
-extra in one sentence, the command line, also in Spanish, and that no module of it needs Qt or anything else
-that is not installed.
+Tests messages of all plain types with and without a master, a service, the error for a missing extra, the
+command line (also in Spanish), and that all modules can be imported without Qt and the other extras.
 """
 
 from __future__ import annotations
@@ -21,7 +20,7 @@ from typing import Any
 import nep
 
 ABSENT = ("PySide6", "shiboken6", "numpy", "cv2", "pynng", "zenoh", "iceoryx2", "cyclonedds", "pytest")
-"""What only the extras bring: if one of them is here, this environment proves nothing."""
+"""Packages of the extras; if one is installed, this test proves nothing."""
 MESSAGES = {
     "json": {"number": 1, "text": "ñ"},
     "string": "ñandú",
@@ -30,11 +29,11 @@ MESSAGES = {
 }
 WAIT_S = 30.0
 EXTRAS = {"nanomsg": "nanomsg", "zenoh": "zenoh", "ros2": "ros2"}
-"""Back ends, each with the extra that it must ask for."""
+"""Back ends and the extras that their error must name."""
 
 
 def installed() -> list[str]:
-    """Whether it is the installed nep that runs, alone."""
+    """Check that nep is imported from the installation and that no extra is installed."""
     faults = [f"{name} is installed" for name in ABSENT if importlib.util.find_spec(name)]
     if not Path(nep.__file__).is_relative_to(sys.prefix):
         faults.append(f"nep was imported from {nep.__file__}, not from {sys.prefix}")
@@ -42,10 +41,10 @@ def installed() -> list[str]:
 
 
 def modules() -> list[str]:
-    """Each module of nep is imported, those of back ends too: none may need what is not installed."""
+    """Check that all modules of nep, including back ends, can be imported."""
     faults = []
     for found in pkgutil.walk_packages(nep.__path__, "nep."):
-        if found.name == "nep.__main__":  # which is the command itself
+        if found.name == "nep.__main__":  # this runs the command itself
             continue
         try:
             importlib.import_module(found.name)
@@ -55,7 +54,7 @@ def modules() -> list[str]:
 
 
 def messages(master: str | None) -> list[str]:
-    """Messages of each plain type; through a master, or inside this program when there is none."""
+    """Check messages of all plain types through a master, or in memory for None."""
     backend = "zeromq" if master else "memory"
     faults = []
     with nep.node("talker", backend, master=master) as one, nep.node("hearer", backend, master=master) as two:
@@ -73,7 +72,7 @@ def _added_up(request: Any) -> dict[str, int]:  # noqa: ANN401 - whatever JSON a
 
 
 def services(master: str) -> list[str]:
-    """A service with a thread of its own, and a call."""
+    """Check a service with a thread of its own."""
     with nep.node("server", master=master) as one, nep.node("caller", master=master) as two:
         one.new_server("sum", _added_up, threads=1)
         answer = two.new_client("sum", timeout_s=WAIT_S).call({"of": [1, 2, 3]})
@@ -81,7 +80,7 @@ def services(master: str) -> list[str]:
 
 
 def sentences(master: str) -> list[str]:
-    """What is not installed is asked for by one sentence, which names the extra."""
+    """Check that the error for a missing package names its extra."""
     faults = []
     with nep.node("painter", master=master) as node:
         try:
@@ -101,11 +100,11 @@ def sentences(master: str) -> list[str]:
 
 
 def command_line(master: str) -> list[str]:
-    """The command `nep` answers, as the installed script."""
+    """Check the installed command `nep`."""
     faults = []
     for arguments in (["--help"], ["--master", master, "topic", "list"], ["--master", master, "doctor"]):
         done = _said(arguments)
-        # The doctor may well have something to say about this computer.
+        # The doctor may find a problem of this computer.
         allowed = {0, 1} if "doctor" in arguments else {0}
         if "Traceback" in done.stderr or done.returncode not in allowed:
             faults.append(f"nep {' '.join(arguments)} ended with {done.returncode}: {done.stderr[-500:]}")
@@ -115,7 +114,7 @@ def command_line(master: str) -> list[str]:
 
 
 def _said(arguments: list[str], language: str = "en") -> subprocess.CompletedProcess[str]:
-    """What the installed script says in a language."""
+    # Runs the installed script in a language.
     script = Path(sys.executable).with_name("nep.exe" if sys.platform == "win32" else "nep")
     return subprocess.run(
         [str(script), *arguments],
@@ -128,7 +127,7 @@ def _said(arguments: list[str], language: str = "en") -> subprocess.CompletedPro
 
 
 def main() -> int:
-    """Try everything; 0 when all of it is well."""
+    """Run all checks; return 0 if all pass."""
     with nep.master("127.0.0.1:0", learn_s=0.0) as master:
         faults = [
             *installed(),

@@ -1,10 +1,10 @@
-"""Write down which packages are installed, with their hashes: requirements/*.txt.
+"""Pin the packages with their hashes in requirements/*.txt.
 
-    python tools/lock.py             add what pyproject.toml asks for now; what is pinned stays as it is
-    python tools/lock.py --upgrade   the newest versions that pyproject.toml allows
+    python tools/lock.py            add new requirements of pyproject.toml and keep existing pins
+    python tools/lock.py --upgrade  the newest versions that pyproject.toml allows
 
-uv resolves for every system and Python at once, which pip can't; install it by `pip install uv`. The files
-are for pip, too: dev.py installs them by the uv of requirements/installer.txt, and by pip where that fails.
+Uses uv (`pip install uv`), which, unlike pip, resolves for all systems and Pythons at once. dev.py installs
+the files with the uv of requirements/installer.txt, or with pip if that fails.
 """
 
 from __future__ import annotations
@@ -24,17 +24,17 @@ else:
 ROOT = Path(__file__).resolve().parents[1]
 OLDEST_PYTHON = "3.10"
 PLAIN = "library"
-"""The file of what nep needs without any extra."""
+"""File with the requirements of nep without extras."""
 LOCKED = ("studio", "dev", "test", "fuzz", "package", PLAIN)
-"""The files, each with the versions of those before it; all but the last are named after their extra."""
+"""Files, each constrained by the previous ones; all but the last are named after their extra."""
 INSTALLER = "installer"
-"""The file of what installs the others; uv alone, which needs nothing."""
+"""File for the installer of the others: only uv, which has no dependencies."""
 EDITABLE = ("editables",)
-"""What hatchling asks for when it installs a checkout; it can't be told from pyproject.toml."""
+"""Requirements of hatchling for editable installs, which pyproject.toml doesn't declare."""
 
 
 def command(uv: str, extra: str, output: Path, upgrade: bool) -> list[str]:
-    """What pins one file; what builds the project itself is read from standard input."""
+    """Return the command that pins a file; build requirements are read from stdin."""
     found = [uv, "pip", "compile", "--quiet", "--universal", "--python-version", OLDEST_PYTHON]
     found += ["--generate-hashes", "--no-annotate", "--no-header", "--no-emit-package", "nep-studio"]
     found += ["--output-file", str(output)]
@@ -49,7 +49,7 @@ def command(uv: str, extra: str, output: Path, upgrade: bool) -> list[str]:
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Write all files; 2 when uv is missing."""
+    """Write all files; return 2 if uv is missing."""
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )

@@ -1,10 +1,10 @@
-"""Draw the map of the rooms: docs/map.md, every folder with what lives there, and which imports which.
+"""Write docs/map.md: all packages with their purposes, and their imports.
 
-    python tools/map.py            write it anew
-    python tools/map.py --check    1 when what is written is no longer true
+    python tools/map.py          write the page
+    python tools/map.py --check  exit with 1 if the page is out of date
 
-Rooms are the packages of nep and app. An arrow says "imports"; one that follows from two others is left out.
-`tests/test_map.py` compares the page with the code, so it can't grow old.
+Diagrams show imports between packages of nep and app, without those implied by others. `tests/test_map.py`
+compares the page with the code.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ import grimp
 ROOT = Path(__file__).resolve().parents[1]
 PAGE = ROOT / "docs" / "map.md"
 DRAWN = ("app", "app.ui", "app.core", "app.blocks", "app.robots", "nep")
-"""Each becomes a drawing of its rooms."""
+"""Packages with a diagram."""
 
 Arrows = Mapping[str, frozenset[str]]
 
@@ -34,12 +34,12 @@ out.
 
 
 def graph() -> grimp.ImportGraph:
-    """The imports of nep and app, also those for types alone."""
+    """Return the import graph of nep and app, including imports for type checking."""
     return grimp.build_graph("nep", "app")
 
 
 def arrows(of: grimp.ImportGraph, package: str) -> Arrows:
-    """Which children of a package import which others, in themselves or anywhere below; no cycles."""
+    """Return the imports between a package's children, each with its subpackages; there are no cycles."""
     children = of.find_children(package)
     return {
         child: frozenset(
@@ -52,7 +52,7 @@ def arrows(of: grimp.ImportGraph, package: str) -> Arrows:
 
 
 def without_what_follows(given: Arrows) -> Arrows:
-    """The fewest arrows from which all others follow (a transitive reduction)."""
+    """Return the transitive reduction of the imports."""
 
     def reached(begin: str, seen: set[str]) -> set[str]:
         for each in given[begin] - seen:
@@ -69,7 +69,7 @@ def without_what_follows(given: Arrows) -> Arrows:
 
 
 def drawing(of: grimp.ImportGraph, package: str) -> str:
-    """One Mermaid drawing of what is directly in a package."""
+    """Return a Mermaid diagram of a package's children."""
     lines = ["```mermaid", "graph TD"]
     reduced = without_what_follows(arrows(of, package))
     short = {name: name.rpartition(".")[2] for name in reduced}
@@ -83,13 +83,13 @@ def drawing(of: grimp.ImportGraph, package: str) -> str:
 
 
 def said(module: Path) -> str:
-    """The first sentence of a module's docstring."""
+    """Return the first line of a module's docstring."""
     found = ast.get_docstring(ast.parse(module.read_text(encoding="utf-8"))) or ""
     return found.partition("\n")[0].rstrip()
 
 
 def rooms(folder: Path) -> Iterator[Path]:
-    """A package and every package below it, parents first."""
+    """Yield a package and all packages below it, parents first."""
     yield folder
     for inside in sorted(folder.iterdir()):
         if (inside / "__init__.py").exists():
@@ -97,7 +97,7 @@ def rooms(folder: Path) -> Iterator[Path]:
 
 
 def listing(package: str) -> str:
-    """Every room of a package as one line: how deep it lies, its name, what lives there."""
+    """Return a list of all packages with the first line of their docstrings, indented by depth."""
     home = ROOT / package
     lines = []
     for room in rooms(home):
@@ -108,7 +108,7 @@ def listing(package: str) -> str:
 
 
 def page() -> str:
-    """The whole page."""
+    """Return the whole page."""
     of = graph()
     parts = [HEAD, "## Rooms", listing("app"), listing("nep"), "## Which imports which"]
     for package in DRAWN:
@@ -117,7 +117,7 @@ def page() -> str:
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Write or check the page; 1 when it is not what the code says."""
+    """Write or check the page; return 1 if it is out of date."""
     parser = argparse.ArgumentParser(description="Draw the map of the rooms.")
     parser.add_argument("--check", action="store_true", help="write nothing; 1 when the page is old")
     options = parser.parse_args(arguments)

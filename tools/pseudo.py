@@ -1,4 +1,4 @@
-"""The pseudo-language, which shows what nobody translates, and the sentences of blocks; without Babel."""
+"""Pseudo-language that reveals untranslated text, and the texts of blocks. Doesn't use Babel."""
 
 from __future__ import annotations
 
@@ -17,21 +17,21 @@ _ACCENTS = str.maketrans(
 
 
 def pseudo(english: str) -> str:
-    """`[Ŕúñ ~~]`: a third longer, in brackets, its letters with accents; holes and markup as they were."""
+    """Return `[Ŕúñ ~~]` for `Run`: a third longer, with brackets and accents; placeholders stay unchanged."""
     pieces, at = [], 0
     for found in _KEPT.finditer(english):
         pieces += [english[at : found.start()].translate(_ACCENTS), found.group()]
         at = found.end()
     pieces.append(english[at:].translate(_ACCENTS))
     text = "".join(pieces)
-    # "[" before a hole or a command would be markup for what prints it, once the hole is filled.
+    # Before a placeholder or command, "[" would become markup after formatting.
     begin = "[" if text[:1] and text[0] not in "{%[`<" else "[~"
     return f"{begin}{text} {'~' * max(1, math.ceil(0.35 * len(english)))}]"
 
 
 def sentences_of_blocks() -> Iterator[tuple[str | None, str, str]]:
-    """(context, English, its file) of what stands in the descriptions of blocks, not in calls of `_`."""
-    # not above: catalogues are compiled where only what builds the project is installed
+    """Yield (context, English, file) of the texts in block definitions, which don't call `_`."""
+    # imported here because catalogues are also compiled with only the build requirements installed
     from app.blocks.categories.robot import GROUPS  # noqa: PLC0415
     from app.blocks.toolbox.catalogue import english_categories, has_words  # noqa: PLC0415
     from app.blocks.toolbox.help import EXAMPLES, english_name_of_gap  # noqa: PLC0415
@@ -58,7 +58,7 @@ def sentences_of_blocks() -> Iterator[tuple[str | None, str, str]]:
 
 
 def sentences_of_examples() -> Iterator[tuple[str, str, str]]:
-    """(context, English, its file) of what is translated when an example is opened."""
+    """Yield (context, English, file) of the texts that are translated when an example is opened."""
     from app.core.documents.examples import translated  # noqa: PLC0415 - as above
     from app.core.documents.file_format import read_file  # noqa: PLC0415
 

@@ -1,11 +1,11 @@
-"""Write the reference: docs/api, a page for each field, from the docstrings of nep's public names.
+"""Write the reference in docs/api, a page per subject, from the docstrings of nep's public names.
 
-    python tools/reference.py            write it anew
-    python tools/reference.py --check    1 when what is written is no longer true
+    python tools/reference.py          write the pages
+    python tools/reference.py --check  exit with 1 if a page is out of date
 
-It reads the sources and imports nothing of nep. Sections of docstrings in Google style become tables of
-arguments and attributes, with errors and results below; so do sentences that begin with an argument's name or
-with "Raises". `tests/test_reference.py` compares the pages with the code.
+It reads the sources without importing nep. Google style sections become tables of arguments and attributes,
+with errors and results below; so do sentences that begin with an argument's name or with "Raises".
+`tests/test_reference.py` compares the pages with the code.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ MADE_BY = "Made from the docstrings by `python3 dev.py reference`; do not write 
 
 @dataclass(frozen=True)
 class Field:
-    """A page: its title, what it begins with, and where its names live."""
+    """A page: its title, introduction, and the modules of its names."""
 
     title: str
     words: str
@@ -72,11 +72,11 @@ PAGES: Mapping[str, Field] = {
     "errors": Field("Errors", "All of them are `NepError`s, and say what to do next.", ("nep.errors",)),
 }
 OWN_PAGES = ("nep.geometry", "nep.sensor")
-"""Public modules of which all that `__all__` names is public."""
+"""Public modules of which all names in `__all__` are public."""
 MADE_BY_HAND = frozenset(
     {"Node", "Master", "FixedServer", "FixedClient", "Blackboard", "ImageFormat", "Encoded"}
 )
-"""Classes that programs call. Of others nep makes the instances, but for those on pages of types."""
+"""Classes that programs instantiate. Others are created by nep, except those on pages of types."""
 INTERNAL = frozenset({
     "Blackboard.deliver", "BlackboardWatch.attach", "BlackboardWatch.take", "Client.join",
     "Master.epoch", "Master.submit", "Message.decoded", "Message.kind", "Message.raw",
@@ -87,11 +87,11 @@ INTERNAL = frozenset({
     "Subscriber.want_payloads",
     "Timer.callback", "Timer.due", "Timer.run_if_due", "Timer.take_turn",
 })  # fmt: skip
-"""What other parts of nep need of these classes,"""
+"""Public members of these classes that are only for nep itself."""
 INTERNAL_EVERYWHERE = frozenset({"args", "forked", "node_closes"})
-"""and of any."""
+"""The same for all classes."""
 _BEGINNINGS: Mapping[str, str] = {"0": "int", "''": "str"}
-"""What something is that begins as this."""
+"""Types of default values."""
 
 _SENTENCE = re.compile(r"(?<=[.!?]) +(?=[A-Z`\"(])")
 _SAID = re.compile(r"`(\w+)`(?::| (?=(?:is|are|as|tells|says|has|counts|are|may)\b))\s*(.*)", re.DOTALL)
@@ -105,7 +105,7 @@ _CODE = "    "
 
 @dataclass(frozen=True)
 class Words:
-    """A docstring in parts: what is said of names, of errors, and the rest as paragraphs."""
+    """A parsed docstring: descriptions of names, errors, and the remaining paragraphs."""
 
     paragraphs: tuple[str, ...]
     names: Mapping[str, str]
@@ -113,7 +113,7 @@ class Words:
 
 
 def words_of(docstring: str, names: Iterable[str]) -> Words:
-    """Take a docstring apart; `names` are those of its arguments or attributes."""
+    """Parse a docstring; `names` are its arguments or attributes."""
     known, told, raises = frozenset(names), dict[str, str](), list[str]()
     paragraphs: list[str] = []
     is_first = True
@@ -147,7 +147,7 @@ def words_of(docstring: str, names: Iterable[str]) -> Words:
 def _add_section(
     title: str, content: str, paragraphs: list[str], named: dict[str, str], raises: list[str]
 ) -> None:
-    """Add a section of a docstring in Google style."""
+    # Section in Google style.
     if title in {"Returns", "Yields"}:
         paragraphs.append(f"**{title}** {' '.join(content.split())}")
         return
@@ -164,7 +164,7 @@ def _add_section(
 
 
 def _listed(paragraph: str) -> Mapping[str, str]:
-    """A list of names with what is said of each, as columns."""
+    # List of names with descriptions in columns.
     if not _IN_COLUMNS.match(paragraph):
         return {}
     found: dict[str, str] = {}
@@ -182,7 +182,7 @@ def _listed(paragraph: str) -> Mapping[str, str]:
 
 
 class Reference:
-    """All public names, each with its page. `package` is nep's."""
+    """All public names by page. `package` is nep."""
 
     def __init__(self, package: griffe.Module) -> None:
         self._package = package
@@ -190,11 +190,11 @@ class Reference:
 
     @property
     def names(self) -> frozenset[str]:
-        """All that have a page."""
+        """All names that have a page."""
         return frozenset(self._pages)
 
     def page(self, name: str) -> str:
-        """The whole page of this name."""
+        """Return the content of a page."""
         field = PAGES[name]
         parts = [
             f"# {field.title}",
@@ -206,7 +206,7 @@ class Reference:
         return "\n\n".join(part.rstrip() for part in parts) + "\n"
 
     def contents(self) -> str:
-        """The page that leads to all others."""
+        """Return the page with links to all others."""
         lines = [
             "# The reference",
             MADE_BY,
@@ -218,11 +218,9 @@ class Reference:
 
     @property
     def spellings(self) -> Mapping[str, str]:
-        """Other spellings of public names, which `nep.public` has beside them."""
+        """Alternative spellings of public names in `nep.public`."""
         members = self._package["public"].members.items()
         return {name: str(each.value) for name, each in members if not each.is_alias and each.is_attribute}
-
-    # ---- which names there are
 
     def _names_on(self, page: str) -> list[str]:
         homes = PAGES[page].homes
@@ -244,11 +242,11 @@ class Reference:
                 yield str(name), _target(module.members[str(name)])
 
     def find(self, name: str) -> griffe.Object:
-        """What is public under this name."""
+        """Return the object with a public name."""
         return next(found for each, found in self._public() if each == name)
 
     def members(self, of: griffe.Class) -> list[griffe.Object]:
-        """The members of a class that programs may use, also those that it has from others of nep."""
+        """Return the public members of a class, including those inherited from nep."""
         bases = [base for base in of.mro() if base.path.startswith("nep.")]
         found: dict[str, griffe.Object] = {}
         for each in (of, *bases):
@@ -261,8 +259,6 @@ class Reference:
             if isinstance(member, griffe.Function | griffe.Attribute)
             and not any(f"{each.name}.{name}" in INTERNAL for each in (of, *bases))
         ]
-
-    # ---- entries
 
     def _entry(self, name: str) -> list[str]:
         found = self.find(name)
@@ -329,7 +325,7 @@ class Reference:
         return ["\n".join(("| argument | type | default | description |", "|---|---|---|---|", *rows))]
 
     def _attributes(self, attributes: Sequence[griffe.Attribute], words: Words, made: object) -> list[str]:
-        """A table; those without a type of their own have that of the argument of their name."""
+        # Attributes without an annotation have the type of the constructor's argument of the same name.
         arguments = made.parameters if isinstance(made, griffe.Function) else ()
         given = {each.name: each.annotation for each in arguments}
         rows = []
@@ -351,7 +347,7 @@ class Reference:
         return "\n".join((f"{before}{name}(", *(f"    {each}," for each in listed), end))
 
     def _type(self, annotation: str | griffe.Expr | None) -> str:
-        """A type as a reader knows it: what only nep's own code has a name for is told in full."""
+        # Resolves nep's internal type aliases.
         said = "" if annotation is None else str(annotation)
         if '"' not in said:
             said = said.replace("'", '"')
@@ -376,7 +372,7 @@ class Reference:
         return self._type(value) if isinstance(value, griffe.Expr) and not _is_call(value) else ""
 
     def _linked(self, text: str) -> str:
-        """Public names as links to their places."""
+        # Turns public names into links.
 
         def link(found: re.Match[str]) -> str:
             whole = found.group(1)
@@ -389,7 +385,7 @@ class Reference:
         return _PAGE.sub(r"[\1](../\1)", re.sub(r"`([A-Za-z_][\w.]*)`", link, text))
 
     def _is_place(self, name: str) -> bool:
-        """Whether it has a heading of its own."""
+        # True if the name has a heading of its own.
         owner, _, member = name.partition(".")
         if owner not in self._pages or owner[0].islower():
             return not member and owner in self._pages and "_" in owner
@@ -418,7 +414,7 @@ def _is_call(value: griffe.Expr) -> bool:
 
 
 def _anchor(heading: str) -> str:
-    """The anchor that GitHub makes of a heading."""
+    # Anchor as generated by GitHub.
     return re.sub(r"[^\w-]", "", heading.lower())
 
 
@@ -441,7 +437,7 @@ def _default(of: griffe.Parameter) -> str:
 
 
 def _value(of: str | griffe.Expr) -> str:
-    """A value as it is written; that of a constant of nep is what it stands for."""
+    # Source text of a value; constants of nep are replaced by their values.
     if isinstance(of, griffe.ExprName) and isinstance(of.parent, griffe.Object):
         try:
             found = _target(of.parent.modules_collection[of.canonical_path])
@@ -476,19 +472,19 @@ def _parameters(of: griffe.Function, type_of: Callable[[str | griffe.Expr | None
 
 
 def reference() -> Reference:
-    """The reference of the sources as they are now."""
+    """Return the reference of the current sources."""
     package = griffe.load("nep", search_paths=[ROOT], allow_inspection=False, resolve_aliases=True)
     return Reference(cast("griffe.Module", package))
 
 
 def pages() -> dict[str, str]:
-    """All pages, by the names of their files."""
+    """Return the content of all pages by file name."""
     found = reference()
     return {"README.md": found.contents(), **{f"{each}.md": found.page(each) for each in PAGES}}
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Write or check the pages; 1 when they are not what the code says."""
+    """Write or check the pages; return 1 if they are out of date."""
     parser = argparse.ArgumentParser(description="Write the reference from the docstrings.")
     parser.add_argument("--check", action="store_true", help="write nothing; 1 when a page is old")
     options = parser.parse_args(arguments)

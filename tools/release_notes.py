@@ -1,10 +1,10 @@
-"""The notes of a release, out of CHANGELOG.md. Standard library only.
+"""Print the notes of a release from CHANGELOG.md. Uses only the standard library.
 
-    python3 -m tools.release_notes v1.2.3                   the section of that version, as Markdown
-    python3 -m tools.release_notes v1.2.3 --links ADDRESS   with links to files of the project below ADDRESS
+    python3 -m tools.release_notes v1.2.3                  the version's section as Markdown
+    python3 -m tools.release_notes v1.2.3 --links ADDRESS  with links to project files below ADDRESS
 
-Exit code 1 and a sentence when the tag is not the version of nep/version.py, or the changelog has no section
-of it: .github/workflows/release.yml builds nothing then.
+Exits with 1 and a message if the tag isn't the version in nep/version.py or the changelog has no section for
+it; .github/workflows/release.yml builds nothing then.
 """
 
 from __future__ import annotations
@@ -22,18 +22,26 @@ _LINK_TO_FILE = re.compile(r"\]\((?![a-z]+:|#)([^)\s]+)\)")
 
 
 class RefusedError(Exception):
-    """This is no release; the text says why, and what to do."""
+    """Error that a release is invalid; the text contains the reason and the solution."""
 
 
 def checked_version(tag: str, version: str = __version__) -> str:
-    """The version that a tag stands for. Raises `RefusedError` when it is not the project's."""
+    """Return the version of a tag.
+
+    Raises:
+        RefusedError: It isn't the project's version.
+    """
     if tag.removeprefix("v") != version:
         raise RefusedError(f"'{tag}' is not the version of nep/version.py, which says '{version}'")
     return version
 
 
 def section(changelog: str, version: str) -> str:
-    """What stands below the heading of a version. Raises `RefusedError` when that is nothing."""
+    """Return the text below the heading of a version.
+
+    Raises:
+        RefusedError: The section is missing or empty.
+    """
     parts = re.split(r"^## (.+)$\n?", changelog, flags=re.MULTILINE)
     for heading, text in zip(parts[1::2], parts[2::2], strict=True):
         if heading.split()[0].strip("[]") == version:
@@ -46,12 +54,12 @@ def section(changelog: str, version: str) -> str:
 
 
 def with_links(text: str, address: str) -> str:
-    """The text with its links to files pointing below an address: what reads it there has no files."""
+    """Return the text with relative links made absolute by an address, for use outside the repository."""
     return _LINK_TO_FILE.sub(rf"]({address.rstrip('/')}/\1)", text)
 
 
 def main(arguments: Sequence[str] | None = None, changelog: Path = CHANGELOG) -> int:
-    """Print the notes; 1 when this is no release."""
+    """Print the notes; return 1 if the release is invalid."""
     parser = argparse.ArgumentParser(
         prog="release_notes", description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )

@@ -1,6 +1,6 @@
-"""Picture the block editor alone, with the sample of the tests: light and running, dark and stopped, errors.
+"""Create images of the block editor with the sample of the tests: running, stopped, with errors.
 
-Run it under a screen: ``xvfb-run -a .venv/bin/python tools/show_blocks.py FOLDER [--open CATEGORY]``
+Run it with a screen: ``xvfb-run -a .venv/bin/python tools/show_blocks.py FOLDER [--open CATEGORY]``
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ for (const label of document.querySelectorAll('.blocklyToolboxCategoryLabel'))
 
 
 def options() -> argparse.Namespace:
-    """What was asked for on the command line."""
+    """Parse the command line."""
     made = argparse.ArgumentParser(description=__doc__)
     made.add_argument("folder", type=Path)
     made.add_argument("--definitions", type=Path, default=SAMPLE / "definitions.json")
@@ -43,7 +43,7 @@ def options() -> argparse.Namespace:
 
 
 class Photographer(QObject):
-    """Shows the sample light and running, then dark and stopped, each with its picture, and ends."""
+    """Saves images of the sample light and running, dark and stopped, and with errors, then exits."""
 
     def __init__(self, view: BlocklyView, folder: Path, category: str | None) -> None:
         super().__init__(view)
@@ -89,7 +89,7 @@ class Photographer(QObject):
 
 
 def main() -> int:
-    """Take the pictures; 0 when they are in the folder."""
+    """Create the images; return 0 on success."""
     asked = options()
     if hasattr(os, "geteuid") and os.geteuid() == 0:
         os.environ.setdefault("QTWEBENGINE_DISABLE_SANDBOX", "1")

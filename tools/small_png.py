@@ -1,4 +1,4 @@
-"""Make pictures of windows small: 256 colours, chosen so that flat surfaces and text keep theirs exactly.
+"""Reduce screenshots to 256 colours; flat surfaces and text keep their exact colours.
 
 python tools/small_png.py PICTURE.png ...
 """
@@ -13,12 +13,12 @@ import numpy as np
 from PySide6.QtGui import QImage
 
 COLOURS = 256
-EXACT = 0.4375  # of them are taken as they are, since they are frequent; the others are found for the rest
+EXACT = 0.4375  # share of the table for the most frequent colours; the others are found by clustering
 SAMPLE, ROUNDS = 40_000, 12
 
 
 def shrink(path: Path, most: int = COLOURS) -> int:
-    """Write the picture again with at most so many colours; its size in bytes now."""
+    """Rewrite an image with at most ``most`` colours; return its new size in bytes."""
     picture = cv2.imread(str(path), cv2.IMREAD_COLOR)
     if picture is None:
         raise OSError(f"{path} is no picture")
@@ -35,19 +35,19 @@ def shrink(path: Path, most: int = COLOURS) -> int:
 
 
 def _channels(colours: np.ndarray) -> np.ndarray:
-    """Packed colours as rows of blue, green, red."""
+    # Packed colours as rows of blue, green, red.
     return np.stack([colours & 255, colours >> 8 & 255, colours >> 16 & 255], axis=1).astype(np.float32)
 
 
 def _table(colours: np.ndarray, counts: np.ndarray, most: int) -> np.ndarray:
-    """The most frequent colours, and the middles of what the others gather around."""
+    # The most frequent colours, and cluster centres of the others.
     order = np.argsort(counts)[::-1]
     as_they_are = round(EXACT * most)
     exact, rest, found = order[:as_they_are], order[as_they_are:], most - as_they_are
     table = _channels(colours[exact])
     if len(rest) <= found:
         return np.vstack([table, _channels(colours[rest])])
-    chance = np.random.default_rng(7)  # the same picture gives the same file
+    chance = np.random.default_rng(7)  # fixed seed, for reproducible files
     share = counts[rest] / counts[rest].sum()
     sample = _channels(colours[chance.choice(rest, SAMPLE, p=share)])
     cv2.setRNGSeed(7)
@@ -57,7 +57,7 @@ def _table(colours: np.ndarray, counts: np.ndarray, most: int) -> np.ndarray:
 
 
 def _nearest(colours: np.ndarray, table: np.ndarray) -> np.ndarray:
-    """For each colour the place of the nearest one in the table."""
+    # Index of the nearest table colour for each colour.
     found = np.empty(len(colours), np.int64)
     for begin in range(0, len(colours), 4096):
         some = colours[begin : begin + 4096]

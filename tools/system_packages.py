@@ -1,6 +1,6 @@
-"""The system packages that Studio needs on Debian and Ubuntu: which are missing, and bringing them.
+"""System packages that Studio needs on Debian and Ubuntu: find and install missing ones.
 
-`sudo python3 -B -m tools.system_packages` does only that; dev.py does it by itself when it is root.
+`sudo python3 -B -m tools.system_packages` does only this; dev.py does it by itself as root.
 """
 
 from __future__ import annotations
@@ -10,7 +10,7 @@ from collections.abc import Sequence
 
 from tools.computer import ROOT, Computer, Trouble, timed
 
-# A name may have changed between releases of Debian and Ubuntu: the first one that can be had is taken.
+# Names differ between releases of Debian and Ubuntu: the first available one is installed.
 QT_LIBRARIES = (
     "libgl1",
     "libegl1",
@@ -53,11 +53,11 @@ TEST_PACKAGES = {
     ),
     "nanocat": ("nanomsg-utils",),
 }
-"""Packages that some tests need, by what they test; without them these tests are skipped."""
+"""Packages that some tests need, by subject; without them these tests are skipped."""
 
 
 def wanted_packages(computer: Computer) -> list[str]:
-    """The system packages that this computer must have, with ``|`` between names that mean the same."""
+    """Return the required packages, with ``|`` between alternative names."""
     wanted = list(QT_LIBRARIES)
     if not computer.has_screen:
         wanted.append("xvfb")
@@ -67,7 +67,7 @@ def wanted_packages(computer: Computer) -> list[str]:
 
 
 def missing_packages(computer: Computer) -> list[str]:
-    """Those of `wanted_packages` of which no name is installed."""
+    """Return the entries of `wanted_packages` of which no name is installed."""
     wanted = wanted_packages(computer)
     names = [name for entry in wanted for name in entry.split("|")]
     lines = computer.ask(["dpkg-query", "-W", "-f", "${Package} ${db:Status-Status}\n", *names]).splitlines()
@@ -76,7 +76,7 @@ def missing_packages(computer: Computer) -> list[str]:
 
 
 def available(computer: Computer, entries: Sequence[str]) -> tuple[list[str], list[str]]:
-    """For each entry the first name that apt can bring, and the entries for which it knows none."""
+    """Return the first available name of each entry, and the entries that apt doesn't know."""
     names = [name for entry in entries for name in entry.split("|")]
     can: set[str] = set()
     name = ""
@@ -91,7 +91,7 @@ def available(computer: Computer, entries: Sequence[str]) -> tuple[list[str], li
 
 
 def bring_system_packages(computer: Computer) -> None:
-    """Install what is missing (root), or raise Trouble with the one line to type."""
+    """Install missing packages as root, otherwise raise Trouble with the command to type."""
     if not computer.has_apt:
         return
     missing = missing_packages(computer)
@@ -128,7 +128,7 @@ def bring_test_packages(computer: Computer) -> None:
 
 
 def apt_install(computer: Computer, missing: Sequence[str], names: list[str], unknown: list[str]) -> None:
-    """Install `names` as root; raises Trouble with apt's own last words when it cannot."""
+    """Install `names` as root; raise Trouble with apt's last output on failure."""
     log = ROOT / "build" / "apt.log"
     log.parent.mkdir(exist_ok=True)
     log.unlink(missing_ok=True)
@@ -137,7 +137,7 @@ def apt_install(computer: Computer, missing: Sequence[str], names: list[str], un
     install = [*apt, "install", "-y", "--no-install-recommends"]
     if not unknown and computer.do([*install, *names], environ, log) == 0:
         return
-    # Only now: the package lists are absent, or older than what the servers still have.
+    # Only after a failure: package lists are missing or outdated.
     computer.do([*apt, "update"], environ, log)
     names, unknown = available(computer, missing)
     if unknown:
@@ -150,7 +150,7 @@ def apt_install(computer: Computer, missing: Sequence[str], names: list[str], un
 
 
 def main(computer: Computer | None = None) -> int:
-    """Bring what is missing; 2 and a sentence when that can't be done."""
+    """Install missing packages; return 2 with a message if that is impossible."""
     try:
         bring_system_packages(computer or Computer())
     except Trouble as trouble:

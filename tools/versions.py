@@ -1,14 +1,14 @@
-"""The library alone, with each Python that it promises: `python3 dev.py versions`. Standard library only.
+"""Test the library with each supported Python: `python3 dev.py versions`. Standard library only.
 
-    python3 dev.py versions                            each Python of this computer, one after the other
-    python3 dev.py versions --only 3.10 --only 3.13    these
-    python3 dev.py versions --plain                    only what nep is without any extra: no tests
-    python3 dev.py versions --plain --install FILE     a wheel or source distribution that was built before
-    python3 dev.py versions -- tests/nep/protocol -x   what comes after -- goes to pytest
+    python3 dev.py versions                            each Python of this computer in turn
+    python3 dev.py versions --only 3.10 --only 3.13    only these
+    python3 dev.py versions --plain                    only nep without extras, no tests
+    python3 dev.py versions --plain --install FILE     a wheel or source distribution built before
+    python3 dev.py versions -- tests/nep/protocol -x   arguments after -- are passed on to pytest
 
-Each Python gets two environments of the pinned packages in `build/versions`, neither of which has Qt: one
-has the built distribution with what it asks for, and a program publishes, hears and calls in it; in the other
-is what the library's tests need, and they run. Exit code 1 when anything failed in any of them.
+Creates two environments of pinned packages without Qt for each Python in `build/versions`: one with the built
+distribution and its requirements, in which a program publishes, receives and calls; and one in which the
+library's tests run. Exits with 1 if anything failed.
 """
 
 from __future__ import annotations
@@ -29,28 +29,25 @@ TESTS = ("tests/nep", "tests/interop")
 WHO = "import sys; print('{}.{}'.format(*sys.version_info[:2]), sys.implementation.name, sys.executable)"
 PYENV = ".pyenv/versions"
 OLDEST_MACOS = "13_0"
-"""As wheels write it: what a package for macOS must run on (installers/macos/information.py)."""
+"""In the format of wheels: minimum version of the macOS package (installers/macos/information.py)."""
 
 
 @dataclass(frozen=True)
 class Outcome:
-    """How one Python did: what failed, in the order of the steps."""
+    """Result for one Python: failed steps in order."""
 
     version: str
     failed: list[str] = field(default_factory=list)
 
     def told(self) -> str:
-        """One line of the table."""
+        """Return the result as one line of the table."""
         return f"  Python {self.version}  {'FAILED: ' + ', '.join(self.failed) if self.failed else 'ok'}"
 
 
-# ---- which Pythons there are ----------------------------------------------------------------------
-
-
 def found(computer: Computer, home: Path | None = None) -> dict[str, str]:
-    """The interpreter of each promised Python that this computer has, by its version.
+    """Return the interpreters of supported Pythons on this computer by version.
 
-    This very one, those that have a name on the path, Windows' launcher's, and pyenv's; in this order.
+    Searches the current one, the PATH, the Windows launcher and pyenv, in this order.
     """
     have: dict[str, str] = {}
     for version in PROMISED:
@@ -63,7 +60,7 @@ def found(computer: Computer, home: Path | None = None) -> dict[str, str]:
 
 
 def _candidates(computer: Computer, version: str, home: Path) -> list[list[str]]:
-    """Commands that may start this Python, the likeliest first."""
+    # Most likely first.
     commands = [[sys.executable]] if version == "{}.{}".format(*sys.version_info[:2]) else []
     if path := computer.which(f"python{version}"):
         commands.append([path])
@@ -74,16 +71,13 @@ def _candidates(computer: Computer, version: str, home: Path) -> list[list[str]]
 
 
 def _number(folder: Path) -> int:
-    """The last number of a folder called 3.10.13; -1 for 3.13.0t and the like."""
+    # Last number of a folder such as 3.10.13; -1 for 3.13.0t and similar.
     last = folder.name.rpartition(".")[2]
     return int(last) if last.isdecimal() else -1
 
 
-# ---- the environments -----------------------------------------------------------------------------
-
-
 def _stamp(requirements: str) -> str:
-    """What an environment is made of: it is made anew when this changes."""
+    # Environments are recreated when this digest changes.
     made_of = [ROOT / "pyproject.toml", ROOT / "requirements" / f"{requirements}.txt"]
     return hashlib.sha256(b"".join(path.read_bytes() for path in made_of)).hexdigest()
 
@@ -91,10 +85,10 @@ def _stamp(requirements: str) -> str:
 def environment(
     computer: Computer, python: str, folder: Path, requirements: str, *, is_for_oldest: bool = False
 ) -> Path:
-    """The interpreter of an environment with the pinned packages of one file.
+    """Create an environment with the pinned packages of a file if needed; return its interpreter.
 
-    ``is_for_oldest``: on a Mac the wheels are those that `OLDEST_MACOS` runs, too. pip takes the newest that
-    this Mac runs: of numpy one that is made for macOS 14.
+    ``is_for_oldest``: on a Mac choose wheels that run on `OLDEST_MACOS`. By default pip chooses those for the
+    current macOS; numpy's require macOS 14.
     """
     made = venv_python(folder, computer.platform)
     stamp = folder / "nep-stamp"
@@ -118,18 +112,15 @@ def environment(
 
 
 def pip(python: Path) -> list[str]:
-    """How its pip installs."""
+    """Return the command of pip's install."""
     return [str(python), "-m", "pip", "install", "--disable-pip-version-check", "--quiet"]
 
 
-# ---- what is tried in them ------------------------------------------------------------------------
-
-
 def try_plain(computer: Computer, python: str, folder: Path, distribution: str = ".") -> list[str]:
-    """Install the distribution with no extra, and use it from elsewhere; what failed."""
+    """Install the distribution without extras and use it from another folder; return the failures."""
     made = environment(computer, python, folder, "library")
     ours = [*pip(made), "--no-deps", "--no-build-isolation", "--force-reinstall", distribution]
-    # -I: what is tried is what was installed, not the sources here.
+    # -I: test the installed package, not the local sources.
     use = [str(made), "-I", str(ROOT / "tools" / "library_alone.py")]
     for what, step in (("install", ours), ("pip check", [str(made), "-m", "pip", "check"]), ("use", use)):
         if computer.do(step, computer.environ, None) != 0:
@@ -138,7 +129,7 @@ def try_plain(computer: Computer, python: str, folder: Path, distribution: str =
 
 
 def try_tests(computer: Computer, python: str, folder: Path, arguments: Sequence[str]) -> list[str]:
-    """Run the library's tests with what they need; what failed."""
+    """Run the library's tests with their requirements; return the failures."""
     made = environment(computer, python, folder, "test")
     ours = [*pip(made), "--no-deps", "--no-build-isolation", "-e", "."]
     pytest = [str(made), "-m", "pytest", "-q", *arguments]
@@ -153,7 +144,7 @@ def try_tests(computer: Computer, python: str, folder: Path, arguments: Sequence
 def versions(
     computer: Computer, given: Sequence[str], folder: Path = FOLDER, home: Path | None = None
 ) -> int:
-    """Try what was asked for; 0 when all that is there did well, 1 when not."""
+    """Run the requested tests; return 0 if all Pythons found succeeded, else 1."""
     parser = argparse.ArgumentParser(
         prog="dev.py versions", description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )

@@ -48,9 +48,6 @@ def as_text(value: Any) -> Any:  # noqa: ANN401 - any plain value
     return [as_text(item) for item in value]
 
 
-# ---- filters and notices
-
-
 def filters() -> list[dict[str, Any]]:
     """Return the filters of subscribers: topics, hellos, answers to echoes and offers, and malformed ones."""
     made: list[dict[str, Any]] = [
@@ -154,9 +151,6 @@ def notices() -> list[dict[str, Any]]:
     return made
 
 
-# ---- the master
-
-
 def node(key: str, name: str) -> requests.NodeRecord:
     """Return the record of a node with this key."""
     return requests.NodeRecord(requests.node_id_from(key), name, "here", 4711, key=key)
@@ -172,7 +166,7 @@ ALL = requests.PublisherRecord(
 COUNTS = requests.PublisherCount(PUBLISHER, 12, 2**40, 12, STAMP_NS)
 RECEIVED = requests.SubscriberCount(LISTENS.id, 11, 1)
 Asked = tuple[str, requests.Request]
-"""Name of the connection, talker or listener, and the request."""
+"""Connection name ("talker" or "listener") and request."""
 
 ASKED: tuple[tuple[str, Sequence[Asked], Asked], ...] = (
     ("ping", (), ("talker", requests.Ping())),
@@ -277,7 +271,6 @@ class _Master:
         self._calls = {"talker": 0, "listener": 0}
 
     def ask(self, asked: Asked) -> tuple[bytes, bytes, list[bytes]]:
-        """Return the bodies of the request, of its reply, and of the pushes to other nodes."""
         sender, request = asked
         self._calls[sender] += 1
         call = self._calls[sender]
@@ -329,9 +322,6 @@ def master() -> dict[str, Any]:
         "pushed": pushed,
         "ping": {"request": ping.hex(), "answer": done.hex()},
     }
-
-
-# ---- malformed parts
 
 
 class _Bytes:

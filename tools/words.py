@@ -1,12 +1,13 @@
-"""The words of Studio and of `nep` in every language: nep/locale (docs/translate.md tells the way).
+"""Maintain the translations in nep/locale; docs/translate.md describes the process.
 
-    python tools/words.py update     after a sentence changed: .pot, .po and .mo follow the sources
-    python tools/words.py extract    only the list of all sentences, nep/locale/nep-studio.pot
-    python tools/words.py compile    only what programs read: .mo, languages.json, and the pseudo-language
-    python tools/words.py add fr     begin a language
-    python tools/words.py check      0 when all of it fits together, else 1 and a sentence for each thing
+    python tools/words.py update   after a change of texts: update .pot, .po and .mo from the sources
+    python tools/words.py extract  only the template nep/locale/nep-studio.pot
+    python tools/words.py compile  only generated files: .mo, languages.json and the pseudo-language
+    python tools/words.py add fr   add a language
+    python tools/words.py check    exit with 0 if everything is consistent, else 1 with messages
 
-Update keeps every translation whose English is still there. Only this and translators write into nep/locale.
+Update keeps all translations whose English text still exists. Only this tool and translators write to
+nep/locale.
 """
 
 from __future__ import annotations
@@ -56,27 +57,24 @@ FOREIGN = (
     "options", "positional arguments", "show program's version number and exit",
     "show this help message and exit",
 )  # fmt: skip
-"""What typer and argparse say themselves, by gettext too."""
+"""Texts of typer and argparse, which also use gettext."""
 FORMATS = {"es": "es_419"}
-"""Languages whose numbers are written as in another place than the language's own name says."""
+"""Languages that use the number format of another locale."""
 _MADE = dt.datetime(2026, 11, 22, tzinfo=dt.timezone.utc)
-"""In every header: a real date would make a new file of the same words."""
+"""Fixed date for headers, so that unchanged texts give unchanged files."""
 _HEADER = "# All sentences of NEP Studio; made by tools/words.py (docs/translate.md)."
 
 
 class Key(NamedTuple):
-    """What a translator's entry is known by."""
+    """Identity of a catalogue entry."""
 
     context: str | None
     ids: tuple[str, ...]
 
 
-# ---- the sentences in the sources -----------------------------------------------------------------
-
-
 def template(root: Path = ROOT) -> Catalog:
-    """All sentences that the sources have."""
-    # not above: hatch_build.py compiles where only what builds the project is installed
+    """Return a catalogue of all texts in the sources."""
+    # imported here because hatch_build.py runs with only the build requirements installed
     from nep.cli.app import docstrings  # noqa: PLC0415
 
     made = Catalog(project="NEP Studio", creation_date=_MADE, header_comment=_HEADER, fuzzy=False)
@@ -103,7 +101,7 @@ def template(root: Path = ROOT) -> Catalog:
 def _marked(
     method: str, path: Path, _changed_ns: int
 ) -> list[tuple[str | tuple[str, ...], list[str], str | None]]:
-    """(Words, a translator's comments, context) of what is marked in a file, which is read once."""
+    # (texts, comments for translators, context) of the marked texts in a file; cached by modification time.
     found = extract_from_file(
         method, path, keywords=KEYWORDS, comment_tags=("Translators:",), strip_comment_tags=True
     )
@@ -111,7 +109,7 @@ def _marked(
 
 
 def sentences_of_robots(root: Path) -> Iterator[tuple[str, str]]:
-    """(English, its file) of what the descriptions that we ship say to people."""
+    """Yield (English, file) of the texts in robot descriptions shipped with Studio."""
     from app.blocks.toolbox.catalogue import has_words  # noqa: PLC0415 - as above
 
     for path in sorted((root / "resources" / "robots").glob("*.tm.jsonld")):
@@ -122,7 +120,7 @@ def sentences_of_robots(root: Path) -> Iterator[tuple[str, str]]:
 
 
 def _of_description(value: object, *, is_inside: bool) -> Iterator[str]:
-    """Titles, descriptions and texts of blocks; names and choices that have none of their own."""
+    # Titles, descriptions and block texts; names and choices where these are missing.
     if isinstance(value, list):
         for each in value:
             yield from _of_description(each, is_inside=is_inside)
@@ -143,7 +141,7 @@ def _of_description(value: object, *, is_inside: bool) -> Iterator[str]:
 
 
 def keys(catalog: Catalog) -> set[Key]:
-    """The entries of a catalogue, without its header."""
+    """Return the entries of a catalogue without its header."""
     return {Key(each.context or None, _ids(each.id)) for each in catalog if each.id}
 
 
@@ -155,36 +153,33 @@ def _ids(id: str | Sequence[str] | None) -> tuple[str, ...]:
     return (id or "",) if id is None or isinstance(id, str) else tuple(id)
 
 
-# ---- files ----------------------------------------------------------------------------------------
-
-
 def pot_file(folder: Path) -> Path:
-    """The list of all sentences."""
+    """Return the path of the template."""
     return folder / f"{DOMAIN}.pot"
 
 
 def po_file(folder: Path, language: str) -> Path:
-    """The translations into a language."""
+    """Return the path of a language's translations."""
     return folder / language / "LC_MESSAGES" / f"{DOMAIN}.po"
 
 
 def languages(folder: Path) -> list[str]:
-    """The languages that somebody translates into."""
+    """Return the languages with translations."""
     return sorted(path.parents[1].name for path in folder.glob(f"*/LC_MESSAGES/{DOMAIN}.po"))
 
 
 def read(path: Path, language: str | None = None) -> Catalog:
-    """A .po or .pot file."""
+    """Read a .po or .pot file."""
     with path.open("rb") as stream:
         found: Catalog = read_po(stream, locale=language, domain=DOMAIN)
     return found
 
 
 def write(catalog: Catalog, path: Path) -> None:
-    """A .po or .pot file, in the order of the English: a change of one sentence is a change of one place."""
+    """Write a .po or .pot file sorted by the English text, so that diffs are minimal."""
     catalog.creation_date = _MADE
     for entry in catalog:
-        entry.flags.discard("python-format")  # Babel takes "%A is known" for one
+        entry.flags.discard("python-format")  # Babel misinterprets texts such as "%A is known"
     held = io.BytesIO()
     write_po(held, catalog, width=100, sort_output=True, ignore_obsolete=True, include_lineno=False)
     path.parent.mkdir(parents=True, exist_ok=True)
@@ -192,14 +187,14 @@ def write(catalog: Catalog, path: Path) -> None:
 
 
 def extract(folder: Path = LOCALE) -> Catalog:
-    """Write the list of all sentences."""
+    """Write the template with all texts."""
     made = template()
     write(made, pot_file(folder))
     return made
 
 
 def update(folder: Path = LOCALE) -> None:
-    """Make everything follow the sources."""
+    """Update all files from the sources."""
     made = extract(folder)
     for language in languages(folder):
         catalog = read(po_file(folder, language), language)
@@ -209,7 +204,7 @@ def update(folder: Path = LOCALE) -> None:
 
 
 def add(language: str, folder: Path = LOCALE) -> None:
-    """Begin a language: all sentences, none translated."""
+    """Add a language with all texts untranslated."""
     about = f"# NEP Studio in '{language}'; docs/translate.md tells the way."
     catalog = Catalog(
         locale=language, header_comment=about, project="NEP Studio", creation_date=_MADE, fuzzy=False
@@ -219,7 +214,7 @@ def add(language: str, folder: Path = LOCALE) -> None:
 
 
 def compile_all(folder: Path = LOCALE) -> None:
-    """Write what programs read: each language, the pseudo-language, and what is known of them."""
+    """Write the generated files: compiled languages, the pseudo-language, and facts about them."""
     known: dict[str, Mapping[str, object]] = {ENGLISH: {"name": "English", "share": 1.0}}
     for language in languages(folder):
         catalog = read(po_file(folder, language), language)
@@ -230,7 +225,7 @@ def compile_all(folder: Path = LOCALE) -> None:
 
 
 def compile_pseudo(folder: Path = LOCALE) -> None:
-    """Write the pseudo-language, which is on no other computer than a developer's."""
+    """Write the pseudo-language, which exists only on developers' computers."""
     _write_mo(pseudo_catalog(read(pot_file(folder))), po_file(folder, PSEUDO).with_suffix(".mo"))
 
 
@@ -238,20 +233,20 @@ def _write_mo(catalog: Catalog, path: Path) -> None:
     catalog.creation_date = _MADE
     for entry in catalog:
         if not is_done(entry.string):
-            entry.string = ""  # Babel would write English for plurals that nobody has translated
+            entry.string = ""  # Babel would use English for untranslated plurals
     held = io.BytesIO()
     write_mo(held, catalog)
     path.parent.mkdir(parents=True, exist_ok=True)
     beside = path.with_name(
         f"{path.name}.{os.getpid()}"
-    )  # a program that starts now reads the one or the other
+    )  # so that programs starting meanwhile read either the old or the new file
     beside.write_bytes(held.getvalue())
     beside.replace(path)
     path.with_name(EDITOR_WORDS).write_text(_json(_for_editor(catalog)), encoding="utf-8")
 
 
 def _for_editor(catalog: Catalog) -> dict[str, str]:
-    """What the page of the block editor says, which can't read a .mo."""
+    # Texts of the block editor's page, which can't read .mo files.
     return {
         str(each.id): str(each.string)
         for each in catalog
@@ -264,7 +259,7 @@ def _json(value: Mapping[str, object]) -> str:
 
 
 def facts(language: str, catalog: Catalog) -> dict[str, object]:
-    """What a language needs beside its sentences, from Unicode's CLDR: it is asked here, not by programs."""
+    """Return the formats of a language from Unicode's CLDR, so that programs don't need Babel."""
     locale = Locale.parse(FORMATS.get(language, language))
     entries = [each for each in catalog if each.id]
     signs = locale.number_symbols["latn"]
@@ -287,7 +282,7 @@ def _pattern(locale: Locale, kind: str) -> dict[str, str]:
 
 
 def _date(pattern: str) -> str:
-    """`d 'de' MMMM` as "{day} de {month}"."""
+    # `d 'de' MMMM` becomes "{day} de {month}".
     return re.sub(r"'([^']*)'|(y+)|(M+)|(d+)", _date_part, pattern)
 
 
@@ -298,15 +293,12 @@ def _date_part(found: re.Match[str]) -> str:
 
 
 def is_done(string: str | Sequence[str] | None) -> bool:
-    """Whether every form is there."""
+    """Return whether all plural forms are translated."""
     return all(_ids(string)) and bool(string)
 
 
-# ---- the pseudo-language --------------------------------------------------------------------------
-
-
 def pseudo_catalog(pot: Catalog) -> Catalog:
-    """Every sentence in the pseudo-language."""
+    """Return a catalogue with all texts in the pseudo-language."""
     made = Catalog(project="NEP Studio", creation_date=_MADE, fuzzy=False)
     for entry in pot:
         if entry.id:
@@ -315,11 +307,8 @@ def pseudo_catalog(pot: Catalog) -> Catalog:
     return made
 
 
-# ---- the check ------------------------------------------------------------------------------------
-
-
 def check(folder: Path = LOCALE) -> list[str]:
-    """A sentence for each thing that does not fit together."""
+    """Return a message for each inconsistency."""
     made, pot = template(), read(pot_file(folder))
     wrong = [
         f"'{_shown(key)}' is {place}; run 'python tools/words.py update'"
@@ -366,7 +355,7 @@ def _told(catalog: Catalog) -> dict[Key, tuple[str, ...]]:
 
 
 def _context(told: str | bytes | None) -> str | None:
-    """Babel reads the contexts of a .mo as bytes."""
+    # Babel returns the contexts of a .mo as bytes.
     return (told.decode() if isinstance(told, bytes) else told) or None
 
 
@@ -388,7 +377,7 @@ def _shown(key: Key) -> str:
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Do it; 1 when a check found something."""
+    """Run the command line; return 1 if the check failed."""
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
