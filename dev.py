@@ -1,22 +1,23 @@
-"""The two commands: ``python3 dev.py demo`` and ``python3 dev.py test``.
+"""Development commands, above all ``python3 dev.py demo`` and ``python3 dev.py test``.
 
-Both make everything they need, also on a bare computer: the system libraries of Qt WebEngine (on Debian and
-Ubuntu), the virtual environment ``.venv``, the pinned packages in it, and a virtual screen if there is none.
+Each command installs what it needs, even on a bare computer: the system libraries of Qt WebEngine (on Debian
+and Ubuntu), the virtual environment ``.venv`` with pinned packages, and a virtual screen if there is none.
 
-    demo           open Studio with its virtual robot; without a screen it does the main job alone
-    test           every check and every test
-    check          the same as test; add --fast to leave the tests out
-    versions       the library alone, without Qt, and its tests with each Python from 3.10 to 3.13
-    fuzz           strange bytes for every parser, a quarter of an hour; -- --minutes 1 takes less
-    bench          the benchmarks
-    screenshots    the pictures of the README
-    guide-pictures the pictures of the guide, in each language
-    reference      the pages of docs/api, from the docstrings
-    package        the installers of this system and the client libraries, into dist/; -- --system clients
-                   builds only the libraries, -- --system windows the Windows installers (by Wine)
-    setup          only make the environment
+    demo            open Studio with its virtual robot; without a screen it runs unattended
+    test            run all checks and tests
+    check           the same as test; add --fast to skip the tests
+    versions        test the library without Qt on each Python from 3.10 to 3.13
+    fuzz            fuzz all parsers for 15 minutes; -- --minutes 1 is shorter
+    bench           run the benchmarks
+    screenshots     create the images of the README
+    guide-pictures  create the images of the guide in each language
+    reference       generate docs/api from the docstrings
+    package         build the installers of this system and the client libraries into dist/;
+                    -- --system clients builds only the libraries,
+                    -- --system windows the Windows installers (with Wine)
+    setup           only create the environment
 
-What stands behind the command goes to the program that it starts. Standard library only.
+Further arguments are passed on to the program that the command starts. Uses only the standard library.
 """
 
 from __future__ import annotations
@@ -52,11 +53,8 @@ SCRIPTS = {
 }
 
 
-# ---- the virtual environment ----------------------------------------------------------------------
-
-
 def stamp(folder: Path, extra: str) -> str:
-    """What the environment must be made of: pyproject.toml, pinned packages, translations."""
+    """Return a digest of the files that the environment depends on: pyproject.toml, pins, translations."""
     digest = hashlib.sha256()
     made_of = [
         *sorted((folder / "requirements").glob("*.txt")),
@@ -68,7 +66,7 @@ def stamp(folder: Path, extra: str) -> str:
 
 
 def is_fresh(folder: Path, extra: str) -> bool:
-    """Whether the environment was made from these very files; ``dev`` holds all that ``studio`` does."""
+    """Return whether the environment is up to date; ``dev`` includes ``studio``."""
     try:
         written = (folder / ".venv" / "nep-stamp").read_text(encoding="utf-8")
     except OSError:
@@ -77,11 +75,11 @@ def is_fresh(folder: Path, extra: str) -> bool:
 
 
 def make_environment(computer: Computer, folder: Path, extra: str) -> Path:
-    """The interpreter of an environment with everything pinned installed in it."""
+    """Create the environment with all pinned packages if needed; return its interpreter."""
     python = venv_python(folder / ".venv", computer.platform)
     if is_fresh(folder, extra) and python.exists():
         return python
-    # What is not finished must not look finished.
+    # An interrupted run must not leave a valid stamp.
     (folder / ".venv" / "nep-stamp").unlink(missing_ok=True)
     if not computer.ask([str(python), "-c", "import pip; print(pip.__version__)"]):
         with timed("making the virtual environment .venv"):
@@ -95,7 +93,7 @@ def make_environment(computer: Computer, folder: Path, extra: str) -> Path:
         if computer.do(probe, computer.environ, None) != 0:
             raise Trouble("Qt WebEngine does not load; the library named above is missing on this computer")
     with timed("compiling Studio, so that its first start is as quick as the later ones"):
-        # What can't be compiled says so when it is imported; a folder that can't be written is no trouble.
+        # Compile errors appear on import anyway, and a read-only folder is no problem.
         compile_ours = [str(python), "-m", "compileall", "-q", "-x", "node_modules", "app", "nep"]
         computer.do(compile_ours, computer.environ, None)
     (folder / ".venv" / "nep-stamp").write_text(stamp(folder, extra), encoding="utf-8")
@@ -103,14 +101,14 @@ def make_environment(computer: Computer, folder: Path, extra: str) -> Path:
 
 
 def install(computer: Computer, python: Path, extra: str) -> None:
-    """Install the pinned packages and this folder: by uv, which takes a third of the time, or else by pip.
+    """Install the pinned packages and this folder with uv, or with pip if that fails.
 
-    uv knows nothing of pip's settings: a computer that gets its packages elsewhere has pip's way left.
+    uv takes a third of pip's time, but ignores pip's configuration, such as another package index.
     """
     quiet = [] if sys.stdout.isatty() else ["--quiet"]
     pip = [str(python), "-m", "pip", "install", "--disable-pip-version-check", *quiet]
-    # A file that is not the one that we tested with is refused, wherever it comes from. Ours has no hash:
-    # it is this folder, and what builds it is pinned with the others.
+    # Hashes ensure that files are those that were tested. The project itself has none: it is this folder, and
+    # its build dependencies are pinned.
     pinned = ["--require-hashes", "-r", f"requirements/{extra}.txt"]
     uv = [str(python), "-m", "uv", "pip", "install", "--python", str(python), "--no-config", *quiet]
     environ = {"UV_HTTP_RETRIES": "0", "UV_LINK_MODE": "copy"} | dict(computer.environ)
@@ -126,15 +124,12 @@ def install(computer: Computer, python: Path, extra: str) -> None:
         raise Trouble("Studio could not be installed; pip's own words are above")
 
 
-# ---- the screen -----------------------------------------------------------------------------------
-
-
 @contextlib.contextmanager
 def screen(computer: Computer) -> Iterator[dict[str, str]]:
-    """The environment of a program with windows; where there is no screen, a virtual one lives as long."""
+    """Yield the environment variables for programs with windows, on a virtual screen if necessary."""
     environ = dict(computer.environ)
     if computer.root:
-        # Chromium refuses to run as root with its sandbox. Only here: never in the product.
+        # Chromium's sandbox doesn't run as root. Only for development, never in the product.
         environ["QTWEBENGINE_DISABLE_SANDBOX"] = "1"
     if computer.has_screen:
         yield environ
@@ -147,13 +142,13 @@ def screen(computer: Computer) -> Iterator[dict[str, str]]:
 
 @contextlib.contextmanager
 def virtual_screen() -> Iterator[int]:
-    """The number of an X display of our own, which ends with the block."""
+    """Start a virtual X display and yield its number."""
     program = shutil.which("Xvfb")
     if program is None:
         raise Trouble("there is no screen, and no Xvfb to make a virtual one; install the package xvfb")
     reader, writer = os.pipe()
     command = [program, "-displayfd", str(writer), "-screen", "0", SCREEN, "-nolisten", "tcp"]
-    # In a session of its own, so that Ctrl+C ends the program that draws on it first.
+    # In a session of its own, so that Ctrl+C ends the programs that draw on it first.
     server = subprocess.Popen(command, pass_fds=[writer], start_new_session=True, stderr=subprocess.DEVNULL)
     os.close(writer)
     try:
@@ -167,11 +162,8 @@ def virtual_screen() -> Iterator[int]:
         end(server)
 
 
-# ---- the commands ---------------------------------------------------------------------------------
-
-
 def demo(computer: Computer, arguments: Sequence[str]) -> int:
-    """Open Studio with the virtual robot, or without a screen let it drive itself; its exit code."""
+    """Open Studio with the virtual robot, unattended without a screen; return its exit code."""
     python = make_environment(computer, ROOT, "studio")
     command = [str(python), "-m", "app", "--demo", *arguments]
     pictures = ROOT / "build" / "demo"
@@ -192,7 +184,7 @@ def script(
     arguments: Sequence[str],
     scripts: Mapping[str, tuple[str, str]] = SCRIPTS,
 ) -> int:
-    """Run one of the project's own scripts in the environment; its exit code."""
+    """Run one of the project's scripts in the environment; return its exit code."""
     path, extra = scripts[name]
     if not (ROOT / path).is_file():
         raise Trouble(f"'{name}' needs '{path}', which this revision does not have")
@@ -207,7 +199,7 @@ def script(
 
 
 def package(computer: Computer, arguments: Sequence[str]) -> int:
-    """Make the packages out of an environment that has only what goes into them; the exit code."""
+    """Build the packages in an environment with only their dependencies; return the exit code."""
     folder = ROOT / "build" / "package" / "env"
     python = environment(computer, sys.executable, folder, "package", is_for_oldest=True)
     ours = [*pip(python), "--no-deps", "--no-build-isolation", "--force-reinstall", "."]
@@ -218,14 +210,14 @@ def package(computer: Computer, arguments: Sequence[str]) -> int:
 
 
 def run(computer: Computer, command: str, arguments: Sequence[str]) -> int:
-    """Prepare this computer and run one command; the exit code of what it started."""
+    """Prepare this computer and run a command; return its exit code."""
     lowest, highest = PYTHONS
     if not lowest <= computer.version <= highest:
         raise Trouble(
             "Python {}.{} to {}.{} is needed, this is {}.{}".format(*lowest, *highest, *computer.version)
         )
     begin = time.monotonic()
-    if command not in {"versions", "fuzz"}:  # which have nothing of Qt's, and so ask nothing of the system
+    if command not in {"versions", "fuzz"}:  # these don't use Qt and need no system packages
         bring_system_packages(computer)
     if command == "test":
         bring_test_packages(computer)
@@ -250,14 +242,14 @@ def run(computer: Computer, command: str, arguments: Sequence[str]) -> int:
 
 
 def main(arguments: Sequence[str] | None = None, computer: Computer | None = None) -> int:
-    """The command line: 0 well, 1 not well, 2 something is missing, 130 after Ctrl+C."""
+    """Run the command line; return 0, 1 on failure, 2 if something is missing, 130 after Ctrl+C."""
     given = sys.argv[1:] if arguments is None else list(arguments)
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
     parser.add_argument("command", choices=["demo", *SCRIPTS, "versions", "fuzz", "package", "setup"])
     command: str = parser.parse_args(given[:1]).command
-    # A terminal that closes, or a CI that gives up, must not leave a virtual screen behind.
+    # Remove the virtual screen also when the terminal closes or CI cancels the job.
     for name in ("SIGTERM", "SIGHUP"):
         if hasattr(signal, name):
             signal.signal(getattr(signal, name), lambda number, _frame: sys.exit(128 + number))

@@ -1,6 +1,6 @@
-"""What a build, also that of an editable checkout, does besides: it compiles the words of every language.
+"""Build hook that compiles the translations, also for editable installs.
 
-Programs read .mo files and never compile: nothing is made at run time. The sources are nep/locale/*/*.po.
+Programs only read .mo files; the sources are nep/locale/*/*.po.
 """
 
 from __future__ import annotations
@@ -13,10 +13,10 @@ from hatchling.builders.hooks.plugin.interface import BuildHookInterface
 
 
 class CustomBuildHook(BuildHookInterface):  # type: ignore[type-arg]  # hatchling's own parameter says nothing here
-    """Asked by hatchling before each build."""
+    """Hook that hatchling runs before each build."""
 
     def initialize(self, version: str, build_data: dict[str, Any]) -> None:  # noqa: ARG002 - hatchling's call
-        """Compile all catalogues."""
+        """Compile all message catalogues."""
         sys.path.insert(0, str(Path(__file__).resolve().parent))
         from tools.words import compile_all  # noqa: PLC0415 - Babel is there only while something is built
 

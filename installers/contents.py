@@ -1,8 +1,8 @@
-"""What of the libraries goes into a package: what Studio uses, and not what only comes with it.
+"""Selection of the library files that go into a package.
 
-Qt is most of a package. The names are those of files as PyInstaller collects them, below the frozen
-program's folder; `is_wanted` decides of each. Left out is what no line of Studio asks for. A library that
-another one in the package is linked with must stay: the self-test of the packages would tell.
+Qt is the largest part of a package. `is_wanted` decides on each file that PyInstaller collects, by its path
+below the frozen program's folder. Files are omitted if no code of Studio uses them and no library in the
+package is linked with them; the packages' self-test would fail otherwise.
 """
 
 from __future__ import annotations
@@ -13,12 +13,12 @@ from pathlib import PurePosixPath
 __all__ = ["EXCLUDED_MODULES", "UNUSED_OF_PYQTGRAPH", "is_wanted"]
 
 UNUSED_OF_PYQTGRAPH = ("console", "dockarea", "examples", "exporters", "flowchart", "jupyter", "opengl")
-"""What the plot does not use: of menus of pyqtgraph's that Studio does not show."""
+"""Parts of pyqtgraph that only its menus use, which Studio doesn't show."""
 
 EXCLUDED_MODULES = (
     *(f"pyqtgraph.{name}" for name in UNUSED_OF_PYQTGRAPH),
-    "PySide6.QtTest", "OpenGL", "numba", "cupy", "scipy",  # asked for by pyqtgraph, which does without them
-    "PySide6.QtQml", "PySide6.QtQuick",  # their libraries come with Chromium; their hooks bring all of QML
+    "PySide6.QtTest", "OpenGL", "numba", "cupy", "scipy",  # optional imports of pyqtgraph
+    "PySide6.QtQml", "PySide6.QtQuick",  # Chromium brings their libraries; their hooks add all of QML
     "tkinter", "_tkinter", "turtle", "idlelib", "lib2to3", "pydoc_data", "ensurepip", "pip", "setuptools",
     "wheel", "pkg_resources", "IPython", "matplotlib", "PIL", "pytest", "_pytest", "hypothesis", "mypy",
     "babel", "numpy.f2py", "numpy.distutils",
@@ -33,9 +33,9 @@ _PLUGINS = frozenset({
     "wayland-graphics-integration-client", "wayland-shell-integration", "xcbglintegrations",
 })  # fmt: skip
 _FFMPEG_OF_QT = re.compile(r"(?:lib)?(?:av(?:codec|format|util)|sw(?:scale|resample))(?:-\d+\.dll|\.)")
-"""What plays films; Studio plays tones, which need none of it."""
+"""FFmpeg libraries for video; Studio plays only tones, which don't need them."""
 _NOT_PLUGINS = re.compile(r"(?:lib)?(?:qgtk3|qtvirtualkeyboardplugin|qtexttospeech_mock|ffmpegmediaplugin)\b")
-"""Of folders that are wanted: GTK's looks, which bring all of GTK; keys on the screen; a mute voice."""
+"""Unwanted plug-ins in wanted folders: the GTK theme (with all of GTK), virtual keyboard, mock voice."""
 _IMAGE_FORMATS = re.compile(r"(?:lib)?q(?:gif|ico|icns|jpeg|svg|webp)\b")
 _PLATFORMS = re.compile(r"(?:lib)?q(?:xcb|wayland|windows|cocoa|offscreen|minimal)\b")
 _UNUSED = re.compile(
@@ -64,32 +64,31 @@ _OF_THE_SYSTEM = re.compile(
     """,
     re.VERBOSE,
 )
-"""Linux: what a desktop has, or a package asks for (installers/linux). A copy of ours would not know the
-graphics driver, the fonts or the printers of the computer that it runs on, or be too old for the driver."""
+"""Libraries of Linux desktops that must not be bundled; the package depends on them (installers/linux).
+Bundled copies wouldn't match the computer's graphics driver, fonts or printers.
+"""
 
 
 _OF_THE_BUILD = frozenset({"direct_url.json", "RECORD"})
-"""Of a distribution's papers: from which folder of the builder's it came, and sums of these."""
+"""Metadata files of a distribution that depend on the build machine: source folder and checksums."""
 
 
 def is_wanted(name: str) -> bool:
-    """Whether a collected file goes into the package; `name` has slashes of either kind."""
+    """Return whether a collected file goes into the package; `name` may contain slashes or backslashes."""
     path = PurePosixPath(name.replace("\\", "/"))
     parts = path.parts
-    # Each part: of a framework of macOS its folder is named so, and a rest of it could not be signed.
+    # Test all parts: a macOS framework is a folder of this name, and a partial one can't be signed.
     if any(_UNUSED.search(part) for part in parts) or _OF_THE_SYSTEM.match(str(path)):
         return False
     if _FFMPEG_OF_QT.match(path.name) and ("PySide6" in parts or len(parts) == 1):
         return False
     if parts[:1] == ("pyqtgraph",):
-        return not {*UNUSED_OF_PYQTGRAPH, "maps"} & set(
-            parts[1:3]
-        )  # maps of colours have licences of their own
+        return not {*UNUSED_OF_PYQTGRAPH, "maps"} & set(parts[1:3])  # colour maps have licences of their own
     if parts[:1] == ("zstandard",) and path.name.startswith("_cffi."):
-        return False  # a second build of the library, for Pythons that are not CPython
+        return False  # second build of the library, for Pythons other than CPython
     if parts[:2] == ("cv2", "data"):
-        return path.suffix != ".xml"  # trained classifiers, which nothing here reads
-    if path.name.startswith("opencv_videoio_ffmpeg"):  # Windows; elsewhere: film_libraries.py
+        return path.suffix != ".xml"  # trained classifiers, which aren't used
+    if path.name.startswith("opencv_videoio_ffmpeg"):  # Windows; for other systems see film_libraries.py
         return False
     if "PySide6" in parts:
         return _is_wanted_of_qt(path)

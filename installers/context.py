@@ -1,4 +1,4 @@
-"""Context: what is packaged, from what, and where the results go."""
+"""Context of a packer: system, interpreter, version and folders."""
 
 from __future__ import annotations
 
@@ -16,16 +16,16 @@ __all__ = ["APP", "ROOT", "SYSTEMS", "Context", "PackageError", "this_system"]
 
 ROOT = Path(__file__).resolve().parents[1]
 APP = "NEP Studio"
-"""The folder of the frozen program, and its name for people."""
+"""Name of the program and of the folder of the frozen program."""
 SYSTEMS = ("windows", "macos", "linux")
 
 
 class PackageError(Exception):
-    """A package can't be built here; the text says why, and what to do."""
+    """Error that a package can't be built; the text contains the reason and the solution."""
 
 
 def this_system() -> str:
-    """The system that this is, as `SYSTEMS` says it."""
+    """Return the current system, one of `SYSTEMS`."""
     return {"win32": "windows", "darwin": "macos"}.get(sys.platform, "linux")
 
 
@@ -35,7 +35,7 @@ def _machine() -> str:
 
 
 def last_commit_s(root: Path = ROOT) -> int:
-    """The time that all files in a package have: $SOURCE_DATE_EPOCH, or that of the last commit."""
+    """Return the timestamp for all files of a package: $SOURCE_DATE_EPOCH or that of the last commit."""
     given = os.environ.get("SOURCE_DATE_EPOCH", "")
     if given.isdecimal():
         return int(given)
@@ -47,9 +47,9 @@ def last_commit_s(root: Path = ROOT) -> int:
 
 @dataclass(frozen=True)
 class Context:
-    """What a packer needs to know.
+    """Inputs of a packer.
 
-    `python` is the command of the interpreter whose environment is frozen; `work` is for what is in between.
+    `python` is the command of the interpreter whose environment is frozen.
     """
 
     system: str
@@ -61,22 +61,22 @@ class Context:
 
     @property
     def dist(self) -> Path:
-        """Where the packages go."""
+        """Folder of the finished packages."""
         return self.root / "dist"
 
     @property
     def work(self) -> Path:
-        """For what is in between."""
+        """Folder of intermediate files."""
         return self.root / "build" / "package" / self.system
 
     @property
     def frozen(self) -> Path:
-        """The frozen program: a folder that runs as it is."""
+        """Folder with the frozen program, ready to run."""
         return self.work / "dist" / APP
 
     @property
     def environ(self) -> Mapping[str, str]:
-        """For programs that write files: the same files each time, as far as they can."""
+        """Environment variables for reproducible output of the programs that are run."""
         return {
             **os.environ,
             "SOURCE_DATE_EPOCH": str(self.epoch),
@@ -85,7 +85,11 @@ class Context:
         }
 
     def run(self, *command: str | Path, cwd: Path | None = None) -> None:
-        """Run a program to its end. Raises `PackageError` when it fails or is not there."""
+        """Run a program.
+
+        Raises:
+            PackageError: The program is missing or has failed.
+        """
         words = [str(each) for each in command]
         try:
             done = subprocess.run(words, cwd=cwd or self.root, env=dict(self.environ), check=False)

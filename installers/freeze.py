@@ -1,4 +1,4 @@
-"""Freezing: Studio and all that it needs, as a folder that runs without a Python."""
+"""Freezing: build a folder with Studio and its dependencies that runs without Python."""
 
 from __future__ import annotations
 
@@ -11,10 +11,13 @@ __all__ = ["add_licences", "freeze"]
 
 
 def freeze(context: Context) -> Path:
-    """The folder with the frozen program. Raises `PackageError`.
+    """Freeze Studio and return the folder.
 
-    `context.python` is asked, in whose environment Studio is installed and not only checked out: what is
-    frozen is what a user would install. On macOS the application's bundle is beside the folder.
+    `context.python` must have Studio installed, not as an editable checkout, so that the result equals an
+    installation. On macOS the application bundle is next to the folder.
+
+    Raises:
+        PackageError: Freezing has failed.
     """
     shutil.rmtree(context.work / "dist", ignore_errors=True)
     context.work.mkdir(parents=True, exist_ok=True)
@@ -22,7 +25,7 @@ def freeze(context: Context) -> Path:
         *context.python, "-m", "PyInstaller", "--noconfirm", "--clean", "--log-level", "WARN",
         "--distpath", context.work / "dist", "--workpath", context.work / "build",
         context.root / "installers" / "nep-studio.spec",
-        cwd=context.work,  # not the checkout, whose modules Python would find first
+        cwd=context.work,  # not the checkout, whose modules Python would import first
     )  # fmt: skip
     if not context.frozen.is_dir():
         raise PackageError(f"the frozen program is not in '{context.frozen}'")
@@ -30,11 +33,12 @@ def freeze(context: Context) -> Path:
 
 
 def add_licences(context: Context, inside: Path, folder: Path) -> Path:
-    """Put the licence texts and the notice of what is `inside` into a folder; the bill, in `dist`.
+    """Write licence texts and notice of the content of `inside`; return the bill of materials in `dist`.
 
-    Raises `PackageError`, also when something is inside of which nobody knows the licence.
+    Raises:
+        PackageError: A part has no known licence, or writing has failed.
     """
-    # A release has one of each, and two for macOS.
+    # A release has one file per system, and two for macOS.
     of = f"macos-{context.machine}" if context.system == "macos" else context.system
     bill = context.dist / f"NEP-Studio-{context.version}-{of}.cdx.json"
     inventory = context.root / "installers" / "inventory" / "__main__.py"

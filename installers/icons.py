@@ -1,10 +1,10 @@
-"""The program's and the document's icons as pictures, painted by Studio's own code.
+"""Paint the icons of the program and of documents with Studio's own code.
 
-Run by an interpreter in whose environment Studio is installed, with no screen:
+Run with an interpreter that has Studio installed; needs no screen:
 
     python icons.py FOLDER
 
-FOLDER gets `nep-studio-SIZE.png` and `nep-behaviour-SIZE.png` for each of `SIZES`.
+Writes `nep-studio-SIZE.png` and `nep-behaviour-SIZE.png` for each of `SIZES`.
 """
 
 from __future__ import annotations
@@ -26,13 +26,13 @@ PAPER, EDGE = "#FFFFFF", "#8A94A6"
 
 
 def paint_program(painter: QPainter, rect: QRectF, theme: Theme) -> None:
-    """The logo with a little room around it."""
+    """Paint the logo with a small margin."""
     room = rect.width() * MARGIN
     paint_logo(painter, rect.adjusted(room, room, -room, -room), theme)
 
 
 def paint_behaviour(painter: QPainter, rect: QRectF, theme: Theme) -> None:
-    """A sheet of paper with a folded corner and the logo on it."""
+    """Paint a sheet of paper with a folded corner and the logo."""
     side = rect.width()
 
     def at(x: float, y: float) -> QPointF:
@@ -52,9 +52,9 @@ PICTURES = {"nep-studio": paint_program, "nep-behaviour": paint_behaviour}
 
 
 def main() -> int:
-    """Paint all; 0, or 1 when one can't be written."""
+    """Paint all icons; return 1 if a file can't be written, else 0."""
     os.environ.setdefault("QT_QPA_PLATFORM", "offscreen")
-    _application = QApplication(sys.argv[:1])  # the theme asks it
+    _application = QApplication(sys.argv[:1])  # required by the theme
     theme, folder = Theme("light"), Path(sys.argv[1])
     folder.mkdir(parents=True, exist_ok=True)
     is_well = True

@@ -1,4 +1,4 @@
-"""Where the painted icons are: `icons.py` is run once by the interpreter that is frozen."""
+"""Access to the painted icons; runs `icons.py` once with the interpreter that is frozen."""
 
 from __future__ import annotations
 
@@ -9,11 +9,11 @@ from installers.context import Context
 __all__ = ["ICON_SIZES", "paint_icons"]
 
 ICON_SIZES = (16, 22, 24, 32, 48, 64, 128, 256, 512)
-"""Those of a desktop; macOS takes 1024 as well."""
+"""Sizes for desktops; macOS also uses 1024."""
 
 
 def paint_icons(context: Context) -> Path:
-    """The folder with `nep-studio-SIZE.png` and `nep-behaviour-SIZE.png`."""
+    """Return the folder with `nep-studio-SIZE.png` and `nep-behaviour-SIZE.png`, painting them if needed."""
     folder = context.work / "icons"
     if not folder.is_dir():
         context.work.mkdir(parents=True, exist_ok=True)

@@ -1,11 +1,11 @@
-"""`python3 dev.py package`: packages of NEP Studio and of the client libraries, written to `dist/`.
+"""`python3 dev.py package`: build packages of NEP Studio and of the client libraries into `dist/`.
 
-    python3 dev.py package                       the packages of this system and the client libraries
-    python3 dev.py package -- --system clients   only nep for JavaScript, C# (NuGet) and Unity
-    python3 dev.py package -- --system windows   the Windows packages; on Linux through Wine
-    python3 dev.py package -- --keep-frozen      pack once more what is frozen already
+    python3 dev.py package                      packages of this system and client libraries
+    python3 dev.py package -- --system clients  only nep for JavaScript, C# (NuGet) and Unity
+    python3 dev.py package -- --system windows  Windows packages; on Linux with Wine
+    python3 dev.py package -- --keep-frozen     pack again without freezing
 
-Beside the packages are a bill of materials (CycloneDX) for each system and the SHA-256 sums of all.
+Also writes a bill of materials (CycloneDX) for each system, and the SHA-256 checksums.
 """
 
 from __future__ import annotations
@@ -26,10 +26,10 @@ CLIENTS = "clients"
 
 
 class Packer(Protocol):
-    """What each system's `packer` module is."""
+    """Interface of each system's `packer` module."""
 
     def build(self, context: Context, *, keep_frozen: bool) -> Sequence[Path]:
-        """Freeze, unless what is frozen is to be kept, and pack; the packages. Raises `PackageError`."""
+        """Freeze, unless ``keep_frozen``, and return the packages; raises `PackageError`."""
 
 
 def packer_for(system: str) -> Packer:
@@ -38,7 +38,7 @@ def packer_for(system: str) -> Packer:
 
 
 def write_sums(folder: Path) -> Path:
-    """The file with the SHA-256 sum of each package in a folder, as `sha256sum --check` reads it."""
+    """Write the SHA-256 checksums of a folder's packages in the format of `sha256sum --check`."""
     lines = [
         f"{hashlib.sha256(path.read_bytes()).hexdigest()}  {path.name}\n"
         for path in sorted(folder.iterdir())
@@ -50,12 +50,12 @@ def write_sums(folder: Path) -> Path:
 
 
 def told(made: Iterable[Path]) -> str:
-    """The files with their sizes, one a line."""
+    """Return the names and sizes of files, one per line."""
     return "\n".join(f"  {path.name}  {path.stat().st_size / 1e6:.1f} MB" for path in made)
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Build; 0 when all is there, 2 when this computer can't."""
+    """Build the packages; return 0, or 2 if this computer can't."""
     parser = argparse.ArgumentParser(
         prog="dev.py package", description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )

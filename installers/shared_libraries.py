@@ -1,4 +1,4 @@
-"""What is left of a folder of shared libraries when some of them are not needed any more."""
+"""Removal of shared libraries that are no longer needed."""
 
 from __future__ import annotations
 
@@ -9,14 +9,14 @@ __all__ = ["remove_dead_links", "remove_unneeded", "size_of"]
 
 
 def size_of(folder: Path) -> int:
-    """The bytes of the files in a folder, without those of the folders in it."""
+    """Return the size in bytes of the files directly in a folder."""
     return sum(path.stat().st_size for path in folder.iterdir())
 
 
 def remove_unneeded(folder: Path, users: Iterable[Path], needed_by: Callable[[Path], Iterable[str]]) -> None:
-    """Remove the libraries of a folder that no program of `users` needs, neither itself nor through others.
+    """Remove the libraries of a folder that no file of `users` needs directly or indirectly.
 
-    ``needed_by`` tells the names of the libraries that a file is linked with.
+    ``needed_by`` returns the names of the libraries that a file is linked with.
     """
     waiting, kept = list(users), set[str]()
     while waiting:
@@ -30,7 +30,7 @@ def remove_unneeded(folder: Path, users: Iterable[Path], needed_by: Callable[[Pa
 
 
 def remove_dead_links(links: Iterable[Path]) -> None:
-    """Remove those that point to nothing now: PyInstaller links libraries into other folders."""
+    """Remove dangling links, which PyInstaller has created in other folders."""
     for link in links:
         if link.is_symlink() and not link.exists():
             link.unlink()

@@ -21,7 +21,7 @@ __all__ = ["build", "check_nuget", "pack_built_javascript", "pack_javascript", "
 
 def build(context: Context, *, keep_frozen: bool) -> Sequence[Path]:
     """Return the packages; those that need missing tools are skipped with a printed line."""
-    del keep_frozen  # the clients are not frozen
+    del keep_frozen  # the clients aren't frozen
     return [
         *pack_javascript(context.root / "clients" / "javascript", context.dist),
         *pack_nuget(context.root / "clients" / "csharp", context.dist),

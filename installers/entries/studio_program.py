@@ -1,16 +1,16 @@
-"""The program `nep-studio` of a package; a frozen Studio is also its own child processes."""
+"""Entry point of `nep-studio` in a package, also used by its child processes."""
 
 import os
 
 os.environ["OPENCV_VIDEOIO_PRIORITY_FFMPEG"] = (
-    "0"  # packages come without it: installers/linux/film_libraries.py
+    "0"  # packages don't contain it: installers/linux/film_libraries.py
 )
 
 import sys
 
 from nep.system.frozen_code import hold_code
 
-hold_code()  # before anything is imported late
+hold_code()  # before any late import
 
 from app.__main__ import main
 

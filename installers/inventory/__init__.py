@@ -1,1 +1,1 @@
-"""What is inside a package, and under which licences: a bill of materials, licence texts, a notice."""
+"""Content of a package with its licences: bill of materials, licence texts, notice."""

@@ -1,11 +1,11 @@
-"""Write what is inside a package, and under which licences.
+"""Write the inventory of a package: bill of materials, licence texts and notice.
 
-Run by the interpreter whose environment is frozen (`installers.freeze` does that):
+`installers.freeze` runs it with the interpreter whose environment is frozen:
 
     python inventory/__main__.py SYSTEM EPOCH INSIDE FOLDER BILL
 
-INSIDE is the frozen program, FOLDER gets `licences/` and `NOTICE.txt`, BILL is the bill of materials.
-Something inside of which nobody knows the licence is an error: a sentence for each, and exit code 1.
+INSIDE is the frozen program, FOLDER gets `licences/` and `NOTICE.txt`, BILL is the bill of materials. Parts
+without a known licence are errors: each is printed, and the exit code is 1.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ from installers.inventory.wheels import parts_in_wheels  # noqa: E402
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """See the module."""
+    """Run the command line; return the exit code."""
     system, epoch, inside, folder, bill_file = sys.argv[1:] if arguments is None else arguments
     version = metadata.version(PROJECT)
     try:

@@ -1,4 +1,4 @@
-"""A package's bill of materials in CycloneDX, its folder of licence texts, and its notice."""
+"""Bill of materials in CycloneDX, folder of licence texts, and notice of a package."""
 
 from __future__ import annotations
 
@@ -23,11 +23,15 @@ __all__ = ["bill", "standard_texts", "write_licences"]
 NOTICE = LICENCES.parent / "notice.txt"
 CRATES = "rust-crates.txt"
 _SAME = {"Unicode-DFS-2016": "Unicode-3.0"}
-"""Licences whose words are those of another, with other names for the data."""
+"""Licences with the same wording as another one apart from names."""
 
 
 def write_licences(parts: Iterable[Part], folder: Path, version: str) -> None:
-    """The folder of licence texts and the notice. Raises `InventoryError` for a crate without a text."""
+    """Write the licence texts and the notice.
+
+    Raises:
+        InventoryError: A crate has no licence text.
+    """
     made = list(parts)
     shutil.rmtree(folder / "licences", ignore_errors=True)
     for part in made:
@@ -45,7 +49,7 @@ def write_licences(parts: Iterable[Part], folder: Path, version: str) -> None:
 
 
 def _write_crates(crates: Sequence[Part], licences: Path) -> None:
-    """A list of all crates with their authors, and the texts of their licences, each once."""
+    # Writes a list of all crates with authors, and each licence text once.
     if not crates:
         return
     lines = {
@@ -64,12 +68,13 @@ def _write_crates(crates: Sequence[Part], licences: Path) -> None:
 
 
 def standard_texts(part: Part) -> Sequence[str]:
-    """The names of those of `LICENCES` that a licence expression needs: of alternatives all that we have.
+    """Return the `LICENCES` files that a licence expression requires; of alternatives all available ones.
 
-    Raises `InventoryError` when what is asked for besides each other is not there.
+    Raises:
+        InventoryError: A required text is missing.
     """
     needed = list[str]()
-    # AND binds closer than OR without brackets; no crate mixes them so.
+    # Ignores that AND binds more tightly than OR: no crate mixes them without brackets.
     for alternatives in re.split(r"\s+AND\s+", part.licence):
         ids = [
             _SAME.get(each, each)
@@ -83,9 +88,9 @@ def standard_texts(part: Part) -> Sequence[str]:
 
 
 def bill(parts: Iterable[Part], system: str, epoch: int, version: str) -> str:
-    """The bill of materials as JSON of CycloneDX 1.6; the same parts give the same bill.
+    """Return the bill of materials as CycloneDX 1.6 JSON; reproducible for the same parts.
 
-    What is compiled into another part is among what that depends on, all else among what Studio does.
+    Parts compiled into another part are its dependencies, all others are those of Studio.
     """
     made = Bom(serial_number=uuid.uuid5(uuid.NAMESPACE_URL, f"{PROJECT}/{version}/{system}/{epoch}"))
     made.metadata.timestamp = datetime.fromtimestamp(epoch, timezone.utc)

@@ -1,7 +1,7 @@
-"""The shared libraries in a frozen program: each has a licence that is told, or the build stops.
+"""Shared libraries of a frozen program; the build fails for a library without a known licence.
 
-PyInstaller takes from the computer that it runs on whatever a program is linked with. A library that nobody
-named here would be given away without its licence.
+PyInstaller collects all libraries that a program is linked with from the build machine. An unknown one would
+be distributed without its licence.
 """
 
 from __future__ import annotations
@@ -27,10 +27,12 @@ __all__ = ["LIBRARIES", "Library", "compiled_files", "library_of", "parts_in_fol
 
 
 class Library(NamedTuple):
-    """What files of these names are.
+    """Origin and licence of library files.
 
-    ``of`` is the part that has them; without one, the package of this computer's system that brought them is
-    a part of its own. ``rights`` and ``texts`` make the licence text when neither has one.
+    Attributes:
+        files: Pattern of the file names without the suffix.
+        of: Part that contains them; if empty, the system package that installed them is a part of its own.
+        rights, texts: Copyright and licence names for parts without a licence text.
     """
 
     files: str
@@ -39,15 +41,15 @@ class Library(NamedTuple):
     rights: str = ""
     texts: tuple[str, ...] = ()
     version: str = ""
-    """A pattern for the name of the file, where that has the version."""
+    """Pattern that extracts the version from the file name."""
     is_of_system: bool = False
-    """Whether the system's package comes first, where there is one."""
+    """True if a system package, where one exists, takes precedence."""
 
 
 _X = "X11"
 _EXTENSION = r"(?:\.so(?:\.[\d.]+)?|(?:\.[\d.]+)?\.dylib|\.dll)"
 LIBRARIES = (
-    # of wheels
+    # in wheels
     Library(r"libzmq(?:-[\w.-]+?)?", "MPL-2.0", "libzmq"),
     Library(r"libsodium(?:-[\w.-]+?)?", "ISC", "libsodium"),
     Library(r"libscipy_openblas\w*(?:-\w+)?", "BSD-3-Clause", "openblas"),
@@ -73,7 +75,7 @@ LIBRARIES = (
         "Copyright (c) 2020 Netflix, Inc.",
         ("BSD-2-Clause-Patent",),
     ),
-    # of Qt's wheels
+    # in Qt's wheels
     Library(r"libicu(?:data|i18n|uc)", "Unicode-3.0", "icu", "", ("Unicode-3.0",), r"\.so\.(\d+)"),
     Library(r"(?:lib)?(?:pyside6(?:qml)?|shiboken6)\.abi3(?:\.[\d.]+)?", "LGPL-3.0-only", "qt"),
     Library(
@@ -158,7 +160,7 @@ LIBRARIES = (
         ("MIT",),
         is_of_system=True,
     ),
-    # of Linux: the text is that of the system's package
+    # of Linux: the licence text is in the system package
     Library(r"libX(?:composite|damage|i|inerama|randr|tst|cursor|ss)|libxkbfile|libxshmfence", _X),
     Library(r"libxcb(?:-[a-z0-9]+)*", _X),
     Library(r"libxkbcommon(?:-x11)?|libwayland-\w+", "MIT"),
@@ -172,7 +174,7 @@ LIBRARIES = (
     Library(r"libtirpc|libnsl|libedit|libbsd|libmd", "BSD-3-Clause"),
     Library(r"libcrypt", "LGPL-2.1-or-later"),
 )  # fmt: skip
-"""By the beginning of their names, before the suffix and its numbers."""
+"""File name patterns without the suffix and version numbers."""
 _PATTERNS = [(re.compile(f"(?:{each.files}){_EXTENSION}", re.IGNORECASE), each) for each in LIBRARIES]
 _PYTHON_KNOWS = {
     "expat": pyexpat.EXPAT_VERSION.rpartition("_")[2],
@@ -180,9 +182,9 @@ _PYTHON_KNOWS = {
     "sqlite": sqlite3.sqlite_version,
     "zlib": zlib.ZLIB_RUNTIME_VERSION,
 }
-"""Versions that the interpreter tells which is frozen."""
+"""Versions reported by the interpreter that is frozen."""
 _FILMS = re.compile(r"lib(?:av(?:codec|device|filter|format|util)|sw(?:scale|resample)|postproc)[.-]")
-"""The names of FFmpeg's libraries, of which empty ones of our own are in the package (film_libraries.py)."""
+"""Names of FFmpeg's libraries, for which the package contains empty replacements (film_libraries.py)."""
 _EMPTY = 96 * 1024
 _QT = re.compile(r"(?:lib)?Qt\w*(?:\.framework)?\b|QtWebEngineProcess")
 _OURS = frozenset({"nep", "nep-studio", "nep.exe", "nep-studio.exe"})
@@ -190,7 +192,7 @@ _MAGIC = (b"\x7fELF", b"\xcf\xfa\xed\xfe", b"\xce\xfa\xed\xfe", b"\xca\xfe\xba\x
 
 
 def compiled_files(folder: Path) -> Iterator[Path]:
-    """Every file of compiled code in a folder, for whatever system, in order; links are not followed."""
+    """Yield the binaries of any system in a folder in sorted order, without following links."""
     for at, folders, names in os.walk(folder):
         folders.sort()
         for path in (Path(at, name) for name in sorted(names)):
@@ -202,14 +204,15 @@ def compiled_files(folder: Path) -> Iterator[Path]:
 
 
 def library_of(name: str) -> Library | None:
-    """What a shared library of this name is; None when nobody named it."""
+    """Return the entry for a library's file name, or None if it is unknown."""
     return next((library for pattern, library in _PATTERNS if pattern.fullmatch(name)), None)
 
 
 def parts_in_folder(folder: Path, told: Sequence[Part]) -> Iterator[Part]:
-    """The parts that a frozen program's libraries are, and that were not told yet.
+    """Yield the parts of a frozen program's libraries that aren't in ``told``.
 
-    Raises `InventoryError` with a sentence for each library that belongs to nothing, or has no licence text.
+    Raises:
+        InventoryError: Libraries are unknown or have no licence text; one sentence for each.
     """
     known = _names_of_wheels({each.name for each in told if each.kind == "pypi"})
     names, wrong, libraries = {each.name for each in told}, list[str](), dict[str, Library]()
@@ -258,12 +261,12 @@ def _names_of_wheels(names: Collection[str]) -> _Known:
 
 
 def _is_extension(path: PurePath) -> bool:
-    """Whether a file is a module of Python's, and no library that came with it."""
+    # True for Python extension modules, not for libraries in wheels.
     return path.suffix in {".pyd", ".so"} and not path.name.startswith("lib")
 
 
 def _is_told(path: Path, known: _Known) -> bool:
-    """Whether a file is a program of ours, a module of what is told, of Qt's, or an empty library of ours."""
+    # True for Studio's programs, known extension modules, Qt's files and the empty FFmpeg libraries.
     if path.name in _OURS or path.name in known.extensions or path.name in known.qt:
         return True
     if path.name in known.python or (path.name == "Python" and "Python.framework" in path.parts):
@@ -272,7 +275,7 @@ def _is_told(path: Path, known: _Known) -> bool:
 
 
 def _carried(name: str, library: Library) -> Part | None:
-    """The part that a library is by what is written here; None when that has no licence text."""
+    # From the table above; None without a licence text.
     if not (library.rights or library.texts):
         return None
     found = re.search(library.version, name) if library.version else None
@@ -282,19 +285,18 @@ def _carried(name: str, library: Library) -> Part | None:
 
 
 class _DebianPackage(NamedTuple):
-    """A package of Debian's or Ubuntu's that brought a library."""
+    """Debian or Ubuntu package that installed a library."""
 
     name: str
     version: str
     text: Path
 
     def part(self, library: Library) -> Part:
-        """The part that a library of it is."""
         return Part(self.name, self.version, library.licence, (("copyright", self.text),), _system_kind())
 
 
 def _debian_packages(names: Iterable[str]) -> Mapping[str, _DebianPackage]:
-    """The packages of this computer that have libraries of these names; none without dpkg."""
+    # Packages of this computer with libraries of these names; empty without dpkg.
     wanted = [f"*/{name}" for name in names]
     if not wanted or shutil.which("dpkg-query") is None:
         return {}
@@ -318,7 +320,7 @@ def _debian_packages(names: Iterable[str]) -> Mapping[str, _DebianPackage]:
 
 
 def _system_kind() -> str:
-    """The beginning of the package URL of a system's package: "deb/debian", "deb/ubuntu"."""
+    # Start of the package URL: "deb/debian" or "deb/ubuntu".
     try:
         release = Path("/etc/os-release").read_text("utf-8")
     except OSError:

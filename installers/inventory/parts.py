@@ -1,4 +1,4 @@
-"""The parts of a package: what Python, Qt and the block editor bring, each with its licence."""
+"""Parts of a package with their licences: from Python, Qt and the block editor."""
 
 from __future__ import annotations
 
@@ -37,18 +37,18 @@ LGPL = "LGPL-3.0-only"
 EDITOR_PART = re.compile(r"^(@?[\w./-]+) (\d[\w.-]*) \(([^)\n]+)\)$", re.MULTILINE)
 
 Texts = Sequence[tuple[str, "Path | str"]]
-"""Licence texts: the name of each, and the file that it is in, or the text itself."""
+"""Licence texts as pairs of a name and a file or the text itself."""
 
 
 class InventoryError(Exception):
-    """Something is inside of which nobody knows the licence; a sentence for each, one a line."""
+    """Error for parts without a known licence, with one line for each."""
 
 
 @dataclass(frozen=True)
 class Part:
-    """One thing inside: its name and version, the licence as SPDX or in words, and its licence texts.
+    """A part of a package: name, version, licence (SPDX or plain text) and licence texts.
 
-    ``kind`` is the package URL's type, ``within`` the name of the part that has it compiled in.
+    ``kind`` is the type of its package URL; ``within`` is the part that it is compiled into.
     """
 
     name: str
@@ -61,20 +61,21 @@ class Part:
 
 
 RIGHTS = {"mcap": ("Copyright (c) Foxglove Technologies Inc.", "MIT")}
-"""Distributions whose wheels have no licence text: who has the rights, and the text that is meant."""
+"""Distributions whose wheels lack a licence text: copyright line and licence."""
 
 
 def own_text(copyright_lines: str, *licences: str) -> Texts:
-    """The text of a part that comes without: who has the rights, and the standard texts of `LICENCES`.
+    """Return a licence text from copyright lines and the standard texts in `LICENCES`.
 
-    OSError when there is no such text.
+    Raises:
+        OSError: The text of a licence is missing.
     """
     texts = [(LICENCES / f"{each}.txt").read_text("utf-8").strip("\n") for each in licences]
     return (("LICENSE.txt", "\n\n".join([copyright_lines, *texts]) + "\n"),)
 
 
 def parts_of(project: str = PROJECT, extra: str = EXTRA) -> Iterator[Part]:
-    """The project with all that it needs on this system, each once."""
+    """Yield the project and all its dependencies on this system, each once."""
     waiting, seen = [Requirement(f"{project}[{extra}]")], set[tuple[str, frozenset[str]]]()
     told = set[str]()
     while waiting:
@@ -97,7 +98,7 @@ def parts_of(project: str = PROJECT, extra: str = EXTRA) -> Iterator[Part]:
 
 
 def _licence(found: metadata.Distribution) -> str:
-    """What it says of its licence: an SPDX expression where it has one."""
+    # Prefers an SPDX expression.
     said = found.metadata.get_all("License-Expression") or found.metadata.get_all("License") or []
     classes = [
         each.rpartition(" :: ")[2]
@@ -109,7 +110,7 @@ def _licence(found: metadata.Distribution) -> str:
 
 
 def _common_text(licence: str, name: str) -> Texts:
-    """For a distribution that comes without: the text, if it is one that we have."""
+    # Standard text for a distribution without one, if available.
     if name in RIGHTS:
         return own_text(*RIGHTS[name])
     if name in QT_WHEELS or "apache" not in licence.lower():
@@ -119,7 +120,7 @@ def _common_text(licence: str, name: str) -> Texts:
 
 
 def _texts(found: metadata.Distribution) -> Iterator[tuple[str, Path]]:
-    """Its licence texts: the name of each below the folder of the distribution, and the file."""
+    # Names are relative to the distribution's folder.
     if canonicalize_name(found.metadata["Name"]) in QT_WHEELS:
         return
     for file in found.files or ():
@@ -131,7 +132,7 @@ def _texts(found: metadata.Distribution) -> Iterator[tuple[str, Path]]:
 
 
 def others(resources: Path) -> Iterator[Part]:
-    """What is inside and is no distribution of Python's."""
+    """Yield the parts that aren't Python distributions."""
     yield Part("cpython", platform.python_version(), "PSF-2.0", _texts_of_python(), "generic")
     qt = metadata.version("PySide6-Essentials")
     own = [(each.name, each) for each in sorted(LICENCES.glob("*GPL-3*"))]
@@ -150,7 +151,8 @@ def others(resources: Path) -> Iterator[Part]:
 
 
 def _texts_of_python(base: Path = Path(sys.base_prefix)) -> Texts:
-    """This Python's own text, which tells on Windows of what was added; Debian's has none: then ours."""
+    # The interpreter's own text, which on Windows includes bundled libraries; Debian has none, so ours is
+    # used.
     beside = (
         base / "LICENSE.txt",
         Path(sysconfig.get_path("stdlib", vars={"installed_base": str(base)})) / "LICENSE.txt",
@@ -159,6 +161,6 @@ def _texts_of_python(base: Path = Path(sys.base_prefix)) -> Texts:
 
 
 def editor_parts(legal: Path) -> Iterator[Part]:
-    """What is in the block editor's page, as the bundler wrote it down."""
+    """Yield the npm packages of the block editor's page, as listed by the bundler."""
     for found in EDITOR_PART.finditer(legal.read_text("utf-8")):
         yield Part(found[1], found[2], found[3], [(legal.name, legal)], "npm")

@@ -1,7 +1,7 @@
-"""What is compiled into wheels and is no distribution of Python's: libraries in C and C++, crates of Rust.
+"""Parts compiled into wheels: C and C++ libraries, and Rust crates.
 
-A wheel that brings a bill of materials of its own (PEP 770) is asked. Of the others each has a function here,
-which reads the versions out of what is installed, so that they are those of the package.
+Wheels with a bill of materials (PEP 770) are read. Others have a function in this module that reads the
+versions from the installed files.
 """
 
 from __future__ import annotations
@@ -47,13 +47,13 @@ CRATES = {
     "toml_writer": "MIT OR Apache-2.0",
     "winnow": "MIT",
 }
-"""Of the crates in iceoryx2, whose wheel has no bill of materials: its library has names and versions."""
+"""Licences of the crates in iceoryx2, whose wheel has no bill of materials; its library has the versions."""
 
 
 class Bundled(NamedTuple):
-    """What OpenCV's list calls a part: its usual name, its licence, where the version is, who has rights.
+    """Entry for a library in OpenCV's list: usual name, licence, version pattern, copyright.
 
-    Without the latter its text is in OpenCV's list of third parties, or it has the standard one.
+    Without a copyright its text is in OpenCV's list of third parties or the standard one.
     """
 
     name: str
@@ -96,7 +96,7 @@ IN_OPENCV: Mapping[str, Bundled | None] = {
         "Intel(R) Integrated Performance Primitives (Intel(R) IPP): Copyright (C) Intel Corporation",
         ("ISSL",),
     ),
-    "ippiw": None,  # sources of Intel IPP, with which it comes
+    "ippiw": None,  # part of Intel IPP
     "ipphal": None,  # OpenCV's own
     "ittnotify": Bundled(
         "ittapi",
@@ -155,11 +155,11 @@ IN_OPENCV: Mapping[str, Bundled | None] = {
     ),
     "zlib": Bundled("zlib", "Zlib", r"ZLib:\s+build \(ver ([\d.]+)\)"),
 }
-"""By the names of "3rdparty dependencies" in what OpenCV tells of its build; None is nothing of its own."""
+"""Libraries by their names under "3rdparty dependencies" in OpenCV's build information; None if internal."""
 
 
 def version_in(path: Path, pattern: bytes) -> str:
-    """The first group that a pattern finds in a file, which may be large; "" when there is none."""
+    """Return the first group of a pattern in a possibly large file, or ""."""
     if path.stat().st_size == 0:
         return ""
     with path.open("rb") as file, mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_READ) as content:
@@ -168,7 +168,11 @@ def version_in(path: Path, pattern: bytes) -> str:
 
 
 def parts_in_wheels(parts: Iterable[Part]) -> Iterator[Part]:
-    """What is compiled into the distributions among these. Raises `InventoryError` for what is not known."""
+    """Yield the parts compiled into the given distributions.
+
+    Raises:
+        InventoryError: A compiled part is unknown.
+    """
     for part in parts:
         if part.kind != "pypi":
             continue
@@ -179,7 +183,7 @@ def parts_in_wheels(parts: Iterable[Part]) -> Iterator[Part]:
 
 
 def parts_of_crates(bill: Mapping[str, Any], within: str) -> Iterator[Part]:
-    """The crates of a bill of materials as Cargo's tool writes it; what only built the wheel is left out."""
+    """Yield the crates of a bill of materials from Cargo, without build dependencies."""
     for each in bill.get("components", ()):
         if str(each.get("purl", "")).startswith("pkg:cargo/") and each.get("scope") != "excluded":
             said: Mapping[str, Any] = next(iter(each.get("licenses", ())), {})
@@ -191,7 +195,10 @@ def parts_of_crates(bill: Mapping[str, Any], within: str) -> Iterator[Part]:
 
 
 def parts_of_build(told: str, theirs: Texts) -> Iterator[Part]:
-    """What OpenCV says of its build is inside of it, with the text of its third parties for some."""
+    """Yield the libraries listed in OpenCV's build information.
+
+    ``theirs`` is its third-party licence text.
+    """
     names = _words(told, "3rdparty dependencies")
     names += [each for each in _words(told, "Extra dependencies") if each == "avif"]
     names += [name for name, line in (("flatbuffers", "Flatbuffers:  "), ("libpng", "PNG: ")) if line in told]
@@ -219,7 +226,7 @@ def _compiled(found: metadata.Distribution) -> Iterator[Path]:
 
 
 def _file(found: metadata.Distribution, name: str) -> Texts:
-    """A licence text of a distribution, the uppermost of that name. Raises `InventoryError`."""
+    # The topmost file of this name. Raises InventoryError.
     there = [file for file in found.files or () if file.name == name and ".dist-info" in file.parts[0]]
     if not there:
         raise InventoryError(f"{found.metadata['Name']} has no '{name}' any more: look for the text")
@@ -249,7 +256,7 @@ def _in_iceoryx2(found: metadata.Distribution) -> Iterator[Part]:
 
 
 def _in_numpy(found: metadata.Distribution) -> Iterator[Part]:
-    """As its licence tells: OpenBLAS, LAPACK, the run-time library of GCC's Fortran."""
+    # As listed in its licence: OpenBLAS, LAPACK, GCC's Fortran runtime.
     text = _file(found, "LICENSE.txt")
     blas = np.show_config(mode="dicts")["Build Dependencies"]["blas"]["version"]
     inside = NUMPY_PART.findall(Path(text[0][1]).read_text("utf-8"))

@@ -1,1 +1,1 @@
-"""Linux: a .deb, and a .tar.xz that unpacks and starts anywhere."""
+"""Packages for Linux: a .deb, and a .tar.xz that runs from any folder."""

@@ -1,9 +1,9 @@
-"""OpenCV without what plays films: it is linked with FFmpeg, and Studio never asks it for a film.
+"""Removal of FFmpeg from OpenCV, which is linked with it although Studio plays no video.
 
-The loader wants a file for each library that `cv2` names, with the names that it imports. So empty libraries
-take FFmpeg's place; their functions do nothing. The programs switch that part of OpenCV off when they start
-(`installers/entries`), so that nobody calls them. What only FFmpeg needed goes, too. That takes away 35 MB,
-and what FFmpeg would have to be mended for. Needs gcc and readelf.
+The loader requires a file with the imported symbols for each library that `cv2` is linked with, so FFmpeg is
+replaced by empty libraries. Their functions are never called, because the entry points disable that part of
+OpenCV (`installers/entries`). Libraries that only FFmpeg uses are removed. This saves 35 MB and FFmpeg's
+security updates. Needs gcc and readelf.
 """
 
 from __future__ import annotations
@@ -25,7 +25,11 @@ _NEEDED = re.compile(r"\(NEEDED\)\s+Shared library: \[([^\]]+)\]")
 
 
 def leave_out_films(context: Context) -> int:
-    """Put empty libraries in the place of FFmpeg's; how many bytes that took away. Raises `PackageError`."""
+    """Replace FFmpeg's libraries by empty ones; return the number of bytes saved.
+
+    Raises:
+        PackageError: A tool is missing or a step has failed.
+    """
     inside = context.frozen / "_internal"
     folder = inside / "opencv_python_headless.libs"
     missing = [tool for tool in ("gcc", "readelf") if shutil.which(tool) is None]
@@ -57,7 +61,7 @@ def _needed_by(path: Path) -> list[str]:
 
 
 def _imported_by(paths: Iterable[Path]) -> Mapping[str, set[str]]:
-    """The functions that these files import, by the version that they ask for, such as LIBAVCODEC_62."""
+    # By symbol version, such as LIBAVCODEC_62.
     found: dict[str, set[str]] = {}
     for path in paths:
         for _kind, name, version in _IMPORTED.findall(_read("--dyn-syms", path)):
@@ -66,7 +70,7 @@ def _imported_by(paths: Iterable[Path]) -> Mapping[str, set[str]]:
 
 
 def _make_empty(context: Context, path: Path, imported: Mapping[str, set[str]]) -> None:
-    """A library of the same name whose functions do nothing."""
+    # A library of the same name whose functions do nothing.
     versions = re.findall(r"Name: (LIB\w+)", _read("--version-info", path))
     wanted = {version: sorted(imported.get(version, ())) for version in dict.fromkeys(versions)}
     source, script = context.work / "empty.c", context.work / "empty.map"

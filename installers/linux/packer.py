@@ -1,8 +1,8 @@
-"""The packages for Linux: `nep-studio_VERSION_ARCH.deb` and `NEP-Studio-VERSION-linux-ARCH.tar.xz`.
+"""Packages for Linux: `nep-studio_VERSION_ARCH.deb` and `NEP-Studio-VERSION-linux-ARCH.tar.xz`.
 
-Both hold the same folder: the two programs, what they need, `share` with the desktop's files, `install.sh`
-for those who unpacked it in their home, the licences and the notice. Where `appimagetool` is, there is an
-AppImage, too.
+Both contain the same folder: the two programs and their libraries, `share` with the desktop files,
+`install.sh` for the unpacked archive, licences and notice. If `appimagetool` is installed, an AppImage is
+built, too.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ NAME = "nep-studio"
 PREFIX = Path("opt") / NAME
 ARCHITECTURES = {"x86_64": "amd64", "arm64": "arm64"}
 RECOMMENDED = ("fonts-noto-color-emoji", "xdg-desktop-portal")
-"""Without these it works, but for pictures in text and the desktop's file dialogs."""
+"""Recommended packages, for emoji and for the desktop's file dialogs."""
 DESCRIPTION = """see what robots say, and tell them what to do
  Watch the messages of robots and programs live, compose behaviours out of blocks,
  rehearse them on a virtual robot and run them on a real one.
@@ -33,11 +33,15 @@ DESCRIPTION = """see what robots say, and tell them what to do
 
 
 WITH_DEBUG_INFO = ("lz4", "msgpack", "zstandard")
-"""Packages whose wheels for Linux hold more words for debuggers than program (zstandard: 10 of 11 MB)."""
+"""Packages whose Linux wheels contain mostly debug information (zstandard: 10 of 11 MB)."""
 
 
 def build(context: Context, *, keep_frozen: bool) -> Sequence[Path]:
-    """The packages. Raises `PackageError`."""
+    """Build and return the packages.
+
+    Raises:
+        PackageError: A tool is missing or a step has failed.
+    """
     if not (keep_frozen and context.frozen.is_dir()):
         freeze(context)
         strip(context)
@@ -53,10 +57,10 @@ def build(context: Context, *, keep_frozen: bool) -> Sequence[Path]:
 
 
 def strip(context: Context) -> None:
-    """Take from Python's own libraries what only a debugger reads: two thirds of them where it was built.
+    """Remove debug information from Python's own libraries and those of `WITH_DEBUG_INFO`.
 
-    So it is with the parts of the few packages that come with it (`WITH_DEBUG_INFO`). Other libraries come
-    stripped, and some are damaged by doing it again.
+    It is up to two thirds of their size. Other libraries are stripped already, and stripping again damages
+    some of them.
     """
     tool = shutil.which("strip")
     inside = context.frozen / "_internal"
@@ -70,7 +74,7 @@ def strip(context: Context) -> None:
 
 
 def add_share(context: Context, folder: Path) -> None:
-    """What a desktop asks for: the menu entry, the file type, icons, and who installs them by hand."""
+    """Add desktop files: menu entry, file type, icons, and the script that installs them."""
     share = folder / "share"
     shutil.rmtree(share, ignore_errors=True)
     for source, target in (
@@ -93,11 +97,8 @@ def add_share(context: Context, folder: Path) -> None:
     (folder / "install.sh").chmod(0o755)
 
 
-# ---- the archive ----------------------------------------------------------------------------------
-
-
 def archive(context: Context) -> Path:
-    """The .tar.xz: sorted, with one time and owner for all, so that the same files give the same bytes."""
+    """Build the .tar.xz, reproducible by sorted names and a single time and owner."""
     made = context.dist / f"NEP-Studio-{context.version}-linux-{context.machine}.tar.xz"
     top = f"NEP-Studio-{context.version}"
     made.unlink(missing_ok=True)
@@ -109,18 +110,15 @@ def archive(context: Context) -> Path:
     return made
 
 
-# ---- the Debian package ---------------------------------------------------------------------------
-
-
 def debian_package(context: Context) -> Path:
-    """The .deb, for Debian and Ubuntu."""
+    """Build the .deb for Debian and Ubuntu."""
     if shutil.which("dpkg-deb") is None:
         raise PackageError("dpkg-deb is not on this computer; the .deb is made on Debian and Ubuntu")
     root = context.work / "deb"
     shutil.rmtree(root, ignore_errors=True)
     program = root / PREFIX
     shutil.copytree(context.frozen, program, symlinks=True)
-    for each in ("applications", "mime", "icons"):  # they are where every desktop looks
+    for each in ("applications", "mime", "icons"):  # standard folders of all desktops
         shutil.move(program / "share" / each, root / "usr" / "share" / each)
     (program / "install.sh").unlink()
     (root / "usr" / "bin").mkdir(parents=True)
@@ -141,7 +139,7 @@ def debian_package(context: Context) -> Path:
 
 
 def control_file(context: Context, root: Path, control: Path) -> str:
-    """The package's description for dpkg."""
+    """Return the control file for dpkg."""
     files = [path for path in root.rglob("*") if path.is_file() and control not in path.parents]
     size = sum(path.lstat().st_size for path in files)
     packages, optional = system_packages(root / PREFIX)
@@ -169,7 +167,7 @@ def _write_documents(context: Context, folder: Path) -> None:
 
 
 def _set_modes(root: Path) -> None:
-    """Everybody may read all, and run what is run; nobody but the administrator may write."""
+    # Readable and executable for everybody, writable only for root.
     for path in [root, *root.rglob("*")]:
         if not path.is_symlink():
             is_run = path.is_dir() or os.access(path, os.X_OK)
@@ -177,7 +175,7 @@ def _set_modes(root: Path) -> None:
 
 
 def _give_one_time(root: Path, epoch: int) -> None:
-    """Let all be of the same time: dpkg-deb takes back what is newer, and leaves what is older."""
+    # dpkg-deb clamps newer timestamps but keeps older ones.
     for path in [root, *root.rglob("*")]:
         os.utime(path, (epoch, epoch), follow_symlinks=False)
 
@@ -193,11 +191,8 @@ def _architecture(context: Context) -> str:
     return ARCHITECTURES.get(context.machine, context.machine)
 
 
-# ---- the AppImage ---------------------------------------------------------------------------------
-
-
 def app_image(context: Context, tool: str) -> Path:
-    """The AppImage, by its own tool."""
+    """Build the AppImage with its tool."""
     folder = context.work / "NEP-Studio.AppDir"
     shutil.rmtree(folder, ignore_errors=True)
     shutil.copytree(context.frozen, folder, symlinks=True)

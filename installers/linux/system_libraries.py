@@ -1,7 +1,7 @@
-"""What a frozen program asks of the system: libraries that are not in it, and the packages that have them.
+"""System libraries that a frozen program requires, and the Debian packages that contain them.
 
-A library that nobody named here stops the build: in the package it would be missing on a person's computer.
-Names are Debian's and Ubuntu's; "a|b" is one thing under two names, as releases call it.
+The build fails for an unlisted library, because it would be missing on a user's computer. Names are those of
+Debian and Ubuntu; "a|b" are the names of one package in different releases.
 """
 
 from __future__ import annotations
@@ -49,17 +49,19 @@ PACKAGES = {
     "libxcb.so.1": "libxcb1",
 }
 ALWAYS = ("xkb-data",)
-"""What no library says: the keyboards that libxkbcommon reads."""
+"""Packages that no library depends on: keyboard layouts for libxkbcommon."""
 _OF_LIBC = re.compile(r"(?:ld-linux-|lib(?:c|dl|m|pthread|resolv|rt|util)\.so\.)")
 _NEEDED = re.compile(r"\(NEEDED\)\s+Shared library: \[([^\]]+)\]")
 _GLIBC = re.compile(rb"GLIBC_(\d+)\.(\d+)\b")
 
 
 def system_packages(folder: Path) -> tuple[Sequence[str], Sequence[str]]:
-    """The packages that a frozen program needs, and those that only plug-ins of Qt's do.
+    """Return the packages that a frozen program requires, and those that only Qt plug-ins require.
 
-    Without the latter a plug-in is not loaded, and Studio works without printing or voices. Raises
-    `PackageError`.
+    Without the latter Studio runs, but can't print or speak.
+
+    Raises:
+        PackageError: A library isn't in `PACKAGES`.
     """
     inside = {path.name for path in folder.rglob("*") if path.is_file()}
     needed, optional = set[str](), set[str]()
@@ -73,7 +75,7 @@ def system_packages(folder: Path) -> tuple[Sequence[str], Sequence[str]]:
 
 
 def libc_needed(folder: Path) -> str:
-    """The newest version of the C library that a program or library in a folder asks for."""
+    """Return the newest glibc version that a binary in a folder requires."""
     versions = {
         (int(major), int(minor))
         for path in _binaries(folder)

@@ -1,1 +1,1 @@
-"""The package for macOS: an application in a disk image, signed when the owner's name is given."""
+"""Package for macOS: an application in a disk image, signed if an identity is given."""

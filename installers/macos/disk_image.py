@@ -1,4 +1,4 @@
-"""The disk image: the application, the Applications folder, and an arrow from one to the other."""
+"""Disk image with the application, the Applications folder, and an arrow between them."""
 
 from __future__ import annotations
 
@@ -18,9 +18,12 @@ _CORNER = (200, 120)
 
 
 def settings(app: Path, background: Path, icon: Path) -> dict[str, Any]:
-    """What dmgbuild is told; a picture beside ``background`` with @2x in its name is for Retina screens."""
+    """Return the settings for dmgbuild.
+
+    An image next to ``background`` with @2x in its name is used for Retina screens.
+    """
     return {
-        "format": "ULMO",  # the smallest; macOS 10.15 and later open it
+        "format": "ULMO",  # smallest format; macOS 10.15 and later open it
         "filesystem": "HFS+",
         "files": [(str(app), app.name)],
         "symlinks": {"Applications": "/Applications"},
@@ -35,7 +38,11 @@ def settings(app: Path, background: Path, icon: Path) -> dict[str, Any]:
 
 
 def dmg(target: Path, app: Path, background: Path, icon: Path) -> Path:
-    """Make the disk image with macOS' own hdiutil. Raises `PackageError`."""
+    """Create the disk image with hdiutil of macOS.
+
+    Raises:
+        PackageError: The image couldn't be created.
+    """
     if this_system() != "macos":
         raise PackageError("a .dmg can be made on a Mac only: it needs hdiutil")
     import dmgbuild  # noqa: PLC0415  asks at once which macOS this is, and fails where it is none
@@ -49,12 +56,15 @@ def dmg(target: Path, app: Path, background: Path, icon: Path) -> Path:
 
 
 def hfs_image(context: Context, target: Path, app: Path, background: Path, icon: Path) -> Path:
-    """The same window as an image of HFS+, by xorrisofs on any computer: to look into, not to give away.
+    """Create a similar HFS+ image with xorrisofs on any system, for inspection only.
 
-    It is not compressed, and the Finder does not show the background: where it is, only a Mac that has the
-    image open can write down. Raises `PackageError`.
+    It isn't compressed, and the Finder doesn't show the background, because only a Mac can store its
+    location.
+
+    Raises:
+        PackageError: The image couldn't be created.
     """
-    from ds_store import DSStore  # noqa: PLC0415  comes with dmgbuild, which only who makes packages has
+    from ds_store import DSStore  # noqa: PLC0415  comes with dmgbuild, which is installed for packaging only
 
     inside = context.work / "image"
     shutil.rmtree(inside, ignore_errors=True)

@@ -1,4 +1,4 @@
-"""What the hardened runtime of macOS must allow: as little as Studio and Qt WebEngine need."""
+"""Entitlements for the hardened runtime of macOS: the minimum for Studio and Qt WebEngine."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ __all__ = [
 ]
 
 SOURCE = "https://developer.apple.com/documentation/security/hardened-runtime"
-"""The list of all of them. It says, too, that a key which is not true is to be left out."""
+"""List of all entitlements. Keys that aren't true must be omitted."""
 _PAGES = "https://developer.apple.com/documentation/bundleresources/entitlements/"
 DOCUMENTED: Mapping[str, str] = {
     "com.apple.security.cs.allow-jit": "Allow execution of JIT-compiled code",
@@ -35,9 +35,9 @@ DOCUMENTED: Mapping[str, str] = {
     "com.apple.security.personal-information.photos-library": "Photos library",
     "com.apple.security.automation.apple-events": "Apple events",
 }
-"""The keys of the hardened runtime with their names: all that `SOURCE` lists, compared in November 2026.
+"""Names of the hardened runtime's keys: all that `SOURCE` lists, as of November 2026.
 
-The first six are its runtime exceptions, the others its access to resources; `source_of` has each one's page.
+The first six are runtime exceptions, the others resource access; `source_of` returns the page of each.
 """
 
 QT_WEB_PROCESS = frozenset(
@@ -48,46 +48,55 @@ QT_WEB_PROCESS = frozenset(
         "com.apple.security.cs.disable-library-validation",
     }
 )
-"""What Qt 6.11.3 itself ships: QtWebEngineProcess.app/Contents/Resources/QtWebEngineProcess.entitlements."""
+"""Entitlements in Qt 6.11.3: QtWebEngineProcess.app/Contents/Resources/QtWebEngineProcess.entitlements."""
 
 WEB_PROCESS: Mapping[str, str] = {
     "com.apple.security.cs.allow-jit": "V8 compiles the block editor's JavaScript",
     "com.apple.security.cs.allow-unsigned-executable-memory": "Qt's own list has it",
     "com.apple.security.cs.disable-executable-page-protection": "without it pages stay empty on Intel",
 }
-"""QtWebEngineProcess, with the reason for each: Qt's list, but for libraries of strangers.
+"""Entitlements of QtWebEngineProcess with reasons: Qt's list without library validation.
 
-All libraries in the package are signed with the same name, so none of them is a stranger.
+All libraries in the package are signed by the same identity, so they pass library validation.
 """
 
 STUDIO: Mapping[str, str] = {
     "com.apple.security.cs.allow-jit": "Qt draws web pages in Studio's own process",
     "com.apple.security.cs.allow-unsigned-executable-memory": "importing ctypes makes a callback",
 }
-"""Studio and the command `nep`.
+"""Entitlements of Studio and the command `nep`.
 
-Callbacks of ctypes and cffi are machine code that libffi writes, where it has none prepared. Not in it: DYLD
-variables, as no child process is started with any; libraries of strangers, as all are signed with one name;
-camera and microphone, as Studio uses neither: without their keys macOS refuses them unasked.
+Callbacks of ctypes and cffi are machine code that libffi generates unless it has prepared trampolines. Not
+included: DYLD variables, as no child process is started with any; library validation, as all libraries have
+the same identity; camera and microphone, as Studio uses neither: without their keys macOS denies access
+without asking.
 """
 
 
 def source_of(key: str) -> str:
-    """Where Apple says what a key of `DOCUMENTED` does. KeyError when it is none."""
+    """Return Apple's page about a key.
+
+    Raises:
+        KeyError: The key isn't in `DOCUMENTED`.
+    """
     if key not in DOCUMENTED:
         raise KeyError(key)
     return f"{_PAGES}{key}"
 
 
 def problems(entitlements: Mapping[str, object]) -> list[str]:
-    """A sentence for each entry that Apple does not document, or that is not simply true."""
+    """Return a sentence for each entry that Apple doesn't document or that isn't true."""
     found = [f"Apple documents no '{key}'" for key in entitlements if key not in DOCUMENTED]
     found += [f"'{key}' must be true or left out" for key, value in entitlements.items() if value is not True]
     return found
 
 
 def write(path: Path, allowed: Mapping[str, str]) -> Path:
-    """Write `STUDIO` or `WEB_PROCESS` as codesign reads it. ValueError for a key that Apple does not tell."""
+    """Write `STUDIO` or `WEB_PROCESS` as a file for codesign.
+
+    Raises:
+        ValueError: Apple doesn't document a key.
+    """
     content: dict[str, object] = dict.fromkeys(sorted(allowed), True)
     if wrong := problems(content):
         raise ValueError("; ".join(wrong))

@@ -1,8 +1,8 @@
-"""OpenCV without what plays films, as on Linux (`installers.linux.film_libraries`).
+"""Removal of FFmpeg from OpenCV, as on Linux (`installers.linux.film_libraries`).
 
-OpenCV's wheels bring an FFmpeg with x264 and x265, on Apple silicon also Rubber Band and vid.stab, which is
-under the GNU General Public License. Studio never asks for a film, so empty libraries take its place, and
-what only FFmpeg needed goes. The programs switch that part of OpenCV off when they start (`entries`).
+OpenCV's wheels contain an FFmpeg with x264 and x265, on Apple silicon also Rubber Band and vid.stab, which
+are under the GNU General Public License. Studio plays no video, so FFmpeg is replaced by empty libraries, and
+libraries that only FFmpeg uses are removed. The entry points disable that part of OpenCV (`entries`).
 """
 
 from __future__ import annotations
@@ -25,10 +25,11 @@ _IMPORTED = re.compile(r"\(undefined\).* external _(\w+) \(from (lib\w+)")
 
 
 def leave_out_films(context: Context, app: Path) -> int:
-    """Put empty libraries in the place of FFmpeg's; how many bytes that took away, 0 where there is none.
+    """Replace FFmpeg's libraries by empty ones; return the bytes saved, 0 if there are none.
 
-    Raises `PackageError`, also when there is no compiler: with that FFmpeg all of the package would have to
-    be under its licence.
+    Raises:
+        PackageError: A step has failed or the compiler is missing. With FFmpeg inside, the whole package
+            would have to be under its licence.
     """
     films = [path for path in compiled(app) if FILMS.match(path.name)]
     if not films:
@@ -55,7 +56,7 @@ def _needed_by(path: Path) -> set[str]:
 
 
 def _imported_by(path: Path) -> Mapping[str, set[str]]:
-    """The functions that a file imports, by the library that it wants them of."""
+    # By the library that they are imported from.
     tool = "nm" if this_system() == "macos" else "llvm-nm"
     try:
         told = subprocess.run([tool, "-m", "-u", path], capture_output=True, text=True, check=True).stdout
@@ -68,12 +69,12 @@ def _imported_by(path: Path) -> Mapping[str, set[str]]:
 
 
 def _make_empty(context: Context, path: Path, names: set[str]) -> None:
-    """A library of the same name whose functions do nothing."""
+    # A library of the same name whose functions do nothing.
     source = context.work / "empty.c"
     source.parent.mkdir(parents=True, exist_ok=True)
     source.write_text("".join(f"long {name}(void) {{ return 0; }}\n" for name in sorted(names)), "utf-8")
     machine = context.machine
-    # Elsewhere, to try it: LLVM's linker, and no system library, which only a Mac has.
+    # For tests on other systems: LLVM's linker, without the system library that only a Mac has.
     elsewhere = () if this_system() == "macos" else ("-fuse-ld=lld", "-mlinker-version=705", "-nostdlib")
     context.run(
         "clang", f"--target={machine}-apple-macos{OLDEST_MACOS[machine]}", "-dynamiclib", "-O1",

@@ -1,4 +1,4 @@
-"""What the application tells macOS about itself: Info.plist, and its sentences in each language."""
+"""Info.plist of the application and its localised texts."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ __all__ = [
 BUNDLE_ID = "org.nep.studio"
 PROGRAM = "nep-studio"
 OLDEST_MACOS: Mapping[str, str] = {"arm64": "13.0", "x86_64": "13.0"}
-"""The oldest macOS by processor: that for which Qt 6.11 is made, and OpenCV (for Intel 4.12, no newer)."""
+"""Oldest macOS by processor, as required by Qt 6.11 and OpenCV (4.12 for Intel, no newer)."""
 APP_ICON, DOCUMENT_ICON = "nep-studio.icns", "behaviour.icns"
 LANGUAGES = ("en", "es")
 
@@ -63,11 +63,11 @@ _WORDS: Mapping[str, tuple[str, str]] = {
     _BEHAVIOUR_WORDS: (_BEHAVIOUR_WORDS, "Comportamiento de robot"),
     _RECORDING_WORDS: (_RECORDING_WORDS, "Grabación de mensajes"),
 }
-"""What a person reads, in the order of `LANGUAGES`. Types of documents are found by their English words.
+"""Texts shown by macOS in the order of `LANGUAGES`. Document types are keyed by their English names.
 
-Studio itself uses no camera and no microphone. Its libraries could, and a program that asks without having
-such a sentence is ended by macOS. With it, and without the entitlement, it is refused unasked. Nothing here
-sends Apple events, so there is no sentence for them.
+Studio uses neither camera nor microphone. Its libraries could, and macOS ends a program that requests access
+without such a text. With the text but without the entitlement, access is denied silently. Studio sends no
+Apple events, so there is no text for them.
 """
 
 _OF_TYPES = frozenset(
@@ -88,7 +88,7 @@ DOCUMENTED = frozenset(
         "UTExportedTypeDeclarations", "UTImportedTypeDeclarations",
     }
 )  # fmt: skip
-"""The keys of Info.plist that we use, as Apple writes them (`source_of`, November 2026)."""
+"""Documented keys of Info.plist that are used (`source_of`, as of November 2026)."""
 _DOCUMENTED_WITHIN: Mapping[str, frozenset[str]] = {
     "CFBundleDocumentTypes": frozenset(
         {
@@ -103,7 +103,7 @@ _PAGES = "https://developer.apple.com/documentation/bundleresources/information-
 
 
 def apple_version(version: str) -> str:
-    """The version in up to three numbers, as macOS wants it: "0.2.0" of "0.2.0rc1"."""
+    """Return a version as up to three numbers, as macOS requires: "0.2.0" for "0.2.0rc1"."""
     found = re.match(r"\d+(?:\.\d+){0,2}", version)
     if found is None:
         raise ValueError(f"no version '{version}'")
@@ -111,9 +111,10 @@ def apple_version(version: str) -> str:
 
 
 def source_of(key: str, within: str = "") -> str:
-    """Where Apple says what a key of Info.plist, or one of the dictionaries `within` it, means.
+    """Return Apple's page about a key of Info.plist or of the dictionary `within` it.
 
-    KeyError when it is none that we know to be documented.
+    Raises:
+        KeyError: The key isn't in `DOCUMENTED`.
     """
     if key not in (_DOCUMENTED_WITHIN[within] if within else DOCUMENTED):
         raise KeyError(key)
@@ -121,19 +122,22 @@ def source_of(key: str, within: str = "") -> str:
 
 
 def sentences(language: str) -> dict[str, str]:
-    """The words of one of `LANGUAGES`, by their keys in InfoPlist.strings."""
+    """Return the texts in one of `LANGUAGES` by their keys in InfoPlist.strings."""
     place = LANGUAGES.index(language)
     return {key: words[place] for key, words in _WORDS.items()}
 
 
 def information(version: str, machine: str) -> dict[str, Any]:
-    """The content of Info.plist of the application for a processor; KeyError when there is none for it.
+    """Return the content of Info.plist for a processor.
 
-    A type of ours is exported, one that others own imported; either conforms in the end to `public.data`:
+    Studio's own type is exported, foreign types are imported; both conform to `public.data`:
     https://developer.apple.com/documentation/uniformtypeidentifiers/defining-file-and-data-types-for-your-app
     (`public.json` does: https://developer.apple.com/documentation/uniformtypeidentifiers/uttypejson).
-    Recordings of messages (.mcap) are a type that is known, so that the Finder has a name for them; nobody
-    has published an identifier for it. Studio opens none yet, so they are not among the documents it opens.
+    Recordings (.mcap) are declared so that the Finder shows a name for them; the type has no official
+    identifier. They aren't among the documents that Studio opens.
+
+    Raises:
+        KeyError: The processor isn't supported.
     """
     return {
         "CFBundleName": "NEP Studio",
@@ -148,7 +152,7 @@ def information(version: str, machine: str) -> dict[str, Any]:
         "CFBundleDevelopmentRegion": LANGUAGES[0],
         "CFBundleLocalizations": list(LANGUAGES),
         "LSApplicationCategoryType": "public.app-category.education",
-        # PyInstaller hides an application beside which there is a program for terminals.
+        # PyInstaller sets it for an application that also contains a console program.
         "LSBackgroundOnly": False,
         "LSMinimumSystemVersion": OLDEST_MACOS[machine],
         "NSHighResolutionCapable": True,
@@ -194,7 +198,7 @@ def write_information(path: Path, version: str, machine: str) -> Path:
 
 
 def write_sentences(resources: Path) -> None:
-    """Write an InfoPlist.strings of each language into the application's Resources."""
+    """Write InfoPlist.strings for each language into the application's Resources."""
     for language in LANGUAGES:
         folder = resources / f"{language}.lproj"
         folder.mkdir(parents=True, exist_ok=True)

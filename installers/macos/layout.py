@@ -1,4 +1,4 @@
-"""Whether an application's folder is as macOS, codesign and Apple's notaries want it."""
+"""Checks of an application bundle by the rules of macOS, codesign and notarisation."""
 
 from __future__ import annotations
 
@@ -23,17 +23,17 @@ _WEB_FILES = ("icudtl.dat", "qtwebengine_resources.pak", "qtwebengine_locales/en
 
 
 def is_bundle(path: Path) -> bool:
-    """Whether a folder is signed as one thing."""
+    """Return whether a folder is a bundle, which is signed as a unit."""
     return path.suffix in BUNDLES and path.is_dir() and not path.is_symlink()
 
 
 def compiled(folder: Path) -> Iterator[Path]:
-    """Every file of compiled code below a folder, in order; links are not followed."""
+    """Yield all binaries below a folder in sorted order, without following links."""
     return (path for path in _files(folder) if not path.is_symlink() and read(path))
 
 
 def check(app: Path, version: str, machine: str) -> list[str]:
-    """A sentence for everything that is wrong; none when nothing is. Raises OSError."""
+    """Return a sentence for each problem of the bundle; raises OSError."""
     contents = app / "Contents"
     found = [f"{name} is beside Contents" for name in _names(app) if name != "Contents"]
     found += [f"{name} has no place in Contents" for name in _names(contents) if name not in _IN_CONTENTS]
@@ -53,10 +53,10 @@ def check(app: Path, version: str, machine: str) -> list[str]:
 
 
 def made_for_newer(app: Path, machine: str) -> dict[Path, str]:
-    """What says that it was made for a newer macOS than the application wants, and for which.
+    """Return binaries built for a newer macOS than the application requires, with that version.
 
-    A library that says so is loaded all the same, and fails only when it uses something that is not there
-    yet: whether it does is to be tried on the oldest macOS.
+    They are loaded nevertheless and fail only when they use a missing function, so they must be tested on the
+    oldest macOS.
     """
     oldest = tuple(int(each) for each in OLDEST_MACOS[machine].split("."))
     wanted = {
@@ -129,7 +129,7 @@ def _check_links(app: Path) -> Iterator[str]:
 
 
 def _check_places(contents: Path) -> Iterator[str]:
-    """Code belongs into MacOS and Frameworks, and nothing else into them; folders there have no dots."""
+    # Only code belongs into MacOS and Frameworks, whose subfolders must have no dots.
     app = contents.parent
     for path in compiled(contents / "Resources"):
         yield f"{_of(path, app)} is code among the resources, which codesign does not sign"
@@ -146,7 +146,7 @@ def _check_places(contents: Path) -> Iterator[str]:
 
 
 def _check_linked(contents: Path) -> Iterator[str]:
-    """Every library that something is linked with is in the application, or is one of macOS."""
+    # Linked libraries must be in the application or part of macOS.
     there = {path.name for path in _files(contents)}
     for path in compiled(contents):
         for name in dict.fromkeys(name for each in read(path) for name in each.needs):
@@ -173,7 +173,7 @@ def _check_framework(framework: Path, app: Path) -> Iterator[str]:
 
 
 def _check_web(contents: Path) -> Iterator[str]:
-    """What the block editor's browser needs where Qt looks for it."""
+    # Files of Qt WebEngine in the places where Qt expects them.
     found = [path for path in contents.rglob("QtWebEngineCore.framework") if is_bundle(path)]
     if len(found) != 1:
         yield f"there are {len(found)} QtWebEngineCore.framework, not 1"

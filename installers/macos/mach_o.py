@@ -1,4 +1,4 @@
-"""What a compiled file of macOS is: for which processors, since which macOS, and what it is linked with."""
+"""Reader for Mach-O files: processors, minimum macOS and linked libraries."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ _THIN = {0xFEEDFACF: ">", 0xCFFAEDFE: "<", 0xFEEDFACE: ">", 0xCEFAEDFE: "<"}
 _WIDE = {0xFEEDFACF, 0xCFFAEDFE}
 _FAT, _FAT_64 = 0xCAFEBABE, 0xCAFEBABF
 _MOST_SLICES = 8
-"""A Java class begins with the same four bytes as a fat file, and its version follows: 45 and more."""
+"""Java classes have the same magic number as fat files, followed by their version: 45 or more."""
 _MACHINES = {0x01000007: "x86_64", 0x0100000C: "arm64"}
 _PROGRAM = 2
 _VERSION_MIN_MACOS, _BUILD_VERSION = 0x24, 0x32
@@ -23,24 +23,24 @@ _LOAD, _REEXPORT = 0xC, 0x8000001F
 
 @dataclass(frozen=True)
 class Slice:
-    """The code for one processor."""
+    """Code for one processor."""
 
     machine: str
-    """ "arm64" or "x86_64"; another one's number."""
+    """"arm64", "x86_64", or the number of another type."""
     is_program: bool
-    """Whether it can be started; else it is a library or a plug-in."""
+    """True for an executable, False for a library or plug-in."""
     oldest_macos: tuple[int, int] | None
-    """The macOS for which it was made; None when it does not say."""
+    """Minimum macOS version, or None if unspecified."""
     needs: tuple[str, ...] = ()
-    """The libraries without which it is not loaded, as it names them: "@rpath/libzmq.5.dylib"."""
+    """Linked libraries by install name, such as "@rpath/libzmq.5.dylib"."""
 
 
 def read(path: Path) -> tuple[Slice, ...]:
-    """The slices of a file; () when it is no compiled code of macOS. Raises OSError."""
+    """Return the slices of a file; empty if it isn't Mach-O. Raises OSError."""
     with path.open("rb") as file:
         try:
             return tuple(_slices(file))
-        except struct.error:  # ends in the middle of a header
+        except struct.error:  # truncated header
             return ()
 
 

@@ -1,4 +1,4 @@
-"""The package for macOS: `NEP-Studio-VERSION-macos-ARCH.dmg`, with the application in it."""
+"""Package for macOS: `NEP-Studio-VERSION-macos-ARCH.dmg` with the application."""
 
 from __future__ import annotations
 
@@ -19,18 +19,19 @@ __all__ = ["application", "build", "finish", "pack", "prepare"]
 _BACKGROUND = "background.png"
 
 MakeImage = Callable[[Path, Path, Path, Path], Path]
-"""Makes the first file of the application, a background and an icon."""
+"""Creates the image (first argument) from an application, a background and an icon."""
 
 
 def application(context: Context) -> Path:
-    """Where PyInstaller puts the application."""
+    """Return the application bundle created by PyInstaller."""
     return context.frozen.with_name(f"{APP}.app")
 
 
 def prepare(context: Context) -> Mapping[str, str]:
-    """Make what is needed before freezing; the variables that the specification of PyInstaller reads.
+    """Create the files needed for freezing; return the variables for the PyInstaller specification.
 
-    Raises `PackageError`.
+    Raises:
+        PackageError: A step has failed.
     """
     pictures = _pictures(context)
     pictures.mkdir(parents=True, exist_ok=True)
@@ -43,9 +44,10 @@ def prepare(context: Context) -> Mapping[str, str]:
 
 
 def build(context: Context, *, keep_frozen: bool) -> Sequence[Path]:
-    """The disk image, signed and notarised as far as names are given, and the bill of materials.
+    """Build the disk image and the bill of materials, signed and notarised as configured.
 
-    Raises `PackageError`, also where this is no Mac.
+    Raises:
+        PackageError: A step has failed, or this isn't a Mac.
     """
     if this_system() != "macos":
         raise PackageError(
@@ -58,8 +60,8 @@ def build(context: Context, *, keep_frozen: bool) -> Sequence[Path]:
 def pack(
     context: Context, identity: signing.Identity, make_image: MakeImage, *, keep_frozen: bool
 ) -> Sequence[Path]:
-    """`build` with somebody who signs and a way to make the disk image. Raises `PackageError`."""
-    os.environ.update(prepare(context))  # the specification reads them
+    """Implement `build` with a given identity and function to create the image; raises `PackageError`."""
+    os.environ.update(prepare(context))  # read by the specification
     app = application(context)
     if not (keep_frozen and app.is_dir()):
         freeze(context)
@@ -78,9 +80,12 @@ def pack(
 
 
 def finish(context: Context, app: Path, identity: signing.Identity) -> None:
-    """Complete a frozen application, look whether it is as it should be, sign it, and have it notarised.
+    """Complete a frozen application, check it, sign it, and have it notarised.
 
-    What is left out for want of a name is said in one line. Raises `PackageError`.
+    Steps that need a missing identity are skipped with a printed line.
+
+    Raises:
+        PackageError: A step has failed.
     """
     if not app.is_dir():
         raise PackageError(f"the frozen application is not in '{app}'")

@@ -1,4 +1,4 @@
-"""The pictures of the package, from Studio's own logo: the icons, and the ground of the disk image's window.
+"""Images of the package made from Studio's logo: icons and the disk image's background.
 
 QT_QPA_PLATFORM=offscreen python -m installers.macos.pictures FOLDER
 """
@@ -28,27 +28,27 @@ SIDES: Mapping[bytes, int] = {
     b"ic04": 16, b"ic11": 32, b"ic05": 32, b"ic12": 64, b"ic07": 128, b"ic13": 256,
     b"ic08": 256, b"ic14": 512, b"ic09": 512, b"ic10": 1024,
 }  # fmt: skip
-"""The kinds of an icon and their pixels: 16, 32, 128, 256 and 512 points, each also for Retina screens."""
+"""Icon types with sizes in pixels: 16, 32, 128, 256 and 512 points, each also at Retina resolution."""
 _RAW = frozenset({b"ic04", b"ic05"})
-"""Kinds that are no PNG but four channels, one after the other, as Apple's iconutil writes them."""
+"""Types that contain four channels in sequence instead of PNG, as written by Apple's iconutil."""
 _LONGEST_RUN = 128
 
 Paint = Callable[[QPainter, float, Theme], None]
 
 
 def paint_app(painter: QPainter, side: float, theme: Theme) -> None:
-    """The logo with the margin that Apple's icons have: 824 of 1024 pixels are the shape."""
+    """Paint the logo with the margin of Apple's icons, whose shape has 824 of 1024 pixels."""
     margin = round(side * 100 / 1024)
     paint_logo(painter, QRectF(margin, margin, side - 2 * margin, side - 2 * margin), theme)
 
 
 def paint_document(painter: QPainter, side: float, theme: Theme) -> None:
-    """The sheet of paper of all systems."""
+    """Paint the document icon used on all systems."""
     paint_behaviour(painter, QRectF(0, 0, side, side), theme)
 
 
 def paint_background(painter: QPainter, scale: float, theme: Theme) -> None:
-    """A light ground with an arrow from the application to the folder; words would be in one language."""
+    """Paint a light background with an arrow from the application to the folder, without text."""
     painter.scale(scale, scale)
     painter.fillRect(QRectF(0, 0, *WINDOW), QColor("#f4f5f7"))
     room = ICON_SIDE / 2 + 26
@@ -75,8 +75,8 @@ def _painted(wide: int, high: int, paint: Paint, size: float, theme: Theme) -> Q
 
 
 def _argb(image: QImage) -> bytes:
-    """All pixels' opacity, then all red, green and blue, in runs that each say one less than their length."""
-    converted = image.convertToFormat(QImage.Format.Format_RGBA8888)  # it must live as long as its bits
+    # Channels alpha, red, green, blue in runs, each preceded by its length minus one.
+    converted = image.convertToFormat(QImage.Format.Format_RGBA8888)  # must outlive its bits
     pixels = bytes(converted.constBits())
     made = bytearray(b"ARGB")
     for channel in (pixels[3::4], pixels[0::4], pixels[1::4], pixels[2::4]):
@@ -90,14 +90,14 @@ def _argb(image: QImage) -> bytes:
 def _png(image: QImage) -> bytes:
     buffer = QBuffer()
     buffer.open(QIODevice.OpenModeFlag.WriteOnly)
-    # PySide knows the type of a picture as bytes, its stubs as text.
+    # The stubs of PySide require str, the method itself bytes.
     if not image.save(buffer, "PNG"):  # type: ignore[call-overload]
         raise OSError("Qt can write no PNG")
     return bytes(buffer.data().data())
 
 
 def icns(paint: Paint, theme: Theme) -> bytes:
-    """An icon of all `SIDES`, as files ending in .icns have it."""
+    """Return an .icns file with all `SIDES`."""
     pieces = []
     for kind, side in SIDES.items():
         image = _painted(side, side, paint, side, theme)
@@ -108,7 +108,7 @@ def icns(paint: Paint, theme: Theme) -> bytes:
 
 
 def write_pictures(folder: Path) -> None:
-    """Write both icons and the background, for plain screens and (@2x) for Retina screens."""
+    """Write both icons and the background, the latter also at Retina resolution (@2x)."""
     folder.mkdir(parents=True, exist_ok=True)
     theme = Theme("light")
     (folder / APP_ICON).write_bytes(icns(paint_app, theme))

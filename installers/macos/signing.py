@@ -1,10 +1,10 @@
-"""Signing and notarising, with the names that the owner gives; without them the package is for trying only.
+"""Signing and notarising with the owner's identity; without one the package is for tests only.
 
-NEP_MACOS_IDENTITY         the certificate: "Developer ID Application: Ana Pérez (ABCDE12345)"
-NEP_MACOS_NOTARY_PROFILE   what `xcrun notarytool store-credentials` has stored; or these three:
-NEP_MACOS_NOTARY_KEY       the file of an App Store Connect key (.p8)
-NEP_MACOS_NOTARY_KEY_ID    its id
-NEP_MACOS_NOTARY_ISSUER    the id of who issued it
+NEP_MACOS_IDENTITY        the certificate: "Developer ID Application: Ana Pérez (ABCDE12345)"
+NEP_MACOS_NOTARY_PROFILE  a profile stored by `xcrun notarytool store-credentials`; or these three:
+NEP_MACOS_NOTARY_KEY      the file of an App Store Connect key (.p8)
+NEP_MACOS_NOTARY_KEY_ID   its id
+NEP_MACOS_NOTARY_ISSUER   the id of its issuer
 """
 
 from __future__ import annotations
@@ -36,36 +36,40 @@ __all__ = [
 ]
 
 AD_HOC = "-"
-"""codesign's name for no name: what Apple silicon needs to start a program at all."""
+"""Ad hoc identity of codesign: the minimum for a program to start on Apple silicon."""
 _AT_ONCE = 50
 _KEY_PARTS = ("NEP_MACOS_NOTARY_KEY", "NEP_MACOS_NOTARY_KEY_ID", "NEP_MACOS_NOTARY_ISSUER")
 
 
 @dataclass(frozen=True)
 class Identity:
-    """Who signs, and how Apple's notaries are asked."""
+    """Signing identity and credentials for notarisation."""
 
     name: str
     notary: tuple[str, ...] = ()
-    """The arguments of notarytool; () when it is not to be notarised."""
+    """Arguments of notarytool; () to skip notarisation."""
 
     @property
     def is_known(self) -> bool:
-        """Whether Apple knows who signs."""
+        """True for an identity known to Apple."""
         return self.name != AD_HOC
 
 
 @dataclass(frozen=True)
 class Piece:
-    """What gets a signature of its own."""
+    """A file or bundle with a signature of its own."""
 
     path: Path
     allowed: str = ""
-    """ "studio" or "web": which entitlements it gets; "" for none."""
+    """Entitlements: "studio", "web", or "" for none."""
 
 
 def identity_of(environ: Mapping[str, str]) -> Identity:
-    """Who signs, by the variables above. Raises `PackageError` when only a part of them is given."""
+    """Return the identity from the variables above.
+
+    Raises:
+        PackageError: Only some of them are set.
+    """
     name, profile = environ.get("NEP_MACOS_IDENTITY", ""), environ.get("NEP_MACOS_NOTARY_PROFILE", "")
     given = [part for part in _KEY_PARTS if environ.get(part)]
     if given and len(given) < len(_KEY_PARTS):
@@ -84,7 +88,7 @@ def identity_of(environ: Mapping[str, str]) -> Identity:
 
 
 def pieces(app: Path) -> list[Piece]:
-    """Everything that is to be signed, from the inside out: what is in a bundle before the bundle."""
+    """Return everything to be signed, contents of bundles before the bundles."""
     programs = {app / "Contents" / "MacOS"}
     bundles = [path for path in sorted(app.rglob("*")) if is_bundle(path)]
     mains = {_main(bundle) for bundle in (app, *bundles)}
@@ -99,7 +103,11 @@ def pieces(app: Path) -> list[Piece]:
 
 
 def sign(context: Context, app: Path, identity: Identity) -> None:
-    """Sign the application and everything in it anew. Raises `PackageError`."""
+    """Sign the application and everything in it, replacing signatures.
+
+    Raises:
+        PackageError: codesign has failed.
+    """
     context.work.mkdir(parents=True, exist_ok=True)
     allowed = {
         "studio": entitlements.write(context.work / "studio.entitlements", entitlements.STUDIO),
@@ -113,15 +121,16 @@ def sign(context: Context, app: Path, identity: Identity) -> None:
 
 
 def sign_image(context: Context, image: Path, identity: Identity) -> None:
-    """Sign a disk image; one that nobody known signs stays as it is. Raises `PackageError`."""
+    """Sign a disk image, unless the identity is ad hoc; raises `PackageError`."""
     if identity.is_known:
         context.run("codesign", "--force", "--sign", identity.name, "--timestamp", image)
 
 
 def notarise(context: Context, path: Path, identity: Identity) -> None:
-    """Let Apple's notaries see an application or a disk image, and staple their answer to it.
+    """Have Apple notarise an application or disk image and staple the ticket to it. Takes minutes.
 
-    It takes some minutes. Raises `PackageError` with what they found when they refuse.
+    Raises:
+        PackageError: Notarisation was rejected; the text contains Apple's findings.
     """
     sent = path
     if path.suffix == ".app":
@@ -141,19 +150,19 @@ def notarise(context: Context, path: Path, identity: Identity) -> None:
 
 
 def verify(context: Context, app: Path) -> None:
-    """Look whether every signature of an application holds. Raises `PackageError`."""
+    """Verify all signatures of an application; raises `PackageError`."""
     context.run("codesign", "--verify", "--deep", "--strict", "--verbose=2", app)
 
 
 def assess(context: Context, path: Path) -> None:
-    """Look whether Gatekeeper lets people open what is notarised. Raises `PackageError`."""
+    """Check that Gatekeeper accepts a notarised file; raises `PackageError`."""
     how = ("execute",) if path.suffix == ".app" else ("open", "--context", "context:primary-signature")
     context.run("spctl", "--assess", "--type", *how, "--verbose=2", path)
 
 
 def _how(identity: Identity) -> Iterator[str]:
     yield from ("--force", "--sign", identity.name)
-    # The hardened runtime loads no library without a known name, so what nobody signs must do without.
+    # The hardened runtime's library validation rejects ad hoc signatures.
     yield from ("--options", "runtime", "--timestamp") if identity.is_known else ("--timestamp=none",)
 
 
@@ -174,7 +183,7 @@ def _is_program(path: Path) -> bool:
 
 
 def _main(bundle: Path) -> Path:
-    """The program or library whose signature is that of its bundle."""
+    # The executable or library whose signature is that of the bundle.
     if bundle.suffix == ".framework":
         return _signed(bundle) / bundle.stem
     try:
@@ -185,6 +194,6 @@ def _main(bundle: Path) -> Path:
 
 
 def _signed(bundle: Path) -> Path:
-    """What codesign is given: of a framework its version."""
+    # codesign expects the version folder of a framework.
     versions = bundle / "Versions"
     return versions / (versions / "Current").readlink() if bundle.suffix == ".framework" else bundle

@@ -1,1 +1,1 @@
-"""The packages for Windows: the setup program and the portable zip, on Windows or through Wine."""
+"""Packages for Windows: installer and portable zip, built on Windows or with Wine."""

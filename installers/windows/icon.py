@@ -1,4 +1,4 @@
-"""The icons of Studio's programs and files, as Windows wants them: one file with all sizes."""
+"""Windows icons of Studio's programs and documents: a file with all sizes."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ SIDES = (16, 24, 32, 48, 64, 128, 256)
 
 
 def ico(pictures: dict[int, bytes]) -> bytes:
-    """An .ico file of square PNG pictures, by their sides in pixels (at most 256)."""
+    """Return an .ico file from square PNG images by their size in pixels (at most 256)."""
     head = struct.pack("<HHH", 0, 1, len(pictures))
     at = len(head) + 16 * len(pictures)
     entries = b""
@@ -22,6 +22,6 @@ def ico(pictures: dict[int, bytes]) -> bytes:
 
 
 def write_icon(painted: Path, name: str, target: Path) -> Path:
-    """Put the painted pictures of that name (`installers.icons_of`) into one file; the file."""
+    """Combine the painted images of a name (`installers.icons_of`) into an .ico file and return it."""
     target.write_bytes(ico({side: (painted / f"{name}-{side}.png").read_bytes() for side in SIDES}))
     return target

@@ -1,4 +1,4 @@
-"""The setup program, made by NSIS from setup/nep-studio.nsi and what is written here for it."""
+"""Installer built by NSIS from setup/nep-studio.nsi and generated macros."""
 
 from __future__ import annotations
 
@@ -18,27 +18,26 @@ HERE = Path(__file__).resolve().parent
 SOURCES = HERE / "setup"
 REG_FILE = HERE / "nep-studio.reg"
 REG_FOLDER = r"C:\Program Files\NEP Studio"
-"""What stands in the .reg file for the folder that Studio is installed in."""
+"""Placeholder for the installation folder in the .reg file."""
 CLASSES = "Software\\Classes\\"
 PROGRAMS = ("nep-studio.exe", "nep.exe")
 UNINSTALLER = "uninstall.exe"
 BEHAVIOUR_ICON = "nep-behaviour.ico"
-"""What Windows shows for a .nepb file; the .reg file names it, too."""
+"""Icon of .nepb files, also named in the .reg file."""
 ROOM_MB = 100
-"""What must be free beside the new files: the settings, and a computer that goes on working."""
+"""Free space required in addition to the files, for settings and normal operation."""
 
 
 def quoted(text: str | PurePath, folder: str = "") -> str:
-    """Text as NSIS reads it in double quotes; in ``folder``, a variable of NSIS, when one is given."""
+    """Quote text for NSIS, optionally as a path in ``folder``, an NSIS variable."""
     escaped = str(text).replace("$", "$$").replace('"', '$\\"')
     return f'"{folder}\\{escaped}"' if folder else f'"{escaped}"'
 
 
 def entries(frozen: Path) -> str:
-    """The macros about what is in the frozen program: its files, and what of it is in its folder itself.
+    """Return the macros with the files of the frozen program and the entries of its folder.
 
-    Each file is named, in order: a folder's own order differs from computer to computer, and like beside like
-    packs better.
+    Files are sorted for reproducibility, and by type because similar files compress better.
     """
     unpack: list[str] = []
     folder = frozen
@@ -46,7 +45,7 @@ def entries(frozen: Path) -> str:
         if path.parent != folder:
             folder = path.parent
             unpack.append(f"SetOutPath {quoted(PureWindowsPath(folder.relative_to(frozen)), '$NewFolder')}")
-        unpack.append(f'File "{path}"')  # a name on this computer: NSIS looks for no variables in it
+        unpack.append(f'File "{path}"')  # a path of this computer, in which NSIS expands no variables
     names = [*sorted(path.name for path in frozen.iterdir()), UNINSTALLER]
     return (
         _macro("UnpackEntries", unpack)
@@ -64,9 +63,10 @@ def _files(frozen: Path) -> Iterator[Path]:
 
 
 def association(reg_file: str) -> str:
-    """The macros that tell Windows who opens .nepb, and take it back, from the text of a .reg file.
+    """Return the macros that register and unregister the .nepb file type, from the text of a .reg file.
 
-    Keys of a suffix may hold what others have written, too: of them goes what is ours; our own go whole.
+    Keys of a suffix may contain values of other programs, so only Studio's values are removed; its own keys
+    are removed completely.
     """
     values = list(_values(reg_file))
     put = [f"WriteRegStr HKCU {quoted(key)} {quoted(name)} {text}" for key, name, text in values]
@@ -79,12 +79,12 @@ def association(reg_file: str) -> str:
                 f"  DeleteRegValue HKCU {quoted(key)} {quoted(name)}",
                 "${EndIf}",
             ]
-    for key in sorted({key for key, _name, _text in values}, reverse=True):  # what is inside goes first
+    for key in sorted({key for key, _name, _text in values}, reverse=True):  # subkeys first
         if _root(key).startswith("."):
             take += [
                 "ClearErrors",
                 f"EnumRegValue $0 HKCU {quoted(key)} 0",
-                "${If} ${Errors}",  # no value, not even one without a name
+                "${If} ${Errors}",  # no values, not even the default value
                 f"  DeleteRegKey /ifempty HKCU {quoted(key)}",
                 "${EndIf}",
             ]
@@ -94,12 +94,12 @@ def association(reg_file: str) -> str:
 
 
 def _root(key: str) -> str:
-    """The suffix or the kind of file that a key is about."""
+    # The suffix or file type that a key belongs to.
     return key.removeprefix(CLASSES).partition("\\")[0]
 
 
 def _values(reg_file: str) -> Iterator[tuple[str, str, str]]:
-    """Key, name and text (as NSIS reads it) of each value; the key without its hive."""
+    # Key without its hive, name, and text in NSIS syntax.
     key = ""
     for line in reg_file.splitlines():
         if line.startswith("["):
@@ -111,7 +111,11 @@ def _values(reg_file: str) -> Iterator[tuple[str, str, str]]:
 
 
 def make_setup(context: Context, icon: Path, picture: Path) -> Path:
-    """Make the setup program of the frozen Studio, and say where it is. Raises `PackageError`."""
+    """Build the installer of the frozen Studio and return it.
+
+    Raises:
+        PackageError: NSIS is missing or has failed.
+    """
     folder = context.work / "setup"
     shutil.rmtree(folder, ignore_errors=True)
     folder.mkdir(parents=True)
@@ -119,7 +123,7 @@ def make_setup(context: Context, icon: Path, picture: Path) -> Path:
     (folder / "association.nsh").write_text(association(REG_FILE.read_text("utf-8")), "utf-8")
     target = context.dist / f"NEP-Studio-{context.version}-setup.exe"
     target.parent.mkdir(exist_ok=True)
-    for path in (icon, picture):  # the setup keeps their times, too
+    for path in (icon, picture):  # the installer preserves their timestamps
         os.utime(path, (context.epoch, context.epoch))
     size_kb = sum(path.stat().st_size for path in _files(context.frozen)) // 1024
     given = {
@@ -146,7 +150,7 @@ def make_setup(context: Context, icon: Path, picture: Path) -> Path:
 
 
 def _makensis() -> Path:
-    """The program of NSIS. Raises `PackageError` when it is not there."""
+    # Raises PackageError if NSIS is missing.
     usual = Path(os.environ.get("PROGRAMFILES(X86)", "C:/Program Files (x86)")) / "NSIS" / "makensis.exe"
     found = shutil.which("makensis") or (str(usual) if usual.is_file() else None)
     if found is None:
@@ -158,10 +162,7 @@ def _makensis() -> Path:
 
 
 def _target(makensis: Path) -> str:
-    """What the setup program itself is: of 64 bit where NSIS can (Debian's), else of 32 bit, which will do.
-
-    Wine without its part for 32 bit starts only the former.
-    """
+    # 64 bit where NSIS supports it (Debian's), otherwise 32 bit, which Wine may be unable to run.
     stubs = (makensis.parent / "Stubs", Path("/usr/share/nsis/Stubs"))
     can = any((folder / "lzma_solid-amd64-unicode").is_file() for folder in stubs)
     return "Target amd64-unicode" if can else "Unicode true"

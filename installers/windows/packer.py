@@ -1,6 +1,6 @@
-"""The packages for Windows: `NEP-Studio-VERSION-setup.exe` and a zip that runs where it is unpacked.
+"""Packages for Windows: `NEP-Studio-VERSION-setup.exe` and a portable zip.
 
-On Windows with its own Python; on Linux with a Windows Python under Wine.
+On Windows they are built with its own Python, on Linux with a Windows Python in Wine.
 """
 
 from __future__ import annotations
@@ -24,18 +24,22 @@ __all__ = ["build", "make_zip", "refuse_files_of_wine"]
 
 OF_WINE = (b"Wine builtin DLL", b"Wine placeholder DLL")
 EARLIEST = 315_532_800
-"""1980: no entry of a zip can be older."""
+"""1980, the earliest timestamp of zip entries."""
 
 
 def build(context: Context, *, keep_frozen: bool) -> Sequence[Path]:
-    """The setup program, the zip, and the bill of materials. Raises `PackageError`."""
+    """Build the installer, the zip and the bill of materials.
+
+    Raises:
+        PackageError: A step has failed.
+    """
     host = replace(context, python=(sys.executable,))
     painted = paint_icons(host)
     icon = write_icon(painted, "nep-studio", context.work / "nep-studio.ico")
     picture = context.work / "page.bmp"
     host.run(sys.executable, context.root / "installers" / "windows" / "page_picture.py", picture)
     if sys.platform != "win32":
-        from installers.windows.wine import windows_python  # noqa: PLC0415  Windows needs none of it
+        from installers.windows.wine import windows_python  # noqa: PLC0415  not needed on Windows
 
         context = replace(context, python=windows_python(context))
     if not (keep_frozen and context.frozen.is_dir()):
@@ -51,7 +55,7 @@ def build(context: Context, *, keep_frozen: bool) -> Sequence[Path]:
 
 
 def refuse_files_of_wine(frozen: Path) -> None:
-    """Raises `PackageError` when a library of Wine's is in the package, where Windows would take it."""
+    """Raise `PackageError` if the package contains libraries of Wine, which Windows would load."""
     found = [
         path.name for path in _files(frozen) if path.suffix.lower() in {".dll", ".exe"} and _is_of_wine(path)
     ]
@@ -65,7 +69,7 @@ def _is_of_wine(path: Path) -> bool:
 
 
 def give_one_time(frozen: Path, epoch: int) -> None:
-    """Let all files be of the same time, whenever they were made."""
+    """Set the timestamps of all files, for reproducible packages."""
     for path in _files(frozen):
         os.utime(path, (epoch, epoch))
 
@@ -75,7 +79,7 @@ def _files(frozen: Path) -> Iterator[Path]:
 
 
 def make_zip(context: Context) -> Path:
-    """The frozen Studio as a zip, in which files are sorted and of one time."""
+    """Create the zip of the frozen Studio, with sorted entries and a single timestamp."""
     target = context.dist / f"NEP-Studio-{context.version}-windows-x64.zip"
     target.parent.mkdir(exist_ok=True)
     moment = datetime.fromtimestamp(max(context.epoch, EARLIEST), timezone.utc).timetuple()[:6]
@@ -83,6 +87,6 @@ def make_zip(context: Context) -> Path:
         for path in _files(context.frozen):
             entry = zipfile.ZipInfo(f"{APP}/{path.relative_to(context.frozen).as_posix()}", moment)
             entry.compress_type = zipfile.ZIP_DEFLATED
-            entry.create_system = 0  # as Windows writes it, wherever it is made
+            entry.create_system = 0  # as on Windows, for reproducibility
             archive.writestr(entry, path.read_bytes())
     return target

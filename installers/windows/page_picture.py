@@ -1,6 +1,6 @@
-"""The picture at the setup's last page: the logo on white.
+"""Paint the image of the installer's last page: the logo on white.
 
-Run by an interpreter in whose environment Studio is installed, with no screen:
+Run with an interpreter that has Studio installed; needs no screen:
 
     python page_picture.py FILE.bmp
 """
@@ -17,14 +17,14 @@ from app.ui.shell.bars.logo import paint_logo
 from app.ui.theme.theme import Theme
 
 WIDTH, HEIGHT = 164, 314
-"""What NSIS wants."""
+"""Size required by NSIS."""
 SIDE, TOP = 80, 40
 
 
 def main(target: str) -> int:
-    """Paint it; 0, or 1 when it can't be written."""
+    """Paint the image; return 1 if it can't be written, else 0."""
     os.environ.setdefault("QT_QPA_PLATFORM", "offscreen")
-    _application = QGuiApplication(sys.argv[:1])  # the theme asks it
+    _application = QGuiApplication(sys.argv[:1])  # required by the theme
     image = QImage(WIDTH, HEIGHT, QImage.Format.Format_RGB888)
     image.fill(Qt.GlobalColor.white)
     painter = QPainter(image)

