@@ -44,10 +44,10 @@ from app.ui.theme import fonts
 from app.ui.theme.theme import MODES, Theme
 from nep.i18n import ENGLISH, _, language, listed
 
-LOG_EVERY_MS = 500
+LOG_INTERVAL_MS = 500
 RESTART = -1
 """Result of `run` when a restart was requested."""
-BEGUN = "begun"  # key of the setting that marks the first start as done
+FIRST_START_KEY = "begun"  # key of the setting that marks the first start as done
 WEB_VIEW = "app.ui.blockly.view"
 SOON = (
     "app.ui.shell.dialogs.command_palette",
@@ -228,7 +228,7 @@ def offer_first_steps(window: MainWindow, *, asked: bool) -> None:
     """
     if not window.session.settings.are_new:
         return
-    window.state.keep(BEGUN, True)
+    window.state.keep(FIRST_START_KEY, True)
     if not asked and not window.banner.offers and all(each.blank for each in window.session.documents):
         window.start.offer_first_steps()
         window.start.focus_first()
@@ -322,7 +322,7 @@ def _show(
     close_when_asked(window, this_run)
     hearing = QTimer(window)
     hearing.timeout.connect(lambda: log.take(session.console.add))
-    hearing.start(LOG_EVERY_MS)
+    hearing.start(LOG_INTERVAL_MS)
     speaker = session.voices.speaker = QtSpeaker()
     soon = DeferredSteps(window, steps_after(window, web=options.web))
     driver = options.drive(window) if options.drive is not None else None

@@ -18,7 +18,7 @@ from PySide6.QtWidgets import QApplication
 from app.ui.shell.main_window import FIRST_SIZE, MainWindow
 from nep.i18n import _, number
 
-LOOK_MS = 100
+POLL_MS = 100
 SETTLE_S = 0.6
 
 
@@ -98,7 +98,7 @@ class SelfDrive(QObject):
         window.resize(FIRST_SIZE)
         folder.mkdir(parents=True, exist_ok=True)
         self._timer = QTimer(self)
-        self._timer.setInterval(LOOK_MS)
+        self._timer.setInterval(POLL_MS)
         self._timer.timeout.connect(self._look)
         self._next()
         self._timer.start()

@@ -27,13 +27,13 @@ from nep.i18n import _
 
 ROBOT = "Pepper"
 STATE = f"/{ROBOT}/state"
-POSE = ("theta_deg", "head_", "arm_", "elbow_")
+JOINT_PREFIXES = ("theta_deg", "head_", "arm_", "elbow_")
 """Prefixes of joint names in the robot's state."""
 SETTLE_S = 1.0
 """Pause before the screenshot, so that recent changes are painted."""
-COMPLAINTS, COMPLAINTS_KEPT = ("warn", "error"), 40
+REPORTED_LEVELS, MAX_REPORTED_RECORDS = ("warn", "error"), 40
 """Levels and number of Console lines in the report."""
-FEWEST_COLOURS = 24
+MIN_COLOURS = 24
 """A painted window has more colours than an empty or incomplete one."""
 
 
@@ -206,7 +206,9 @@ class WindowSteps:
 
     def _moves(self) -> bool:
         state = self._state()
-        turned = (name for name in state if name.startswith(POSE) and state[name] != self._rest.get(name))
+        turned = (
+            name for name in state if name.startswith(JOINT_PREFIXES) and state[name] != self._rest.get(name)
+        )
         self._spoken = self._spoken or str(state.get("speech") or "")
         self._moved = self._moved or next(
             (f"{name} {self._rest.get(name)} → {state[name]}" for name in turned), ""
@@ -254,16 +256,18 @@ class Told:
             self._test.seen(step.said())
             return
         shown = colours(QImage(str(self._test.place.path(PICTURE))))
-        if shown < FEWEST_COLOURS:
+        if shown < MIN_COLOURS:
             self._test.fail(_("the window's picture has only {count} colours").format(count=shown))
         else:
             self._test.seen(_("{count} colours").format(count=shown))
 
     def ended(self, well: bool, words: str) -> None:
         """Report the failure, if any; then the closing of the window is timed as the last step."""
-        complaints = [each for each in self._session.console.records if each.level in COMPLAINTS]
+        complaints = [each for each in self._session.console.records if each.level in REPORTED_LEVELS]
         self._test.report.tell(
-            console=[f"{each.level} {each.origin}: {each.text}" for each in complaints[-COMPLAINTS_KEPT:]]
+            console=[
+                f"{each.level} {each.origin}: {each.text}" for each in complaints[-MAX_REPORTED_RECORDS:]
+            ]
         )
         if not well:
             self._test.fail(words)

@@ -45,9 +45,9 @@ ADVICE = {
     ),
 }
 """Instructions to install a voice, by `sys.platform`."""
-MOST_TONES = 4
-RATE_HZ, EDGE_S, LOUDNESS = 44_100, 0.006, 0.5
-JOIN_S = 0.5
+MAX_TONES = 4
+RATE_HZ, FADE_S, LOUDNESS = 44_100, 0.006, 0.5
+JOIN_TIMEOUT_S = 0.5
 TRIAL_S = 20.0
 """Time limit for the test process; a voice that takes longer hangs and would hang here, too."""
 Order: TypeAlias = tuple[str, tuple[Any, ...], int]
@@ -137,7 +137,7 @@ def samples(notes: Notes, volume: float, rate_hz: int = RATE_HZ) -> bytes:
     for hz, seconds in notes:
         count = max(1, round(seconds * rate_hz))
         wave = np.sin(np.arange(count) * (2 * math.pi * hz / rate_hz)) if hz else np.zeros(count)
-        edge = min(count // 2, round(EDGE_S * rate_hz))
+        edge = min(count // 2, round(FADE_S * rate_hz))
         if edge:
             rise = np.linspace(0.0, 1.0, edge)
             wave[:edge] *= rise
@@ -223,7 +223,7 @@ class QtEngine:
         shape.setSampleFormat(QAudioFormat.SampleFormat.Int16)
         if device.isNull() or not device.isFormatSupported(shape):
             return _(NO_SOUND)
-        while len(self._sinks) >= MOST_TONES:
+        while len(self._sinks) >= MAX_TONES:
             self._sinks.pop(0)[0].stop()
         buffer = QBuffer()
         buffer.setData(QByteArray(samples(notes, volume)))
@@ -363,7 +363,7 @@ class QtSpeaker(QObject):
         self.stop()
         if self._thread is not None:
             self._order("end")
-            self._thread.join(JOIN_S)
+            self._thread.join(JOIN_TIMEOUT_S)
         self._closed = True
 
     def _order(self, what: str, *given: object) -> None:

@@ -12,8 +12,8 @@ from app.ui.widgets import paint
 
 OUT, HALO = 5, 5
 RADIUS = 12
-LOOK_MS = 100
-SHOWN_MS = 15_000
+POLL_MS = 100
+TIMEOUT_MS = 15_000
 
 
 class HintRing(QWidget):
@@ -28,11 +28,11 @@ class HintRing(QWidget):
         self.setAttribute(Qt.WidgetAttribute.WA_NoSystemBackground)
         self.setFocusPolicy(Qt.FocusPolicy.NoFocus)
         self._look = QTimer(self)
-        self._look.setInterval(LOOK_MS)
+        self._look.setInterval(POLL_MS)
         self._look.timeout.connect(self._place)
         self._end = QTimer(self)
         self._end.setSingleShot(True)
-        self._end.setInterval(SHOWN_MS)
+        self._end.setInterval(TIMEOUT_MS)
         self._end.timeout.connect(self.forget)
         self.hide()
 

@@ -47,7 +47,7 @@ from app.ui.widgets.file_dialogs import FileDialogs, SystemDialogs
 from nep.i18n import _, lazy
 
 TICK_MS = 33
-SMALLEST = QSize(960, 540)  # leaves room for the system's bars on a screen of 1024 x 600
+MIN_SIZE = QSize(960, 540)  # leaves room for the system's bars on a screen of 1024 x 600
 FIRST_SIZE = QSize(1440, 900)
 FACTS_EVERY = 8  # ticks between refreshes
 OPEN_ALERTS = "panel:alerts"
@@ -59,8 +59,8 @@ BLOCK_KEYS = {
 MENU = QKeyCombination(Qt.KeyboardModifier.ShiftModifier, Qt.Key.Key_F10)
 DUPLICATE = QKeyCombination(Qt.KeyboardModifier.ControlModifier, Qt.Key.Key_D)
 BOOKMARK = QKeyCombination(Qt.KeyboardModifier.ControlModifier, Qt.Key.Key_B)
-SOON_WORDS = {"behaviour": lazy("Loading blocks.")}
-OTHER_SOON_WORDS = lazy("Loading panels.")
+LOADING_TEXTS = {"behaviour": lazy("Loading blocks.")}
+OTHER_LOADING_TEXT = lazy("Loading panels.")
 
 
 @runtime_checkable
@@ -129,7 +129,7 @@ class MainWindow(QMainWindow):
     def _build(self, examples: Sequence[Example]) -> None:
         theme = self.theme
         self.setWindowTitle("NEP Studio")
-        self.setMinimumSize(SMALLEST)
+        self.setMinimumSize(MIN_SIZE)
         self.resize(FIRST_SIZE)
         self.bar = AppBar(theme, LAYOUTS)
         self.setMenuWidget(self.bar)
@@ -575,7 +575,7 @@ class Placeholder(QWidget):
 
     def __init__(self, layout: str) -> None:
         super().__init__()
-        words = _(SOON_WORDS.get(layout, OTHER_SOON_WORDS))
+        words = _(LOADING_TEXTS.get(layout, OTHER_LOADING_TEXT))
         self.setAccessibleName(words)
         self.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
         self.setProperty("ownFocus", True)  # it only holds the focus, so there is nothing to highlight

@@ -25,9 +25,9 @@ from app.ui.widgets import IconButton
 from nep.i18n import _, lazy
 
 STOP_KEY = "F12"
-NEEDS_WITH = lazy("A single letter can't be a shortcut. Hold Ctrl or Alt with it, or use a function key.")
-ALONE = range(Qt.Key.Key_F1, Qt.Key.Key_F35 + 1)
-HOLDS = (
+NEEDS_MODIFIER = lazy("A single letter can't be a shortcut. Hold Ctrl or Alt with it, or use a function key.")
+FUNCTION_KEYS = range(Qt.Key.Key_F1, Qt.Key.Key_F35 + 1)
+MODIFIERS = (
     Qt.KeyboardModifier.ControlModifier | Qt.KeyboardModifier.AltModifier | Qt.KeyboardModifier.MetaModifier
 )
 
@@ -182,9 +182,9 @@ class Shortcuts(QObject):
         key = key_of(pressed)
         if key == STOP_KEY:
             return "" if name == STOP else _("F12 always stops and can't be changed.")
-        held = pressed.keyboardModifiers() & HOLDS
-        if not held and pressed.key() not in ALONE:
-            return _(NEEDS_WITH)
+        held = pressed.keyboardModifiers() & MODIFIERS
+        if not held and pressed.key() not in FUNCTION_KEYS:
+            return _(NEEDS_MODIFIER)
         for fixed in FIXED:
             own = key in self.default(name)  # Ctrl+F is "find" both in the Inspector and in the blocks
             if key in [normal(each) for each in fixed.key.split(", ")] and held and not own:

@@ -23,10 +23,10 @@ from app.ui.widgets import Chip, IconButton, Segments, StopButton, paint
 from app.ui.widgets.buttons import PaintedButton
 from nep.i18n import _, lazy, ngettext
 
-WIDE, HIGH, LEFT, ICON, GAP = 248, 28, 10, 14, 9
+FIELD_WIDTH, FIELD_HEIGHT, LEFT, ICON, GAP = 248, 28, 10, 14, 9
 EDGE = 12
 DIRECT = Qt.FindChildOption.FindDirectChildrenOnly
-LEAST_ROOM = 44  # minimum text width of the palette field in px; below it only icon and key are shown
+MIN_TEXT_WIDTH = 44  # minimum text width of the palette field in px; below it only icon and key are shown
 CHIP_WORDS = {
     "ready": lazy("{robot} ready"),
     "busy": lazy("{robot} moving"),
@@ -199,8 +199,8 @@ class PaletteField(PaintedButton):
     def sizeHint(self) -> QSize:
         font = self._theme.font("body")
         wide = LEFT + self._side() + GAP + paint.width_of(font, self.text()) + 16 + self._key_room()
-        high = max(HIGH, round(paint.height_of(font)) + 8)
-        return QSize(max(WIDE, round(wide)), high)
+        high = max(FIELD_HEIGHT, round(paint.height_of(font)) + 8)
+        return QSize(max(FIELD_WIDTH, round(wide)), high)
 
     def minimumSizeHint(self) -> QSize:
         least = LEFT + self._side() + GAP + (self._key_room() or LEFT)
@@ -216,7 +216,7 @@ class PaletteField(PaintedButton):
         font = theme.font("body")
         left = LEFT + side + GAP
         room = rect.width() - left - self._key_room() - 4
-        if room >= self._theme.scaled(LEAST_ROOM):
+        if room >= self._theme.scaled(MIN_TEXT_WIDTH):
             area = QRectF(left, 0, room, rect.height())
             whole = paint.width_of(font, self.text()) <= room
             paint.words(

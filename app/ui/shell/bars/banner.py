@@ -22,17 +22,17 @@ from app.ui.widgets.cards import AlertBox
 from nep.i18n import _, ngettext
 
 FIGURES = re.compile(r"\d+")
-LEAST_WIDTH = 140  # px at 100 % text; below it only the status bar shows alerts
-LEAST_WORDS = 160  # px at 100 % text; below it the next step is only an icon
+MIN_WIDTH = 140  # px at 100 % text; below it only the status bar shows alerts
+MIN_TEXT_WIDTH = 160  # px at 100 % text; below it the next step is only an icon
 FONTS = ("bodyLarge", "body", "small")
-TALL = 44  # px at 100 % text; lower banners have small buttons
+MIN_TALL_HEIGHT = 44  # px at 100 % text; lower banners have small buttons
 STEP_ICONS = {
     "help.doctor": "stethoscope",
     "help.report": "message-square-warning",
     "robots.virtual": "bot",
     "file.open": "folder-open",
 }
-NEXT = "arrow-right"
+NEXT_ICON = "arrow-right"
 FRESH_S = 0.5
 """Seconds during which a banner that appears under the mouse passes clicks on to what was there."""
 
@@ -208,7 +208,7 @@ class Banner(AlertBox):
 
     def _fit(self) -> None:
         scaled = self._theme.scaled
-        size: Size = "form" if self.height() >= scaled(TALL) else "small"
+        size: Size = "form" if self.height() >= scaled(MIN_TALL_HEIGHT) else "small"
         for button in (self.button, self.second):
             button.set_size(size)
         count = ngettext("and {count} more", "and {count} more", self._others).format(count=self._others)
@@ -220,9 +220,9 @@ class Banner(AlertBox):
         beside = zip((self.more, self.button, self.second), wanted, strict=True)
         taken = sum(width + self.gap for button, width in beside if not button.isHidden())
         room = self.width() - self.left - self.close_button.sizeHint().width() - self.gap - taken
-        is_narrow = room < scaled(LEAST_WORDS)
+        is_narrow = room < scaled(MIN_TEXT_WIDTH)
         self.more.set_word(f"+{self._others}" if is_narrow else count, name=count)
-        self.button.icon_name = NEXT if is_narrow and self._icon is None else self._icon
+        self.button.icon_name = NEXT_ICON if is_narrow and self._icon is None else self._icon
         self.button.set_word("" if is_narrow else self._step, name=self._step)
         self.button.setToolTip(plain.tip(self._step if is_narrow else ""))
 
@@ -351,7 +351,7 @@ class AlertBanner(QWidget):
         if not self.identity:
             self._placed = ""
             return
-        paint.show_when(self, area.width() >= self._theme.scaled(LEAST_WIDTH))
+        paint.show_when(self, area.width() >= self._theme.scaled(MIN_WIDTH))
         if area != self.geometry() or self.identity != self._placed:
             self._placed = self.identity
             self.setGeometry(area)

@@ -18,7 +18,7 @@ from app.ui.widgets.keyboard import is_plain, is_pressed_key
 GAP = 8
 PADDING = 14
 LEAST_HEIGHT = 52
-MOST_COLUMNS = 3
+MAX_COLUMNS = 3
 NUMBER_KEYS = 9
 _WRAPPED = int(Qt.TextFlag.TextWordWrap | Qt.AlignmentFlag.AlignLeft | Qt.AlignmentFlag.AlignVCenter)
 
@@ -121,7 +121,7 @@ class Choices(QWidget):
         """Return the number of columns for a width in px."""
         widest = max((each.one_line_width() for each in self.buttons), default=1)
         fitting = (width - GAP) // (widest + GAP)
-        return max(1, min(MOST_COLUMNS, len(self.buttons), fitting))
+        return max(1, min(MAX_COLUMNS, len(self.buttons), fitting))
 
     def places(self, width: int) -> list[QRect]:
         """Return the rectangles of the buttons for a width; the buttons of a row have equal heights."""

@@ -21,7 +21,7 @@ from app.ui.widgets.menus import Menu, drop_below
 from nep.i18n import _
 
 FREEZE, RECORD, KEEP = "view.freeze", "recording.toggle", "recording.keep"
-EVERY = 8  # refresh interval in half ticks
+REFRESH_HALF_TICKS = 8  # refresh interval in half ticks
 RECORD_PX = 146  # fixed width of the record button, so that nothing moves when a recording starts
 KEEP_ROOM_PX = 1340  # width of the whole bar at 100 % text
 ROOM_PX = 940  # width without Keep, which has a shortcut
@@ -191,5 +191,5 @@ class DeveloperTools(QObject):
     def follow(self) -> None:
         """Refresh every few half ticks while the bar is visible."""
         self._ticks += 1
-        if self._ticks % EVERY == 0 and self._bar.isVisible():
+        if self._ticks % REFRESH_HALF_TICKS == 0 and self._bar.isVisible():
             self.refresh()

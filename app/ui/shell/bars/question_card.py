@@ -26,10 +26,10 @@ from app.ui.widgets.lists.scroll_areas import Scrolled
 from app.ui.widgets.menus import EditMenu
 from nep.i18n import _
 
-WIDE, WIDE_WITH_CHOICES = 460, 560
+WIDTH, WIDTH_WITH_CHOICES = 460, 560
 MARGIN = 16
-LOWER = 0.8  # lower edge as a share of the window's height: over the blocks, above the panels below them
-LONGEST_ANSWER = 10_000
+BOTTOM_SHARE = 0.8  # lower edge as a share of the window's height: above the panels below the blocks
+MAX_ANSWER_LENGTH = 10_000
 
 
 class QuestionCard(FloatingCard):
@@ -47,7 +47,7 @@ class QuestionCard(FloatingCard):
         self._held = False
         self.words = label("", "heading", wrap=True)
         self.field = QLineEdit()
-        self.field.setMaxLength(LONGEST_ANSWER)
+        self.field.setMaxLength(MAX_ANSWER_LENGTH)
         self.field.setProperty("focusRadius", theme.radius("control"))
         EditMenu(theme, self.field)
         self.button = Button(theme, _("Answer"), kind="primary", size="form")
@@ -152,12 +152,12 @@ class QuestionCard(FloatingCard):
         if window is None or layout is None:
             return
         self.field.setMinimumHeight(self.button.sizeHint().height())
-        wanted = WIDE_WITH_CHOICES if self.choices.buttons else WIDE
+        wanted = WIDTH_WITH_CHOICES if self.choices.buttons else WIDTH
         wide = min(window.width() - 2 * MARGIN, round(self._theme.scaled(wanted)))
         left = (window.width() - wide) // 2
         top, lowest = self._free(window, left, wide)
         needed = max(layout.totalHeightForWidth(wide), layout.minimumSize().height())
-        bottom = min(lowest, max(round(window.height() * LOWER), top + needed))
+        bottom = min(lowest, max(round(window.height() * BOTTOM_SHARE), top + needed))
         high = min(needed, bottom - top)
         self.setGeometry(left, bottom - high, wide, high)
 

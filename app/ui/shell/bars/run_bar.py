@@ -21,10 +21,10 @@ from nep.i18n import _
 PACES = ("run.full_speed", "run.slow", "run.very_slow")
 ROOM_PX = 960  # width of the bar at 100 % text
 SENTENCE_PX, RESULT_PX = 190, 230  # at 100 % text: room for the state and for a result
-LEAST_RESULT_PX = 110  # minimum width of a successful result; it is elided to this
+MIN_RESULT_PX = 110  # minimum width of a successful result; it is elided to this
 EDGES_PX = 150  # speed button, mark and the gaps between all items
-LEAST_ROOM_PX = 600  # below this even Run is an icon, so that the result of a stop isn't cut
-LEAST_SENTENCE = 30  # px at 100 % text
+MIN_TEXT_WIDTH_PX = 600  # below this even Run is an icon, so that the result of a stop isn't cut
+MIN_SENTENCE_PX = 30  # px at 100 % text
 WIDE_SENTENCE_PX, SENTENCE_SHARE = 300, 0.2  # at 100 % text, and share of the bar: state next to an alert
 BANNER_PX = 300  # at 100 % text; with less room an alert also covers the state of the tool bar
 BANNER_EDGE, GAP = 3, 8
@@ -137,7 +137,7 @@ class Sentence(QWidget):
 
     def paintEvent(self, _event: QPaintEvent) -> None:
         width = self.width() if self._shared_px is None else min(self.width(), self._shared_px)
-        if width < self._theme.scaled(LEAST_SENTENCE):
+        if width < self._theme.scaled(MIN_SENTENCE_PX):
             return  # too narrow to read; the tooltip and screen readers have the full text
         painter = QPainter(self)
         lines = self.lines(width)
@@ -380,7 +380,7 @@ class RunBar(Bar):
         words = sum(each.full_width() for each in buttons)
         needed = words + self.stop.sizeHint().width() + EDGES_PX + scaled(SENTENCE_PX) + scaled(RESULT_PX)
         bare = self.width() < max(scaled(ROOM_PX), needed)
-        self.run.set_bare(self.width() < self._theme.scaled(LEAST_ROOM_PX))
+        self.run.set_bare(self.width() < self._theme.scaled(MIN_TEXT_WIDTH_PX))
         self.pause.set_bare(bare)
         self.step.set_bare(bare)
         shown = (
@@ -389,7 +389,7 @@ class RunBar(Bar):
             *(each for each in (self.restart, self.confirm) if each.isVisibleTo(self)),
         )
         rest = self.width() - EDGES_PX - sum(each.sizeHint().width() for each in shown)
-        left = max(scaled(LEAST_RESULT_PX), rest - min(self.sentence.full_width(), scaled(SENTENCE_PX)))
+        left = max(scaled(MIN_RESULT_PX), rest - min(self.sentence.full_width(), scaled(SENTENCE_PX)))
         self.result.setMaximumWidth(round(left) if self.result.look in {"ok", "off"} else QWIDGETSIZE_MAX)
 
     def show_view(self, view: RunView) -> None:

@@ -21,7 +21,7 @@ from nep.i18n import _, day_text
 if TYPE_CHECKING:
     from PySide6.QtPrintSupport import QPrinter
 
-MOST_DPI = 300
+MAX_DPI = 300
 """Limit of the resolution: more isn't visible in blocks, and a page at 1200 dpi takes 500 MB."""
 
 
@@ -152,7 +152,7 @@ def paint_pdf(data: bytes, printer: QPrinter) -> bool:
             painter.end()
             return False
         points = pages.pagePointSize(number - 1)
-        dpi = min(printer.resolution(), MOST_DPI)
+        dpi = min(printer.resolution(), MAX_DPI)
         size = QSize(round(points.width() * dpi / 72), round(points.height() * dpi / 72))
         scale = printer.resolution() / 72
         target = QRectF(0, 0, points.width() * scale, points.height() * scale)

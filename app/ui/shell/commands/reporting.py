@@ -28,9 +28,9 @@ else:
     problem_report = lazy_module("app.core.reports.problem_report")
     report_sheet = lazy_module("app.ui.shell.dialogs.report")
 
-DOCTOR_S = 15.0
+DOCTOR_TIMEOUT_S = 15.0
 """Time that a report waits for the connection doctor."""
-FRESH_S = 60.0
+DOCTOR_MAX_AGE_S = 60.0
 """Age up to which the doctor's results are reused."""
 
 
@@ -54,7 +54,7 @@ class ReportCommands:
         """Open a problem report that contains the newest edits of the open behaviours."""
         self._session.alerts.resolve(ALERT)
         doctor = self._session.doctor
-        if doctor.looked_s is None or self._clock() - doctor.looked_s > FRESH_S:
+        if doctor.looked_s is None or self._clock() - doctor.looked_s > DOCTOR_MAX_AGE_S:
             doctor.look()
         self._files.with_newest(self._open)
 
@@ -65,7 +65,7 @@ class ReportCommands:
                 shell.theme, shell.surface, self._asks, shell.say, self._clock
             )
         parts = problem_report.ReportParts(
-            qt_facts(shell.surface), session.settings.all(), lambda: session.doctor.report(DOCTOR_S)
+            qt_facts(shell.surface), session.settings.all(), lambda: session.doctor.report(DOCTOR_TIMEOUT_S)
         )
         documents = session.documents
         names = [documents.title(each) for each in documents if not each.blank]

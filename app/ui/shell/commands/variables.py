@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 else:
     name_sheet = lazy_module("app.ui.shell.dialogs.name")
 
-LONGEST = 60
+MAX_NAME_LENGTH = 60
 
 
 @runtime_checkable
@@ -135,8 +135,8 @@ class VariableCommands:
         """Return why a name is invalid, or ""; ``own`` is the id of the variable to be renamed."""
         if not name:
             return _("A variable needs a name.")
-        if len(name) > LONGEST:
-            return _("This name is too long. Use at most {most} characters.").format(most=LONGEST)
+        if len(name) > MAX_NAME_LENGTH:
+            return _("This name is too long. Use at most {most} characters.").format(most=MAX_NAME_LENGTH)
         used = {each.casefold() for id, each in self._workspace().variables.items() if id != own}
         if name.casefold() in used:
             return _("A variable named “{name}” already exists. Choose another name.").format(name=name)

@@ -19,9 +19,9 @@ from app.ui.widgets.lists.fuzzy import Entry, Finder, Match
 from app.ui.widgets.menus import EditMenu
 from nep.i18n import _, lazy, ngettext
 
-WIDE, TOP, FIELD, FOOT = 640, 128, 56, 36
+WIDTH, TOP, FIELD, FOOTER_HEIGHT = 640, 128, 56, 36
 ROWS_SHOWN = 9.5
-MOST, MOST_EMPTY, LAST_SHOWN, LAST_KEPT = 40, 8, 5, 12
+MAX_RESULTS, MAX_RESULTS_EMPTY, MAX_LAST_SHOWN, MAX_LAST_SAVED = 40, 8, 5, 12
 
 
 class _Field(QLineEdit):
@@ -72,10 +72,10 @@ class _Foot(QWidget):
         super().__init__()
         self._theme = theme
         self.counted = ""
-        self.setFixedHeight(round(theme.scaled(FOOT)))
+        self.setFixedHeight(round(theme.scaled(FOOTER_HEIGHT)))
 
     def sizeHint(self) -> QSize:
-        return QSize(100, round(self._theme.scaled(FOOT)))
+        return QSize(100, round(self._theme.scaled(FOOTER_HEIGHT)))
 
     def paintEvent(self, _event: QPaintEvent) -> None:
         theme, painter = self._theme, QPainter(self)
@@ -163,18 +163,18 @@ class Palette(Overlay):
         rows = min(self.rows.height_of_all(), round(scaled(40) * ROWS_SHOWN)) + 8
         shown = rows if self.rows.lines.lines else self.nothing.sizeHint().height()
         high = self.field.height() + shown + self.foot.height() + 2
-        return QSize(min(room.width(), round(scaled(WIDE))), min(room.height(), high))
+        return QSize(min(room.width(), round(scaled(WIDTH))), min(room.height(), high))
 
     def _restyle(self) -> None:
         self.field.restyle()
-        self.foot.setFixedHeight(round(self.theme.scaled(FOOT)))
+        self.foot.setFixedHeight(round(self.theme.scaled(FOOTER_HEIGHT)))
         self.place()
 
     def _search(self) -> None:
         query = self.field.text().strip()
         lines = self._for_nothing_typed() if not query else []
         if query:
-            found, count = self._finder.find(query, MOST)
+            found, count = self._finder.find(query, MAX_RESULTS)
             self.foot.counted = _("{shown} of {count}").format(shown=count, count=len(self._finder.entries))
             for each in found:
                 heading = Heading(_(TITLES[each.entry.kind]))
@@ -192,12 +192,12 @@ class Palette(Overlay):
         # Last used entries, then the first ones of each kind.
         entries = self._finder.entries
         known = {entry.id: entry for entry in entries if entry.id in self.last}
-        last = [known[id] for id in self.last if id in known][:LAST_SHOWN]
+        last = [known[id] for id in self.last if id in known][:MAX_LAST_SHOWN]
         lines: list[Line] = [Heading(_(TITLES["recent"])), *map(Match, last)] if last else []
         kinds: dict[str, list[Match]] = {}
         for entry in entries:
             of_kind = kinds.setdefault(entry.kind, [])
-            if entry not in last and (entry.kind == "command" or len(of_kind) < MOST_EMPTY):
+            if entry not in last and (entry.kind == "command" or len(of_kind) < MAX_RESULTS_EMPTY):
                 of_kind.append(Match(entry))
         for kind, of_kind in kinds.items():
             if of_kind:
@@ -235,7 +235,7 @@ class Palette(Overlay):
         if entry.reason:
             paint.announce(self.field, entry.reason)
             return
-        self.last = [entry.id, *(id for id in self.last if id != entry.id)][:LAST_KEPT]
+        self.last = [entry.id, *(id for id in self.last if id != entry.id)][:MAX_LAST_SAVED]
         self.on_last(self.last)
         self.shut()
         self._run(entry)

@@ -46,7 +46,7 @@ from app.ui.widgets.lists.scroll_areas import ScrollColumn
 from app.ui.widgets.menus import EditMenu
 from nep.i18n import _, lazy
 
-WIDE, HIGH, PLACES_WIDE, FOLDER_NAME_WIDE = 860, 560, 190, 200
+WIDTH, HEIGHT, PLACES_WIDTH, FOLDER_NAME_WIDTH = 860, 560, 190, 200
 NAME, CHANGED, SIZE = range(3)
 
 
@@ -324,7 +324,7 @@ class FileSheet(Overlay):
 
     def wanted_size(self, room: QSize) -> QSize:
         scaled = self.theme.scaled
-        return QSize(min(room.width(), round(scaled(WIDE))), min(room.height(), round(scaled(HIGH))))
+        return QSize(min(room.width(), round(scaled(WIDTH))), min(room.height(), round(scaled(HEIGHT))))
 
     def _focus_changed(self, _old: QWidget | None, _new: QWidget | None) -> None:
         # Overrides the closing on focus loss: the sheet stays open while Stop is pressed.
@@ -341,7 +341,7 @@ class FileSheet(Overlay):
             button.setToolTip(plain.tip(str(place.folder)))
             button.clicked.connect(lambda _on=False, folder=place.folder: self.go_to(folder))
             column.insertWidget(number, button)
-        self.places.setFixedWidth(round(self.theme.scaled(PLACES_WIDE)))
+        self.places.setFixedWidth(round(self.theme.scaled(PLACES_WIDTH)))
 
     def go_to(self, folder: Path) -> None:
         """Show a folder; on an error show the reason and stay in the current one."""
@@ -406,7 +406,7 @@ class FileSheet(Overlay):
 
     def _show_folder_field(self, shown: bool) -> None:
         # The field takes the place of the "New folder" button.
-        self.folder_name.setMinimumWidth(round(self.theme.scaled(FOLDER_NAME_WIDE)))
+        self.folder_name.setMinimumWidth(round(self.theme.scaled(FOLDER_NAME_WIDTH)))
         for widget in (self.folder_name, self.make_folder):
             paint.show_when(widget, shown and self._makes_folders)
         paint.show_when(self.new_folder, self._makes_folders and not shown)

@@ -47,7 +47,7 @@ from app.ui.theme.theme import Theme
 from app.ui.widgets import SearchField, label, paint
 from nep.i18n import ENGLISH, _, ngettext
 
-WIDE, HIGH, LIST_WIDE = 920, 640, 220
+WIDE, HIGH, LIST_WIDTH = 920, 640, 220
 LINE_PERCENT = 115.0
 PICTURE_RATIO = 1.5
 """Pixels of the image file per pixel of the window at 100 %, for sharpness on high-DPI screens."""
@@ -239,7 +239,7 @@ class GuideSheet(Overlay):
     def _filter(self, words: str) -> None:
         self.list.blockSignals(True)
         self.list.clear()
-        self._left.setFixedWidth(round(self.theme.scaled(LIST_WIDE)))
+        self._left.setFixedWidth(round(self.theme.scaled(LIST_WIDTH)))
         for page in self.shown:
             item = QListWidgetItem(page.title)
             item.setSizeHint(QSize(0, round(self.theme.scaled(self.theme.size("row", "comfortable")))))

@@ -17,7 +17,7 @@ from app.ui.theme.theme import Theme
 from app.ui.widgets import Button, Switch, label, paint
 from nep.i18n import _
 
-WIDE = 480
+WIDTH = 480
 TOP_SHARE = 0.42  # below every Stop: those of the run bar and of the robots
 TILE, EDGE, BETWEEN = 40, 20, 10
 
@@ -139,7 +139,7 @@ class MotionQuestion(QWidget):
         window = self.parentWidget()
         if window is None:
             return
-        wide = min(round(self._theme.scaled(WIDE)), window.width() - 32)
+        wide = min(round(self._theme.scaled(WIDTH)), window.width() - 32)
         self.setFixedWidth(wide)
         self._name_always(wide)
         layout = self.layout()

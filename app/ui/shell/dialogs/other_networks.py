@@ -18,9 +18,9 @@ from app.ui.widgets.menus import EditMenu
 from nep.errors import NepError
 from nep.i18n import _, lazy, ngettext
 
-WIDE = 560
-SWITCH_WIDE = 132
-LOOK_MS = 300
+WIDTH = 560
+SWITCH_WIDTH = 132
+REFRESH_MS = 300
 SIDE, GAP, SCROLL_BAR = 19, 12, 10
 INTRODUCTION = lazy(
     "Studio shows its own network. Turn on another network to see its topics and nodes as "
@@ -61,7 +61,7 @@ class OtherNetworksSheet(Overlay):
         column.addLayout(self._head)
         column.addWidget(self._area, 1)
         self._timer = QTimer(self)
-        self._timer.setInterval(LOOK_MS)
+        self._timer.setInterval(REFRESH_MS)
         self._timer.timeout.connect(self.show_states)
         self.closed.connect(self._timer.stop)
 
@@ -70,7 +70,7 @@ class OtherNetworksSheet(Overlay):
 
     def wanted_size(self, room: QSize) -> QSize:
         least = max(row.minimumSizeHint().width() for row in self.rows) + 2 + 2 * SIDE + SCROLL_BAR
-        wide = min(room.width(), max(round(self.theme.scaled(WIDE)), least))
+        wide = min(room.width(), max(round(self.theme.scaled(WIDTH)), least))
         inner = wide - 2 - 2 * SIDE - SCROLL_BAR
         high = self.introduction.heightForWidth(inner)
         # measured per row: their layout items are updated late after a change of text
@@ -107,7 +107,7 @@ class NetworkRow(QWidget):
         self._network, self._networks = network, networks
         kind = network.kind
         self.switch = Switch(theme, kind.words)
-        self.switch.setMinimumWidth(round(theme.scaled(SWITCH_WIDE)))
+        self.switch.setMinimumWidth(round(theme.scaled(SWITCH_WIDTH)))
         place = _(kind.place)
         self.address = AddressField(theme, f"{kind.words}: {place}", kind.example, self.take)
         said = label(place, "small", role="textTertiary")

@@ -52,7 +52,7 @@ if TYPE_CHECKING:
 WIDE, HIGH, SIDE = 640, 812, 20
 BESIDE_FROM = 1280  # px at 100 % text; wider windows show it over one column, without a scrim
 BELOW_BARS = 88
-LOOK_MS = 300
+REFRESH_MS = 300
 ROWS_HIGH = 170
 LABEL_WIDE, NUMBER_WIDE, BAR_WIDE = 80, 84, 120
 LONG_S = 2 * 86_400.0
@@ -106,7 +106,7 @@ class RecordSheet(Overlay):
         self._make_foot()
         self._arrange()
         self._timer = QTimer(self)
-        self._timer.setInterval(LOOK_MS)
+        self._timer.setInterval(REFRESH_MS)
         self._timer.timeout.connect(self.show_state)
         self.closed.connect(self._timer.stop)
 

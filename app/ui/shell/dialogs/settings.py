@@ -28,7 +28,7 @@ MODE_WORDS = {
 }
 PREFERENCE_WORDS = {"system": lazy("Match system"), "on": lazy("On"), "off": lazy("Off")}
 TEXT_SIZES = ("100", "125", "150", "175", "200")
-SIDE_BY_SIDE = 3
+MAX_SEGMENTS = 3
 """Up to this number languages are shown side by side, otherwise as a drop-down list."""
 
 
@@ -83,7 +83,7 @@ class SettingsSheet(Overlay):
 
     def _language_input(self) -> Segments | ComboBox:
         offered = i18n.offered()
-        if len(offered) > SIDE_BY_SIDE:
+        if len(offered) > MAX_SEGMENTS:
             choice = ComboBox(self.theme, offered, name=_("Language"))
             choice.activated.connect(lambda _index: self._language(choice.value))
             return choice

@@ -25,9 +25,9 @@ from app.ui.widgets.lists.entry_list import EntryList, Heading, Line
 from app.ui.widgets.lists.fuzzy import Entry, Match
 from nep.i18n import _, day_text, lazy, ngettext
 
-WIDE, MOST_HIGH, EMPTY_HIGH = 680, 560, 330
+WIDTH, MAX_HEIGHT, EMPTY_HEIGHT = 680, 560, 330
 HINT = lazy("Opens a copy in a new tab. Your file doesn't change.")
-WHAT_MAKES_ONE = lazy(
+WHEN_CREATED = lazy(
     "Studio keeps the previous version of a file each time it is saved, saved under another "
     "name, or closed with unsaved work."
 )
@@ -139,7 +139,7 @@ class VersionHistorySheet(Overlay):
             self.empty.say(_("{name} is not saved to a file yet").format(name=name), _(SAVE_FIRST))
             self.empty.set_actions([EmptyAction(_("Save"), self._save_it, "save", primary=True)])
         else:
-            self.empty.say(_("No earlier versions yet"), _(WHAT_MAKES_ONE))
+            self.empty.say(_("No earlier versions yet"), _(WHEN_CREATED))
             self.empty.set_actions([EmptyAction(_("Close"), self.shut)])
 
     def _line(self, version: Version, now: dt.datetime) -> Match:
@@ -151,13 +151,13 @@ class VersionHistorySheet(Overlay):
 
     def wanted_size(self, room: QSize) -> QSize:
         scaled = self.theme.scaled
-        wide = min(room.width(), round(scaled(WIDE)))
+        wide = min(room.width(), round(scaled(WIDTH)))
         layout = self.layout()
         if not self._versions or layout is None:
-            return QSize(wide, min(room.height(), round(scaled(EMPTY_HIGH))))
+            return QSize(wide, min(room.height(), round(scaled(EMPTY_HEIGHT))))
         rest = layout.totalHeightForWidth(wide) - self.rows.sizeHint().height()
         high = rest + self.rows.height_of_all() + 8
-        return QSize(wide, min(room.height(), round(scaled(MOST_HIGH)), high))
+        return QSize(wide, min(room.height(), round(scaled(MAX_HEIGHT)), high))
 
     def _read_one(self) -> None:
         if not self._unread or not self.isVisible():

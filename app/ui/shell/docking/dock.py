@@ -29,12 +29,12 @@ from app.ui.widgets.keyboard import proxy_of, tab_stops
 from app.ui.widgets.menus import Menu, drop_below
 from nep.i18n import _
 
-LEAST_BODY = QSize(160, 60)
+MIN_BODY_SIZE = QSize(160, 60)
 RESTS_AFTER_S = 2.0
 """Delay before a hidden panel unsubscribes, so that quick tab changes don't resubscribe."""
-FAULTS = (Exception, SystemExit)
+CAUGHT_ERRORS = (Exception, SystemExit)
 """Exceptions of panels that are caught; a plug-in's panel may call `sys.exit`."""
-SENTENCE_LIMIT = 400
+MAX_SENTENCE_LENGTH = 400
 
 _log = logging.getLogger(__name__)
 
@@ -81,7 +81,7 @@ class DockBody(QWidget):
 
     def minimumSizeHint(self) -> QSize:
         # Content scrolls inside the panel, so that its size is up to the person.
-        return LEAST_BODY
+        return MIN_BODY_SIZE
 
     def resizeEvent(self, _event: object) -> None:
         left, right = self._corners
@@ -223,11 +223,11 @@ class Dock(QDockWidget):
     def _try(self, act: Callable[[], object]) -> str | None:
         try:
             act()
-        except FAULTS as error:  # no exception of a panel may close the window
+        except CAUGHT_ERRORS as error:  # no exception of a panel may close the window
             self.failed = True
-            with suppress(*FAULTS):  # a failed panel needs no subscriptions
+            with suppress(*CAUGHT_ERRORS):  # a failed panel needs no subscriptions
                 self.panel.rest()
-            sentence = error_words(error)[:SENTENCE_LIMIT]
+            sentence = error_words(error)[:MAX_SENTENCE_LENGTH]
             said = ("the panel '%s' stopped: %s", self.description.name, sentence)
             _log.error(*said, exc_info=error, extra=IN_CONSOLE)
             traceback.clear_frames(error.__traceback__)
@@ -249,7 +249,7 @@ class Dock(QDockWidget):
         try:
             found = self.panel.save_state()
             json.dumps(found)
-        except FAULTS:
+        except CAUGHT_ERRORS:
             _log.exception("the panel '%s' can't tell its state", self.description.name)
             return {}
         return found
@@ -258,14 +258,14 @@ class Dock(QDockWidget):
         """Restore the panel's state; an error is logged so that the layout is still restored."""
         try:
             self.panel.restore_state(state)
-        except FAULTS:
+        except CAUGHT_ERRORS:
             _log.exception("the panel '%s' can't be as it was", self.description.name)
 
     def shut(self) -> None:
         """Dispose of the panel when the window closes; an error is logged."""
         try:
             self.panel.shut()
-        except FAULTS:
+        except CAUGHT_ERRORS:
             _log.exception("the panel '%s' can't end in order", self.description.name)
 
     def keyPressEvent(self, event: QKeyEvent) -> None:
@@ -285,7 +285,7 @@ class Dock(QDockWidget):
         own: list[QAction] = []
         try:
             own.extend(self.panel.more_actions())
-        except FAULTS:  # it can still be closed
+        except CAUGHT_ERRORS:  # it can still be closed
             _log.exception("the panel '%s' can't tell what it can do", self.description.name)
         menu.addActions(own)
         if own:
@@ -355,7 +355,7 @@ def make_dock(description: Panel, context: PanelContext, density: Density, numbe
     """Return a dock with a new panel, or with a `FailedPanel` if the panel can't be created."""
     try:
         return Dock(context.theme, description, description.make(context), density, number)
-    except FAULTS as error:
+    except CAUGHT_ERRORS as error:
         traceback.clear_frames(error.__traceback__)
         unmade = FailedPanel(context, description, error)
     dock = Dock(context.theme, description, unmade, density, number)

@@ -18,7 +18,7 @@ from nep.i18n import _
 
 ICON, GAP = 16, 7
 BADGE = 18
-LEAST_NAME = 56  # px at 100 %; with less room the front panel is shown as an icon, too
+MIN_NAME_WIDTH = 56  # px at 100 %; with less room the front panel is shown as an icon, too
 
 
 class TitleTab(PaintedButton):
@@ -233,7 +233,7 @@ class DockTitle(QWidget):
         silent = whole > room and (whole <= room + words or front > room)
         room += words if silent else 0
         bare = whole > room
-        least = room - behind < self._theme.scaled(LEAST_NAME)
+        least = room - behind < self._theme.scaled(MIN_NAME_WIDTH)
         for chip in chips:
             chip.set_bare(silent)
         for tab in self._tabs:

@@ -14,7 +14,7 @@ from app.ui.shell.docking.workbench import Workbench
 from app.ui.shell.window_state import WindowState
 from nep.i18n import _
 
-OWN = "own:"
+OWN_PREFIX = "own:"
 LONGEST = 40
 
 
@@ -39,8 +39,8 @@ class SavedLayouts:
         bases = {layout.name for layout in LAYOUTS}
         found = []
         for key, kept in self._state.layouts().items():
-            if key.startswith(OWN) and isinstance(kept, Mapping) and kept.get("base") in bases:
-                found.append(OwnLayout(key.removeprefix(OWN), str(kept["base"])))
+            if key.startswith(OWN_PREFIX) and isinstance(kept, Mapping) and kept.get("base") in bases:
+                found.append(OwnLayout(key.removeprefix(OWN_PREFIX), str(kept["base"])))
         return tuple(sorted(found, key=lambda own: own.name.lower()))
 
     def named(self, name: str) -> OwnLayout | None:
@@ -69,7 +69,7 @@ class SavedLayouts:
     def bring_back(self, bench: Workbench, base: str) -> None:
         """Restore the last arrangement of a workbench, or the default if there is none or it is damaged."""
         own = self.own(base)
-        saved = self._state.of_layout(OWN + own if own else base)
+        saved = self._state.of_layout(OWN_PREFIX + own if own else base)
         if not saved:
             bench.arrange()
             return
@@ -86,7 +86,7 @@ class SavedLayouts:
     def keep(self, bench: Workbench, base: str) -> None:
         """Save the arrangement of a workbench under the current layout's name."""
         own = self.own(base)
-        self._state.keep_layouts({OWN + own if own else base: {**bench.save(), "base": base}})
+        self._state.keep_layouts({OWN_PREFIX + own if own else base: {**bench.save(), "base": base}})
 
     def use(self, bench: Workbench, base: str, own: str) -> None:
         """Show another layout ("" for the built-in one) after saving the current one."""
@@ -101,7 +101,7 @@ class SavedLayouts:
 
         Return False if it couldn't be written and is lost when Studio ends.
         """
-        kept = self._state.keep_layouts({OWN + name.strip(): {**bench.save(), "base": base}})
+        kept = self._state.keep_layouts({OWN_PREFIX + name.strip(): {**bench.save(), "base": base}})
         self._choose(base, name.strip())
         return kept
 
@@ -126,7 +126,7 @@ class SavedLayouts:
         while self.refusal(free):
             ending = f" {number}"
             free, number = f"{name[: LONGEST - len(ending)]}{ending}", number + 1
-        return free, self._state.keep_layouts({OWN + free: {**saved, "base": base}})
+        return free, self._state.keep_layouts({OWN_PREFIX + free: {**saved, "base": base}})
 
     def rename(self, old: str, new: str) -> None:
         """Rename a custom layout."""
@@ -134,8 +134,8 @@ class SavedLayouts:
         if found is None or new.strip() == old:
             return
         shown = self.own(found.base) == old
-        self._state.keep_layouts({OWN + new.strip(): self._state.of_layout(OWN + old)})
-        self._state.forget_layout(OWN + old)
+        self._state.keep_layouts({OWN_PREFIX + new.strip(): self._state.of_layout(OWN_PREFIX + old)})
+        self._state.forget_layout(OWN_PREFIX + old)
         if shown:
             self._choose(found.base, new.strip())
 
@@ -150,11 +150,11 @@ class SavedLayouts:
         base, shown = found.base, self.own(found.base) == name
         if shown and bench is not None:
             self.use(bench, base, "")
-        saved = dict(self._state.of_layout(OWN + name))
-        kept = self._state.forget_layout(OWN + name)
+        saved = dict(self._state.of_layout(OWN_PREFIX + name))
+        kept = self._state.forget_layout(OWN_PREFIX + name)
 
         def undo() -> None:
-            self._state.keep_layouts({OWN + name: saved})
+            self._state.keep_layouts({OWN_PREFIX + name: saved})
             if shown and bench is not None:
                 self.use(bench, base, name)
 

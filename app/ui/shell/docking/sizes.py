@@ -14,22 +14,22 @@ from PySide6.QtWidgets import QDockWidget, QMainWindow
 
 from app.ui.shell.docking.layouts import Layout
 
-LEAST_PX = 120
+MIN_SIZE_PX = 120
 
 
 def shares(wanted: Sequence[int], room: int, *, keep: Sequence[bool]) -> list[int]:
     """Return sizes that fill ``room``: fixed ones for ``keep``, the others in proportion.
 
-    If less than `LEAST_PX` each were left for the others, all sizes are proportional with this minimum.
+    If less than `MIN_SIZE_PX` each were left for the others, all sizes are proportional with this minimum.
     """
     whole = max(1, sum(wanted))
-    least = sum(size if kept else LEAST_PX for size, kept in zip(wanted, keep, strict=True))
+    least = sum(size if kept else MIN_SIZE_PX for size, kept in zip(wanted, keep, strict=True))
     sizes = list(wanted)
     if least > room:
-        sizes = [min(size, max(LEAST_PX, round(room * size / whole))) for size in wanted]
+        sizes = [min(size, max(MIN_SIZE_PX, round(room * size / whole))) for size in wanted]
     kept = sum(size for size, kept in zip(sizes, keep, strict=True) if kept)
     free = sum(size for size, kept in zip(wanted, keep, strict=True) if not kept)
-    left = max(room - kept, LEAST_PX * sum(1 for kept in keep if not kept))
+    left = max(room - kept, MIN_SIZE_PX * sum(1 for kept in keep if not kept))
     return [
         own if kept else round(left * size / max(1, free))
         for own, size, kept in zip(sizes, wanted, keep, strict=True)
@@ -76,7 +76,7 @@ def fit(
     wanted = [
         round(min(max(column.width * scale, column.share * wide), column.most * wide))
         if column.width
-        else LEAST_PX
+        else MIN_SIZE_PX
         for column, _ in columns
     ]
     keep = [bool(column.width) for column, _ in columns]

@@ -21,7 +21,7 @@ ACROSS = Qt.Orientation.Horizontal
 DOWN = Qt.Orientation.Vertical
 AREA = Qt.DockWidgetArea.LeftDockWidgetArea
 BELOW = Qt.DockWidgetArea.BottomDockWidgetArea
-MOST_BELOW = 0.42
+MAX_BELOW_SHARE = 0.42
 """Share of the window's height."""
 STATE_VERSION = 1  # when it changes, app.core.storage.settings.FORMAT must change, too
 MOST_OF_A_KIND = 8
@@ -159,7 +159,7 @@ class Workbench(QMainWindow):
             if dock is None or dock.isHidden() or dock.isFloating() or self.dockWidgetArea(dock) != BELOW:
                 continue
             high = self._heights.get(name) if self._moved else None
-            high = high or round(min(height * scale, MOST_BELOW * self.height()))
+            high = high or round(min(height * scale, MAX_BELOW_SHARE * self.height()))
             self.resizeDocks([dock], [high], DOWN)
             return high
         return 0

@@ -18,7 +18,7 @@ from app.ui.widgets.buttons import PaintedButton
 from nep.i18n import _
 
 HEIGHT, TILE, LEFT = 56, 30, 54
-IN_A_ROW = 3
+COLUMNS = 3
 DOT = 7.0
 
 
@@ -129,7 +129,7 @@ class OpenWorkList(QWidget):
         self._grid = QGridLayout()
         self._grid.setContentsMargins(0, 0, 0, 0)
         self._grid.setSpacing(8)
-        for place in range(IN_A_ROW):
+        for place in range(COLUMNS):
             self._grid.setColumnStretch(place, 1)
         column.addLayout(self._grid)
         self.hide()
@@ -147,7 +147,7 @@ class OpenWorkList(QWidget):
         self.rows = [OpenRow(self._theme, each) for each in work]
         for place, row in enumerate(self.rows):
             row.clicked.connect(lambda _on=False, key=row.work.key: self.chosen.emit(key))
-            self._grid.addWidget(row, place // IN_A_ROW, place % IN_A_ROW)
+            self._grid.addWidget(row, place // COLUMNS, place % COLUMNS)
         paint.show_when(self, bool(self.rows))
         for row in self.rows:
             if row.work.key == had:

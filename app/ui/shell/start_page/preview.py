@@ -14,8 +14,8 @@ from app.ui.widgets import paint
 ROW = 27.0
 GAP = 1.0
 INDENT = 16.0
-DEEPEST = 6
-MOST_ROWS = 12
+MAX_DEPTH = 6
+MAX_ROWS = 12
 STATEMENTS = frozenset({"DO", "DO0", "ELSE", "STACK", "BODY", "THEN"})
 _LAST_WORD = {"do": "robot", "get": "sensors", "when": "events"}
 
@@ -45,13 +45,13 @@ def rows(workspace: Mapping[str, object]) -> tuple[Row, ...]:
     if not isinstance(tops, list):
         return ()
     scripts = [tuple(_chain(top, 0)) for top in tops if isinstance(top, Mapping)]
-    return max(scripts, key=len, default=())[:MOST_ROWS]
+    return max(scripts, key=len, default=())[:MAX_ROWS]
 
 
 def _chain(block: Mapping[str, object], depth: int) -> Iterator[Row]:
     current: object = block
     count = 0
-    while isinstance(current, Mapping) and count < MOST_ROWS:
+    while isinstance(current, Mapping) and count < MAX_ROWS:
         count += 1
         inputs = current.get("inputs")
         held = dict(inputs) if isinstance(inputs, Mapping) else {}
@@ -60,7 +60,7 @@ def _chain(block: Mapping[str, object], depth: int) -> Iterator[Row]:
         values = len(held) - len(inside) + (len(fields) if isinstance(fields, Mapping) else 0)
         kind = str(current.get("type", ""))
         yield Row(depth, category_of(kind), len(kind.rsplit("_", 1)[-1]), min(values, 3))
-        if depth < DEEPEST:
+        if depth < MAX_DEPTH:
             for child in inside:
                 if child is not None:
                     yield from _chain(child, depth + 1)

@@ -17,9 +17,9 @@ from nep.i18n import _
 from nep.system.addresses import OwnAddress
 
 LABEL_WIDE = 80
-_MOST_SEGMENTS = 2
-_HIDDEN = "•••• •••• {end}"
-_END = 4
+_MAX_SEGMENTS = 2
+_MASK = "•••• •••• {end}"
+_VISIBLE_CHARS = 4
 
 
 class OpenTo(QWidget):
@@ -47,7 +47,7 @@ class OpenTo(QWidget):
         if self._choice is not None:
             self._row.removeWidget(self._choice)
             self._choice.deleteLater()
-        if len(options) <= _MOST_SEGMENTS:
+        if len(options) <= _MAX_SEGMENTS:
             segments = Segments(self._theme, options, value, check=True, name=_("Open to"), wraps=True)
             segments.changed.connect(self.chosen)
             self._choice = segments
@@ -157,7 +157,7 @@ class AccessForm(QWidget):
 
     def _show_token(self) -> None:
         token = self._web.token
-        shown = token if self.reveal.isChecked() else _HIDDEN.format(end=token[-_END:])
+        shown = token if self.reveal.isChecked() else _MASK.format(end=token[-_VISIBLE_CHARS:])
         self.token.show_text(shown if token else _("not needed on this computer"), can_copy=bool(token))
         self.reveal.set_icon("eye-off" if self.reveal.isChecked() else "eye")
         self.reveal.set_name(_("Hide the token") if self.reveal.isChecked() else _("Show the token"))

@@ -57,11 +57,11 @@ if TYPE_CHECKING:
     from nep.programs.web.context import PageTopic
 
 Index = QModelIndex | QPersistentModelIndex
-PAGE_HIGH, TOPIC_HIGH = 28, 23
+PAGE_ROW_HEIGHT, TOPIC_ROW_HEIGHT = 28, 23
 _EDGE, _PADDING, _ICON, _GAP = 8, 6, 15, 6
 PageColumn = Literal["rate", "bandwidth", "dropped", "disconnect"]
 _WIDTHS: dict[PageColumn, int] = {"rate": 66, "bandwidth": 88, "dropped": 78, "disconnect": 34}
-_STRUCK = "textDisabled"
+_GONE_ROLE = "textDisabled"
 
 
 class _PageHeader(QHeaderView):
@@ -74,7 +74,7 @@ class _PageHeader(QHeaderView):
         self.setStretchLastSection(True)
 
     def sizeHint(self) -> QSize:
-        return QSize(super().sizeHint().width(), round(self._theme.scaled(TOPIC_HIGH)) + 2)
+        return QSize(super().sizeHint().width(), round(self._theme.scaled(TOPIC_ROW_HEIGHT)) + 2)
 
     def paintSection(self, painter: QPainter, rect: QRect, _section: int) -> None:
         theme, font = self._theme, head_font(self._theme)
@@ -102,7 +102,9 @@ class _RowHeights(QStyledItemDelegate):
         self.measure(theme)
 
     def measure(self, theme: Theme) -> None:
-        self._page, self._topic = (QSize(40, round(theme.scaled(high))) for high in (PAGE_HIGH, TOPIC_HIGH))
+        self._page, self._topic = (
+            QSize(40, round(theme.scaled(high))) for high in (PAGE_ROW_HEIGHT, TOPIC_ROW_HEIGHT)
+        )
 
     def sizeHint(self, _option: QStyleOptionViewItem, index: Index) -> QSize:
         return self._topic if index.internalId() else self._page
@@ -328,7 +330,7 @@ class PageTree(QTreeView):
             self._icon(painter, left, rect, chevron, "textSecondary")
         left += theme.scaled(_ICON) + _GAP
         left = self._icon(
-            painter, left, rect, page_icon(listed.page), _STRUCK if is_gone else "textSecondary"
+            painter, left, rect, page_icon(listed.page), _GONE_ROLE if is_gone else "textSecondary"
         )
         small = self._font("small")
         since = since_words(listed)
@@ -339,10 +341,10 @@ class PageTree(QTreeView):
         paint.words(painter, room, since, small, theme.colour("textSecondary"), paint.RIGHT)
         name, font = page_name(listed.page), self._font("body", bold=True, struck=is_gone)
         words = QRectF(left, rect.top(), max(20.0, room.left() - left - _GAP), rect.height())
-        paint.words(painter, words, name, font, theme.colour(_STRUCK if is_gone else "text"))
+        paint.words(painter, words, name, font, theme.colour(_GONE_ROLE if is_gone else "text"))
         words.setLeft(words.left() + paint.width_of(font, name) + 8)
         if words.width() > theme.scaled(40):
-            role = _STRUCK if is_gone else "textSecondary"
+            role = _GONE_ROLE if is_gone else "textSecondary"
             paint.words(painter, words, where_words(listed.page), self._font("body"), theme.colour(role))
         if not is_gone:
             is_over = self._over_button and self._hovered == index
@@ -356,13 +358,13 @@ class PageTree(QTreeView):
 
     def _paint_topic(self, painter: QPainter, rect: QRectF, topic: PageTopic, *, is_gone: bool) -> None:
         theme = self.theme
-        role = _STRUCK if is_gone else "text"
+        role = _GONE_ROLE if is_gone else "text"
         left = _EDGE + 2 * (theme.scaled(_ICON) + _GAP)
         icon = "arrow-up-from-line" if topic.is_published else "arrow-down-to-line"
-        left = self._icon(painter, left, rect, icon, _STRUCK if is_gone else "textSecondary")
+        left = self._icon(painter, left, rect, icon, _GONE_ROLE if is_gone else "textSecondary")
         body, small = self._font("body"), self._font("small")
         verbs = max(paint.width_of(body, each) for each in (_("reads"), _("publishes")))
-        quiet = theme.colour(_STRUCK if is_gone else "textSecondary")
+        quiet = theme.colour(_GONE_ROLE if is_gone else "textSecondary")
         paint.words(
             painter, QRectF(left, rect.top(), verbs + 2, rect.height()), does_words(topic), body, quiet
         )
@@ -372,7 +374,7 @@ class PageTree(QTreeView):
         end = self.cell("rate", rect).left() - 2 * _PADDING
         paint.words(
             painter, QRectF(end - wide, rect.top(), wide, rect.height()), limit, small,
-            theme.colour(_STRUCK if is_gone else "textTertiary"), paint.RIGHT,
+            theme.colour(_GONE_ROLE if is_gone else "textTertiary"), paint.RIGHT,
         )  # fmt: skip
         name = QRectF(left, rect.top(), max(20.0, end - wide - left - _GAP), rect.height())
         paint.words(painter, name, topic.topic, self._font("code", struck=is_gone), theme.colour(role))

@@ -19,7 +19,7 @@ from app.ui.widgets.inputs.token_field import Token, TokenField
 from nep.errors import NepError
 from nep.i18n import _, listed
 
-_FIELD_HIGH = 31
+_FIELD_HEIGHT = 31
 EXAMPLE = "http://192.168.1.20:8080"
 
 
@@ -199,7 +199,7 @@ class PermissionForm(QWidget):
     def _measure(self) -> None:
         self._grid.setColumnMinimumWidth(0, round(self._theme.scaled(LABEL_WIDE)))
         for title in self._titles:  # aligned with the first line of a field that grows
-            title.setMinimumHeight(round(self._theme.scaled(_FIELD_HIGH)))
+            title.setMinimumHeight(round(self._theme.scaled(_FIELD_HEIGHT)))
 
     def show_state(self) -> None:
         """Show the current permissions."""
