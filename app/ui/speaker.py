@@ -65,7 +65,7 @@ def has_voice_engine() -> bool:
     try:
         from PySide6.QtTextToSpeech import QTextToSpeech  # noqa: PLC0415 (heavy, and needs a sound system)
     except (ImportError, RuntimeError) as error:
-        _log.info("robots have no voice here: %s", error)
+        _log.info("no speech output: %s", error)
         return False
     return bool(set(QTextToSpeech.availableEngines()) - {"mock"})
 
@@ -111,10 +111,10 @@ def outlives_trial(command: Sequence[str] = ()) -> bool:
             check=False,
         )
     except (OSError, subprocess.SubprocessError) as error:
-        _log.warning("robots have no voice here: it could not be tried: %s", error)
+        _log.warning("no speech output: the test process failed: %s", error)
         return False
     if done.returncode != 0:
-        _log.warning("robots have no voice here: the trial of it ended with %d", done.returncode)
+        _log.warning("no speech output: the test process exited with %d", done.returncode)
     return done.returncode == 0
 
 
@@ -182,7 +182,7 @@ class QtEngine:
                     self._voice = QTextToSpeech()
                     self._voice.stateChanged.connect(self._changed)
                 except RuntimeError as error:
-                    _log.info("robots have no voice here: %s", error)
+                    _log.info("no speech output: %s", error)
         return self._voice
 
     def _changed(self) -> None:
@@ -214,7 +214,7 @@ class QtEngine:
         try:
             from PySide6.QtMultimedia import QAudioFormat, QAudioSink, QMediaDevices  # noqa: PLC0415 (heavy)
         except (ImportError, RuntimeError) as error:
-            _log.info("robots make no sounds here: %s", error)
+            _log.info("no audio output: %s", error)
             return _(NO_SOUND)
         device = QMediaDevices.defaultAudioOutput()
         shape = QAudioFormat()
@@ -292,8 +292,8 @@ class _Desk(QObject):
                 problem = self._engine.say(first, language, volume, lambda: self.ended.emit(turn))
             else:
                 problem = self._engine.play(first, *others)
-        except Exception:  # noqa: BLE001 - whatever an engine of the system raises: Studio goes on in silence
-            _log.warning("the computer's voice broke off", exc_info=True)
+        except Exception:  # noqa: BLE001 - an engine of the system may raise anything; continue without sound
+            _log.warning("speech or audio output failed", exc_info=True)
         self.told.emit(what, problem)
         if problem and what == "say":
             self.ended.emit(turn)

@@ -84,8 +84,8 @@ def test_one_that_cant_end_or_tell_its_state_does_not_keep_the_window_open(
     assert not window.isVisible()
     assert bench.docks["console"].panel.closed
     assert {record.getMessage() for record in caplog.records} == {
-        "the panel 'topics' can't tell its state",
-        "the panel 'topics' can't end in order",
+        "saving the state of panel 'topics' failed",
+        "closing panel 'topics' failed",
     }
 
 
@@ -239,7 +239,7 @@ def test_one_whose_state_json_cant_say_keeps_nothing_else_from_being_kept(
     monkeypatch.setattr(Bad, "save_state", lambda _panel: {"when": object()})
     with caplog.at_level(logging.ERROR):
         window.close()
-    assert [record.getMessage() for record in caplog.records] == ["the panel 'bad' can't tell its state"]
+    assert [record.getMessage() for record in caplog.records] == ["saving the state of panel 'bad' failed"]
     layouts: dict[str, dict[str, object]] = Settings(home).get("layouts", {})
     assert "bad" in layouts["developer"]["open"]
 

@@ -250,7 +250,7 @@ class Dock(QDockWidget):
             found = self.panel.save_state()
             json.dumps(found)
         except CAUGHT_ERRORS:
-            _log.exception("the panel '%s' can't tell its state", self.description.name)
+            _log.exception("saving the state of panel '%s' failed", self.description.name)
             return {}
         return found
 
@@ -259,14 +259,14 @@ class Dock(QDockWidget):
         try:
             self.panel.restore_state(state)
         except CAUGHT_ERRORS:
-            _log.exception("the panel '%s' can't be as it was", self.description.name)
+            _log.exception("restoring panel '%s' failed", self.description.name)
 
     def shut(self) -> None:
         """Dispose of the panel when the window closes; an error is logged."""
         try:
             self.panel.shut()
         except CAUGHT_ERRORS:
-            _log.exception("the panel '%s' can't end in order", self.description.name)
+            _log.exception("closing panel '%s' failed", self.description.name)
 
     def keyPressEvent(self, event: QKeyEvent) -> None:
         """Focus the panel's filter on ``/``, leave a field on Esc; also while floating."""
@@ -286,7 +286,7 @@ class Dock(QDockWidget):
         try:
             own.extend(self.panel.more_actions())
         except CAUGHT_ERRORS:  # it can still be closed
-            _log.exception("the panel '%s' can't tell what it can do", self.description.name)
+            _log.exception("reading the actions of panel '%s' failed", self.description.name)
         menu.addActions(own)
         if own:
             menu.addSeparator()
