@@ -48,7 +48,7 @@ def test_both_work_both_stop_and_the_second_outlives_the_first(
     assert not any(state["moving"] for state in heard)
     assert len(robots(first)) == 1  # the second uses the one that is there
 
-    second.choose("View", "Look")
+    second.choose("View", "Appearance")
     second.pick("Dark")
     (firsts,) = robots(first)
     first.process.terminate()

@@ -69,12 +69,12 @@ class DoctorPanel(PanelWidget):
             self.theme, "stethoscope", _("Checking connections"), _("This takes a second or two.")
         )
         self.pages = PanelRows(self.empty, _("Connection doctor"))
-        self.missed = ComboBox(self.theme, name=_("What is missing?"))
+        self.missed = ComboBox(self.theme, name=_("Missing topic"))
         self.missed.activated.connect(self._choose_missed)
         self._arrange()
 
     def _arrange(self) -> None:
-        about = label(_("What is missing?"), "body", role="textSecondary")
+        about = label(_("Missing topic"), "body", role="textSecondary")
         about.setBuddy(self.missed)
         self.looked = ElidedLabel("small", "textTertiary", least=40)
         top = QHBoxLayout()

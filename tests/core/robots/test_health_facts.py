@@ -61,7 +61,7 @@ def test_a_robot_that_is_well(case: Case) -> None:
         ("Stop", "ok", "confirmed in 41 ms, at 8:40"),
         ("Camera", "ok", "sends 15 images per second"),
         ("Sensors", "ok", f"all {len(PEPPER.sensors) - 1} send"),
-        ("When its program stops", "ok", "stops by itself after 1 s"),
+        ("Safety stop", "ok", "stops by itself after 1 s"),
         ("Last response", "ok", f"every {PEPPER.beat_s:g} s while it works"),
     ]
     assert not any(fact.to_look_at for fact in case.facts())
@@ -120,7 +120,7 @@ def test_of_one_that_has_gone_nothing_old_is_said(case: Case) -> None:
     assert [fact.title for fact in case.facts()] == [
         "Connection",
         "Stop",
-        "When its program stops",
+        "Safety stop",
         "Last response",
     ]
 
@@ -196,6 +196,6 @@ def test_one_of_rize_has_neither_watchdog_nor_signs_of_life(case: Case) -> None:
     case.link.robot = rize.robot("Nao")
     case.link.last_stop = None
     assert case.says("Stop") == ("off", "not used yet; this robot can't confirm")
-    assert case.says("When its program stops")[0] == "off"
+    assert case.says("Safety stop")[0] == "off"
     assert "Last response" not in [fact.title for fact in case.facts()]
     assert not any(fact.to_look_at for fact in case.facts())

@@ -289,6 +289,6 @@ def test_of_blocks_and_notes_chosen_together_it_takes_the_blocks_and_says_so(
     them.until(lambda: len(window.backpack.items) == 1, "the block is in the backpack")
     assert window.types == [["wait"]]
     assert window.said == [
-        "Put 1 block into the backpack. Notes were left out: the backpack holds blocks only."
+        "Added 1 block to the backpack. Notes were left out: the backpack holds blocks only."
     ]
     assert them.newest() == before

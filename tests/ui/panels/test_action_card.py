@@ -41,7 +41,7 @@ def tried(state: str = "running", **more: object) -> Invocation:
 @pytest.mark.parametrize(
     ("made", "words"),
     [
-        (tried("sent"), "asked"),
+        (tried("sent"), "sent"),
         (tried("accepted", waits_for=("say", "show_emotion")), "waits for say and show emotion"),
         (tried("accepted", replaces=("turn",)), "replaces turn"),
         (tried(feedback={"moved": 0.2}), "moved 0.20 m"),
@@ -72,7 +72,7 @@ def test_too_late_is_a_sentence_below(card) -> None:
 
 def test_what_was_replaced_says_by_what_and_a_plain_stop_says_no_more(card) -> None:
     card.show_invocation(tried("canceled", error="replaced by turn", elapsed_s=1.0))
-    assert (card.result.text, card.error.text()) == ("stopped after 1.0 s", "replaced by Turn.")
+    assert (card.result.text, card.error.text()) == ("stopped after 1.0 s", "Replaced by turn.")
     assert card.error.property("role") == "textSecondary"  # that is no error
     card.show_invocation(tried("canceled", elapsed_s=1.0), may_move=True)
     assert card.result.text == "ended after 1.0 s"  # its robot is not proven to stand still

@@ -189,7 +189,7 @@ def test_what_is_on_is_told_in_the_row_the_title_the_alerts_and_the_history(pane
     ticks(window, panel, 2)
     panel._show_states()
     assert panel.rows[0].chip.text.endswith("12 now")
-    assert panel.chip.text == "1 on"
+    assert panel.chip.text == "1 active"
     assert panel.badge() == ("1", "error")
     (alert,) = [each for each in session.alerts.active if each.id == "alarm:d"]
     assert alert.title == "Robots.Pepper.battery of /blackboard is 12, below 20."

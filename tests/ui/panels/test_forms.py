@@ -116,7 +116,7 @@ def test_sentences_stand_below_their_rows_and_others_at_the_end(qtbot, theme) ->
     assert below["t"].text() == "Must not be empty." or below["t"].text() == "Text must not be empty."
     assert below["t"].isVisible()
     assert not below["s"].isVisible()
-    assert form.problem.text() == "Pepper disconnected."
+    assert form.problem.text() == "Pepper has gone."
     form.show_problems(())
     assert not below["t"].isVisible()
     assert not form.problem.isVisible()

@@ -372,7 +372,7 @@ def test_keys_walk_along_lines_and_say_what_is_chosen(panel: GraphPanel, window:
     assert canvas.accessibleDescription() == "/touch, 20/s, 10 kB/s, from pepper_driver to blackboard"
     QTest.keyClick(canvas, Qt.Key.Key_Right)
     assert canvas.choice.key == key_of(panel, "blackboard")
-    assert canvas.accessibleDescription().startswith("blackboard, Python, 1.2 %. Lines to others: 1.")
+    assert canvas.accessibleDescription().startswith("blackboard, Python, 1.2 %. Outgoing lines: 1.")
     QTest.keyClick(canvas, Qt.Key.Key_Right)
     QTest.keyClick(canvas, Qt.Key.Key_Return)
     assert window.opened == ["/blackboard"]

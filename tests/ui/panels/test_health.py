@@ -57,7 +57,7 @@ def test_what_is_to_be_looked_at_is_counted_and_first(panel, asked) -> None:
     assert panel.rows[0].title.text() == "Battery"
     asked.session.fleet.links[0].mute = True
     panel.refresh()
-    assert (panel.chip.text, panel.chip.status) == ("2 warning", "error")
+    assert (panel.chip.text, panel.chip.status) == ("2 warnings", "error")
 
 
 @pytest.mark.parametrize(("virtual", "does"), [(True, "connect:Pepper"), (False, "help.doctor")])

@@ -77,7 +77,7 @@ def test_a_picture_keeps_its_aspect_on_black(view) -> None:
 
 def test_it_says_how_many_are_shown_and_their_size(view) -> None:
     view.take(stream_of(picture(320, 240)))  # type: ignore[arg-type]
-    assert view.words.startswith("shown 30 of 60/s  320\u00d7240  ")
+    assert view.words.startswith("60 fps (30 shown)  320\u00d7240  ")
     assert view.words.endswith(" ms")  # its age
     assert rate_sentence(None, None) == ""
     assert rate_sentence(17.2, 15.0) == "15 fps (15 shown)"  # two windows of time: never more than arrive

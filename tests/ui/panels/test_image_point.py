@@ -100,9 +100,9 @@ def test_it_says_what_to_arm_and_one_click_is_one_message(qtbot, window, panel) 
     assert heard.listen(timeout_s=20.0) == (True, {"x": 16, "y": 8, "button": "left", **told})
     assert panel.view.marked == point
     assert not panel.view.grab().isNull()
-    assert points.strip.counts.text() == "1 point sent, heard by 1"
+    assert points.strip.counts.text() == "1 point sent, received by 1"
     entry = session.acting.sent.records[-1]
-    assert (entry.asker, entry.name, entry.words) == ("image", POINTS, "Point (16, 8), heard by 1")
+    assert (entry.asker, entry.name, entry.words) == ("image", POINTS, "Point (16, 8), received by 1")
     qtbot.waitUntil(lambda: panel.view.marked is None, timeout=20_000)
 
     panel.actions_of["right"].trigger()
@@ -110,7 +110,7 @@ def test_it_says_what_to_arm_and_one_click_is_one_message(qtbot, window, panel) 
     panel.view.zoom_by(1.5)
     click(qtbot, window, panel, 200.5, 100.5, MIDDLE)
     assert heard.listen(timeout_s=20.0) == (True, {"x": 200, "y": 100, "button": "middle", **told})
-    assert points.strip.counts.text() == "2 points sent, heard by 1"
+    assert points.strip.counts.text() == "2 points sent, received by 1"
     assert session.acting.repeat(entry.number) == ""
     assert heard.listen(timeout_s=20.0)[1]["x"] == 16
     session.runs.stop()
@@ -228,7 +228,7 @@ def test_two_clicks_at_two_places_are_two_points(qtbot, window, panel) -> None:
             QTest.mouseClick(panel.view, LEFT, Qt.KeyboardModifier.NoModifier, at(panel, x + 0.5, 50.5))
     ticks(window, panel)
     words = [each.words for each in window.session.acting.sent.records if each.asker == "image"]
-    assert words == ["Point (20, 50), heard by 1", "Point (300, 50), heard by 1"]
+    assert words == ["Point (20, 50), received by 1", "Point (300, 50), received by 1"]
 
 
 def test_what_is_armed_elsewhere_is_not_armed_here_and_closing_takes_it_away(qtbot, window, panel) -> None:

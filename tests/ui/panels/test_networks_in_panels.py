@@ -116,7 +116,7 @@ def test_topics_of_ros_stand_beside_the_native_ones_and_say_what_is_not_known(
     told = tips(panel, "ros /blackboard")
     assert "doesn't report it" in told["rate"]
     assert "doesn't count" in told["loss"]
-    assert "on ROS 1 nobody tells rates or losses" in panel.foot.text()
+    assert "ROS 1 report neither rates nor losses" in panel.foot.text()
     panel.filter.setText("ros 1 camera")
     assert [panel.model.key_of(row) for row in panel.model._rows.shown] == ["ros /camera"]
     panel.filter.clear()

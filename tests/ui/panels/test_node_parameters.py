@@ -130,7 +130,7 @@ def test_a_value_is_set_with_return_and_what_was_typed_stays_when_it_is_refused(
     part.field.selectAll()
     QTest.keyClicks(part.field, "fast")
     part.button.click()
-    assert part.sentence.text() == "Write a number."
+    assert part.sentence.text() == "Enter a number."
     part.field.selectAll()
     QTest.keyClicks(part.field, "1.25")
     part.button.click()
@@ -182,7 +182,7 @@ def test_what_can_not_be_set_says_why(world: World) -> None:
     part.table.choose("serial")
     assert not part.field.isEnabled()
     assert not part.button.isEnabled()
-    assert part.sentence.text() == "Only its own node may set it."
+    assert part.sentence.text() == "Only its own node can set it."
     world.window.session.source.tell(GraphView(1, 2, {}))
     ticks(world.window, world.panel, 2)
     part.table.choose("speed")

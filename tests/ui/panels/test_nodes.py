@@ -159,7 +159,7 @@ def test_a_vanished_node_is_struck_through_for_ten_seconds(panel, window) -> Non
 
 def test_what_an_original_cannot_do_is_said_for_the_chosen_one(panel, window) -> None:
     panel.table.choose(NodeRow(window.session.nodes.get("2")).key)
-    assert panel.foot.text().startswith("rize, on this computer, pid 512, JavaScript, here since ")
+    assert panel.foot.text().startswith("rize, on this computer, pid 512, JavaScript, connected since ")
     assert "up to 0.5.4.5" in panel.foot.text()
     assert "no sequence numbers or time stamps" in panel.foot.text()
     panel.table.choose(NodeRow(window.session.nodes.get("1")).key)
@@ -170,9 +170,9 @@ def test_what_an_original_cannot_do_is_said_for_the_chosen_one(panel, window) ->
 @pytest.mark.parametrize(
     ("generation", "words", "version"),
     [
-        ("A", "NEP up to 0.5.4.5", " up to 0.5.4.5:"),
-        ("B", "NEP 0.5.4.8", " 0.5.4.8:"),
-        ("C", "NEP C", "NEP:"),
+        ("A", "NEP up to 0.5.4.5", " up to 0.5.4.5."),
+        ("B", "NEP 0.5.4.8", " 0.5.4.8."),
+        ("C", "NEP C", "NEP."),
     ],
 )
 def test_generations_have_words(generation, words, version) -> None:

@@ -180,7 +180,7 @@ def test_a_robot_of_another_start_is_away_and_can_be_forgotten(qtbot, window) ->
     panel = window.make(PANEL, (1032, 800))
     qtbot.addWidget(panel)
     nao = panel.list.away["NAO"]
-    assert nao.chip.text == "away"
+    assert nao.chip.text == "not running"
     assert nao.where.startswith("seen ")
     menu = panel.list.menu_of(nao)
     assert [action.text() for action in menu.actions()] == ["Find the cause", "Forget NAO"]

@@ -55,7 +55,7 @@ def test_what_is_sent_is_listed_copied_and_sent_again_while_it_is_armed(qtbot, w
     assert heard.listen(timeout_s=20.0)[0]
     ticks(window, panel)
     assert rows(panel) == [
-        ["/words", "Word, heard by 1", "", "Publish"],
+        ["/words", "Word, received by 1", "", "Publish"],
         ["Studio", "armed for 5 min", "", "Studio"],
     ]
     assert panel.total.text().startswith("1 since ")
@@ -68,12 +68,12 @@ def test_what_is_sent_is_listed_copied_and_sent_again_while_it_is_armed(qtbot, w
     press(panel.again)
     assert heard.listen(timeout_s=20.0) == (True, {"word": "yes"})
     ticks(window, panel)
-    assert rows(panel)[0] == ["/words", "Word, heard by 1", "\u00d7 2", "Publish"]
+    assert rows(panel)[0] == ["/words", "Word, received by 1", "\u00d7 2", "Publish"]
     assert panel.chosen() is not None, "what is chosen stays chosen"
 
     panel.copy()
     line = QGuiApplication.clipboard().text()
-    assert line.endswith("[Publish] /words 2 \u00d7 Word, heard by 1")
+    assert line.endswith("[Publish] /words 2 \u00d7 Word, received by 1")
     menu = panel.menu_of(key)
     assert menu is not None
     entries = {action.text(): action for action in menu.actions()}

@@ -140,7 +140,7 @@ def test_a_call_with_its_answer_time_and_history(window, panel, qtbot) -> None:
     rows = panel.answer.model
     shown = [(rows.cell_at(row, 0).text, rows.cell_at(row, 1).text) for row in range(rows.rowCount())]
     assert shown == [("ok", "true"), ("faces", "[1]"), ("0", "{1}"), ("id", "7"), ("quality", "0.93")]
-    assert panel.answer.chip.text.startswith("confirmed in ")
+    assert panel.answer.chip.text.startswith("replied in ")
     assert panel.answer.facts.text().endswith("B")
     panel.answer.way.set_value("json")
     panel.answer._turn("json")
@@ -224,7 +224,7 @@ def test_nothing_of_an_answer_is_cut_off_at_the_width_of_the_developer_layout(wi
     window.session.source.node.new_server("remember_face", lambda _request: {"ok": True}, threads=1)
     press(panel.call_button)
     answered(window, panel, qtbot)
-    assert panel.answer.chip.text.startswith("confirmed in ")
+    assert panel.answer.chip.text.startswith("replied in ")
     right = panel.mapToGlobal(panel.rect().topRight()).x()
     for widget in (panel.answer.table, panel.answer.way, panel.answer.copy, panel.calls, panel.way):
         assert widget.isVisible()

@@ -67,7 +67,7 @@ def test_values_come_while_it_runs_are_marked_and_stay_after_the_end(panel, wind
     window.session.runs.run()
     tells(window, panel, score=3, names=["Ada", "Grace"], later=0)
     assert shown(panel) == [("score", "3"), ("names", "2 items: Ada, Grace"), ("later", "0")]
-    assert panel.when.text() == "Now"
+    assert panel.when.text() == "Live"
     now[0] += 1
     ticks(window, panel, 1)
     assert panel.model.cell_at(0, 1).tint == ""

@@ -175,5 +175,5 @@ def test_the_longest_menu_fits_a_low_screen(window: MainWindow, commands: Comman
         rows = [each for each in menu.actions() if each.isVisible() and not each.isSeparator()]
         assert len(rows) <= 18, f"{menu.title()} has {len(rows)} entries"
     view = next(menu for menu in window.bar.menus.findChildren(QMenu) if menu.title() == "&View")
-    look = next(each.menu() for each in view.actions() if each.text() == "Look")
+    look = next(each.menu() for each in view.actions() if each.text() == "Appearance")
     assert commands.actions["theme.dark"] in look.actions()

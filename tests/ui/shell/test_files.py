@@ -275,7 +275,7 @@ def test_a_tab_that_can_not_be_saved_stays(commands, window, tmp_path: Path) -> 
     commands.run("tab.close")
     assert names(window) == ["Mine"]
     alert = window.session.alerts.active[0]
-    assert alert.title.startswith("can't write Mine.nepb (")
+    assert alert.title.startswith("Can't write Mine.nepb (")
     assert alert.button == "Save somewhere else"
 
 
@@ -344,7 +344,7 @@ def test_a_file_that_is_no_behaviour_becomes_an_alert(commands, window, document
     commands.files.open(path)
     alert = window.session.alerts.active[0]
     assert alert.title == "bad.nepb is damaged or not a behaviour."
-    assert alert.detail == "Open a copy from before."
+    assert alert.detail == "Open an earlier copy."
     assert alert.action == "file.open"
     assert document.workspace == BLOCKS
 

@@ -81,7 +81,7 @@ def test_work_that_cant_be_kept_is_not_lost_without_a_word(
     assert not window.close()
     window.tick()
     assert (shut, window.isVisible(), window.showing) == ([], True, "behaviour")
-    assert "Studio can't close" in window.banner.banner.accessibleName()
+    assert "Studio stays open" in window.banner.banner.accessibleName()
     assert window.toast.isVisible()
     (home / "journal").unlink()
     session._next_check = 0.0

@@ -109,7 +109,7 @@ def test_a_layout_goes_out_and_comes_back_and_can_be_undone(
     assert [each.name for each in window.saved_layouts.all()] == ["Arm", "Arm 2"]
     file.write_bytes(b"nothing of the kind")
     commands.files.open_all([file])
-    assert window.toast.text == "Can't open Mine.nep-layout: it is damaged, or no layout of Studio"
+    assert window.toast.text == "Can't open Mine.nep-layout: it is damaged or not a layout of Studio"
     commands.files.open_all([tmp_path / "gone.nep-layout"])
     assert window.toast.text == "Can't open gone.nep-layout: no such file or directory"
     answers.path = tmp_path / "a file" / "x.nep-layout"

@@ -483,7 +483,7 @@ def test_what_a_dead_studio_left_is_offered_without_a_dialog(
     show(qtbot, window)
     commands.behaviours.come_back(left_behind(home / "journal"), window.banner.offer)
     assert window.banner.isVisible()
-    assert "“Song” and 2 others were not saved" in window.banner.banner.accessibleName()
+    assert "“Song” and 2 others weren't saved" in window.banner.banner.accessibleName()
     assert QApplication.activeModalWidget() is None
     QTest.mouseClick(window.banner.banner.button, Qt.MouseButton.LeftButton)
     assert {document.name for document in window.session.documents} == {"Story", "Tale", "Song"}

@@ -44,7 +44,7 @@ def test_the_beginning_of_a_word_is_better_than_its_middle() -> None:
 
 
 def test_letters_that_fit_are_told() -> None:
-    assert bold("reco", "Save the last 60 s of the recording") == "reco"
+    assert bold("reco", "Save last 60 s of the recording") == "reco"
     assert bold("pb", "Reset panels") == "P|b"
     assert bold("text larger", "Larger text") == "Larger|text"
     assert bold("ab", "ÄAB") == "AB"

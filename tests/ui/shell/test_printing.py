@@ -69,7 +69,7 @@ def test_without_a_printer_a_pdf_is_offered_in_a_sentence(qtbot, tmp_path: Path)
     case.answers.path = tmp_path / "Tea 1.2"
     case.printing.ask()
     assert "No printer" in case.said[0]
-    assert case.answers.asked == [f"Save the blocks as PDF: {Path.home() / 'Tea'}"]
+    assert case.answers.asked == [f"Save blocks as PDF: {Path.home() / 'Tea'}"]
     assert (tmp_path / "Tea 1.2.pdf").read_bytes() == b"%PDF"
     assert case.said[1] == "Saved Tea 1.2.pdf"
     assert case.editor.asked[0][0] == "Tea"

@@ -40,7 +40,7 @@ def test_the_ending_that_is_typed_says_as_what_it_is_saved(tmp_path: Path) -> No
     editor, answers = Editor(b"<svg/>"), Answers()
     answers.path = tmp_path / "Tea.SVG"
     made(editor, said, answers).ask()
-    assert answers.asked == [f"Save a picture of the blocks: {Path.home() / 'Tea'}"]
+    assert answers.asked == [f"Save blocks as image: {Path.home() / 'Tea'}"]
     assert editor.asked == [("svg", True)]
     assert answers.path.read_bytes() == b"<svg/>"
 

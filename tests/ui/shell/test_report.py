@@ -83,7 +83,7 @@ def lines(sheet: ReportSheet) -> str:
 def test_it_opens_in_the_field_and_says_what_goes_in(sheet: ReportSheet) -> None:
     assert sheet.isVisible()
     assert sheet.happened.edit.hasFocus()
-    for words in ("Sending is off", "Included", "connection doctor", "Not included", "Keys, passwords"):
+    for words in ("Nothing is sent", "Included", "connection doctor", "Not included", "Keys, passwords"):
         assert words in lines(sheet)
     assert not sheet.work.isVisible(), "nothing is open that could go in"
     assert "unless" not in lines(sheet)
@@ -156,7 +156,7 @@ def test_a_place_that_takes_nothing_is_said_and_what_was_typed_stays(
     answers.path = tmp_path / "file" / "report.zip"
     sheet.happened.set_text("It stopped")
     written(qtbot, sheet)
-    assert sheet.state.text().startswith("can't write Report.zip (")
+    assert sheet.state.text().startswith("Can't write report.zip (")
     assert sheet.state.text().endswith("choose another folder.")
     assert sheet.happened.text() == "It stopped"
     assert not sheet.show_file.isVisible()

@@ -72,7 +72,7 @@ def test_names_that_cant_be_are_said(shown: MainWindow, commands: Commands) -> N
     assert sheet.wrong.text() == "“developer” already exists."
     sheet.field.setText("x" * 41)
     QTest.keyClick(sheet.field, Qt.Key.Key_Return)
-    assert "40 letters" in sheet.wrong.text()
+    assert "40 characters" in sheet.wrong.text()
     sheet.field.setText("  ")
     QTest.keyClick(sheet.field, Qt.Key.Key_Return)
     assert sheet.wrong.text() == "A layout needs a name."

@@ -175,11 +175,11 @@ def test_nobody_else_gets_f12_not_even_from_the_settings(tmp_path: Path, qapp: o
 @pytest.mark.parametrize(
     ("key", "held", "said"),
     [
-        (Qt.Key.Key_S, NONE, "typing"),
-        (Qt.Key.Key_Return, NONE, "typing"),
-        (Qt.Key.Key_A, Qt.KeyboardModifier.ShiftModifier, "typing"),
+        (Qt.Key.Key_S, NONE, "single letter"),
+        (Qt.Key.Key_Return, NONE, "single letter"),
+        (Qt.Key.Key_A, Qt.KeyboardModifier.ShiftModifier, "single letter"),
         (Qt.Key.Key_F12, NONE, "F12 always stops"),
-        (Qt.Key.Key_C, CTRL, "Ctrl+C stays"),
+        (Qt.Key.Key_C, CTRL, "Ctrl+C is reserved"),
         (Qt.Key.Key_F4, NONE, ""),
         (Qt.Key.Key_S, CTRL, ""),
     ],

@@ -131,7 +131,7 @@ def test_open_work_stands_first_and_leads_back(page: StartPage) -> None:
     assert "Open now" in words(page)
     assert [row.accessibleName() for row in page.open_work.rows] == [
         "Continue with Greeting, not saved yet",
-        "Continue with Quiz, runs now",
+        "Continue with Quiz, running",
     ]
     told: list[str] = []
     page.work_chosen.connect(told.append)

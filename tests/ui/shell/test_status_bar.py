@@ -31,7 +31,7 @@ def test_health_names_the_alerts_before_the_robots(session: fakes.Session) -> No
     assert facts(session).health()[1] == "2 alerts"
     session.alerts.resolve("slow")
     session.alerts.resolve("message:/faces")
-    assert facts(session).health() == ("circle-check", "Pepper is well", "ok")
+    assert facts(session).health() == ("circle-check", "Pepper: no problems", "ok")
 
 
 def test_health_agrees_with_the_health_panel(session: fakes.Session) -> None:

@@ -96,5 +96,5 @@ def test_the_system_opens_files_beside_the_browser_of_the_editor() -> None:
     )
     assert done.returncode == 0, done.stderr
     refused, took = done.stdout.splitlines()
-    assert refused.startswith("rejected: QObject can't filter the events of the whole application")
+    assert refused.startswith("refused: QObject can't filter the events of the whole application")
     assert took == "['Early.nepb', 'Late.nepb']"

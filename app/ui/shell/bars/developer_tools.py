@@ -164,7 +164,7 @@ class DeveloperTools(QObject):
         self.freeze.setChecked(frozen)
         self.freeze.setEnabled(bool(freezable(shell.bench)))
         self.record.show_recording(self._recordings)
-        self.keep.set_word(_("Save the last {count} s").format(count=self._recordings.wish.seconds))
+        self.keep.set_word(_("Save last {count} s").format(count=self._recordings.wish.seconds))
         own = shell.saved_layouts.own("developer")
         name = own or _("Developer")
         self.layout.set_word(name)

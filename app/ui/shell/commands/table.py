@@ -30,7 +30,7 @@ from nep.programs.alarms import AlarmCondition
 from nep.version import RELEASES_PAGE
 
 A = TypeVar("A")
-LOOK, RECORD = lazy("Theme"), lazy("Record")
+LOOK, RECORD = lazy("Appearance"), lazy("Record")
 MENUS = (lazy("File"), lazy("Edit"), lazy("View"), lazy("Run"), lazy("Robots"), lazy("Help"))
 WHY_NO_RUN = {
     "stopping": lazy("Stopping robots"),

@@ -114,7 +114,7 @@ class RecordSheet(Overlay):
         self.length = RecordMeter(_("Length"))
         self.size_so_far = RecordMeter(_("Current size"))
         self.unkept = RecordMeter(_("Write errors"))
-        self.disk = RecordMeter(_("Free disk space"))
+        self.disk = RecordMeter(_("Free space"))
         self.at_end = RecordMeter(_("Expected"))
         self._meters = Card(self.theme)
         row = QHBoxLayout(self._meters)
@@ -487,7 +487,7 @@ class RecordSheet(Overlay):
     def _show_ring(self) -> None:
         recordings, state = self._recordings, self._recordings.client.state
         wish = recordings.wish
-        self.keep.set_word(_("Save the last {count} s").format(count=wish.seconds))
+        self.keep.set_word(_("Save last {count} s").format(count=wish.seconds))
         self.keep.setEnabled(state.ring_s is not None)
         if state.ring_s is None:
             self.ring_bar.set_fraction(None)

@@ -59,7 +59,7 @@ class SettingsSheet(Overlay):
         if restart is not None:
             self.restart.clicked.connect(restart)
         modes = [(mode, _(MODE_WORDS[mode][0]), MODE_WORDS[mode][1]) for mode in MODES]
-        look = pgettext("colours of the window", "Theme")
+        look = pgettext("colours of the window", "Appearance")
         self.mode = Segments(theme, modes, check=True, size="form", name=look)
         self.text = Segments(
             theme, [(p, f"{p} %", None) for p in TEXT_SIZES], check=True, size="form", name=_("Text size")
@@ -128,7 +128,7 @@ class SettingsSheet(Overlay):
         heard.addWidget(self.voice, 1)
         rows: tuple[tuple[str, QWidget | QHBoxLayout], ...] = (
             (_("Language"), spoken),
-            (pgettext("colours of the window", "Theme"), self.mode),
+            (pgettext("colours of the window", "Appearance"), self.mode),
             (_("Text size"), self.text),
             (_("High contrast"), self.contrast),
             (_("Reduce motion"), self.motion),

@@ -474,7 +474,7 @@ def test_a_typing_error_stays_with_what_was_meant(adding) -> None:
     panel = adding
     panel.add.setText("/odon.speed + 1")
     QTest.keyClick(panel.add, Qt.Key.Key_Return)
-    assert panel.add.sentence == "There is no topic /odon; did you mean /odom?"
+    assert panel.add.sentence == "Topic /odon does not exist; did you mean /odom?"
     assert panel.add.text() == "/odon.speed + 1"
     assert panel.shown == []
     QTest.keyClick(panel.add, Qt.Key.Key_Escape)
