@@ -115,7 +115,7 @@ class RecordCommands:
         self._shell.panel_focus.give(dock)
 
     def show_for_export(self, path: Path) -> None:
-        """Show where a part of a recording can be exported: its timeline's loop, or the recordings panel."""
+        """Show the recordings panel, which exports a part: the timeline's loop, if the recording is open."""
         if path.parent == self._recordings.folder:
             self.show(path)
         else:

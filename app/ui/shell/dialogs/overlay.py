@@ -304,5 +304,5 @@ class Overlay(QWidget):
             effect.setOpacity(max(0.01, strength))
 
     def _arrived(self) -> None:
-        self.setGraphicsEffect(None)  # type: ignore[arg-type]  # None takes the effect away
+        self.setGraphicsEffect(None)  # type: ignore[arg-type]  # None removes the effect
         self._scrim.set_strength(1.0)

@@ -1,7 +1,7 @@
 """Saved layouts: the last state of Behaviour and Developer, and custom layouts.
 
-A custom layout arranges the panels of Behaviour or Developer, its base. Changes are saved continuously, as
-for the built-in ones. Saved entries that no longer fit are skipped with a line in the Console.
+A custom layout arranges the panels of Behaviour or Developer, its base. Like the built-in ones it keeps its
+last state. Saved entries that no longer fit are skipped with a line in the Console.
 """
 
 from __future__ import annotations
