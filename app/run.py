@@ -232,8 +232,8 @@ def _run(
     program: Program, found: FoundRobots, reach: _Connection, say: _Lines, interrupted: threading.Event
 ) -> int:
     stopper = reach.stopper
-    told = _RunEvents(say)
-    runner = Runner(told)
+    events = _RunEvents(say)
+    runner = Runner(events)
     say(_("“{name}” runs").format(name=program.name))
     if interrupted.is_set():
         return FAILED if say.is_lost else INTERRUPTED
@@ -251,13 +251,13 @@ def _run(
         # Once at once, and again after the program has ended and can't move the robots any more.
         stopper.send_stop(ends=runner.program_key)
         runner.close()
-        names = [*(robot.name for robot in found.robots if robot.name in program.robots), *told.silent]
+        names = [*(robot.name for robot in found.robots if robot.name in program.robots), *events.silent]
         report = stopper.stop_all(names, ends=runner.program_key)
         for line in stop_lines(report):
             say(line)
     if was_interrupted:
         return INTERRUPTED if not report.unproven and not say.is_lost else FAILED
-    return OK if told.ok and not report.unproven else FAILED
+    return OK if events.ok and not report.unproven else FAILED
 
 
 class _LateRobots:

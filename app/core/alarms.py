@@ -161,10 +161,10 @@ class SessionAlarms:
     def _has_room(self) -> bool:
         if len(self.rules) < MOST_ALARMS:
             return True
-        said = _("You have {count} alarms, the maximum.").format(count=MOST_ALARMS)
+        text = _("You have {count} alarms, the maximum.").format(count=MOST_ALARMS)
         hint = _("Delete one you don't need.")
         self._session.alerts.put(
-            "alarms:most", "warn", said, hint, button=_("Show the alarms"), action=SHOW, count=0
+            "alarms:most", "warn", text, hint, button=_("Show the alarms"), action=SHOW, count=0
         )
         return False
 
@@ -280,8 +280,8 @@ class SessionAlarms:
         # prefers the recorded value that triggered the alarm over the current one
         words = record.words if record is not None else what_words(condition, seen)
         if condition.kind == "silent" and isinstance(seen, int | float) and seen >= 1:
-            said = _("{topic} has been silent for {time}")
-            words = said.format(topic=subject_words(condition), time=time_words(round(seen)))
+            template = _("{topic} has been silent for {time}")
+            words = template.format(topic=subject_words(condition), time=time_words(round(seen)))
         details = [deed.words for deed in record.deeds] if record is not None else []
         now = self.alarms.evaluator.state(rule).count
         known = next((each.count for each in self._session.alerts.active if each.id == _alert_id(rule.id)), 0)

@@ -190,8 +190,8 @@ def _log_unraisable(raised: sys.UnraisableHookArgs) -> None:
 
 def error_words(error: BaseException) -> str:
     """Return an exception as one line: type and message."""
-    said = " ".join(str(error).split())
-    return f"{type(error).__name__}: {said}" if said else type(error).__name__
+    text = " ".join(str(error).split())
+    return f"{type(error).__name__}: {text}" if text else type(error).__name__
 
 
 @dataclass(slots=True)
@@ -219,10 +219,10 @@ class FaultAlerts:
         try:
             yield
         except Exception as error:  # noqa: BLE001  the following steps must run after any error
-            english, told = what.format(**holes), _(what).format(**holes)
+            english, translated = what.format(**holes), _(what).format(**holes)
             _log.exception("can't %s", english)
             self._failed(
-                english, _("Studio can't {what}: {error}").format(what=told, error=error_words(error))
+                english, _("Studio can't {what}: {error}").format(what=translated, error=error_words(error))
             )
         else:
             if self._faults and what in self._faults:

@@ -81,7 +81,7 @@ class BackgroundWorker(Generic[T]):
                 owner = self._current_owner = next(iter(self._pending))
                 work = self._pending.pop(owner)
             try:
-                made = work()
+                result = work()
             except Exception as error:  # noqa: BLE001  raised in the thread that takes the result
                 with self._changed:
                     self._done.pop(owner, None)
@@ -89,4 +89,4 @@ class BackgroundWorker(Generic[T]):
                 continue
             with self._changed:
                 self._failed.pop(owner, None)
-                self._done[owner] = made
+                self._done[owner] = result

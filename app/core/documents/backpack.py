@@ -93,11 +93,11 @@ class Backpack:
         """Add stacks of blocks, the first on top. Raises BackpackError when it is full."""
         # Newer than all existing stacks, even if the clock was set back.
         newest = max([self._clock(), *(item.at + len(blocks) * _MIN_DISTANCE_S for item in self.items[:1])])
-        made = [
+        items = [
             Packed(uuid4().hex, newest - place * _MIN_DISTANCE_S, each) for place, each in enumerate(blocks)
         ]
-        self.restore(made)
-        return made
+        self.restore(items)
+        return items
 
     def restore(self, items: Sequence[Packed]) -> None:
         """Restore removed stacks at their positions. Raises BackpackError when it is full."""
@@ -185,8 +185,8 @@ class Backpack:
         entries = whole.get("items")
         if not isinstance(entries, list):
             return self._set_aside()
-        made = [(entry, _packed(entry)) for entry in entries]
-        unknown = tuple(entry for entry, item in made if item is None)
+        parsed = [(entry, _packed(entry)) for entry in entries]
+        unknown = tuple(entry for entry, item in parsed if item is None)
         if unknown:
             self._report_once(
                 ngettext(
@@ -195,7 +195,7 @@ class Backpack:
                     len(unknown),
                 ).format(count=len(unknown), path=self.path)
             )
-        return _Found(_sorted(item for _entry, item in made if item is not None), unknown)
+        return _Found(_sorted(item for _entry, item in parsed if item is not None), unknown)
 
     def _use_own_file(self) -> _Found:
         # The file of a newer Studio stays unchanged; a file of this version is used beside it.

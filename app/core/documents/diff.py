@@ -30,14 +30,14 @@ def difference(then: Workspace, now: Workspace) -> Difference:
     """Compare two states by block ids; numbers and texts inside a block are part of it."""
     old, new = (dict(_blocks(workspace)) for workspace in (then, now))
     stayed = old.keys() & new.keys()
-    made = Difference(
+    result = Difference(
         len(old),
         added=len(new.keys() - old.keys()),
         removed=len(old.keys() - new.keys()),
         changed=sum(old[id] != new[id] for id in stayed),
     )
-    if made != Difference(len(old)) or _same(then, now):
-        return made
+    if result != Difference(len(old)) or _same(then, now):
+        return result
     return Difference(len(old), moved=True)
 
 

@@ -110,10 +110,10 @@ class Document:
 
     def edited(self, workspace: Workspace | WorkspaceJson) -> None:
         """Apply an edit of the blocks. The journal gets the editor's text; nothing blocks on the disk."""
-        told = workspace if isinstance(workspace, WorkspaceJson) else WorkspaceJson.of(workspace)
-        if told.same_as(self._json):
+        edited = workspace if isinstance(workspace, WorkspaceJson) else WorkspaceJson.of(workspace)
+        if edited.same_as(self._json):
             return
-        self._json = told
+        self._json = edited
         self.dirty = True
         self.edits += 1
         self._store_used_robots()
@@ -210,8 +210,8 @@ class Document:
         known = next((each for each in self._known() if each.name == missing), None)
         if known is None or not blocks_of(self.workspace, missing):
             return False
-        made = deep_json.deeply(lambda: use_robot(self.workspace, missing, known.model, robot))
-        self.edited(made)
+        workspace = deep_json.deeply(lambda: use_robot(self.workspace, missing, known.model, robot))
+        self.edited(workspace)
         self.mends += 1
         return True
 
@@ -305,10 +305,10 @@ class Document:
 
     def try_program(self, stack: Stack) -> Program | None:
         """Return one stack of blocks as a program; None when it no longer exists."""
-        made = deep_json.deeply(lambda: stack.workspace(self.workspace))
-        if made is None:
+        workspace = deep_json.deeply(lambda: stack.workspace(self.workspace))
+        if workspace is None:
             return None
-        program = _compile(WorkspaceJson.of(made), self._connected, self.absent, self.name)
+        program = _compile(WorkspaceJson.of(workspace), self._connected, self.absent, self.name)
         return replace(program, shows_value=stack.is_value)
 
     def newest(self) -> Program | None:
@@ -350,8 +350,8 @@ class Document:
     def definitions(self) -> Mapping[str, object]:
         """Return blocks and toolbox for the editor, from the categories and the connected robots."""
         if self._definitions is None or self._definitions[0] != self.definitions_revision:
-            made = editor_definitions(self._connected, self.absent, self._topics)
-            self._definitions = (self.definitions_revision, made)
+            definitions = editor_definitions(self._connected, self.absent, self._topics)
+            self._definitions = (self.definitions_revision, definitions)
         return self._definitions[1]
 
     # -- private ---------------------------------------------------------------------------------------------

@@ -39,9 +39,9 @@ def translated(example: BehaviourFile, translate_text: Say = translate) -> Behav
     def label(english: str) -> str:
         # English where two names would be equal.
         if english not in names:
-            told = translate_text(LABEL, english)
-            is_taken = told.casefold() in map(str.casefold, names.values())
-            names[english] = english if is_taken else told
+            translation = translate_text(LABEL, english)
+            is_taken = translation.casefold() in map(str.casefold, names.values())
+            names[english] = english if is_taken else translation
         return names[english]
 
     workspace = _translated(example.workspace, translate_text, label)
@@ -72,22 +72,22 @@ def _translated(value: object, say: Say, label: Callable[[str], str]) -> object:
         return [_translated(each, say, label) for each in value]
     if not isinstance(value, Mapping):
         return value
-    made = {key: _translated(each, say, label) for key, each in value.items()}
-    kind, fields = made.get("type"), made.get("fields")
+    result = {key: _translated(each, say, label) for key, each in value.items()}
+    kind, fields = result.get("type"), result.get("fields")
     if kind == "values_text" and isinstance(fields, dict) and _has_letters(fields.get("TEXT")):
         fields["TEXT"] = say(TEXT, str(fields["TEXT"]))
     if str(kind).startswith("functions_define") and isinstance(fields, dict):
         fields["NAME"] = label(str(fields["NAME"]))
-    for note in _dicts(made.get("workspaceComments")):
+    for note in _dicts(result.get("workspaceComments")):
         note["text"] = say(NOTE, str(note.get("text", "")))
-    for variable in _dicts(made.get("variables")):
+    for variable in _dicts(result.get("variables")):
         variable["name"] = label(str(variable["name"]))
-    state = made.get("extraState")
+    state = result.get("extraState")
     if isinstance(state, dict):
         for named in (state, *_dicts(state.get("inputs"))):
             if "name" in named:
                 named["name"] = label(str(named["name"]))
-    return made
+    return result
 
 
 def _dicts(value: object) -> list[dict[str, object]]:

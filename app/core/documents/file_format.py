@@ -111,9 +111,9 @@ def write_file(path: Path, behaviour: BehaviourFile) -> None:
         data = file_bytes(behaviour)
         if len(data) > LARGEST_BYTES:
             size, most = len(data) / 1e6, LARGEST_BYTES / 1e6
-            said = _("{file} would be {size} MB").format(file=path.name, size=number(size, ".1f"))
+            template = _("{file} would be {size} MB").format(file=path.name, size=number(size, ".1f"))
             advice = _("at most {most} MB can be read; use smaller images").format(most=number(most, ".0f"))
-            raise DocumentError(path, said, advice)
+            raise DocumentError(path, template, advice)
         write_atomically(path, data)
     except RecursionError as error:
         words = _("can't write {file}: {reason}").format(file=path.name, reason=_(TOO_DEEP))

@@ -30,7 +30,7 @@ class FolderEntry:
 
 def entries_of(folder: Path, endings: tuple[str, ...] = (SUFFIX,)) -> tuple[FolderEntry, ...]:
     """Return the folders and the files with one of these endings, without hidden ones. Raises OSError."""
-    made = []
+    entries = []
     with os.scandir(folder) as found:
         for each in found:
             if each.name.startswith("."):
@@ -41,10 +41,10 @@ def entries_of(folder: Path, endings: tuple[str, ...] = (SUFFIX,)) -> tuple[Fold
                 continue  # a broken link, or deleted meanwhile
             is_folder = stat.S_ISDIR(facts.st_mode)
             if is_folder or each.name.lower().endswith(endings):
-                made.append(FolderEntry(Path(each.path), is_folder, facts.st_mtime, facts.st_size))
-            if len(made) == MAX_ENTRIES:
+                entries.append(FolderEntry(Path(each.path), is_folder, facts.st_mtime, facts.st_size))
+            if len(entries) == MAX_ENTRIES:
                 break
-    return tuple(made)
+    return tuple(entries)
 
 
 def name_refusal(name: str) -> str:
@@ -69,7 +69,7 @@ def whole_path(typed: str) -> Path | None:
 
 def free_name(folder: Path, name: str, ending: str = SUFFIX) -> str:
     """Return the name, numbered if a file has it: "Greeting 2"."""
-    number, made = 2, name
-    while (folder / f"{made}{ending}").exists():
-        made, number = f"{name} {number}", number + 1
-    return made
+    number, candidate = 2, name
+    while (folder / f"{candidate}{ending}").exists():
+        candidate, number = f"{name} {number}", number + 1
+    return candidate

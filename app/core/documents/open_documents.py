@@ -53,9 +53,9 @@ class Documents:
         """Start an empty behaviour in a new tab, or in an unchanged one."""
         if self.current.blank:
             return self.current
-        made = self._new_document()
-        made.new(self._free_name(_(UNNAMED)))
-        return self._insert(made)
+        document = self._new_document()
+        document.new(self._free_name(_(UNNAMED)))
+        return self._insert(document)
 
     def open(self, path: Path) -> Document:
         """Open a file in a tab, or show its tab. On DocumentError nothing changes."""
@@ -75,9 +75,9 @@ class Documents:
     def duplicate(self, document: Document) -> Document:
         """Open a copy of a behaviour in the next tab."""
         self.show(document)
-        made = self._new_document()
-        made.duplicate(document, self._free_name(_("{name} copy").format(name=document.name)))
-        return self._insert(made)
+        copied = self._new_document()
+        copied.duplicate(document, self._free_name(_("{name} copy").format(name=document.name)))
+        return self._insert(copied)
 
     def rename(self, document: Document, name: str) -> None:
         """Rename a behaviour and its file. On DocumentError nothing changes."""
@@ -277,19 +277,19 @@ class Documents:
     # -- private -----------------------------------------------------------------------------------------
 
     def _new_document(self) -> Document:
-        made = self._make()
-        made.compiler, made.journal_writer = self._compiler, self._journal_writer
-        made.set_connected(self._robots)
-        made.set_topics(self._topics)
-        return made
+        document = self._make()
+        document.compiler, document.journal_writer = self._compiler, self._journal_writer
+        document.set_connected(self._robots)
+        document.set_topics(self._topics)
+        return document
 
     def _open_with(self, fill: Callable[[Document], None]) -> Document:
         if self.current.blank:
             fill(self.current)
             return self._make_current(self.current)
-        made = self._new_document()
-        fill(made)
-        return self._insert(made)
+        document = self._new_document()
+        fill(document)
+        return self._insert(document)
 
     def _insert(self, made: Document) -> Document:
         self._open.insert(self._open.index(self.current) + 1, made)

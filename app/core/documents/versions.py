@@ -178,15 +178,15 @@ def _newest_first(folder: Path) -> list[Version]:
 
 
 def _version(copy: Path) -> Version | None:
-    told = _NAME.fullmatch(copy.name)
-    if told is None:
+    match = _NAME.fullmatch(copy.name)
+    if match is None:
         return None
     try:
         written = copy.stat().st_mtime
-        replaced = time.mktime(time.strptime(told["stamp"], _STAMP))
+        replaced = time.mktime(time.strptime(match["stamp"], _STAMP))
     except (OSError, ValueError, OverflowError):
         return None
-    return Version(copy, told["stem"], written, replaced, told["mark"] or "")
+    return Version(copy, match["stem"], written, replaced, match["mark"] or "")
 
 
 def _thin_out(folder: Path, mark: str) -> None:

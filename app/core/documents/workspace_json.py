@@ -45,8 +45,8 @@ class WorkspaceJson:
     def blocks(self) -> Mapping[str, object]:
         """Blocks in Blockly's JSON; empty when the text is not an object."""
         if self._blocks is None:
-            made = deep_json.loads(self._text or "{}")
-            self._blocks = made if isinstance(made, dict) else {}
+            parsed = deep_json.loads(self._text or "{}")
+            self._blocks = parsed if isinstance(parsed, dict) else {}
         return self._blocks
 
     @property

@@ -95,5 +95,5 @@ def _counts(facts: GraphFacts) -> Iterator[tuple[str, int | None]]:
         for server in service.servers:
             yield server.node_id, server.calls
         for client in service.clients:
-            told = None if client.answered is None else client.answered + (client.failed or 0)
-            yield client.node_id, told
+            count = None if client.answered is None else client.answered + (client.failed or 0)
+            yield client.node_id, count

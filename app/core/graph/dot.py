@@ -27,9 +27,9 @@ def dot_of(graph: NodeGraph, group_names: Mapping[str, str], label: Callable[[Gr
     lines += [f"  {each}" for others in inside.values() for each in others]
     for line in graph.lines:
         style = ", style=dashed" if line.kind == "service" else ""
-        said = quoted(label(line))
+        text = quoted(label(line))
         lines += [
-            f"  {names[source]} -> {names[target]} [label={said}{style}];" for source, target in line.pairs()
+            f"  {names[source]} -> {names[target]} [label={text}{style}];" for source, target in line.pairs()
         ]
     return "\n".join([*lines, "}", ""])
 

@@ -205,11 +205,11 @@ def _place_block(
     if len(keys) == 1:
         return {keys[0]: (0.0, 0.0)}
     index = {key: number for number, key in enumerate(keys)}
-    made = graphlay.layout(
+    layout = graphlay.layout(
         {"nodes": [_request_box(key, sizes.node) for key in keys], "edges": _request_edges(ways, index)},
         options=_library_options(effort),
     )
-    return {key: _point(node["center"]) for key, node in zip(keys, made.nodes, strict=True)}
+    return {key: _point(node["center"]) for key, node in zip(keys, layout.nodes, strict=True)}
 
 
 def _block_box(graph: NodeGraph, block: str, places: Mapping[str, Place], sizes: LayoutSizes) -> Box:
@@ -232,10 +232,12 @@ def _place_boxes(boxes: Mapping[str, Box], between: Mapping[tuple[str, str], int
         for (begin, end), count in between.items()
     ]
     nodes = [_request_box(block, (box[2], box[3])) for block, box in boxes.items()]
-    made = graphlay.layout({"nodes": nodes, "edges": edges}, options=_library_options("balanced", GROUP_GAP))
-    middles = {block: _point(node["center"]) for block, node in zip(boxes, made.nodes, strict=True)}
-    wide = made.bounds["max"]["x"] - made.bounds["min"]["x"]
-    high = made.bounds["max"]["y"] - made.bounds["min"]["y"]
+    layout = graphlay.layout(
+        {"nodes": nodes, "edges": edges}, options=_library_options("balanced", GROUP_GAP)
+    )
+    middles = {block: _point(node["center"]) for block, node in zip(boxes, layout.nodes, strict=True)}
+    wide = layout.bounds["max"]["x"] - layout.bounds["min"]["x"]
+    high = layout.bounds["max"]["y"] - layout.bounds["min"]["y"]
     return middles if wide <= WIDEST * high or len(boxes) < 4 else _in_shelves(boxes, middles)
 
 
@@ -265,12 +267,12 @@ def _route_lines(
         {**_request_box(key, sizes.node), "position": {"x": x, "y": y}} for key, (x, y) in places.items()
     ]
     try:
-        made = graphlay.reroute(
+        layout = graphlay.reroute(
             {"nodes": request, "edges": _request_edges(ways, index)}, options=_library_options("fast")
         )
         return {
             way: tuple(_point(each) for each in edge["points"])
-            for way, edge in zip(ways, made.edges, strict=True)
+            for way, edge in zip(ways, layout.edges, strict=True)
             if len(edge["points"]) > 1
         }
     except BaseException as error:
@@ -394,15 +396,15 @@ def _group_boxes(graph: NodeGraph, places: Mapping[str, Place], sizes: LayoutSiz
     inside: dict[str, list[Box]] = {}
     for node in graph.nodes:
         inside.setdefault(node.group, []).append(_box_at(places[node.key], sizes.node))
-    made = {}
+    rectangles = {}
     for group in graph.groups:
         if group.is_closed or group.key not in inside:
             continue
         left, top, wide, high = _around(_with_margins(box, group.key, sizes) for box in inside[group.key])
         if group.quiet:
             high += sizes.foot
-        made[group.key] = (left, top, wide, high)
-    return made
+        rectangles[group.key] = (left, top, wide, high)
+    return rectangles
 
 
 def _with_margins(box: Box, group: str, sizes: LayoutSizes) -> Box:
@@ -418,11 +420,11 @@ def _box_at(place: Place, size: Place) -> Box:
 
 
 def _around(boxes: Iterable[Box]) -> Box:
-    made = list(boxes)
-    if not made:
+    rectangles = list(boxes)
+    if not rectangles:
         return 0.0, 0.0, 0.0, 0.0
-    left, top = min(box[0] for box in made), min(box[1] for box in made)
-    right, bottom = max(box[0] + box[2] for box in made), max(box[1] + box[3] for box in made)
+    left, top = min(box[0] for box in rectangles), min(box[1] for box in rectangles)
+    right, bottom = max(box[0] + box[2] for box in rectangles), max(box[1] + box[3] for box in rectangles)
     return left, top, right - left, bottom - top
 
 

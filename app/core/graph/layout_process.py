@@ -39,16 +39,16 @@ class LayoutProcess:
         """Call `arrange` in the process; None when it failed, was killed, or took longer than `TIMEOUT_S`."""
         bare = replace(graph, nodes=tuple(replace(node, entry=None) for node in graph.nodes))
         try:
-            told, _nothing = self._process.communicate(pickle.dumps((bare, before, sizes)), TIMEOUT_S)
+            output, _nothing = self._process.communicate(pickle.dumps((bare, before, sizes)), TIMEOUT_S)
         except (subprocess.TimeoutExpired, OSError, ValueError):
             self.kill()
             return None
         finally:
             self._clean_up()
-        if self._process.returncode or not told:
+        if self._process.returncode or not output:
             return None
-        made = pickle.loads(told)  # noqa: S301 - written by our own child
-        return made if isinstance(made, GraphLayout) else None
+        layout = pickle.loads(output)  # noqa: S301 - written by our own child
+        return layout if isinstance(layout, GraphLayout) else None
 
     def _clean_up(self) -> None:
         # Closes the pipes and reaps the process.

@@ -51,8 +51,8 @@ class LayoutThread:
     def take(self) -> tuple[NodeGraph, GraphLayout] | None:
         """Return the newest finished graph with its layout once; None when there is none."""
         with self._changed:
-            made, self._made = self._made, None
-            return made
+            layout, self._made = self._made, None
+            return layout
 
     def close(self) -> None:
         """Stop; returns when the thread has ended, or after `JOIN_TIMEOUT_S` if the library hangs."""
@@ -72,13 +72,13 @@ class LayoutThread:
                     return
                 graph, before, sizes = self._waiting
                 self._waiting, self._is_busy = None, True
-            made: GraphLayout | None = None
+            layout: GraphLayout | None = None
             with log_errors("lay out the graph"):
-                made = self._arrange(graph, before, sizes)
+                layout = self._arrange(graph, before, sizes)
             with self._changed:
                 self._is_busy = False
-                if made is not None:
-                    self._made = graph, made
+                if layout is not None:
+                    self._made = graph, layout
 
     def _arrange_anywhere(
         self, graph: NodeGraph, before: GraphLayout | None, sizes: LayoutSizes
@@ -93,8 +93,8 @@ class LayoutThread:
             except OSError:  # no more processes can be started
                 return arrange_plainly(graph, sizes)
         try:
-            made = process.arrange(graph, before, sizes)
+            layout = process.arrange(graph, before, sizes)
         finally:
             with self._changed:
                 self._process = None
-        return made if made is not None else arrange_plainly(graph, sizes)
+        return layout if layout is not None else arrange_plainly(graph, sizes)

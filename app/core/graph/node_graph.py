@@ -190,13 +190,12 @@ def _is_hidden(node: DrawnNode, choices: GraphChoices) -> bool:
 def _boxes(facts: GraphFacts, choices: GraphChoices) -> dict[str, DrawnNode]:
     # By the entry's key; groups are not collapsed yet.
     pictures = {topic.key for topic in facts.topics if topic.codec == "image"}
-    made: dict[str, DrawnNode] = {}
+    drawn: dict[str, DrawnNode] = {}
     taken: Counter[str] = Counter()
     for entry in sorted(facts.nodes, key=lambda each: (each.since_ns, each.id)):
         key = f"{entry.network}|{entry.host}|{entry.name}"
         taken[key] += 1
-        page = facts.pages.get(entry.name) if _is_page(entry) else None
-        made[entry.key] = DrawnNode(
+        drawn[entry.key] = DrawnNode(
             key if taken[key] == 1 else f"{key}|{taken[key]}",
             _name_of(entry) if page is None else page.title,
             _group_of(entry, facts, choices.group_by),
@@ -209,7 +208,7 @@ def _boxes(facts: GraphFacts, choices: GraphChoices) -> dict[str, DrawnNode]:
             entry.key in choices.quiet and entry.gone_s is None,
             page=page,
         )
-    return dict(sorted(made.items(), key=lambda item: item[1].key))
+    return dict(sorted(drawn.items(), key=lambda item: item[1].key))
 
 
 def _kind_of(entry: NodeEntry, facts: GraphFacts) -> NodeKind:
@@ -269,19 +268,19 @@ def _groups(
     for node in boxes.values():
         members.setdefault(node.group, []).append(node)
     addresses = _addresses(facts)
-    made = []
+    groups = []
     for key in sorted(members):
         if not key:
             continue
         nodes = members[key]
         hidden = sum(_is_hidden(node, choices) for node in nodes)
-        told = Counter(addresses[node.entry_key] for node in nodes if node.entry_key in addresses)
-        address = min(told, key=lambda each: (-told[each], each)) if told and key != WEB_GROUP else ""
+        counts = Counter(addresses[node.entry_key] for node in nodes if node.entry_key in addresses)
+        address = min(counts, key=lambda each: (-counts[each], each)) if counts else ""
         closed = choices.is_closed(key) or hidden == len(nodes)
-        made.append(
+        groups.append(
             GraphGroup(key, _host_of(key), address, _icon_of(key, nodes, facts), len(nodes), hidden, closed)
         )
-    return tuple(made)
+    return tuple(groups)
 
 
 def _host_of(group: str) -> str:

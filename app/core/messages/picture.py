@@ -92,8 +92,10 @@ def decode(
     one = numbers is not None
     if (bgra.shape[1], bgra.shape[0]) != size:
         numbers = None
-    made = Picture(bgra, *size, message.seq, message.stamp_ns, received_s, message, numbers, look, scale, one)
-    return made, None
+    image = Picture(
+        bgra, *size, message.seq, message.stamp_ns, received_s, message, numbers, look, scale, one
+    )
+    return image, None
 
 
 def once_more(

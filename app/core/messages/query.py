@@ -39,9 +39,9 @@ class FoundPath(str):
     @classmethod
     def of(cls, steps: Steps) -> FoundPath:
         """Return the path of these steps; ``$`` for the whole message."""
-        made = cls(path_text(steps) if steps else "$")
-        made.steps = steps
-        return made
+        found = cls(path_text(steps) if steps else "$")
+        found.steps = steps
+        return found
 
 
 @dataclass(frozen=True, slots=True)
@@ -96,10 +96,10 @@ class JsonQuery:
 
 @cache
 def _environment() -> jsonpath.JSONPathEnvironment:
-    made = jsonpath.JSONPathEnvironment(strict=True)
+    environment = jsonpath.JSONPathEnvironment(strict=True)
     for name in ("match", "search"):
-        made.function_extensions.pop(name, None)
-    return made
+        environment.function_extensions.pop(name, None)
+    return environment
 
 
 def _sentence(error: jsonpath.JSONPathError, text: str) -> str:
@@ -107,8 +107,8 @@ def _sentence(error: jsonpath.JSONPathError, text: str) -> str:
     rest = text[token.index :] if token is not None and 0 <= token.index < len(text) else ""
     if not rest:
         return _("the query is incomplete: {reason}").format(reason=reason)
-    said = _("the query is not valid from {rest} on: {reason}")
-    return said.format(rest=escaped(shortened(rest, 20)), reason=reason)
+    template = _("the query is not valid from {rest} on: {reason}")
+    return template.format(rest=escaped(shortened(rest, 20)), reason=reason)
 
 
 class _LimitReached(Exception):  # noqa: N818  not an error: it ends the search

@@ -23,20 +23,20 @@ def arrivals(before: GraphView, after: GraphView) -> list[str]:
     here: list[tuple[str, str]] = []
     more: list[tuple[str, str]] = []
     came = [id for id, node in after.nodes.items() if id not in before.nodes and _is_reported(node)]
-    told: set[str] = set()
+    reported: set[str] = set()
     topics_of = _topics_by_node(after)
     for node in came:
         new = [name for name in topics_of.get(node, ()) if not _published(before, name)]
         name, original = after.nodes[node].name, after.nodes[node].generation != NATIVE
         if len(new) > FEW:
             here.append((name, _here_with(name, len(new), original=original)))
-            told.update(new)
+            reported.update(new)
         elif not new:
             words = _("{node} joined (original NEP)") if original else _("{node} joined")
             here.append((name, words.format(node=name)))
     for name, info in after.topics.items():
         count = len(info.publishers)
-        if count and name not in told and not _is_internal(name) and not _published(before, name):
+        if count and name not in reported and not _is_internal(name) and not _published(before, name):
             words = ngettext("{topic} is new, {count} publisher", "{topic} is new, {count} publishers", count)
             more.append((name, words.format(topic=name, count=count)))
     left = [node.name for id, node in before.nodes.items() if id not in after.nodes and _is_reported(node)]

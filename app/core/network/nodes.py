@@ -132,9 +132,9 @@ class Nodes:
             _update_entry(node, info)
             place = place_of(id)
             node.may_set = place in view.services
-            told = view.topics.get(place)
-            told = view.topics.get(place)
-            node.has_parameters = node.may_set or (told is not None and bool(told.publishers))
+            topic = view.topics.get(place)
+            topic = view.topics.get(place)
+            node.has_parameters = node.may_set or (topic is not None and bool(topic.publishers))
             node.publishes, node.subscribes = publishes.get(id, ()), subscribes.get(id, ())
         for id, node in self._nodes.items():
             if id not in view.nodes and node.gone_since is None:

@@ -193,7 +193,7 @@ def free_path(wanted: Path, *, is_folder: bool = False) -> Path:
     A folder has no suffix: dots in its name belong to times.
     """
     stem, suffix = (wanted.name, "") if is_folder else (wanted.stem, wanted.suffix)
-    made, number = wanted, 2
-    while made.exists():
-        made, number = wanted.with_name(f"{stem} {number}{suffix}"), number + 1
-    return made
+    path, number = wanted, 2
+    while path.exists():
+        path, number = wanted.with_name(f"{stem} {number}{suffix}"), number + 1
+    return path

@@ -315,9 +315,9 @@ class RecorderClient:
         if isinstance(event, RecorderGone):
             self._on_gone(event.detail)
             return
-        told = self._handlers.get(str(event.content.get("event")))
-        if told is not None:
-            told(event.content)
+        handler = self._handlers.get(str(event.content.get("event")))
+        if handler is not None:
+            handler(event.content)
 
     def _on_recording(self, _content: Mapping[str, object]) -> None:
         if self.state.phase == "starting":

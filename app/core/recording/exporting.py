@@ -79,15 +79,15 @@ class RecordingExport:
         if self.problem:
             return _("Not exported: {reason}").format(reason=self.problem)
         count = len(self.files)
-        said = ngettext("Exported {count} file", "Exported {count} files", count).format(count=count)
-        return said if not self.damage else f"{said}; {self.damage}"
+        text = ngettext("Exported {count} file", "Exported {count} files", count).format(count=count)
+        return text if not self.damage else f"{text}; {self.damage}"
 
     def _run(self) -> None:
         try:
             with self._opener.open(self._recording) as recording:
-                made = export(recording, self._kind, self.folder, self._part, progress=self._report_progress)
+                files = export(recording, self._kind, self.folder, self._part, progress=self._report_progress)
                 self.damage = damage_words(recording.damage, recording.start_ns)
-            self.files = tuple(made)
+            self.files = tuple(files)
         except _CancelledError:
             pass
         except (NepError, OSError, MemoryError) as error:

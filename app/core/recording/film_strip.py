@@ -88,9 +88,9 @@ def film_strip(
             counted = recording.densities(start_ns, end_ns + 1, bars)
             counts = tuple(map(sum, zip(*counted.values(), strict=True))) if counted else ()
             topics = tuple(recording.topics.values())
-            made = _pictures(recording, pictures, fit)
+            images = _pictures(recording, pictures, fit)
             sizes = _message_bytes(recording)
-            return FilmStripLook(path, start_ns, end_ns, made, counts, topics, counted, sizes)
+            return FilmStripLook(path, start_ns, end_ns, images, counts, topics, counted, sizes)
     except (NepError, OSError):
         return None
 
@@ -100,13 +100,13 @@ def _pictures(recording: Recording, count: int, fit: Size) -> tuple[Picture | No
     if not topics:
         return ()
     topic = max(topics, key=lambda each: each.message_count).name
-    made = []
+    images = []
     for place in range(count):
         span = recording.end_ns - recording.start_ns
         at_ns = recording.start_ns + (2 * place + 1) * span // (2 * count)
         found = recording.newest(at_ns, (topic,)).get(topic) or recording.after(at_ns, topic)
-        made.append(decode(found.message, 0.0, fit)[0] if found is not None else None)
-    return tuple(made)
+        images.append(decode(found.message, 0.0, fit)[0] if found is not None else None)
+    return tuple(images)
 
 
 def _message_bytes(recording: Recording) -> dict[str, float]:

@@ -91,5 +91,5 @@ def fatal_line(trace: str) -> str:
 
     On Windows faulthandler also writes exceptions that a system library raises and catches itself.
     """
-    told = [line for line in trace.splitlines() if line.startswith(TRACE_BEGINS)]
-    return next((line for line in reversed(told) if not line.startswith(MAYBE_CAUGHT)), "")
+    headers = [line for line in trace.splitlines() if line.startswith(TRACE_BEGINS)]
+    return next((line for line in reversed(headers) if not line.startswith(MAYBE_CAUGHT)), "")

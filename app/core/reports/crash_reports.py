@@ -98,10 +98,10 @@ class CrashReports:
         taken = []
         for each in self.all():
             if each.is_new:
-                told = each.path.with_name(each.path.name.replace(".new.txt", ".txt"))
+                path = each.path.with_name(each.path.name.replace(".new.txt", ".txt"))
                 with suppress(OSError):  # another instance took it, or the disk is read-only
-                    replace_file(each.path, told)
-                    taken.append(CrashReport(told, each.part, each.noticed_s, is_new=False))
+                    replace_file(each.path, path)
+                    taken.append(CrashReport(path, each.part, each.noticed_s, is_new=False))
         return taken
 
 
@@ -125,11 +125,16 @@ def offer(alerts: Alerts, reports: CrashReports) -> None:
     if found:
         worst = min(found, key=lambda each: PARTS.index(each.part))
         version = _version_of(worst)
-        told = [_(DETAIL)]
+        sentences = [_(DETAIL)]
         if version not in {"", __version__}:  # it may be fixed already
-            told.insert(0, _(OF_ANOTHER).format(version=version, own=__version__))
+            sentences.insert(0, _(OF_ANOTHER).format(version=version, own=__version__))
         alerts.put(
-            ALERT, "warn", _(TITLES[worst.part]), " ".join(told), button=_("Report a problem"), action=OFFER
+            ALERT,
+            "warn",
+            _(TITLES[worst.part]),
+            " ".join(sentences),
+            button=_("Report a problem"),
+            action=OFFER,
         )
 
 
@@ -169,12 +174,12 @@ def _text(crash: Crash, now_s: float) -> str:
 
 
 def _report(path: Path) -> CrashReport | None:
-    told = _NAME.fullmatch(path.name)
-    part = next((part for part in PARTS if told is not None and told["part"] == part), None)
-    if told is None or part is None:
+    match = _NAME.fullmatch(path.name)
+    part = next((part for part in PARTS if match is not None and match["part"] == part), None)
+    if match is None or part is None:
         return None
     try:
-        noticed = time.mktime(time.strptime(told["stamp"], _STAMP))
+        noticed = time.mktime(time.strptime(match["stamp"], _STAMP))
     except (ValueError, OverflowError):
         return None
-    return CrashReport(path, part, noticed, told["new"] is not None)
+    return CrashReport(path, part, noticed, match["new"] is not None)

@@ -188,7 +188,7 @@ def _missing(names: tuple[str, ...], release: Callable[[], Mapping[str, str]]) -
 def _has_time64_names(release: Callable[[], Mapping[str, str]]) -> bool:
     # Debian or Ubuntu with packages renamed for 64-bit times.
     try:
-        told = release()
-        return float(told.get("VERSION_ID", "0")) >= _RENAMED_SINCE[told.get("ID", "")]
+        system = release()
+        return float(system.get("VERSION_ID", "0")) >= _RENAMED_SINCE[system.get("ID", "")]
     except (OSError, ValueError, KeyError):
         return False

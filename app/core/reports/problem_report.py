@@ -121,11 +121,11 @@ def make_report(parts: ReportParts, happened: str, work: Sequence[ReportedWork] 
     for name, data in texts(parts.crashes.all()):
         files.append((f"crashes/{name}", _private(data.decode("utf-8", "replace"))))
     files += _named(work)
-    made = io.BytesIO()
-    with zipfile.ZipFile(made, "w", zipfile.ZIP_DEFLATED) as archive:
+    buffer = io.BytesIO()
+    with zipfile.ZipFile(buffer, "w", zipfile.ZIP_DEFLATED) as archive:
         for name, data in files:
             archive.writestr(name, data)
-    return made.getvalue()
+    return buffer.getvalue()
 
 
 def write_report(path: Path, data: bytes) -> None:

@@ -100,8 +100,8 @@ class StudioRun:
     ) -> None:
         # An uncaught exception is stored and propagates.
         if isinstance(error, Exception):
-            told = "".join(traceback.format_exception(kind, error, trace))
-            CrashReports(self._log / "crashes", self._clock).add(Crash("studio", error_words(error), told))
+            text = "".join(traceback.format_exception(kind, error, trace))
+            CrashReports(self._log / "crashes", self._clock).add(Crash("studio", error_words(error), text))
         self.end()
 
     def left(self) -> list[Crash]:

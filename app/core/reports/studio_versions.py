@@ -59,8 +59,8 @@ def with_this_version(
 
 def used_here(values: Mapping[str, object]) -> str:
     """Format the versions for developers: "0.0.9 since 2026-11-02, 0.1.0 since 2026-11-27"."""
-    told = [
+    versions = [
         f"{version} since {time.strftime('%Y-%m-%d', time.gmtime(since_s))}" if since_s else version
         for version, since_s in known(values)
     ]
-    return ", ".join(told) or "unknown"
+    return ", ".join(versions) or "unknown"

@@ -258,7 +258,7 @@ class Announcements:
         except NepError:
             return  # reported by the session's alert `message:<topic>`; the previous description stays valid
         except DescriptionError as error:
-            said = f"{error.sentence[:1].upper()}{error.sentence[1:]}."
+            sentence = f"{error.sentence[:1].upper()}{error.sentence[1:]}."
             whose = known.owner.words if known.owner is not None else topic
             words = (
                 _("{program} announces it; its driver needs to be fixed.")
@@ -267,7 +267,7 @@ class Announcements:
                     "{program} announces it; its driver needs to be fixed. The previous description is used."
                 )
             )
-            known.wrong, known.is_unreadable = Claim(said, words.format(program=whose)), True
+            known.wrong, known.is_unreadable = Claim(sentence, words.format(program=whose)), True
             return
         wrong = wrong_topic(robot, topic)
         known.robot = robot if wrong is None else None
@@ -302,15 +302,15 @@ class RizeNames:
 
         ``native`` are robots with a description, which also send ready messages on ``rize_event``.
         """
-        told = [name for name in self._told if name not in native]
+        candidates = [name for name in self._told if name not in native]
         info = view.topics.get(rize.COMMANDS)
         ids = {subscriber.node_id for subscriber in info.subscribers} if info is not None else set()
         nodes = [
             view.nodes[id].name for id in ids if id in view.nodes and view.nodes[id].generation not in NATIVE
         ]
-        if len(nodes) == 1 and len(told) == 1:
-            return {told[0]}
-        return {_name(node, told) for node in nodes}
+        if len(nodes) == 1 and len(candidates) == 1:
+            return {candidates[0]}
+        return {_name(node, candidates) for node in nodes}
 
 
 def _name(node: str, told: Collection[str]) -> str:

@@ -269,9 +269,9 @@ class Health:
         for name in self._unreachable - problems.keys():
             self._alerts.resolve(f"stop:{name}")
         for name, why in problems.items():
-            said = _("{why}. Studio tries again every second.").format(why=f"{why[:1].upper()}{why[1:]}")
+            detail = _("{why}. Studio tries again every second.").format(why=f"{why[:1].upper()}{why[1:]}")
             title = _("Stop can't reach {robot}.").format(robot=name)
-            self._alerts.put(f"stop:{name}", "error", title, said, count=0)
+            self._alerts.put(f"stop:{name}", "error", title, detail, count=0)
         self._unreachable = set(problems)
 
     def _check_motion(self, link: RobotLink) -> None:

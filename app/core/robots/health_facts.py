@@ -122,9 +122,9 @@ def _battery(link: RobotLink) -> Iterable[HealthFact]:
 
 
 def _temperature(link: RobotLink) -> Iterable[HealthFact]:
-    told = [found for sensor in link.robot.sensors for found in _degrees(sensor, link.values)]
-    if told:
-        value, what = max(told)
+    readings = [found for sensor in link.robot.sensors for found in _degrees(sensor, link.values)]
+    if readings:
+        value, what = max(readings)
         if value >= WARM_C:
             yield HealthFact(
                 TEMPERATURE,
@@ -158,8 +158,8 @@ def _stop(link: RobotLink) -> HealthFact:
         return HealthFact(STOP, "off", _("Stop sent; waiting for confirmation"))
     if link.last_stop is not None:
         return HealthFact(STOP, link.last_stop_status, link.last_stop)
-    said = _("not used yet") if link.can_confirm_stop else _("not used yet; this robot can't confirm")
-    return HealthFact(STOP, "off", said)
+    text = _("not used yet") if link.can_confirm_stop else _("not used yet; this robot can't confirm")
+    return HealthFact(STOP, "off", text)
 
 
 def _camera(link: RobotLink, topics: Topics, age_words: AgeWords) -> Iterable[HealthFact]:

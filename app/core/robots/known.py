@@ -37,8 +37,8 @@ class KnownRobots:
     @property
     def robots(self) -> tuple[KnownRobot, ...]:
         """All known robots, most recently seen first; invalid entries are skipped."""
-        told: list[Told] = self._settings.get(KEY, []) if self._settings is not None else []
-        found = {robot.name: robot for robot in map(_robot, told) if robot is not None}
+        entries: list[Told] = self._settings.get(KEY, []) if self._settings is not None else []
+        found = {robot.name: robot for robot in map(_robot, entries) if robot is not None}
         return tuple(sorted(found.values(), key=lambda robot: -robot.seen_s))
 
     def saw(self, robots: Sequence[Robot]) -> None:
@@ -56,10 +56,10 @@ class KnownRobots:
     def _save(self, robots: Sequence[KnownRobot]) -> None:
         if self._settings is None:
             return
-        told = [{"name": robot.name, "seen_s": robot.seen_s} for robot in robots[:LIMIT]]
+        entries = [{"name": robot.name, "seen_s": robot.seen_s} for robot in robots[:LIMIT]]
         # Only an entry of a list is lost, and saving other settings alerts problems of the same file.
         with contextlib.suppress(SettingsError):
-            self._settings.set(KEY, told)
+            self._settings.set(KEY, entries)
 
 
 def _robot(told: object) -> KnownRobot | None:

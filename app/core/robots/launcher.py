@@ -252,15 +252,17 @@ class Launcher:
                 _process, log = self._robots.pop(name)
                 self.ended |= {name}
                 self._starting.pop(name, None)
-                said, trace = split_trace(_tail(log))
+                output, trace = split_trace(_tail(log))
                 if is_crash(code):
                     how = f"the process of a virtual robot {end_words(code)}"
-                    _log.error("%s", how, extra={**IN_CONSOLE, **crash_extra("robot", how, f"{said}{trace}")})
+                    _log.error(
+                        "%s", how, extra={**IN_CONSOLE, **crash_extra("robot", how, f"{output}{trace}")}
+                    )
                 self._post_event(
                     LaunchFailed(
                         name,
                         _("The virtual robot {robot} ended.").format(robot=name),
-                        said.strip()[-TAIL_LETTERS:] or _end_without_output(code),
+                        output.strip()[-TAIL_LETTERS:] or _end_without_output(code),
                     )
                 )
                 log.close()

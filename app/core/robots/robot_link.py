@@ -161,8 +161,8 @@ class RobotLink:
     @property
     def running(self) -> tuple[Invocation, ...]:
         """Invocations that have not ended."""
-        known = {made.id: made for made in (*self.tried, *self.invocations.values())}
-        return tuple(made for made in known.values() if made.running)
+        known = {invocation.id: invocation for invocation in (*self.tried, *self.invocations.values())}
+        return tuple(invocation for invocation in known.values() if invocation.running)
 
     @property
     def state_words(self) -> str:

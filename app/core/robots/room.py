@@ -105,11 +105,11 @@ class SessionRoom:
         batch = batches.get(TOPIC)
         for message in batch.messages if batch is not None else ():
             try:
-                told = message.payload
+                payload = message.payload
             except NepError:
                 continue
-            if isinstance(told, Mapping):
-                self._map.merge(told)
+            if isinstance(payload, Mapping):
+                self._map.merge(payload)
 
     def tick(self) -> None:
         """Publish and save changes. Called at every tick of the session."""

@@ -36,7 +36,7 @@ class Tries:
 
     def begin(self, link: RobotLink, action: Action, input: Payload) -> Invocation:
         """Send an invocation; it fails immediately if the robot can't be reached."""
-        made = Invocation(
+        invocation = Invocation(
             uuid.uuid4().hex,
             action.name,
             started_s=self._clock(),
@@ -45,32 +45,32 @@ class Tries:
             timeout_s=action.timeout_s,
             at_s=self._wall(),
         )
-        link.invocations[action.name] = made
-        link.tried.append(made)
+        link.invocations[action.name] = invocation
+        link.tried.append(invocation)
         link.heard_s = self._clock()
-        if not self._send(link, command_of(link.robot, made, input)):
+        if not self._send(link, command_of(link.robot, invocation, input)):
             self._end(
                 link,
-                made,
+                invocation,
                 "failed",
                 _("{robot} can't be reached; check that it is switched on").format(robot=link.name),
             )
-        return made
+        return invocation
 
     def cancel(self, link: RobotLink, action: str) -> None:
         """Cancel the invocation of an action, unless it has ended."""
-        made = link.invocations.get(action)
-        if made is not None and made.running:
-            self._send_cancel(link, made)
+        invocation = link.invocations.get(action)
+        if invocation is not None and invocation.running:
+            self._send_cancel(link, invocation)
 
     def answer(self, link: RobotLink, answer: Payload) -> None:
         """Apply a reply of the robot; replies to other programs only show that it is alive."""
         link.heard_s = link.answered_s = self._clock()
         link.mute = False
-        for made in link.running:
-            if made.id != answer.get("id") or answer.get("op") not in (None, "invoke"):
+        for invocation in link.running:
+            if invocation.id != answer.get("id") or answer.get("op") not in (None, "invoke"):
                 continue
-            self._apply(link, made, answer)
+            self._apply(link, invocation, answer)
 
     def _apply(self, link: RobotLink, made: Invocation, answer: Payload) -> None:
         state = answer.get("state")
@@ -97,8 +97,8 @@ class Tries:
         """End invocations of robots that stopped replying, and those beyond their time limit."""
         now = self._clock()
         for link in links:
-            for made in link.running:
-                self._check_invocation(link, made, now)
+            for invocation in link.running:
+                self._check_invocation(link, invocation, now)
 
     def _check_invocation(self, link: RobotLink, made: Invocation, now: float) -> None:
         robot = link.robot
@@ -112,10 +112,10 @@ class Tries:
             return
         silence = max(MIN_SILENCE_S, BEATS_MISSED * robot.beat_s) if robot.beat_s else None
         if silence is not None and now - link.heard_s > silence:
-            said = _(
+            error = _(
                 "{robot} stopped responding. Check that it is switched on; press Stop to make it stand still."
             ).format(robot=link.name)
-            self._mark_unresponsive(link, made, said)
+            self._mark_unresponsive(link, made, error)
             return
         left_s = made.left_s
         if left_s is not None and left_s < -GRACE_S:
@@ -137,8 +137,8 @@ class Tries:
 
     def end_all(self, link: RobotLink, state: str, error: str | None = None) -> None:
         """End all invocations of a robot with this state."""
-        for made in link.running:
-            self._end(link, made, state, error)
+        for invocation in link.running:
+            self._end(link, invocation, state, error)
 
     def _end(self, link: RobotLink, made: Invocation, state: str, error: str | None) -> None:
         made.state, made.error, made.ended_s = state, error, self._clock()

@@ -165,8 +165,8 @@ class RobotVoices:
         self._speak_next(self.speaker)
 
     def _take(self, name: str, drawing: Mapping[str, object] | None, *, is_heard: bool) -> None:
-        told, before = self._last_drawings.get(name, (None, Heard()))
-        if drawing is None or drawing is told:
+        last_drawing, before = self._last_drawings.get(name, (None, Heard()))
+        if drawing is None or drawing is last_drawing:
             return
         now = Heard.parse(drawing)
         first = name not in self._last_drawings
@@ -204,9 +204,9 @@ class RobotVoices:
             speaker.stop_voice()
         self._current = None
         if self._waiting:
-            said = self._current = self._waiting.popleft()
-            self._until_s = self._clock() + PATIENCE_S + PATIENCE_PER_LETTER_S * len(said.words)
-            speaker.say(said.words, said.language, said.volume)
+            utterance = self._current = self._waiting.popleft()
+            self._until_s = self._clock() + PATIENCE_S + PATIENCE_PER_LETTER_S * len(utterance.words)
+            speaker.say(utterance.words, utterance.language, utterance.volume)
 
     def silence(self) -> None:
         """Stop and discard all speech and sounds."""

@@ -53,13 +53,13 @@ class BlockErrors:
         self._checked = newest
         program = newest if wanted.stack is None else wanted.program()
         wrong = {} if program is None else wanted.problems(program)
-        return {block: said for block, said in self.by_block.items() if wrong.get(block) == said}
+        return {block: words for block, words in self.by_block.items() if wrong.get(block) == words}
 
     def _unchanged(self, workspace: Mapping[str, object]) -> Mapping[str, str]:
         before, now = (_contents(each, self.by_block) for each in (self._ran, workspace))
         return {
-            block: said
-            for block, said in self.by_block.items()
+            block: words
+            for block, words in self.by_block.items()
             if block in now and deep_json.same(before.get(block), now[block])
         }
 

@@ -169,10 +169,10 @@ class Runs:
         if self._view is None or self._view[0] is not run or self._view[1] is not current:
             names = [link.name for link in self._fleet.connected]
             elsewhere = self.document not in {None, current}
-            made = view_of(
+            view = view_of(
                 run, names, self._clock(), coming=self.coming(), elsewhere=elsewhere, slow=self.pace_s > 0
             )
-            self._view = (run, current, made)
+            self._view = (run, current, view)
         return self._view[2]
 
     def run(self) -> None:
@@ -463,8 +463,8 @@ class Runs:
         self._run = replace(
             run, started_s=self._clock(), last_words=before.last_words, last_status=before.last_status
         )
-        said = _("trying “{block}”").format(block=trying) if trying else _("started")
-        self._console.add("info", self._run.name, said)
+        text = _("trying “{block}”").format(block=trying) if trying else _("started")
+        self._console.add("info", self._run.name, text)
 
     def _runnable_program(self, wanted: Wanted) -> Program | None:
         # None if it has no blocks to run or has problems; the run bar shows the reason.

@@ -308,12 +308,12 @@ class Runner:
         if hung:
             return _("The program lost its connection to Studio and was stopped.")
         code = child.popen.returncode
-        said, trace = split_trace("".join(f"{line}\n" for line in self._errors))
+        output, trace = split_trace("".join(f"{line}\n" for line in self._errors))
         if is_crash(code):
             how = f"the program's process {end_words(code)}"
-            extra = {**IN_CONSOLE, **crash_extra("behaviour", how, f"{said}{trace}")}
+            extra = {**IN_CONSOLE, **crash_extra("behaviour", how, f"{output}{trace}")}
             _log.error("%s", how, extra=extra)
-        words = next((line for line in reversed(said.splitlines()) if line.strip()), "")
+        words = next((line for line in reversed(output.splitlines()) if line.strip()), "")
         if code < 0:
             how = _("The program's process was killed (signal {signal})").format(signal=-code)
         else:
@@ -333,44 +333,46 @@ class Runner:
 
     def _event(self, line: bytes) -> RunnerEvent | None:
         try:
-            said = json.loads(line)
+            event = json.loads(line)
         except (ValueError, RecursionError):
             return None
-        if not isinstance(said, Mapping):
+        if not isinstance(event, Mapping):
             return None
-        kind = said.get("is")
-        block = said.get("block")
+        kind = event.get("is")
+        block = event.get("block")
         first = (block,) if isinstance(block, str) else ()
-        blocks = (*first, *(each for each in texts(said.get("blocks"))[:MAX_BLOCKS] if each not in first))
+        blocks = (*first, *(each for each in texts(event.get("blocks"))[:MAX_BLOCKS] if each not in first))
         if kind == "ready":
             return RunnerEvent("ready", self.run)
         if kind in ("running", "paused"):
-            says, text = text_of(said, "says"), text_of(said, "warning")
+            says, text = text_of(event, "says"), text_of(event, "warning")
             return RunnerEvent(kind, self.run, blocks=blocks, says=says, text=text)
         if kind == "error":
-            return RunnerEvent("error", self.run, blocks=first, text=text_of(said, "sentence"), ok=False)
+            return RunnerEvent("error", self.run, blocks=first, text=text_of(event, "sentence"), ok=False)
         if kind == "warning" and first:
-            count = said.get("count")
-            text = text_of(said, "sentence")
+            count = event.get("count")
+            text = text_of(event, "sentence")
             return RunnerEvent(
                 "warning", self.run, blocks=first, text=text, count=count if isinstance(count, int) else 1
             )
         if kind in ("print", "ask"):
-            question = said.get("question")
+            question = event.get("question")
             asked = question if isinstance(question, int) else 0
-            choices = tuple(each[:MAX_CHOICE_LENGTH] for each in texts(said.get("choices"))[:MAX_CHOICES])
-            return RunnerEvent(kind, self.run, text=text_of(said, "text"), question=asked, choices=choices)
+            choices = tuple(each[:MAX_CHOICE_LENGTH] for each in texts(event.get("choices"))[:MAX_CHOICES])
+            return RunnerEvent(kind, self.run, text=text_of(event, "text"), question=asked, choices=choices)
         if kind == "variables":
-            told = said.get("values")
-            made = map(VariableValue.from_json, told if isinstance(told, list) else ())
-            return RunnerEvent("variables", self.run, values=tuple(each for each in made if each is not None))
+            listed = event.get("values")
+            values = map(VariableValue.from_json, listed if isinstance(listed, list) else ())
+            return RunnerEvent(
+                "variables", self.run, values=tuple(each for each in values if each is not None)
+            )
         if kind == "ended":
-            elapsed_s = said.get("elapsed_s")
+            elapsed_s = event.get("elapsed_s")
             return RunnerEvent(
                 "ended",
                 self.run,
-                ok=said.get("ok") is True,
+                ok=event.get("ok") is True,
                 elapsed_s=float(elapsed_s) if isinstance(elapsed_s, (int, float)) else self._elapsed(),
-                silent=texts(said.get("silent")),
+                silent=texts(event.get("silent")),
             )
         return None

@@ -40,12 +40,12 @@ class StopNews:
     def tell_person(self, report: StopReport, origin: str) -> None:
         """Report in the Console, for ``origin``, and by an alert while a robot may still move."""
         for name, program in report.strangers:
-            said = _("“{program}” answered Stop in the name of {robot}; that does not count").format(
+            sentence = _("“{program}” answered Stop in the name of {robot}; that does not count").format(
                 program=program, robot=name
             )
-            self._console.add("error", origin, said)
+            self._console.add("error", origin, sentence)
             detail = _("Find out what this program is, and close it.")
-            self._alerts.put(f"stranger:{name}", "error", f"{said}.", detail)
+            self._alerts.put(f"stranger:{name}", "error", f"{sentence}.", detail)
         words = result_words(report)
         if not report.unproven:
             self._console.add("info", origin, words)

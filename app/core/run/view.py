@@ -412,12 +412,12 @@ def unanswered_words(report: StopReport, doubts: Sequence[str] = ()) -> tuple[st
 
 def _wrong_words(report: StopReport) -> str:
     # First what robots reported, then those that the Stop could not be sent to, then silent ones.
-    told = [robot.wrong for robot in report.unproven if robot.refused]
+    refusals = [robot.wrong for robot in report.unproven if robot.refused]
     untold = [robot.wrong for robot in report.unproven if robot.error and not robot.refused]
     silent = [robot.who for robot in report.unproven if not robot.error]
     if len(silent) > MAX_NAMED:
         silent = [*silent[:MAX_NAMED], _("{count} more").format(count=len(silent) - MAX_NAMED)]
-    wrong = [*told, *untold]
+    wrong = [*refusals, *untold]
     if silent:
         words = ngettext("{robots} did not respond", "{robots} did not respond", len(silent))
         wrong.append(words.format(robots=listed(silent)))

@@ -138,8 +138,10 @@ class Report:
         step, why = self.step, self._why
         if not why and not self._over:
             name = step.name if step is not None else (self._steps[-1].name if self._steps else "")
-            why = _("Studio ended during the self-test; its last step was “{step}”.").format(step=name)
-        told = {
+            why = _("Studio ended during the self-test; its last step was “{step}”.").format(
+                step=name
+            )
+        content = {
             "format": FORMAT,
             "format_version": FORMAT_VERSION,
             "ok": self._over and not self._why,
@@ -148,7 +150,7 @@ class Report:
             **{name: self._marks.get(name) for name in ("first_paint_ms", "editor_ready_ms", "total_ms")},
             "steps": [each.to_json() for each in self._steps],
         }
-        text = json.dumps(told, indent=1, ensure_ascii=False)
+        text = json.dumps(content, indent=1, ensure_ascii=False)
         try:
             write_atomically(self._path, text.encode("utf-8", "backslashreplace") + b"\n", durable=False)
         except OSError as error:  # disk full, or folder deleted: the exit code still reports the failure

@@ -63,14 +63,14 @@ def prepare(folder: Path, environ: MutableMapping[str, str], *, is_root: bool) -
     except (OSError, ValueError) as error:
         reason = getattr(error, "strerror", None) or str(error)
         raise UnwritableFolderError(folder, str(reason).lower()) from error
-    made = Surroundings(folder, home, f"127.0.0.1:{_free_port()}")
+    surroundings = Surroundings(folder, home, f"127.0.0.1:{_free_port()}")
     environ["NEP_STUDIO_HOME"] = str(home)
     environ["NEP_STATE_DIR"] = str(home / "state")
     environ["NEP_GATEWAY"] = "0"  # its ports are fixed, and another instance or test may use them
-    environ[MASTER_VARIABLE] = made.master
+    environ[MASTER_VARIABLE] = surroundings.master
     if is_root and sys.platform.startswith("linux"):
         environ.setdefault("QTWEBENGINE_DISABLE_SANDBOX", "1")
-    return made
+    return surroundings
 
 
 def remove_home(made: Surroundings) -> None:

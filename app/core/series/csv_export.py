@@ -28,7 +28,7 @@ class CsvColumn:
 
 def columns_of(curves: Sequence[Curve], begin_s: float = -inf, end_s: float = inf) -> list[CsvColumn]:
     """Return the values of curves in a range, for a thread that writes them."""
-    made = []
+    columns = []
     for curve in curves:
         first, end = curve.samples.places(begin_s, end_s)
         runs = curve.states.runs(begin_s, end_s) if curve.states is not None else ()
@@ -38,8 +38,8 @@ def columns_of(curves: Sequence[Curve], begin_s: float = -inf, end_s: float = in
             if run.word is not None and begin_s <= run.begin_s <= end_s
         )
         times, values = curve.samples.times[first:end].copy(), curve.samples.values[first:end].copy()
-        made.append(CsvColumn(curve.text, times, values, states))
-    return made
+        columns.append(CsvColumn(curve.text, times, values, states))
+    return columns
 
 
 def csv_lines(columns: Sequence[CsvColumn], origin_ns: int) -> Iterator[str]:

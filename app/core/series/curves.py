@@ -124,13 +124,13 @@ class Curves:
             raise CurveError(_("{text} is empty now").format(text=text))
         if len(self.all) + len(new) > MOST_CURVES:
             raise CurveError(_("a plot has at most {count} curves").format(count=MOST_CURVES))
-        made = []
+        curves = []
         for source in new:
             shared = self._acquire(source)
-            made.append(Curve(str(source), source, shared.samples, shared.of))
-        self.all += made
+            curves.append(Curve(str(source), source, shared.samples, shared.of))
+        self.all += curves
         self._distribute_capacity()
-        return made
+        return curves
 
     def remove(self, curve: Curve) -> None:
         """Remove a curve; its topic's watch ends when no other curve needs it."""
@@ -249,9 +249,9 @@ class Curves:
         if topic is None:
             topic = self._topics[source.topic] = TopicSeries(source.topic, self._feed.origin_ns)
             self._feed.join(source.topic, topic)
-        made = FieldSeries(source.topic, source.path)
-        topic.join(made)
-        return _Shared(made.numbers, of=made)
+        series = FieldSeries(source.topic, source.path)
+        topic.join(series)
+        return _Shared(series.numbers, of=series)
 
     def _release(self, name: str) -> None:
         shared = self._shared[name]

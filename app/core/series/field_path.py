@@ -165,12 +165,12 @@ def fields_of(payload: object, most: int = MAX_FIELDS) -> Iterator[FieldFound]:
     waiting: list[tuple[tuple[Step, ...], object]] = [((), payload)]
     if not isinstance(payload, Mapping) and not is_list(payload):
         waiting = [((ALONE,), payload)]
-    told = 0
-    while waiting and told < most:
+    produced = 0
+    while waiting and produced < most:
         steps, here = waiting.pop(0)
         kind = kind_of_value(here)
         if kind is not None:
-            told += 1
+            produced += 1
             count = len(here) if kind == "list" else 1  # type: ignore[arg-type]
             yield FieldFound(FieldPath((*steps, ALL) if kind == "list" else steps), kind, here, count)
         if len(steps) >= MAX_STEPS or len(waiting) > most:

@@ -249,13 +249,13 @@ class _Parser:
         is_field = isinstance(node, ast.Name) and re.fullmatch(r"_\d+", name)
         if not is_field and not (isinstance(node, ast.Call) and name in WINDOWED):
             near = nearest(name, [*FUNCTIONS, *WINDOWED])
-            said = _("'{name}' does not exist; {hint}")
+            template = _("'{name}' does not exist; {hint}")
             hint = (
                 _("did you mean '{near}'?").format(near=near)
                 if near
                 else _("topics begin with a slash, such as /odom.speed")
             )
-            raise CurveError(said.format(name=name[:40], hint=hint))
+            raise CurveError(template.format(name=name[:40], hint=hint))
         source = self._source(node)
         assert source is not None  # noqa: S101  a field, or a function of one
         if source not in inputs:

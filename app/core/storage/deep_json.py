@@ -66,12 +66,12 @@ def deeply(work: Callable[[], T]) -> T:
         return work()
     except RecursionError:
         pass
-    made: list[T] = []
+    results: list[T] = []
     failed: list[Exception] = []
 
     def run() -> None:
         try:
-            made.append(work())
+            results.append(work())
         except (ValueError, RecursionError) as error:
             failed.append(error)
 
@@ -89,4 +89,4 @@ def deeply(work: Callable[[], T]) -> T:
             sys.setrecursionlimit(limit)
     if failed:
         raise failed[0]
-    return made[0]
+    return results[0]

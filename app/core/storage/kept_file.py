@@ -47,8 +47,8 @@ def read_kept(
     try:
         value, problem = parse(data)
     except newer as error:
-        said = _("Your changes are not being saved: {reason}. The file is unchanged.")
-        return KeptFile(None, said.format(reason=error), is_newer=True)
+        template = _("Your changes are not being saved: {reason}. The file is unchanged.")
+        return KeptFile(None, template.format(reason=error), is_newer=True)
     except NepError as error:
         return KeptFile(None, _put_aside(path, str(error)))
     return KeptFile(value, _put_aside(path, problem, data) if problem else "")

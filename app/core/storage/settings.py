@@ -183,11 +183,11 @@ class Settings:
 
     def set_recent(self, files: Sequence[RecentFile]) -> None:
         """Set the recent files, newest first. Raises SettingsError."""
-        told = [
+        recent = [
             {"path": str(file.path), "name": file.name, "opened_s": file.opened_s}
             for file in files[:RECENT_LIMIT]
         ]
-        self.set("recent", told)
+        self.set("recent", recent)
 
     def _read(self) -> dict[str, object]:
         try:

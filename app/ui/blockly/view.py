@@ -185,8 +185,8 @@ class BlocklyView(BlocklyHost):
         edge = max(_EDGE_INCH, *_margins(layout))
         pixels = {"width": paper.width(), "height": paper.height(), "edge": edge}
         self._pictures[token] = laid
-        told: Json = {name: inches * _PIXELS_PER_INCH for name, inches in pixels.items()}
-        self._bridge.tell("pages", {"token": token, "title": title, "date": date, **told})
+        settings: Json = {name: inches * _PIXELS_PER_INCH for name, inches in pixels.items()}
+        self._bridge.tell("pages", {"token": token, "title": title, "date": date, **settings})
 
     def set_toolbox_pinned(self, pinned: bool | None) -> None:
         """Set whether the flyout stays open, or closes after each use; None: depending on the space."""
@@ -254,10 +254,10 @@ class BlocklyView(BlocklyHost):
 
         Other robots have the dot for connected or not.
         """
-        told: Json = {name: {"status": status, "words": words} for name, (status, words) in alarms.items()}
-        if told != self._alarms:
-            self._alarms = told
-            self._tell("alarms", told)
+        states: Json = {name: {"status": status, "words": words} for name, (status, words) in alarms.items()}
+        if states != self._alarms:
+            self._alarms = states
+            self._tell("alarms", states)
 
     def set_backpack(self, items: Sequence[Mapping[str, object]]) -> None:
         """Set the content of the backpack, newest first: ``{"id", "at", "block"}`` of each."""
@@ -266,10 +266,10 @@ class BlocklyView(BlocklyHost):
 
     def set_first_step(self, first: str, robot: bool) -> None:
         """Set the hint of an empty canvas to drag the block ``first`` there; ``robot``: one is connected."""
-        told: Json = {"first": first, "robot": robot}
-        if told != self._first_step:
-            self._first_step = told
-            self._tell("begin", told)
+        state: Json = {"first": first, "robot": robot}
+        if state != self._first_step:
+            self._first_step = state
+            self._tell("begin", state)
 
     def point_at(self, block: str, name: str = "", then: str = "") -> None:
         """Highlight the category of a block type, then the block; "" ends that.

@@ -59,19 +59,19 @@ class PicturePlace:
 
     def orientation(self) -> QTransform:
         """Return the transform from the image to the rotated and mirrored one, both as fractions."""
-        made = QTransform()
-        made.translate(0.5, 0.5)
-        made.scale(-1 if self.flipped_across else 1, -1 if self.flipped_down else 1)
-        made.rotate(self.turned)
-        made.translate(-0.5, -0.5)
-        return made
+        transform = QTransform()
+        transform.translate(0.5, 0.5)
+        transform.scale(-1 if self.flipped_across else 1, -1 if self.flipped_down else 1)
+        transform.rotate(self.turned)
+        transform.translate(-0.5, -0.5)
+        return transform
 
     def to_view(self, area: QRectF) -> QTransform:
         """Return the transform from the image (fractions) to the view."""
-        made = QTransform()
-        made.translate(area.x(), area.y())
-        made.scale(area.width(), area.height())
-        return self.orientation() * made
+        transform = QTransform()
+        transform.translate(area.x(), area.y())
+        transform.scale(area.width(), area.height())
+        return self.orientation() * transform
 
     def to_picture(self, at: QPointF, area: QRectF) -> QPointF:
         """Return the place in the image (fractions) of a point in the view.

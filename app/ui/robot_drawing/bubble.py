@@ -62,9 +62,9 @@ def scrolled(lines: Sequence[str], most: int, spoken: float) -> BubbleText:
     """Return as many lines as fit, scrolled so that the spoken word is visible (``spoken`` from 0 to 1)."""
     shown = max(1, min(most, len(lines)))
     letters = sum(len(line) for line in lines)
-    said, line = spoken * letters, 0
-    while line < len(lines) - 1 and said >= len(lines[line]):
-        said -= len(lines[line])
+    position, line = spoken * letters, 0
+    while line < len(lines) - 1 and position >= len(lines[line]):
+        position -= len(lines[line])
         line += 1
     first = min(max(0, line - (shown - 1 - READ_AHEAD if shown > READ_AHEAD else 0)), len(lines) - shown)
     return BubbleText(lines, max(0, first), shown)

@@ -40,8 +40,8 @@ def freeze_garbage() -> None:
 
 def collect_garbage() -> None:
     """Collect what Python would have collected automatically since the last call."""
-    made, young, middle = gc.get_count()
-    if made > NEW_OBJECTS:
+    new_objects, young, middle = gc.get_count()
+    if new_objects > NEW_OBJECTS:
         gc.collect(0 if young <= COLLECTIONS else 1 if middle <= COLLECTIONS else 2)
 
 

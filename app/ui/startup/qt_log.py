@@ -84,10 +84,10 @@ class Log(logging.Handler):
         """Store a record; repetitions are stored with their count."""
         if getattr(record, "in_console", False):
             return
-        told = self._repeat_filter.filter(record)
-        if told is not None:
-            level = "error" if told.levelno >= logging.ERROR else "warn"
-            self._records.append((level, told.name.partition(".")[0], told.getMessage()))
+        filtered = self._repeat_filter.filter(record)
+        if filtered is not None:
+            level = "error" if filtered.levelno >= logging.ERROR else "warn"
+            self._records.append((level, filtered.name.partition(".")[0], filtered.getMessage()))
 
     def take(self, add: Callable[[str, str, str], object]) -> None:
         """Pass stored records to ``add`` (level, origin, text), oldest first."""
@@ -109,10 +109,10 @@ class TerminalHandler(logging.StreamHandler[terminal.Terminal]):
 
     def emit(self, record: logging.LogRecord) -> None:
         """Write a record; repetitions are written with their count."""
-        told = self._repeat_filter.filter(record)
-        if told is not None:
-            super().emit(told)
-            if told.levelno >= logging.CRITICAL:  # Qt ends the program afterwards
+        filtered = self._repeat_filter.filter(record)
+        if filtered is not None:
+            super().emit(filtered)
+            if filtered.levelno >= logging.CRITICAL:  # Qt ends the program afterwards
                 self.stream.drain()
 
     def close(self) -> None:

@@ -22,12 +22,12 @@ def breakable(words: str) -> str:
 
 def _pieces(word: str) -> str:
     # Combining characters stay with their letter.
-    made, since = "", 0
+    result, since = "", 0
     for letter in word:
         if since >= PIECE and not unicodedata.combining(letter) and unicodedata.category(letter)[0] in "LN":
-            made, since = made + MAY_BREAK, 0
-        made, since = made + letter, since + 1
-    return made
+            result, since = result + MAY_BREAK, 0
+        result, since = result + letter, since + 1
+    return result
 
 
 def tip(words: str) -> str:

@@ -89,15 +89,19 @@ def _object(sensor: Sensor, value: Mapping[str, object]) -> ReadingWords:
     # Fields with the same unit are combined ("1.3, 0.3 m"), the others follow ("facing 31°").
     fields = sensor.fields or tuple(DataField(str(name), str(name), "number") for name in value)
     known = [(field, value.get(field.name)) for field in fields]
-    numbers = [(field, told) for field, told in known if _is_number(told)]
+    numbers = [(field, measured) for field, measured in known if _is_number(measured)]
     if not numbers:
         return ReadingWords(
             "", ", ".join(f"{field.title} {words}" for field, words in known if words is not None)
         )
     unit = numbers[0][0].unit
-    together = [number(told, ".1f").replace("-", MINUS) for field, told in numbers if field.unit == unit]
-    others = [(field, told) for field, told in numbers if field.unit != unit]
-    beside = ", ".join(f"{field.title} {number_words(round(told), field.unit)}" for field, told in others)
+    together = [
+        number(measured, ".1f").replace("-", MINUS) for field, measured in numbers if field.unit == unit
+    ]
+    others = [(field, measured) for field, measured in numbers if field.unit != unit]
+    beside = ", ".join(
+        f"{field.title} {number_words(round(measured), field.unit)}" for field, measured in others
+    )
     return ReadingWords(f"{', '.join(together)}{f' {unit}' if unit else ''}", beside)
 
 

@@ -41,5 +41,5 @@ def wants_less_motion(platform: str = sys.platform) -> bool:
         return False
     animated = ctypes.c_int(1)
     user32 = getattr(ctypes, "windll").user32  # noqa: B009  mypy knows that it exists only on Windows
-    told = user32.SystemParametersInfoW(CLIENT_AREA_ANIMATION, 0, ctypes.byref(animated), 0)
-    return bool(told) and animated.value == 0
+    succeeded = user32.SystemParametersInfoW(CLIENT_AREA_ANIMATION, 0, ctypes.byref(animated), 0)
+    return bool(succeeded) and animated.value == 0

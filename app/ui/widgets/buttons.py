@@ -465,8 +465,8 @@ class StopButton(PaintedButton):
     def sizeHint(self) -> QSize:
         wanted = self._theme.pair("stop", self._place)
         word, key = self._fonts()
-        said = (_("Stop"), _("Stopping"), _("Stop again"))  # the same size in every state
-        least = self._side() + 26 + max(paint.width_of(word, each) for each in said)
+        captions = (_("Stop"), _("Stopping"), _("Stop again"))  # the same size in every state
+        least = self._side() + 26 + max(paint.width_of(word, each) for each in captions)
         if self._place != "runBar":
             least += paint.width_of(key, "F12") + 8
         height = max(wanted.height(), round(paint.height_of(word)) + 10)

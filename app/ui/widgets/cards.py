@@ -142,8 +142,10 @@ class AlertRow(AlertBox):
             paint.show_when(line, bool(text))
         self.button.set_word(button)
         paint.show_when(self.button, bool(button))
-        said = _("{status}: {sentence}").format(status=spoken(status), sentence=f"{title} {detail}".strip())
-        self.setAccessibleName(said)
+        spoken_text = _("{status}: {sentence}").format(
+            status=spoken(status), sentence=f"{title} {detail}".strip()
+        )
+        self.setAccessibleName(spoken_text)
 
     def minimumSizeHint(self) -> QSize:
         return QSize(160, super().minimumSizeHint().height())

@@ -13,12 +13,12 @@ from app.ui.widgets import paint
 
 def label(text: str = "", kind: str = "body", *, role: str = "text", wrap: bool = False) -> QLabel:
     """Return a label of one kind ("body", "small", "title", ...) in the colour of a role."""
-    made = QLabel(text)
-    made.setTextFormat(Qt.TextFormat.PlainText)
-    made.setProperty("kind", kind)
-    made.setProperty("role", role)
-    made.setWordWrap(wrap)
-    return made
+    result = QLabel(text)
+    result.setTextFormat(Qt.TextFormat.PlainText)
+    result.setProperty("kind", kind)
+    result.setProperty("role", role)
+    result.setWordWrap(wrap)
+    return result
 
 
 def set_role(shown: QLabel, role: str) -> None:

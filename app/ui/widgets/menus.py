@@ -237,13 +237,13 @@ class Menu(QMenu):
         key = spoken_key(own or action.text().partition("\t")[2])
         ink = theme.colour("text" if action.isEnabled() else "textDisabled")
         inside = place.adjusted(TEXT_LEFT, 0, -12, 0)
-        said = plain_words(action.text())
-        whole = width_of(self.font(), said)
+        text = plain_words(action.text())
+        whole = width_of(self.font(), text)
         if whole + 12 + width_of(self.font(), key) > inside.width():
             key = ""  # in a narrowed menu the text takes precedence; shortcuts are listed on F1
-        words(painter, inside, said, self.font(), ink)
+        words(painter, inside, text, self.font(), ink)
         if self._by_keys and letter >= 0 and whole <= inside.width():
-            self._underline(painter, inside, said, letter)
+            self._underline(painter, inside, text, letter)
         if action.menu() is not None:
             chevron = QRectF(inside.right() - 12, place.center().y() - 7, 14, 14)
             paint_icon(painter, chevron, "chevron-right", theme.colour("textTertiary"))

@@ -37,8 +37,8 @@ def open_recording(path: Path, progress: Progress, opener: RecordingOpener | Non
     recording = (opener or LocalOpener()).open(path, progress=told)
     try:
         if len(recording.topics) > MAX_TOPICS:
-            said = _("it has {count} topics; at most {most} can be shown")
-            raise RecordingError(str(path), said.format(count=len(recording.topics), most=MAX_TOPICS))
+            template = _("it has {count} topics; at most {most} can be shown")
+            raise RecordingError(str(path), template.format(count=len(recording.topics), most=MAX_TOPICS))
         if not recording.message_count:
             raise RecordingError(str(path), _("it has no message that can be decoded"))
         return OpenedRecording(recording, Bookmarks(recording), recording.figures())

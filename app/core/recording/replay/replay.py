@@ -361,8 +361,8 @@ class Replay:
             self._add(message.topic, Batch([message]), now)
 
     def _take_history(self, handed: Handed, now: float) -> None:
-        said = [message for topic in LOGS for message in handed.history.get(topic, ())]
-        self.console.take(sorted(said, key=lambda message: message.stamp_ns or 0))
+        log_messages = [message for topic in LOGS for message in handed.history.get(topic, ())]
+        self.console.take(sorted(log_messages, key=lambda message: message.stamp_ns or 0))
         for topic, messages in handed.history.items():
             batch = Batch(list(messages))
             self._add(topic, Batch(batch.messages[-2:]), now)
@@ -387,7 +387,7 @@ class Replay:
 
 def graph_of(topics: Mapping[str, RecordedTopic], figures: Mapping[str, TopicFigures]) -> GraphView:
     """Return a recording's graph: topics, the number of publishers of each, and losses."""
-    made = {}
+    found = {}
     for name, topic in topics.items():
         known = figures.get(name)
         publishers = tuple(
@@ -397,5 +397,5 @@ def graph_of(topics: Mapping[str, RecordedTopic], figures: Mapping[str, TopicFig
         lost = known.lost if known is not None else None
         sent = known.received + lost if known is not None and lost is not None else 0
         ratio = lost / sent if lost is not None and sent else None
-        made[name] = TopicInfo(name, topic.msg_type, topic.codec, publishers, lost=lost, loss_ratio=ratio)
-    return GraphView(1, 1, topics=made)
+        found[name] = TopicInfo(name, topic.msg_type, topic.codec, publishers, lost=lost, loss_ratio=ratio)
+    return GraphView(1, 1, topics=found)

@@ -90,13 +90,13 @@ class ReplayOutbox:
 
     def begin(self, route: ReplayRoute, turn: int, msg_type: str, *, is_latched: bool) -> None:
         """Publish this topic as soon as its publisher is ready, during the switch's ``turn``."""
-        made = SentTopic(route, turn, is_latched)
+        sent = SentTopic(route, turn, is_latched)
         with self._lock:
             old = self._active.get(route.recorded)
-            self._active[route.recorded] = made
+            self._active[route.recorded] = sent
         if old is not None:
             self._close_later(old)
-        self._create_publisher(made, msg_type)
+        self._create_publisher(sent, msg_type)
 
     def end(self, recorded: str) -> SentTopic | None:
         """Stop publishing a topic; return its state."""
@@ -155,13 +155,13 @@ class ReplayOutbox:
             if not self._is_going(sent):
                 return
             try:
-                made = node.new_pub(sent.route.name, msg_type, latched=sent.is_latched)
+                publisher = node.new_pub(sent.route.name, msg_type, latched=sent.is_latched)
             except Exception as error:  # noqa: BLE001 - reported as a problem of this topic
                 sent.problem = str(error) if isinstance(error, NepError) else error_words(error)
                 return
             sent.node = node
             # a new dict, because another thread reads it
-            sent.publishers = {**sent.publishers, msg_type: made}
+            sent.publishers = {**sent.publishers, msg_type: publisher}
             sent.is_ready = True
             if not self._is_going(sent):
                 self._close(sent)
@@ -365,8 +365,8 @@ def sent_words(sent: SentTopic) -> str:
 
 def late_words(count: int) -> str:
     """Format the number of dropped messages: "3 left out, being late"."""
-    said = ngettext("{count} late message skipped", "{count} late message skipped", count)
-    return said.format(count=count)
+    template = ngettext("{count} late message skipped", "{count} late message skipped", count)
+    return template.format(count=count)
 
 
 def _ignore() -> None: ...

@@ -416,8 +416,8 @@ def _own_copy(message: Message) -> Message:
     # Copies small messages, so that they don't keep the chunk of the file.
     if isinstance(message.raw, bytes) or message.size_bytes > OWN_BYTES:
         return message
-    made = new_message(Message)
-    made.kind, made.raw = message.kind, bytes(message.raw)
-    made.stamp_ns, made.seq, made.publisher = message.stamp_ns, message.seq, message.publisher
-    made.extension, made.decoded = message.extension, message.decoded
-    return made
+    copied = new_message(Message)
+    copied.kind, copied.raw = message.kind, bytes(message.raw)
+    copied.stamp_ns, copied.seq, copied.publisher = message.stamp_ns, message.seq, message.publisher
+    copied.extension, copied.decoded = message.extension, message.decoded
+    return copied

@@ -89,9 +89,9 @@ def spans_of(recording: Recording) -> RecordedSpans:
     first_ns, last_ns = recording.start_ns, recording.end_ns
     runs, alarms = _Lane(first_ns, last_ns), _Lane(first_ns, last_ns)
     for lane, role in ((runs, "runs"), (alarms, "alarms")):
-        for at_ns, told in recording.said(role):
-            if isinstance(told, Mapping) and isinstance(told.get("id"), str):
-                lane.put(told["id"], _span(told, at_ns, last_ns))
+        for at_ns, entry in recording.said(role):
+            if isinstance(entry, Mapping) and isinstance(entry.get("id"), str):
+                lane.put(entry["id"], _span(entry, at_ns, last_ns))
     _read_alerts(recording, alarms)
     return RecordedSpans(runs.sorted(), alarms.sorted(), runs.left_out + alarms.left_out)
 
@@ -115,8 +115,8 @@ def _span(told: Mapping[str, object], at_ns: int, last_ns: int) -> RecordedSpan:
 def _read_alerts(recording: Recording, lane: _Lane) -> None:
     # Each change of the graph's alerts lists all of them.
     present: dict[str, str] = {}
-    for at_ns, told in recording.said("alerts"):
-        listed = told.get("alerts") if isinstance(told, Mapping) else None
+    for at_ns, entry in recording.said("alerts"):
+        listed = entry.get("alerts") if isinstance(entry, Mapping) else None
         there = {
             _text(each, "id"): each
             for each in (listed if isinstance(listed, list) else ())[:MAX_SPANS]

@@ -168,8 +168,8 @@ def _refusal_words(topic: str, names: Sequence[str]) -> str:
         return ""
     if names == [topic]:
         return _("a message on {topic} would move a robot that is not allowed to move").format(topic=topic)
-    said = _("it would move {robots}, which is not allowed")
-    return said.format(robots=listed(list(names)))
+    template = _("it would move {robots}, which is not allowed")
+    return template.format(robots=listed(list(names)))
 
 
 def _actions(robot: Robot) -> Sequence[str]:

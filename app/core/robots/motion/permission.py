@@ -59,8 +59,8 @@ class Question:
     @property
     def sentence(self) -> str:
         """Sentences about the motion and how to stop it."""
-        told = [self.reason] if self.reason else []
-        told += [
+        sentences = [self.reason] if self.reason else []
+        sentences += [
             ngettext("{actions} moves {robot}.", "{actions} move {robot}.", len(actions)).format(
                 actions=listed(actions), robot=name
             )
@@ -68,10 +68,10 @@ class Question:
         ]
         if self.strangers:
             names = listed([_stranger(each) for each in self.strangers])
-            said = _("The message may move {robot}, which Studio doesn't know.")
-            told.append(said.format(robot=names))
+            template = _("The message may move {robot}, which Studio doesn't know.")
+            sentences.append(template.format(robot=names))
         return _("{moves} Make sure nobody is in the way. Press F12 to stop at any time.").format(
-            moves=" ".join(told)
+            moves=" ".join(sentences)
         )
 
 

@@ -135,8 +135,8 @@ class StopReport:
     def still(self) -> tuple[str, ...]:
         """Names of robots that are proven to have stopped: all their programs confirmed."""
         silent = self.silent
-        said = (robot.name for robot in self.robots if robot.can_confirm and robot.answered)
-        return tuple(dict.fromkeys(name for name in said if name not in silent))
+        confirmed = (robot.name for robot in self.robots if robot.can_confirm and robot.answered)
+        return tuple(dict.fromkeys(name for name in confirmed if name not in silent))
 
     def with_asked(self, names: Iterable[str], why: str = "") -> StopReport:
         """Return a report that also has a line for each of these robots that was not reached."""

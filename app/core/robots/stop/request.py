@@ -88,9 +88,9 @@ class StopRequest:
         A refusal may be followed by a confirmation; nothing else is replaced. ``words`` formats the sentence
         of a refusal from the robot's error.
         """
-        told = answer_in(message)
-        state = None if told is None else told.get("state")
-        if told is None or told.get("id") != self.id or state not in ("succeeded", "failed"):
+        reply = answer_in(message)
+        state = None if reply is None else reply.get("state")
+        if reply is None or reply.get("id") != self.id or state not in ("succeeded", "failed"):
             return False
         before, is_still = self.serving[node], state == "succeeded"
         if before is not None and (before.answered or not is_still):
@@ -100,7 +100,7 @@ class StopRequest:
             self.line.name,
             is_still,
             (now - self.sent_s) * 1000,
-            error="" if is_still else words(told.get("error")),
+            error="" if is_still else words(reply.get("error")),
             refused=not is_still,
             program=self.programs.get(node, ""),
             node=node,

@@ -94,10 +94,12 @@ class RobotStopper:
             self._view, self._hearers = view, {}
             targets = [line.target for line in self._lines.values()]
             self._senders.learn(view, {way.answer for target in targets for way in target.ways})
-            late = [said for asked in self._asked.values() for said in self._apply_held_replies_locked(asked)]
+            late = [
+                reply for asked in self._asked.values() for reply in self._apply_held_replies_locked(asked)
+            ]
             self._changed.notify_all()
-        for tell, said in late:
-            tell(said)
+        for tell, reply in late:
+            tell(reply)
 
     def expect(self, targets: Iterable[StopTarget]) -> None:
         """Announce the current robots without connecting; `set_robots` connects.
@@ -113,8 +115,8 @@ class RobotStopper:
 
         Failures are listed in `problems` and retried by the next call.
         """
-        made = (each if isinstance(each, StopTarget) else StopTarget(each) for each in robots)
-        wanted = {target.robot.name: target for target in made}
+        targets = (each if isinstance(each, StopTarget) else StopTarget(each) for each in robots)
+        wanted = {target.robot.name: target for target in targets}
         left: list[StopWay] = []
         with self._changed:
             for name in self._lines.keys() - wanted.keys():
@@ -416,7 +418,7 @@ class RobotStopper:
         self._refresh_view()
         with self._changed:
             for each in asked:
-                known = {node: said for node, said in each.serving.items() if node != _UNKNOWN_PROGRAM}
+                known = {node: reply for node, reply in each.serving.items() if node != _UNKNOWN_PROGRAM}
                 each.serving = self._serving(each) | known
 
     def _refresh_view(self) -> None:
@@ -475,7 +477,7 @@ class RobotStopper:
         # publisher has not registered, or the master is missing, and then nothing can be proven.
         held = asked.unknown.take()
         known = [(node, message) for message in held if (node := self._senders.node_of(message)) is not None]
-        return [said for node, message in known for said in self._apply_reply_locked(asked, node, message)]
+        return [late for node, message in known for late in self._apply_reply_locked(asked, node, message)]
 
     def _apply_reply_locked(
         self, asked: StopRequest, node: str | None, message: Message
@@ -490,10 +492,10 @@ class RobotStopper:
             return []
         name = asked.line.name
         is_news = asked.accept(node, message, self._clock(), partial(said_of_stop, name))
-        said = asked.serving[node]
-        if not is_news or said is None or not asked.is_over or asked.late is None:
+        reply = asked.serving[node]
+        if not is_news or reply is None or not asked.is_over or asked.late is None:
             return []
-        return [(asked.late, said)]
+        return [(asked.late, reply)]
 
     def _report(
         self,

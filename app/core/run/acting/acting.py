@@ -70,11 +70,11 @@ class ArmQuestion:
     @property
     def sentence(self) -> str:
         """Sentence about the motion, without names if the robots are unknown here."""
-        said = _("{topic} moves {robots}. Make sure nobody is in the way. Press F12 to stop.")
+        template = _("{topic} moves {robots}. Make sure nobody is in the way. Press F12 to stop.")
         if not self.robots:
-            said = _("{topic} commands robots. Make sure nobody is in the way. Press F12 to stop.")
-            return said.format(topic=self.topic)
-        return said.format(topic=self.topic, robots=listed(list(self.robots)))
+            template = _("{topic} commands robots. Make sure nobody is in the way. Press F12 to stop.")
+            return template.format(topic=self.topic)
+        return template.format(topic=self.topic, robots=listed(list(self.robots)))
 
 
 class SessionActing:
@@ -214,14 +214,14 @@ class SessionActing:
     def new_message(self, topic: str, msg_type: str, text: str) -> KeptMessage | None:
         """Add a message to the shelf; return None when it is full."""
         name = self.shelf.free_name(topic.rpartition("/")[2] or _("Message"))
-        made = KeptMessage(new_message_id(), name, topic, msg_type or "json", text)
-        return made if self.shelf.put(made) else None
+        message = KeptMessage(new_message_id(), name, topic, msg_type or "json", text)
+        return message if self.shelf.put(message) else None
 
     def problem_of(self, message: KeptMessage) -> str:
         """Return a sentence why a message can't be sent, or "" when it can be once armed."""
         if not is_written(message.msg_type):
-            said = _("Messages of type {type} can't be edited by hand.")
-            return said.format(type=message.msg_type)
+            template = _("Messages of type {type} can't be edited by hand.")
+            return template.format(type=message.msg_type)
         read = None if is_plain(message.msg_type) else read_json(message.text)
         if read is not None and read.fault is not None:
             return read.fault.sentence  # before the topic: its line is marked red
@@ -397,9 +397,9 @@ class SessionActing:
                 self._session.alerts.resolve("messages:kept")
         except OSError as error:
             self._written = -1  # retried at the next check
-            said = _("They are kept until Studio closes: {reason}.").format(reason=error.strerror or error)
+            detail = _("They are kept until Studio closes: {reason}.").format(reason=error.strerror or error)
             title = _("The saved messages can't be saved.")
-            self._session.alerts.put("messages:kept", "warn", title, said, count=0)
+            self._session.alerts.put("messages:kept", "warn", title, detail, count=0)
 
     def close(self) -> None:
         """End all sending and save changes."""
@@ -428,8 +428,10 @@ class SessionActing:
     def _read(self, path: Path) -> Shelf:
         def parse(data: bytes) -> tuple[Shelf, str]:
             shelf, unread = read_shelf(data)
-            said = ngettext("{count} message can't be read", "{count} messages can't be read", unread)
-            return shelf, said.format(count=unread) if unread else ""
+            template = ngettext(
+                "{count} message can't be read", "{count} messages can't be read", unread
+            )
+            return shelf, template.format(count=unread) if unread else ""
 
         kept = read_kept(path, parse, NewerShelfError, MAX_BYTES)
         self._is_newer = kept.is_newer

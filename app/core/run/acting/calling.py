@@ -144,8 +144,8 @@ class ServiceCalls:
         waiting, now = self.waiting, self._in_flight
         has_begun = now is None or now.future is not None  # from then on its client measures the timeout
         if waiting is not None and not has_begun and self.waited_s > waiting.timeout_s:
-            said = _("no master was found within {time} s").format(time=number(waiting.timeout_s))
-            self._cancel("failed", said)
+            error = _("no master was found within {time} s").format(time=number(waiting.timeout_s))
+            self._cancel("failed", error)
         done, self._done = self._done, []
         return done
 
@@ -172,7 +172,7 @@ class ServiceCalls:
         self.revision += 1
 
     def _apply(self, place: int, ended: _Ended) -> None:
-        made = replace(
+        updated = replace(
             self._records[place],
             state=ended.state,
             took_s=ended.took_s,
@@ -182,8 +182,8 @@ class ServiceCalls:
             is_cut=ended.is_cut,
             was_begun=self._in_flight is not None and self._in_flight.future is not None,
         )
-        self._records[place] = made
-        self._done.append(made)
+        self._records[place] = updated
+        self._done.append(updated)
         self._in_flight = None
         self.revision += 1
 
@@ -214,8 +214,8 @@ class ServiceCalls:
             if not self._arming.if_armed(now.turn, target, call_it):
                 raise NepError(_("not called: no longer armed"))
         except Exception as error:  # noqa: BLE001 - reported as the result of this call
-            said = str(error) if isinstance(error, NepError) else error_words(error)
-            self._ended.append(_Ended(record.number, "failed", 0.0, said))
+            text = str(error) if isinstance(error, NepError) else error_words(error)
+            self._ended.append(_Ended(record.number, "failed", 0.0, text))
             return
         if now.future is not None:
             now.future.add_done_callback(lambda future: self._answered(record, began_s, future))

@@ -78,8 +78,8 @@ class JsonText:
         fault = find_json_fault(whole)
         if fault is not None:  # a number as a field name
             raise NepError(fault.sentence)
-        made: object = json.loads(whole)
-        return made
+        parsed: object = json.loads(whole)
+        return parsed
 
 
 @lru_cache(maxsize=64)
@@ -90,11 +90,11 @@ def read_json(text: str) -> JsonText:
 
 def value_typed(text: str) -> object:
     """Parse a typed value: JSON or a number with a decimal comma, else the text itself."""
-    said = text.strip()
-    if said and find_json_fault(said) is None:
-        return json.loads(said)
+    stripped = text.strip()
+    if stripped and find_json_fault(stripped) is None:
+        return json.loads(stripped)
     try:
-        return parse_number(said) if "," in said else text
+        return parse_number(stripped) if "," in stripped else text
     except TypedNumberError:
         return text
 

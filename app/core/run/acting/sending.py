@@ -152,10 +152,10 @@ class Outbox:
         def send_it(node: Node) -> None:
             publisher = self._publisher(node, order)
             value = order.make()
-            made = codec_for(order.msg_type).encode(value)
+            payload = codec_for(order.msg_type).encode(value)
             self._check(node, order, publisher)
-            if self._arming.if_armed(turn, order.target, lambda: publisher.publish(made)):
-                text = _text_of(value) if len(made.data) <= KEPT_BYTES else ""
+            if self._arming.if_armed(turn, order.target, lambda: publisher.publish(payload)):
+                text = _text_of(value) if len(payload.data) <= KEPT_BYTES else ""
                 self._add_result(SendResult(order, "sent", heard=publisher.subscribers, text=text))
             else:
                 self._add_result(SendResult(order, "failed", _("not sent: no longer armed")))
@@ -175,11 +175,11 @@ class Outbox:
             codec_for(order.msg_type).encode(order.make())  # errors are reported before anything is sent
             publisher = self._publisher(node, order)
             now = time.monotonic()
-            made = Repeated(order, rate_hz, turn, node, publisher, now, since_s=now)
+            repeated = Repeated(order, rate_hz, turn, node, publisher, now, since_s=now)
             with self._changed:
                 if self._starting.get(order.id) is not token:
                     return  # ended meanwhile
-                self._repeated[order.id] = made
+                self._repeated[order.id] = repeated
                 if self._thread is None and not self._is_closed:
                     self._thread = threading.Thread(target=self._run, name="studio-sending", daemon=True)
                     self._thread.start()
@@ -306,9 +306,11 @@ class Outbox:
     def _send_repeated(self, each: Repeated) -> None:
         problem = ""
         try:
-            made = codec_for(each.order.msg_type).encode(each.order.make())
+            payload = codec_for(each.order.msg_type).encode(each.order.make())
             self._check(each.node, each.order, each.publisher)
-            is_done = self._arming.if_armed(each.turn, each.order.target, lambda: self._publish(each, made))
+            is_done = self._arming.if_armed(
+                each.turn, each.order.target, lambda: self._publish(each, payload)
+            )
         except Exception as error:  # noqa: BLE001 - the other messages continue
             is_done, problem = False, str(error) if isinstance(error, NepError) else error_words(error)
         if is_done:

@@ -108,10 +108,10 @@ class Shelf:
         if place is None or len(self._messages) >= MOST_MESSAGES:
             return None
         old = self._messages[place]
-        made = replace(old, id=new_message_id(), name=self.free_name(old.name))
-        self._messages.insert(place + 1, made)
+        copied = replace(old, id=new_message_id(), name=self.free_name(old.name))
+        self._messages.insert(place + 1, copied)
         self.revision += 1
-        return made
+        return copied
 
     def free_name(self, wanted: str) -> str:
         """Return the name, numbered if another message has it: "Stand still 2"."""
@@ -192,8 +192,8 @@ def read_shelf(data: bytes) -> tuple[Shelf, int]:
         raise NepError(_("it has no list of messages"))
     if isinstance(number := value.get("format"), int) and number > FORMAT:
         raise NewerShelfError(_("it was saved by a newer Studio"))
-    made = [_message(each) for each in listed[:MOST_MESSAGES]]
-    good = {each.id: each for each in made if each is not None}
+    messages = [_message(each) for each in listed[:MOST_MESSAGES]]
+    good = {each.id: each for each in messages if each is not None}
     requests = value.get("requests")
     asked = {
         name: text

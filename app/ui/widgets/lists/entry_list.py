@@ -50,8 +50,8 @@ class EntryModel(QAbstractListModel):
         """Update note and reason of an entry in place."""
         for row, line in enumerate(self.lines):
             if isinstance(line, Match) and line.entry.id == id:
-                told = replace(line, entry=replace(line.entry, note=note, reason=reason))
-                self.lines = [*self.lines[:row], told, *self.lines[row + 1 :]]
+                updated = replace(line, entry=replace(line.entry, note=note, reason=reason))
+                self.lines = [*self.lines[:row], updated, *self.lines[row + 1 :]]
                 self.dataChanged.emit(self.index(row), self.index(row))
 
     def rowCount(self, parent: Index | None = None) -> int:
@@ -148,13 +148,13 @@ class EntryDelegate(QStyledItemDelegate):
             right -= side + 12
         for key in reversed(entry.key.split("\n") if entry.key else ()):
             right = paint.key_cap(painter, theme, right, middle, spoken_key(key)).left() - 8
-        said = entry.reason or entry.note
-        if said:
+        text = entry.reason or entry.note
+        if text:
             font = theme.font("body")
-            room = min(paint.width_of(font, said), rect.width() * 0.55)
+            room = min(paint.width_of(font, text), rect.width() * 0.55)
             right -= room + 4
             area = QRectF(right, rect.top(), room, rect.height())
-            paint.words(painter, area, said, font, theme.colour(quiet), paint.RIGHT)
+            paint.words(painter, area, text, font, theme.colour(quiet), paint.RIGHT)
         return right
 
     def _words(self, painter: QPainter, area: QRectF, found: Match, ink: str, marked: str) -> None:

@@ -120,13 +120,13 @@ def _word_beginning(letter: str, text: str, start: int) -> int:
 
 def _merged(spans: Iterable[Span]) -> tuple[Span, ...]:
     # Merges adjacent spans.
-    made: list[Span] = []
+    merged: list[Span] = []
     for begin, end in sorted(spans):
-        if made and begin <= made[-1][1]:
-            made[-1] = (made[-1][0], max(made[-1][1], end))
+        if merged and begin <= merged[-1][1]:
+            merged[-1] = (merged[-1][0], max(merged[-1][1], end))
         else:
-            made.append((begin, end))
-    return tuple(made)
+            merged.append((begin, end))
+    return tuple(merged)
 
 
 class Finder:
