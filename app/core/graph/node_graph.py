@@ -195,6 +195,7 @@ def _boxes(facts: GraphFacts, choices: GraphChoices) -> dict[str, DrawnNode]:
     for entry in sorted(facts.nodes, key=lambda each: (each.since_ns, each.id)):
         key = f"{entry.network}|{entry.host}|{entry.name}"
         taken[key] += 1
+        page = facts.pages.get(entry.name) if _is_page(entry) else None
         drawn[entry.key] = DrawnNode(
             key if taken[key] == 1 else f"{key}|{taken[key]}",
             _name_of(entry) if page is None else page.title,
@@ -232,6 +233,8 @@ def _is_page(entry: NodeEntry) -> bool:
 
 
 def _name_of(entry: NodeEntry) -> str:
+    if _is_page(entry):
+        return entry.name.removeprefix("web_")
     return entry.name.removeprefix(PROGRAM) or entry.name
 
 
@@ -275,7 +278,7 @@ def _groups(
         nodes = members[key]
         hidden = sum(_is_hidden(node, choices) for node in nodes)
         counts = Counter(addresses[node.entry_key] for node in nodes if node.entry_key in addresses)
-        address = min(counts, key=lambda each: (-counts[each], each)) if counts else ""
+        address = min(counts, key=lambda each: (-counts[each], each)) if counts and key != WEB_GROUP else ""
         closed = choices.is_closed(key) or hidden == len(nodes)
         groups.append(
             GraphGroup(key, _host_of(key), address, _icon_of(key, nodes, facts), len(nodes), hidden, closed)

@@ -428,9 +428,7 @@ class SessionActing:
     def _read(self, path: Path) -> Shelf:
         def parse(data: bytes) -> tuple[Shelf, str]:
             shelf, unread = read_shelf(data)
-            template = ngettext(
-                "{count} message can't be read", "{count} messages can't be read", unread
-            )
+            template = ngettext("{count} message can't be read", "{count} messages can't be read", unread)
             return shelf, template.format(count=unread) if unread else ""
 
         kept = read_kept(path, parse, NewerShelfError, MAX_BYTES)
