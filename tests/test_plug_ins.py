@@ -136,7 +136,7 @@ def test_a_robot_is_described_found_driven_and_made_into_blocks(write: Write, ma
             state, output = "", None
             while state not in {"succeeded", "failed"}:
                 arrived, answer = answers.listen(timeout_s=30.0)
-                assert arrived, "the robot did not respond"
+                assert arrived, "the robot did not reply"
                 state, output = answer["state"], answer["output"]
             assert (state, output) == ("succeeded", {"blinked": 2})
         finally:

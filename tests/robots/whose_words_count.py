@@ -165,7 +165,7 @@ class WhoseWordsCount:
         with nep.node("spy", master=evil._master) as spy:
             spy.new_sub("/Pepper/command", "robot/command", sink=forge)
             assert not side.stop(SHORT_S)
-        assert side.stop_says() == "Pepper did not respond"
+        assert side.stop_says() == "Pepper did not reply"
 
     @pytest.mark.parametrize("silent", [False, True])
     def test_a_twin_must_answer_too(

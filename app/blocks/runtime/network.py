@@ -288,7 +288,7 @@ class Network:
 
     def stop_words(self, name: str) -> str:
         """Return why a robot's stop is not confirmed, in its own words if it answered; without full stop."""
-        return self._stop_errors.get(name) or _("{robot} did not respond").format(robot=name)
+        return self._stop_errors.get(name) or _("{robot} did not reply").format(robot=name)
 
     def _stop_nodes(self, robot: Robot) -> set[str]:
         # The robot's own node, and others that answer its commands, must answer a stop.

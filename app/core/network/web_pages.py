@@ -11,14 +11,15 @@ from typing import TYPE_CHECKING, Literal, Protocol
 from app.core.network.web_page_list import ListedPage, PageList, SlowTopic
 from nep.errors import AddressInUseError, NepError
 from nep.i18n import _
-from nep.programs.doctor.processes import describe, is_free, listening
 from nep.system.addresses import OwnAddress, own_addresses
 from nep.system.lazy_import import lazy_module
 
 if TYPE_CHECKING:
+    from nep.programs.doctor import processes
     from nep.programs.web import access, context, served_pages, server
     from nep.recordings.formats import channels
 else:  # loaded with the first start of a server
+    processes = lazy_module("nep.programs.doctor.processes")
     access = lazy_module("nep.programs.web.access")
     context = lazy_module("nep.programs.web.context")
     server = lazy_module("nep.programs.web.server")
@@ -373,7 +374,7 @@ class WebPages:
 
 def _port_taken(port: int) -> tuple[str, int]:
     """Return the sentence that says which program has the port, and the next free port."""
-    holder = describe(listening().get(port))
+    holder = processes.describe(processes.listening().get(port))
     if holder is None:
         sentence = _("Port {port} is in use by another program, perhaps rosbridge.").format(port=port)
     else:
@@ -381,4 +382,4 @@ def _port_taken(port: int) -> tuple[str, int]:
             port=port, program=holder.name, pid=holder.pid
         )
     others = range(port + 1, min(port + 1 + _PORTS_TRIED, MAX_PORT + 1))
-    return sentence, next((each for each in others if is_free(each)), 0)
+    return sentence, next((each for each in others if processes.is_free(each)), 0)

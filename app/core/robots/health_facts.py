@@ -25,7 +25,7 @@ WARM_C = 60
 CONNECTION, BATTERY, TEMPERATURE = lazy("Connection"), lazy("Battery"), lazy("Temperature")
 STOP, CAMERA, SENSORS = lazy("Stop"), lazy("Camera"), lazy("Sensors")
 REJECTED, ERRORS = lazy("Rejected messages"), lazy("Driver exceptions")
-LEFT_ALONE, SIGN_OF_LIFE = lazy("When its program stops"), lazy("Last response")
+LEFT_ALONE, SIGN_OF_LIFE = lazy("Safety stop"), lazy("Last response")
 TOLD = frozenset({BATTERY, TEMPERATURE, CAMERA, SENSORS})
 
 AgeWords = Callable[[float], str]

@@ -419,7 +419,7 @@ def _wrong_words(report: StopReport) -> str:
         silent = [*silent[:MAX_NAMED], _("{count} more").format(count=len(silent) - MAX_NAMED)]
     wrong = [*refusals, *untold]
     if silent:
-        words = ngettext("{robots} did not respond", "{robots} did not respond", len(silent))
+        words = ngettext("{robots} did not reply", "{robots} did not reply", len(silent))
         wrong.append(words.format(robots=listed(silent)))
     left = len(wrong) - MAX_NAMED
     if left > 0:

@@ -319,7 +319,7 @@ def test_a_late_answer_changes_what_stands_there(session: Session, pepper: WireR
     the_link(session, "Pepper")
     pepper.silent = {"stop"}
     session.runs.stop()
-    tick_until(session, lambda: session.runs.view().title == "Pepper did not respond")
+    tick_until(session, lambda: session.runs.view().title == "Pepper did not reply")
     pepper._say(pepper.heard("stop")[0], "failed", "the brake is stuck")
     tick_until(session, lambda: session.runs.view().title == "Pepper may still move: the brake is stuck")
     pepper._say(pepper.heard("stop")[0], "succeeded")
@@ -339,7 +339,7 @@ def test_the_programs_own_silent_robots_are_asked_again(session: Session, pepper
     assert runner is not None
     session.runs.on_runner(RunnerEvent("ended", runner.run, silent=("Pepper",)))
     tick_until(session, lambda: session.runs.view().state == "unanswered")
-    assert session.runs.view().title == "Pepper did not respond"
+    assert session.runs.view().title == "Pepper did not reply"
     runner.close()
 
 

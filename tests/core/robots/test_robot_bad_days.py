@@ -262,7 +262,7 @@ def test_it_says_nothing_at_all(session: Session, liar: Liar, tried: Invocation)
     tick_until(session, lambda: liar.commands[-1]["op"] == "cancel")
     session.runs.stop()
     tick_until(session, lambda: session.runs.view().state == "unanswered", SAID_S)
-    assert session.runs.view().title == "Turtle did not respond"
+    assert session.runs.view().title == "Turtle did not reply"
 
 
 def test_it_falls_silent_in_the_middle(session: Session, liar: Liar, tried: Invocation) -> None:

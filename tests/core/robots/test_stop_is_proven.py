@@ -101,7 +101,7 @@ def test_two_robots_of_one_name_must_both_answer(master, stopper, pepper) -> Non
         report = stopper.stop_all(timeout_s=SHORT_S, on_answer=told.append)
         assert [(each.answered, each.waits) for each in told] == [(True, True), (False, False)]
         assert (report.proven, report.silent) == (False, ("Pepper",))
-        assert report.robots[1].sentence == "Pepper (“Pepper”) did not respond. Switch it off by hand."
+        assert report.robots[1].sentence == "Pepper (“Pepper”) did not reply. Switch it off by hand."
         twin.silent, pepper.silent = set(), {"stop"}
         report = stopper.stop_all(timeout_s=SHORT_S)
         assert [robot.answered for robot in report.robots] == [False, True]

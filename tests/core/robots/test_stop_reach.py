@@ -74,7 +74,7 @@ def test_a_robot_that_went_away_during_the_program_is_named_until_it_answers(ses
             session.runs.stop()
             tick_until(session, lambda: session.runs.view().state == "stopping")
             tick_until(session, lambda: session.runs.view().state != "stopping")
-            assert session.runs.view().title == "Lamp did not respond"
+            assert session.runs.view().title == "Lamp did not reply"
             assert not session.runs.view().can_run
             tick_until(session, lambda: not is_needed(session))
         driver = Driver(LAMP, "Lamp", node)

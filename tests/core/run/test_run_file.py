@@ -119,7 +119,7 @@ def test_ctrl_c_pressed_again_does_not_cut_the_stop_short(pepper, saved, master,
     until(lambda: bool(pepper.heard("stop")))
     process.send_signal(signal.SIGINT)
     out, _ = process.communicate(timeout=60)
-    assert "Pepper did not respond. Switch it off by hand." in out
+    assert "Pepper did not reply. Switch it off by hand." in out
     assert "Traceback" not in out
     assert process.returncode == (FAILED if how == "a file of Studio" else 0)
 
@@ -128,7 +128,7 @@ def test_a_robot_that_does_not_stop_is_named(pepper, saved):
     pepper.silent = {"stop"}
     code, out = run(saved(workspace(started(say("Hi")))))
     assert code == FAILED
-    assert "Pepper did not respond. Switch it off by hand." in out
+    assert "Pepper did not reply. Switch it off by hand." in out
 
 
 def test_a_robot_that_is_not_there(master, saved):

@@ -54,7 +54,7 @@ def test_a_silent_robot_is_named(stopper, robots):
     assert (report.proven, report.silent) == (False, ("Turtle",))
     by_name = {robot.name: robot for robot in report.robots}
     assert by_name["Pepper"].answered
-    assert by_name["Turtle"].sentence == "Turtle did not respond. Switch it off by hand."
+    assert by_name["Turtle"].sentence == "Turtle did not reply. Switch it off by hand."
     assert report.elapsed_ms >= SILENT_S * 1000
     assert [robot.name for robot in answered] == [
         "Pepper",

@@ -90,19 +90,19 @@ def test_an_answer_in_less_than_a_millisecond_is_not_zero() -> None:
 def test_not_answered_names_the_robot_and_what_a_hand_can_do() -> None:
     view = view_of(after(PEPPER, SILENT), [], 0)
     assert (view.title, view.detail) == (
-        "Turtle did not respond",
+        "Turtle did not reply",
         "Pepper stopped (38 ms). Switch Turtle off by hand.",
     )
     assert (view.result, view.result_status) == ("1 of 2 robots stopped", "error")
     assert (view.stop_word, view.confirm) == ("Stop again", "Turtle isn't moving")
-    assert view.compact == "Turtle did not respond; switch it off by hand"
+    assert view.compact == "Turtle did not reply; switch it off by hand"
     assert (view.can_run, view.can_pause, view.can_step) == (False, False, False)
 
 
 def test_what_a_robot_said_stands_first_in_its_own_words() -> None:
     stuck = RobotStop("Arm", False, 9.0, error="Arm may still move: the brake is stuck", refused=True)
     view = view_of(after(PEPPER, stuck, SILENT), [], 0)
-    assert view.title == "Arm may still move: the brake is stuck; Turtle did not respond"
+    assert view.title == "Arm may still move: the brake is stuck; Turtle did not reply"
     assert view.detail == "Pepper stopped (38 ms). Switch Arm and Turtle off by hand."
     assert view.confirm == "Arm and Turtle aren't moving"
     twin = RobotStop("Arm", False, 9.0, error=stuck.error, refused=True, program="arm 2")
@@ -113,7 +113,7 @@ def test_what_a_robot_said_stands_first_in_its_own_words() -> None:
 def test_many_that_did_not_answer_do_not_fill_the_window() -> None:
     many = [RobotStop("Pepper", False, None, program=f"copy {number}") for number in range(30)]
     title = view_of(after(*many), [], 0).title
-    assert title.endswith("Pepper (“copy 3”) and 26 more did not respond")
+    assert title.endswith("Pepper (“copy 3”) and 26 more did not reply")
     refused = [
         RobotStop(f"R{n}", False, 1.0, error=f"R{n} may still move: no", refused=True) for n in range(9)
     ]
@@ -123,14 +123,14 @@ def test_many_that_did_not_answer_do_not_fill_the_window() -> None:
 def test_the_button_beside_the_sentence_leaves_it_room() -> None:
     long = RobotStop("The old blue robot in the entrance hall", False, None)
     view = view_of(after(PEPPER, long), [], 0)
-    assert (view.title, view.confirm) == (f"{long.name} did not respond", "It isn't moving")
+    assert (view.title, view.confirm) == (f"{long.name} did not reply", "It isn't moving")
     assert view_of(after(long, SILENT), [], 0).confirm == "They aren't moving"
 
 
 def test_robots_are_counted_not_the_programs_that_serve_them() -> None:
     twin = RobotStop("Pepper", False, None, program="pepper 2")
     view = view_of(after(PEPPER, twin, TURTLE), [], 0)
-    assert view.title == "Pepper (“pepper 2”) did not respond"
+    assert view.title == "Pepper (“pepper 2”) did not reply"
     assert view.result == "1 of 2 robots stopped"
     assert view.detail == "Turtle stopped (41 ms). Switch Pepper off by hand."
     ears = RobotStop("Pepper", False, None, can_confirm=False, program="nep-topic-echo")

@@ -45,7 +45,7 @@ def test_a_tab_says_its_name_that_it_is_not_saved_and_that_it_runs(tabs) -> None
     tabs.show_tabs([A, TabFacts("b", "Tour guide", dirty=True, runs=True)], "a")
     assert [tab.accessibleName() for tab in tabs.tabs.values()] == [
         "Greeting",
-        "Tour guide, not saved, runs",
+        "Tour guide, not saved, running",
     ]
     assert [tab.isChecked() for tab in tabs.tabs.values()] == [True, False]
 

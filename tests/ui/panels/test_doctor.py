@@ -104,7 +104,7 @@ def test_panels_that_wait_are_listed_with_the_topic_that_was_meant(qtbot, panel,
     panel.refresh()
     told = {row.accessibleName(): row.button for row in panel.rows}
     assert len(told) == before + 3
-    (why,) = [told[each] for each in told if "/zzzz/qqqqqqqqqq. Nobody sends it." in each]
+    (why,) = [told[each] for each in told if "/zzzz/qqqqqqqqqq, which has no publisher." in each]
     assert why.accessibleName() == "Why do I see nothing?"
     press(why)
     assert window.asked_why == [(far, "/zzzz/qqqqqqqqqq")]
@@ -297,7 +297,7 @@ def test_a_person_says_what_they_miss(panel, window, asker) -> None:
     assert window.session.doctor.missed == "/odom"
     assert "paused" not in panel.rows[0].accessibleName()
     panel.copy.click()
-    assert QGuiApplication.clipboard().text().startswith("Missed: /odom\n")
+    assert QGuiApplication.clipboard().text().startswith("Missing: /odom\n")
 
 
 def test_a_topic_of_a_network_that_does_not_answer(panel, window) -> None:

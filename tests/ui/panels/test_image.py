@@ -221,7 +221,7 @@ def test_the_value_under_the_mouse_is_said(qtbot, view) -> None:
     QTest.mouseMove(view, QPoint(20, 60))
     qtbot.waitUntil(lambda: "(16, 8)  196 198 190  #C4C6BE" in view.words)
     QTest.mouseMove(view, QPoint(20, 20))
-    qtbot.waitUntil(lambda: "(" not in view.words)
+    qtbot.waitUntil(lambda: "#" not in view.words)
 
 
 def test_the_image_panel_shows_the_first_picture_topic_and_others_on_demand(qtbot, qapp) -> None:

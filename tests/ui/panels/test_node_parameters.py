@@ -186,7 +186,7 @@ def test_what_can_not_be_set_says_why(world: World) -> None:
     world.window.session.source.tell(GraphView(1, 2, {}))
     ticks(world.window, world.panel, 2)
     part.table.choose("speed")
-    assert (part.field.isEnabled(), part.sentence.text()) == (False, "Its node disconnected.")
+    assert (part.field.isEnabled(), part.sentence.text()) == (False, "Its node has disappeared.")
     assert part.model.cell_at(0, 0).role == "textDisabled"
 
 

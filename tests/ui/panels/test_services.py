@@ -228,6 +228,6 @@ def test_nothing_of_an_answer_is_cut_off_at_the_width_of_the_developer_layout(wi
     right = panel.mapToGlobal(panel.rect().topRight()).x()
     for widget in (panel.answer.table, panel.answer.way, panel.answer.copy, panel.calls, panel.way):
         assert widget.isVisible()
-        assert widget.mapToGlobal(widget.rect().topRight()).x() <= right
+        qtbot.waitUntil(lambda each=widget: each.mapToGlobal(each.rect().topRight()).x() <= right)
     panel.resize(720, 640)
     qtbot.waitUntil(lambda: panel.answer.copy.y() < panel.answer.chip.geometry().bottom())

@@ -94,7 +94,7 @@ def test_topics_are_chosen_named_armed_asked_for_sent_and_counted(qtbot, qapp, p
     assert has_keys(panel.strip.switch)
     assert panel.strip.isVisible()
     assert not panel.transport.armed.isVisible()
-    assert panel.strip.question.text().startswith("/base/cmd_vel tells robots what to do.")
+    assert panel.strip.question.text().startswith("/base/cmd_vel commands robots.")
     QTest.mouseClick(panel.strip.let, Qt.MouseButton.LeftButton)
     session.tick(), panel.refresh()
     assert [token.text() for token in panel.strip.tokens] == ["/a as /test/a", "/base/cmd_vel"]

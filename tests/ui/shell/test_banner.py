@@ -119,7 +119,7 @@ def test_words_beside_it_are_shortened_but_not_those_that_ask_somebody_to_act(
     beside = window.banner.x() - bar.sentence.x()
     assert bar.sentence.width() == wide, "only the painting ends before the banner"
     assert beside < bar.sentence.full_width()
-    title = "Pepper did not respond. Switch it off by hand."
+    title = "Pepper did not reply. Switch it off by hand."
     bar.show_view(RunView("unanswered", title, "It may still move, so look at it now.", title))
     QApplication.processEvents()
     assert bar.banner_area().x() >= bar.sentence.x() + bar.sentence.full_width()

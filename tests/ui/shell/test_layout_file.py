@@ -115,4 +115,4 @@ def test_a_layout_goes_out_and_comes_back_and_can_be_undone(
     answers.path = tmp_path / "a file" / "x.nep-layout"
     answers.path.parent.write_bytes(b"in its place")
     commands.run("layout.export")
-    assert window.toast.text.startswith("Can't write x.nep-layout: ")
+    assert window.toast.text.startswith("can't write x.nep-layout: ")

@@ -45,7 +45,7 @@ def test_the_beginning_of_a_word_is_better_than_its_middle() -> None:
 
 def test_letters_that_fit_are_told() -> None:
     assert bold("reco", "Save last 60 s of the recording") == "reco"
-    assert bold("pb", "Reset panels") == "P|b"
+    assert bold("rp", "Reset panels") == "R|p"
     assert bold("text larger", "Larger text") == "Larger|text"
     assert bold("ab", "ÄAB") == "AB"
 
@@ -56,8 +56,8 @@ def test_what_does_not_fit_is_not_found(query: str) -> None:
 
 
 def test_what_can_be_done_now_stands_above_what_can_not() -> None:
-    entries = [Entry("command:a", "Resume", reason="Nothing is paused"), Entry("command:b", "Go up")]
-    assert [each.entry.words for each in Finder(entries).find("go", 20)[0]] == ["Go up", "Resume"]
+    entries = [Entry("command:a", "Let go", reason="Nothing is held"), Entry("command:b", "Go up")]
+    assert [each.entry.words for each in Finder(entries).find("go", 20)[0]] == ["Go up", "Let go"]
 
 
 def test_scattered_letters_do_not_fit() -> None:
@@ -67,7 +67,7 @@ def test_scattered_letters_do_not_fit() -> None:
 
 @pytest.mark.parametrize(
     ("query", "words"),
-    [("pb", "Reset panels"), ("ptpb", "Reset panels"), ("vl", "Volver a poner los paneles")],
+    [("rp", "Reset panels"), ("ob", "Open another behaviour"), ("vl", "Volver a poner los paneles")],
 )
 def test_the_initials_of_a_command_mean_it(query: str, words: str) -> None:
     topics = [Entry(f"topic:/{query}", f"/{query}"), Entry(f"topic:/a{query}", f"/a{query}")]

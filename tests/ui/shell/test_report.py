@@ -93,7 +93,7 @@ def test_it_opens_in_the_field_and_says_what_goes_in(sheet: ReportSheet) -> None
 def test_it_asks_where_and_suggests_a_name_with_the_day(sheet: ReportSheet, answers: Answers) -> None:
     sheet.write.click()
     (asked,) = answers.asked
-    assert asked.startswith(f"Write the report: {documents_folder() / 'nep-studio-report-'}")
+    assert asked.startswith(f"Write report: {documents_folder() / 'nep-studio-report-'}")
     assert asked.endswith(".zip")
     assert sheet.write.isEnabled(), "who gives up can go on"
 

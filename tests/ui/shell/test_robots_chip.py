@@ -35,7 +35,7 @@ def test_several_are_counted() -> None:
 
 
 def test_one_that_is_silent_is_named() -> None:
-    assert chip("silent") == ("Silent", "error")
+    assert chip("silent") == ("Not responding", "error")
     assert chip("silent", silent="camera silent") == ("Camera silent", "error")
     assert chip("silent", "ready") == ("Robot 1: silent", "error")
     assert chip("silent", "silent") == ("2 robots not responding", "error")

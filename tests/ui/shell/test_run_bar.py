@@ -41,8 +41,8 @@ VIEWS = {
         can_run=True, can_step=True, result="all 2 robots stopped (41 ms)", result_status="ok",
     ),
     "unanswered": RunView(
-        "unanswered", "Turtle did not respond", "Pepper stopped (38 ms). Switch Turtle off by hand.",
-        "Turtle did not respond; switch it off by hand", stop_word="Stop again",
+        "unanswered", "Turtle did not reply", "Pepper stopped (38 ms). Switch Turtle off by hand.",
+        "Turtle did not reply; switch it off by hand", stop_word="Stop again",
         result="1 of 2 robots stopped", result_status="error", confirm="Turtle isn't moving",
     ),
 }  # fmt: skip
@@ -149,7 +149,7 @@ def test_the_buttons_trigger_their_commands(theme: Theme, bar: RunBar) -> None:
     [
         ("running", False, True, "Greeting runs, 14 s"),
         ("proven", True, False, "all 2 robots stopped (41 ms)"),
-        ("unanswered", False, False, "Turtle did not respond; switch it off by hand"),
+        ("unanswered", False, False, "Turtle did not reply; switch it off by hand"),
         ("paused", True, False, "Greeting is paused"),
     ],
 )

@@ -51,9 +51,9 @@ VIEWS = (
     ),
     RunView(
         "unanswered",
-        "Turtle did not respond",
+        "Turtle did not reply",
         "Pepper stopped (38 ms). Switch Turtle off by hand.",
-        "Turtle did not respond; switch it off by hand",
+        "Turtle did not reply; switch it off by hand",
         stop_word="Stop again",
         result="1 of 2 robots stopped",
         result_status="error",

@@ -50,7 +50,7 @@ class RobotStop:
             return ""
         if self.program and self.refused:
             return _("{error} (from “{program}”)").format(error=self.error, program=self.program)
-        return self.error or _("{robot} did not respond").format(robot=self.who)
+        return self.error or _("{robot} did not reply").format(robot=self.who)
 
     @property
     def sentence(self) -> str:

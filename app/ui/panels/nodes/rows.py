@@ -242,7 +242,7 @@ COLUMNS: tuple[Column[NodeRow], ...] = (
         lambda r: len(r.node.subscribes), figures=True, yields=2,
     ),
     Column(
-        "since", lazy("Connected for"), 62, _of_node(_since),
+        "since", lazy("Uptime"), 62, _of_node(_since),
         lambda r: r.node.since_ns, figures=True, yields=6,
     ),
 )  # fmt: skip

@@ -260,7 +260,7 @@ COMMANDS: tuple[C, ...] = (
       why_not=_nothing_to_freeze),
     C("replay.live", lazy("Back to live"), lambda do: do.replay.back_to_live(), "View", icon="radio-tower",
       tip=lazy("Closes the recording and returns to the live network"), above=True, why_not=_no_recording),
-    C("replay.play", lazy("Play or pause the recording"), lambda do: do.replay.play(), icon="play",
+    C("replay.play", lazy("Play recording"), lambda do: do.replay.play(), icon="play",
       why_not=_not_there_yet),
     C("replay.bookmark", lazy("Add bookmark"), lambda do: do.replay.bookmark(), icon="bookmark",
       why_not=_not_there_yet),

@@ -616,7 +616,9 @@ def test_what_can_not_be_written_is_told(qtbot, panel, window, tmp_path: Path) -
     (tmp_path / "file").write_text("x")
     for kind in (CSV, PNG):
         panel.exporter.write(tmp_path / "file" / f"a{kind.ending}", kind)
-        qtbot.waitUntil(lambda: panel.refresh() or any("can't be written" in each for each in window.toasts))
+        qtbot.waitUntil(
+            lambda: panel.refresh() or any("can't write" in each.lower() for each in window.toasts)
+        )
         window.toasts.clear()
     assert not [
         each for each in threading.enumerate() if each.name == "studio-plot-export" and each.is_alive()
