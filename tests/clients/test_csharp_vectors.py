@@ -13,7 +13,7 @@ import msgpack
 import numpy as np
 import pytest
 
-from nep.backends.zeromq.loss import HeardPublishers
+from nep.backends.zeromq.loss import PublisherTracker
 from nep.errors import WireError
 from nep.messages import image_codec
 from nep.protocol.clock_samples import ClockSamples
@@ -142,25 +142,25 @@ STEPS = (
 
 def losses_in_python(steps: list[tuple[str, int, int]]) -> list[object]:
     """Apply steps to a new subscriber's losses; return each result, then received and lost messages."""
-    sources = HeardPublishers()
+    sources = PublisherTracker()
 
     def connect(id: int, history: int) -> None:
         record = PublisherRecord(id, "t", "json", "json", history=history)
-        source = sources.listed(RemotePublisher(record, "n", "name"))
-        source.is_lapsed, source.ends_at = False, None
+        source = sources.add_listed(RemotePublisher(record, "n", "name"))
+        source.is_silent, source.ends_at = False, None
 
     do: dict[str, Callable[[int, int], object]] = {
         "listed": connect,
         "expect": lambda id, _number: sources.expect_all_of(id),
-        "arrived": lambda id, number: sources.arrived(id, number, is_alone=False),
-        "alone": lambda id, number: sources.arrived(id, number, is_alone=True),
+        "arrived": lambda id, number: sources.count_message(id, number, is_alone=False),
+        "alone": lambda id, number: sources.count_message(id, number, is_alone=True),
         "early": lambda id, _number: sources.is_early(id),
-        "reached": sources.reached,
-        "promised": sources.promised,
-        "closing": lambda id, number: sources.closing(id, number, 0.0),
-        "lapsed": sources.lapsed,
-        "settle": lambda id, _number: sources.settle(id),
-        "dropped": lambda _id, number: sources.dropped(number),
+        "reached": sources.advance_to,
+        "promised": sources.expect_up_to,
+        "closing": lambda id, number: sources.mark_closing(id, number, 0.0),
+        "lapsed": sources.mark_silent,
+        "settle": lambda id, _number: sources.count_missing(id),
+        "dropped": lambda _id, number: sources.count_dropped(number),
         "forget": lambda id, _number: sources.pop(id),
     }
     results: list[object] = []

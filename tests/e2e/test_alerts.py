@@ -132,7 +132,7 @@ def test_alerts_cover_nothing_and_panels_keep_what_they_show(
     with adder(address):
         fingers.do("call a serv", "Call a service")
         studio.click("Arm and call")
-        studio.says("confirmed in ")
+        studio.says("replied in ")
         panel, answer = (
             studio.find(kind="ServicesPanel")["rect"],
             studio.find("Answer", kind="TableView")["rect"],

@@ -36,7 +36,7 @@ def test_an_error_stands_on_its_block_as_a_sentence(with_robot: Callable[[dict],
     studio.click("Run", kind="RunButton")
     until(lambda: studio.outlined("error") == ["walk"], "the block has its error", 40)
     assert "something is in the way" in str(studio.page("document.body.textContent"))
-    studio.says("Stopped because of an error")
+    studio.says("because of an error")
 
 
 def test_pause_step_and_go_on(with_robot: Callable[[dict], Studio], address: str) -> None:

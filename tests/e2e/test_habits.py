@@ -36,7 +36,7 @@ def test_keys_lead_from_the_page_to_every_command(studio: Studio) -> None:
     studio.screen.type("smaller")
     chosen_first(studio, "Smaller text")
     studio.screen.key("Return", ["Ctrl"])  # another key for it
-    studio.says("Press the new key for “Smaller text”")
+    studio.says("Press the new shortcut for “Smaller text”")
     studio.screen.key("F7")
     studio.says("“Smaller text” has F7 now.")
     studio.screen.key("Escape")

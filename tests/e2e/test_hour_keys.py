@@ -348,7 +348,7 @@ def take_back(studio: Studio, film: Film, fingers: Fingers) -> None:
 
 def picture(studio: Studio, film: Film, fingers: Fingers, home: Path) -> None:
     with film.step("A picture of the blocks: Ctrl+K, its name, Enter"):
-        fingers.do("picture", "Save blocks as image")
+        fingers.do("blocks as image", "Save blocks as image")
         studio.find(kind="FileSheet")
         studio.find(kind="QLineEdit", focus=True)
         fingers.press("Return")

@@ -26,7 +26,7 @@ def test_what_was_published_while_it_recorded_is_in_the_file(studio: Studio) -> 
         folder = studio.home / "Recordings"
         until(lambda: [each for each in folder.glob("*.mcap") if each.stat().st_size], "a file is there")
         studio.screen.key("r", ["Ctrl"])
-        studio.says("Recorded recording-")
+        studio.says("Saved recording recording-")
         (path,) = folder.glob("*.mcap")
         with Recording(path) as recording:
             assert recording.is_complete

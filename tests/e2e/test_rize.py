@@ -67,4 +67,4 @@ def test_the_window_finds_it_and_blocks_drive_it(
     studio.click("Run", kind="RunButton")
     studio.click("Allow motion")  # it is no virtual robot, and its program walks
     heard(driver)
-    studio.says("Turtle cannot confirm")
+    studio.says("Turtle can't confirm")

@@ -106,7 +106,7 @@ def files() -> Iterator[bytes]:
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "map.json"
         made = PortMap(path, 1.0)
-        made.give(line, 20_000)
+        made.assign(line, 20_000)
         made.add(Registration(line, "n", "publisher", "json", "A", "c++", 42, 5.0))
         made.save()
         yield path.read_bytes()

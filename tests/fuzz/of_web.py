@@ -11,14 +11,14 @@ from urllib.parse import unquote
 from nep.errors import NepError
 from nep.messages.encoded import Encoded
 from nep.messages.message import Message
-from nep.programs.web import operations as op
 from nep.programs.web.access import Access, AuthCheck
 from nep.programs.web.foxglove import protocol as foxglove
-from nep.programs.web.fragments import FragmentBuffer
 from nep.programs.web.limits import MAX_MESSAGE_BYTES
+from nep.programs.web.messages import operations as op
+from nep.programs.web.messages.fragments import FragmentBuffer
+from nep.programs.web.messages.payloads import from_ros, nep_type_of, ros_type_of
+from nep.programs.web.messages.png import text_as_png, text_in_png
 from nep.programs.web.outgoing import EncodingOptions, publish_frames
-from nep.programs.web.payloads import from_ros, nep_type_of, ros_type_of
-from nep.programs.web.png import text_as_png, text_in_png
 from nep.programs.web.served_pages import PageRequest, answer
 from nep.programs.web.server import node_name
 from nep.programs.web.visitors import MAX_SHOWN_LENGTH, client_name, page_title

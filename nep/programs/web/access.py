@@ -18,7 +18,7 @@ from urllib.parse import parse_qs, quote, urlsplit
 
 from nep.errors import NepError
 from nep.i18n import _
-from nep.programs.web.operations import Auth
+from nep.programs.web.messages.operations import Auth
 from nep.text import quotable
 
 __all__ = ["Access", "AuthCheck", "checked_origin", "is_own_host", "new_token", "query_of"]

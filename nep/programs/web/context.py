@@ -12,7 +12,7 @@ from typing import Literal, ParamSpec, TypeVar
 
 from nep.nodes.node import Node
 from nep.programs.robots.guard import MotionGuard
-from nep.programs.web.operations import LEVELS, Level, OperationId
+from nep.programs.web.messages.operations import LEVELS, Level, OperationId
 from nep.programs.web.outgoing import EncodingOptions, operation_frames
 from nep.programs.web.send_queue import SendQueue
 from nep.programs.web.visitors import Device

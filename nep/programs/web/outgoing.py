@@ -15,11 +15,11 @@ from nep.backends.ros.definition import Definition, FieldKind
 from nep.errors import EncodeError
 from nep.messages.message import Message
 from nep.messages.nesting import json_is_too_deep
-from nep.programs.web.fragments import cut
-from nep.programs.web.operations import Compression
-from nep.programs.web.payloads import ros_bytes, ros_type_of, to_ros
-from nep.programs.web.png import text_as_png
-from nep.programs.web.ros_definitions import bare_type, definition_of
+from nep.programs.web.messages.fragments import cut
+from nep.programs.web.messages.operations import Compression
+from nep.programs.web.messages.payloads import ros_bytes, ros_type_of, to_ros
+from nep.programs.web.messages.png import text_as_png
+from nep.programs.web.messages.ros_definitions import bare_type, definition_of
 from nep.system.lazy_import import lazy_module
 
 if TYPE_CHECKING:

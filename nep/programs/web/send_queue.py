@@ -16,7 +16,7 @@ from typing import NamedTuple
 from nep.messages.codecs import codec_for
 from nep.messages.message import Message
 from nep.programs.web.limits import MAX_CONTROL_BYTES, MAX_QUEUED_BYTES, MAX_QUEUED_MESSAGES
-from nep.programs.web.operations import COMPRESSIONS, OperationId, Subscribe
+from nep.programs.web.messages.operations import COMPRESSIONS, OperationId, Subscribe
 from nep.programs.web.outgoing import EncodingOptions, Frame
 from nep.programs.web.rates import RateMeter
 

@@ -28,7 +28,7 @@ from nep.programs.web.foxglove import SUBPROTOCOLS, ChannelFormat, FoxglovePage,
 from nep.programs.web.handshake import address_of, host_of, is_handshake, origin_of, own_origin
 from nep.programs.web.kept_out import KeptOut
 from nep.programs.web.limits import MAX_MESSAGE_BYTES, MAX_PAGES
-from nep.programs.web.page import Page, authenticate
+from nep.programs.web.rosbridge.page import Page, authenticate
 from nep.programs.web.served_pages import PageRequest, answer
 from nep.system.addresses import ANY
 from nep.system.descriptors import is_lack, limit, opened

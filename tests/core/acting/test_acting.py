@@ -38,7 +38,7 @@ def test_messages_and_calls_go_to_the_network_and_stop_ends_them(session: Sessio
         assert call_words(acting.calls.records[-1]).startswith("replied in ")
         assert acting.shelf.requests["sum"] == '{"a": 2, "b": 3}'
         sent, called = list(acting.sent.records)[1:]
-        assert (sent.asker, sent.name, sent.words) == ("publish", "/cmd_vel", "Stand still, heard by 1")
+        assert (sent.asker, sent.name, sent.words) == ("publish", "/cmd_vel", "Stand still, received by 1")
         assert json.loads(sent.text) == first
         assert (called.asker, called.name, called.is_bad) == ("service", "sum", False)
         assert called.text == '{"a": 2, "b": 3}'
@@ -64,7 +64,7 @@ def test_messages_and_calls_go_to_the_network_and_stop_ends_them(session: Sessio
         tick_until(session, lambda: any(" sent" in each.words for each in acting.sent.records))
     said = [each.text for each in session.console.records]
     assert "armed for 5 min" in said
-    assert "/cmd_vel: Stand still, heard by 1" in said
+    assert "/cmd_vel: Stand still, received by 1" in said
     assert "no longer armed" in said
 
 
@@ -119,8 +119,8 @@ def test_how_it_ended_in_words() -> None:
     for result, words in (
         (SendResult(order, "sent", heard=2), "received by 2"),
         (SendResult(order, "sent"), "no subscribers"),
-        (SendResult(order, "started"), "started"),
-        (SendResult(order, "ended", count=412, skipped=3), "412 sent, 3 late message skipped"),
+        (SendResult(order, "began"), "started"),
+        (SendResult(order, "ended", count=412, skipped=3), "412 sent, 3 late messages skipped"),
         (SendResult(order, "failed", "not sent: there was no master"), "not sent: there was no master"),
         (SendResult(order, "failed", "it is closed", count=2), "2 sent, it is closed"),
         (SendResult(order, "ended"), "0 sent"),

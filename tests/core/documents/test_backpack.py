@@ -129,7 +129,7 @@ def test_one_that_cannot_be_read_or_written_is_left_as_it_is(tmp_path: Path) -> 
         backpack.put([WAIT])
     (tmp_path / "backpack.json").rmdir()
     (tmp_path / "file").write_text("")
-    with pytest.raises(BackpackError, match="can't be kept"):
+    with pytest.raises(BackpackError, match="can't save "):
         Backpack(tmp_path / "file").put([WAIT])
 
 

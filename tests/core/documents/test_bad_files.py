@@ -104,8 +104,8 @@ def test_behaviour_in_another_unicode_encoding_opens(tmp_path: Path, encoding: s
 
 @pytest.mark.parametrize(("version", "reason"), [
     (2, "newer NEP Studio (version 2) and is unchanged; update this one"),
-    (99, "newer NEP Studio"), (0, "does not say its version"), (-1, "does not say its version"),
-    (True, "does not say its version"), ("1", "does not say its version"), (None, "does not say its version"),
+    (99, "newer NEP Studio"), (0, "has no format version"), (-1, "has no format version"),
+    (True, "has no format version"), ("1", "has no format version"), (None, "has no format version"),
 ])  # fmt: skip
 def test_another_version_is_refused_with_the_next_step_and_left_alone(tmp_path, version, reason) -> None:
     path = tmp_path / "x.nepb"

@@ -92,7 +92,7 @@ def test_nothing_is_lost_on_a_full_disk_and_all_of_it_is_said(told: dict[str, ob
     full = told["full"]
     assert told["edit"] == f"can't back up unsaved work ({full}); save the file now"
     assert told["save"] == (
-        f"DocumentError: Mine.nepb can't be written ({full}); make room there or save it in another place"
+        f"DocumentError: can't write Mine.nepb ({full}); free some space or choose another folder"
     )
     assert str(told["setting"]).startswith("SettingsError: ")
     assert str(told["earlier"]).startswith("DocumentError: Mine.nepb was not saved: what it said before")

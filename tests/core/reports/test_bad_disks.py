@@ -58,8 +58,8 @@ def disk(tmp_path_factory: pytest.TempPathFactory) -> SmallDisk:
 def test_on_a_full_disk_a_report_is_whole_or_not_there(disk: SmallDisk) -> None:
     told = disk.run(FULL)
     advice = "free some space or choose another folder"
-    assert told["report"] == f"other.zip can't be written ({told['full']}); {advice}"
-    assert told["over"] == f"report.zip can't be written ({told['full']}); {advice}"
+    assert told["report"] == f"can't write other.zip ({told['full']}); {advice}"
+    assert told["over"] == f"can't write report.zip ({told['full']}); {advice}"
     assert told["old"] is True, "what was there is as it was"
     assert told["crash"] == "None"
     assert told["noted"] is False

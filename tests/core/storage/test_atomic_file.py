@@ -141,7 +141,7 @@ def test_what_is_no_file_is_a_sentence_for_every_reader(tmp_path: Path, kind: st
         path.symlink_to(real if "pipe" in kind else "/dev/zero")
     with pytest.raises(OSError, match=r"a folder, a pipe or a device, not a file"):
         read_whole(path)
-    with pytest.raises(DocumentError, match="can't be read"):
+    with pytest.raises(DocumentError, match="can't read "):
         read_file(path)
     assert keep_earlier(path, tmp_path / "earlier") is None
     assert left_behind(tmp_path) == []

@@ -226,8 +226,8 @@ def test_who_does_not_say_where_it_is_is_judged_by_its_address(
 def test_a_computer_is_known_by_what_it_does_not_tell(monkeypatch: pytest.MonkeyPatch) -> None:
     assert len(computer_id()) == 16
     assert computer.clock_name() not in computer_id()
-    monkeypatch.setattr(computer, "_NAMES", {})
+    monkeypatch.setattr(computer, "_NAME_QUERIES", {})
     assert computer.clock_name() == ""
     assert computer.computer_id.__wrapped__() == ""
-    monkeypatch.setattr(computer, "_NAMES", {sys.platform: lambda: (_ for _ in ()).throw(OSError)})
+    monkeypatch.setattr(computer, "_NAME_QUERIES", {sys.platform: lambda: (_ for _ in ()).throw(OSError)})
     assert computer.clock_name() == ""

@@ -99,7 +99,7 @@ def test_an_alarm_keeps_the_last_seconds_by_whoever_has_them(master, type_in, fi
     assert asked == [{"seconds": 30, "note": "range of /distance is 0.3, below 0.4"}]
     assert "need Studio" not in done.stderr
     told = [json.loads(line)["what"] for line in refused.stdout.splitlines()]
-    assert told[1] == "nothing was saved: 'nep recording ring' is not running"
+    assert told[1] == "nothing saved: 'nep recording ring' is not running"
 
 
 def test_a_message_is_sent_and_a_typo_is_told(master, type_in, file) -> None:

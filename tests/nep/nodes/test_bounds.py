@@ -205,7 +205,7 @@ def test_alerts_about_originals_are_cleaned_and_bounded() -> None:
         lambda: pytest.fail("no node is needed"), GraphRegistrar(lambda _request: None, 7), report
     )  # type: ignore[arg-type, return-value]
     for n in range(1000):
-        native.tell(f"topic:{n}", f"“{n}{CONTROLS}” stays")
+        native.report(f"topic:{n}", f"“{n}{CONTROLS}” stays")
     assert max(told) == 200
     assert not any(map(control_in, shown))
     for n in range(1000):
@@ -220,7 +220,7 @@ def test_who_asked_and_never_came_makes_room() -> None:
     registry = ProgramTable(known, processes, lambda _line: None)  # type: ignore[arg-type]
     for n in range(3):
         known.add(Registration(line, f"n{n}", "publisher", "json", "A", None, None, None))
-    registry.look()
+    registry.remove_ended()
     assert registry.make_room()
     assert [each.node for each in known.registrations] == ["n1", "n2"]
     assert registry.make_room()

@@ -8,7 +8,7 @@ import pytest
 
 from nep.errors import NepError
 from nep.programs.web.access import Access, AuthCheck, checked_origin
-from nep.programs.web.operations import Auth
+from nep.programs.web.messages.operations import Auth
 from nep.programs.web.server import WebServer, WebSettings, node_name
 
 

@@ -16,9 +16,8 @@ from nep.errors import NepError
 from nep.messages.codecs import codec_for
 from nep.messages.encoded import Encoded
 from nep.messages.message import Message
-from nep.programs.web.operations import OperationError
-from nep.programs.web.outgoing import EncodingOptions, operation_frames, publish_frames
-from nep.programs.web.payloads import (
+from nep.programs.web.messages.operations import OperationError
+from nep.programs.web.messages.payloads import (
     PayloadError,
     from_ros,
     is_compatible,
@@ -26,8 +25,9 @@ from nep.programs.web.payloads import (
     ros_type_of,
     to_ros,
 )
-from nep.programs.web.png import text_as_png, text_in_png
-from nep.programs.web.ros_definitions import definition_of, type_definitions
+from nep.programs.web.messages.png import text_as_png, text_in_png
+from nep.programs.web.messages.ros_definitions import definition_of, type_definitions
+from nep.programs.web.outgoing import EncodingOptions, operation_frames, publish_frames
 from tests import hostile
 
 PICTURE = np.arange(6 * 8 * 3, dtype=np.uint8).reshape(6, 8, 3)

@@ -7,9 +7,9 @@ import random
 
 import pytest
 
-from nep.programs.web import operations as op
-from nep.programs.web.fragments import FragmentBuffer, cut
 from nep.programs.web.limits import MAX_FRAGMENTED, MAX_MESSAGE_BYTES, MIN_FRAGMENT_SIZE
+from nep.programs.web.messages import operations as op
+from nep.programs.web.messages.fragments import FragmentBuffer, cut
 from tests import hostile
 
 EXAMPLES = (

@@ -9,7 +9,7 @@ import pytest
 
 from nep.messages.message import Message
 from nep.programs.web.limits import MAX_CONTROL_BYTES
-from nep.programs.web.operations import Subscribe
+from nep.programs.web.messages.operations import Subscribe
 from nep.programs.web.outgoing import Frame
 from nep.programs.web.send_queue import Feed, Queued, SendQueue
 

@@ -37,5 +37,5 @@ def test_several_are_counted() -> None:
 def test_one_that_is_silent_is_named() -> None:
     assert chip("silent") == ("Not responding", "error")
     assert chip("silent", silent="camera silent") == ("Camera silent", "error")
-    assert chip("silent", "ready") == ("Robot 1: silent", "error")
+    assert chip("silent", "ready") == ("Robot 1: not responding", "error")
     assert chip("silent", "silent") == ("2 robots not responding", "error")

@@ -364,8 +364,8 @@ def sent_words(sent: SentTopic) -> str:
 
 
 def late_words(count: int) -> str:
-    """Format the number of dropped messages: "3 left out, being late"."""
-    template = ngettext("{count} late message skipped", "{count} late message skipped", count)
+    """Format the number of skipped messages: "3 late messages skipped"."""
+    template = ngettext("{count} late message skipped", "{count} late messages skipped", count)
     return template.format(count=count)
 
 

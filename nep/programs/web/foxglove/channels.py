@@ -18,10 +18,10 @@ from nep.nodes.subscriber import Subscriber
 from nep.programs.web.context import PageContext, PageTopic
 from nep.programs.web.foxglove.protocol import MAX_ID, message_frame
 from nep.programs.web.limits import MAX_TOPICS
-from nep.programs.web.operations import Subscribe
+from nep.programs.web.messages.operations import Subscribe
+from nep.programs.web.messages.payloads import ros_type_of
 from nep.programs.web.outgoing import Frame, json_bytes
-from nep.programs.web.page_topics import read_messages, subscribed_topic
-from nep.programs.web.payloads import ros_type_of
+from nep.programs.web.rosbridge.page_topics import read_messages, subscribed_topic
 from nep.programs.web.send_queue import Feed, Queued
 
 __all__ = ["ChannelFormat", "Channels"]

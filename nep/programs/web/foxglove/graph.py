@@ -6,8 +6,8 @@ from collections.abc import Iterable, Mapping
 from typing import NamedTuple
 
 from nep.programs.web.foxglove.protocol import ENCODING
-from nep.programs.web.payloads import ros_type_of
-from nep.programs.web.rosapi import is_shown
+from nep.programs.web.messages.payloads import ros_type_of
+from nep.programs.web.rosbridge.rosapi import is_shown
 from nep.protocol.graph_view import GraphView
 
 __all__ = ["GraphUpdates"]

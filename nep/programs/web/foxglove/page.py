@@ -21,18 +21,18 @@ from nep.i18n import _
 from nep.nodes.loop_wait import give_way
 from nep.nodes.node import Node
 from nep.programs.robots.guard import MotionGuard
-from nep.programs.web import operations as op
 from nep.programs.web.connection import PageConnection
 from nep.programs.web.context import PageContext, PageTopic, WebCounts
 from nep.programs.web.foxglove import protocol as wire
 from nep.programs.web.foxglove.channels import ChannelFormat, Channels
 from nep.programs.web.foxglove.graph import GraphUpdates
 from nep.programs.web.limits import MAX_TOPICS
+from nep.programs.web.messages import operations as op
+from nep.programs.web.messages.ros_definitions import JSON_TYPE
 from nep.programs.web.outgoing import Frame, json_bytes
-from nep.programs.web.page_services import PageServices
-from nep.programs.web.page_topics import PageTopics
-from nep.programs.web.ros_definitions import JSON_TYPE
-from nep.programs.web.rosapi import is_shown
+from nep.programs.web.rosbridge.page_services import PageServices
+from nep.programs.web.rosbridge.page_topics import PageTopics
+from nep.programs.web.rosbridge.rosapi import is_shown
 from nep.programs.web.send_queue import Queued
 from nep.system.lazy_import import lazy_module
 from nep.system.log_rarely import is_logged

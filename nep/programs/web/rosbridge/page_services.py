@@ -14,7 +14,7 @@ from nep.patterns.services.client import Client
 from nep.patterns.services.server import Server
 from nep.programs.web.context import PageContext
 from nep.programs.web.limits import MAX_CALLS, MAX_SERVICES
-from nep.programs.web.operations import (
+from nep.programs.web.messages.operations import (
     AdvertiseService,
     CallService,
     OperationError,
@@ -23,7 +23,7 @@ from nep.programs.web.operations import (
     UnadvertiseService,
 )
 from nep.programs.web.outgoing import EncodingOptions, operation_frames
-from nep.programs.web.rosapi import RosApi, is_rosapi
+from nep.programs.web.rosbridge.rosapi import RosApi, is_rosapi
 from nep.text import bounded_str, quotable
 
 __all__ = ["PageServices"]

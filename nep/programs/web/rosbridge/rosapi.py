@@ -15,8 +15,8 @@ from nep.errors import NepError
 from nep.i18n import _
 from nep.nodes.node import Node
 from nep.patterns.parameters.owned import place_of
-from nep.programs.web.payloads import ros_type_of
-from nep.programs.web.ros_definitions import JSON_TYPE, bare_type, full_text, type_definitions
+from nep.programs.web.messages.payloads import ros_type_of
+from nep.programs.web.messages.ros_definitions import JSON_TYPE, bare_type, full_text, type_definitions
 from nep.protocol.graph_view import GraphView, NodeInfo
 from nep.text import bounded_str, quotable
 

@@ -12,16 +12,16 @@ from nep.i18n import _
 from nep.nodes.loop_wait import give_way
 from nep.nodes.node import Node
 from nep.programs.robots.guard import MotionGuard
-from nep.programs.web import operations as op
 from nep.programs.web.access import AuthCheck
 from nep.programs.web.connection import PageConnection
 from nep.programs.web.context import PageContext, PageTopic, WebCounts
-from nep.programs.web.fragments import FragmentBuffer
 from nep.programs.web.limits import AUTH_TIMEOUT_S, MAX_NESTED_OPERATIONS
+from nep.programs.web.messages import operations as op
+from nep.programs.web.messages.fragments import FragmentBuffer
+from nep.programs.web.messages.png import text_in_png
 from nep.programs.web.outgoing import Frame, publish_frames
-from nep.programs.web.page_services import PageServices
-from nep.programs.web.page_topics import PageTopics
-from nep.programs.web.png import text_in_png
+from nep.programs.web.rosbridge.page_services import PageServices
+from nep.programs.web.rosbridge.page_topics import PageTopics
 from nep.programs.web.send_queue import Queued
 from nep.system.lazy_import import lazy_module
 from nep.system.log_rarely import is_logged

@@ -29,7 +29,13 @@ from nep.messages.codecs import codec_for
 from nep.messages.encoded import Encoded
 from nep.messages.image_files import examine
 from nep.messages.message import Message
-from nep.programs.web.ros_definitions import JSON_TYPE, MSGPACK_TYPE, bare_type, definition_of, full_text
+from nep.programs.web.messages.ros_definitions import (
+    JSON_TYPE,
+    MSGPACK_TYPE,
+    bare_type,
+    definition_of,
+    full_text,
+)
 from nep.text import bounded_str, escaped
 
 __all__ = ["PayloadError", "from_ros", "is_compatible", "nep_type_of", "ros_bytes", "ros_type_of", "to_ros"]

@@ -12,7 +12,7 @@ from nep.nodes.publisher import Publisher
 from nep.nodes.subscriber import Subscriber
 from nep.programs.web.context import PageContext, PageTopic
 from nep.programs.web.limits import MAX_SUBSCRIPTION_IDS, MAX_TOPICS
-from nep.programs.web.operations import (
+from nep.programs.web.messages.operations import (
     Advertise,
     OperationError,
     OperationId,
@@ -21,9 +21,9 @@ from nep.programs.web.operations import (
     Unadvertise,
     Unsubscribe,
 )
-from nep.programs.web.payloads import from_ros, is_compatible, nep_type_of, ros_type_of
+from nep.programs.web.messages.payloads import from_ros, is_compatible, nep_type_of, ros_type_of
+from nep.programs.web.messages.ros_definitions import bare_type, definition_of
 from nep.programs.web.rates import RateMeter
-from nep.programs.web.ros_definitions import bare_type, definition_of
 from nep.programs.web.send_queue import Feed, SendQueue
 from nep.text import quotable
 

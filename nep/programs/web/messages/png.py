@@ -11,7 +11,7 @@ from nep.i18n import _
 from nep.messages import image_codec
 from nep.messages.image_files import examine
 from nep.programs.web.limits import MAX_MESSAGE_BYTES
-from nep.programs.web.operations import OperationError
+from nep.programs.web.messages.operations import OperationError
 
 __all__ = ["text_as_png", "text_in_png"]
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from nep.i18n import _
 from nep.programs.web.limits import MAX_FRAGMENTED, MAX_MESSAGE_BYTES
-from nep.programs.web.operations import Fragment, OperationError, OperationId, Png
+from nep.programs.web.messages.operations import Fragment, OperationError, OperationId, Png
 
 __all__ = ["FragmentBuffer", "cut"]
 

@@ -1,0 +1,1 @@
+"""Operations of rosbridge and payloads in ROS message shapes, as values and as JSON."""

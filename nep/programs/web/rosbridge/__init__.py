@@ -1,0 +1,1 @@
+"""Pages and programs that speak the rosbridge v2 protocol."""
