@@ -38,7 +38,7 @@ def test_keys_lead_from_the_page_to_every_command(studio: Studio) -> None:
     studio.screen.key("Return", ["Ctrl"])  # another key for it
     studio.says("Press the new shortcut for “Smaller text”")
     studio.screen.key("F7")
-    studio.says("“Smaller text” has F7 now.")
+    studio.says("The shortcut of “Smaller text” is now F7.")
     studio.screen.key("Escape")
     until(lambda: not studio.all("Reset all"), "the sheet closes")
 

@@ -95,7 +95,7 @@ def test_nothing_is_lost_on_a_full_disk_and_all_of_it_is_said(told: dict[str, ob
         f"DocumentError: can't write Mine.nepb ({full}); free some space or choose another folder"
     )
     assert str(told["setting"]).startswith("SettingsError: ")
-    assert str(told["earlier"]).startswith("DocumentError: Mine.nepb was not saved: what it said before")
+    assert str(told["earlier"]).startswith("DocumentError: Mine.nepb was not saved: its previous version")
     assert str(full) in str(told["snapshot"])
     assert told["dirty"] is True
     assert told["old"] is True, "the behaviour's file is what it was"
