@@ -526,7 +526,7 @@ class ConnectsOnce(Client):
 
 @breaks("other-socket-at-publisher")
 class LeavesConnectingToLibzmq(Client):
-    def mend(self, sub: Sub) -> None:
+    def mend(self, sub: Sub, failed: set[str]) -> None:
         pass
 
 

@@ -545,7 +545,7 @@ class Client(Connections, Services):
         poller.poll(2)
         while self.master.poll(0):
             self.follow(self.master.recv())
-        if self.master_handshakes.have_failed():
+        if self.master_handshakes.failed():
             self.mend_master()
         for server in self.servers:
             while server.poll(0):
@@ -561,8 +561,8 @@ class Client(Connections, Services):
                 self.read(sub, sub.socket.recv_multipart())
             except WireError as error:
                 self.refuse(sub, error)
-        if sub.handshakes.have_failed():
-            self.mend(sub)
+        if failed := sub.handshakes.failed():
+            self.mend(sub, failed)
         for each, source in list(sub.sources.items()):
             if source.ends_at is not None and now >= source.ends_at:
                 self.leave_source(sub, each)

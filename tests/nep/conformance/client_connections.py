@@ -63,9 +63,10 @@ class Connections:
     def mend_master(self) -> None:
         self.connect_again(self.master, self.master_endpoint)
 
-    def mend(self, sub: Sub) -> None:
+    def mend(self, sub: Sub, failed: set[str]) -> None:
+        # An event of an endpoint that was disconnected meanwhile must not end the connection to the new one.
         for source in sub.sources.values():
-            if source.endpoint and not source.has_echoed:
+            if source.endpoint in failed and not source.has_echoed:
                 self.connect_again(sub.socket, source.endpoint)
 
     def connect_again(self, socket: zmq.Socket[bytes], endpoint: str) -> None:

@@ -73,7 +73,7 @@ class Services:
             self.call_at(socket, found["publisher"]["endpoints"][0], call)
 
             def is_answered() -> bool:
-                if handshakes.have_failed():
+                if handshakes.failed():
                     self.mend_call(socket, found["publisher"]["endpoints"][0], call)
                 return bool(socket.poll(0))
 

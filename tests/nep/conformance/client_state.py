@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 import zmq
+from zmq.utils.monitor import recv_monitor_message
 
 from nep.protocol import wire
 
@@ -68,17 +69,17 @@ class Source:
 
 
 class Handshakes:
-    """Monitor of a socket: tells whether a connection has ended, which libzmq may not make again."""
+    """Monitor of a socket for ended connections, which libzmq may not make again."""
 
     def __init__(self, socket: zmq.Socket[bytes]) -> None:
         self._socket = socket
         self._monitor = socket.get_monitor_socket(zmq.EVENT_DISCONNECTED)
 
-    def have_failed(self) -> bool:
-        found = False
+    def failed(self) -> set[str]:
+        """Return the endpoints whose connection has ended since the last call."""
+        found = set()
         while self._monitor.poll(0):
-            self._monitor.recv_multipart()
-            found = True
+            found.add(recv_monitor_message(self._monitor)["endpoint"].decode())
         return found
 
     def close(self) -> None:
