@@ -61,7 +61,8 @@ def _bye_disconnects(bench: Bench) -> None:
     publisher, sub = bench.subscribed_publisher(bench.new_topic())
     publisher.send(b'{"a":1}')
     publisher.bye()
-    bench.need(lambda: not _is_connected(publisher), "disconnect")
+    # The master still lists the publisher, so a renewal may make the adapter connect again.
+    bench.need(lambda: any(not each.is_added for each in publisher.filters), "disconnect")
     bench.need(lambda: len(bench.events(sub)) == 1, "message")
 
 
