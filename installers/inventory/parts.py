@@ -143,7 +143,7 @@ def others(resources: Path) -> Iterator[Part]:
     )
     yield from editor_parts(resources / "blockly" / "LEGAL.txt")
     fonts = resources / "fonts"
-    for name in ("Inter", "JetBrainsMono"):
+    for name in ("Inter", "JetBrainsMono", "MPLUS1p"):
         text = fonts / f"LICENSE-{name}.txt"
         yield Part(name.lower(), "", "OFL-1.1", [(text.name, text)], "generic")
     icons = resources / "icons" / "LICENSE.txt"

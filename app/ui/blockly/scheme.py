@@ -66,15 +66,13 @@ def content(path: str, folder: Path | None = None) -> tuple[str, bytes] | None:
 
 
 def _font_faces(folder: Path) -> str:
-    # One `@font-face` for each bundled weight of Inter; empty without fonts.
-    faces = []
-    for file in sorted(folder.glob("Inter*.[ot]tf")):
-        weight = _WEIGHTS.get(file.stem.partition("-")[2])
-        span = str(weight) if weight else "100 900"
-        faces.append(
-            f'@font-face{{font-family:Inter;font-weight:{span};src:url("fonts/{file.name}");font-display:block}}'
-        )
-    return "\n".join(faces)
+    # One `@font-face` for each bundled weight of Inter and M PLUS 1p; empty without fonts.
+    return "\n".join(
+        f'@font-face{{font-family:"{family}";font-weight:{_WEIGHTS[file.stem.partition("-")[2]]};'
+        f'src:url("fonts/{file.name}");font-display:block}}'
+        for family, prefix in (("Inter", "Inter"), ("M PLUS 1p", "MPLUS1p"))
+        for file in sorted(folder.glob(f"{prefix}-*.[ot]tf"))
+    )
 
 
 def _qwebchannel() -> bytes:

@@ -1,4 +1,4 @@
-"""Bundled fonts: Inter for text, JetBrains Mono for topics, paths, values and programs."""
+"""Bundled fonts: Inter for text, M PLUS 1p for Japanese, JetBrains Mono for topics, paths, values and programs."""
 
 from __future__ import annotations
 
@@ -20,6 +20,8 @@ FILES = (
     "JetBrainsMono-Medium.ttf",
     "JetBrainsMono-SemiBold.ttf",
     "JetBrainsMono-Bold.ttf",
+    "MPLUS1p-Regular.ttf",
+    "MPLUS1p-Bold.ttf",
 )
 
 

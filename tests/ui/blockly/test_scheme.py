@@ -47,9 +47,10 @@ def test_nothing_else_can_be_read(path):
 def test_fonts_come_from_the_shipped_ones():
     kind, css = content("/fonts.css")
     assert kind == "text/css"
-    file = resources.path("fonts", "Inter-SemiBold.otf")
-    assert f'font-weight:600;src:url("fonts/{file.name}")'.encode() in css
-    assert content(f"/fonts/{file.name}") == ("font/otf", file.read_bytes())
+    for name, weight, kind in (("Inter-SemiBold.otf", 600, "otf"), ("MPLUS1p-Bold.ttf", 700, "ttf")):
+        file = resources.path("fonts", name)
+        assert f'font-weight:{weight};src:url("fonts/{name}")'.encode() in css
+        assert content(f"/fonts/{name}") == (f"font/{kind}", file.read_bytes())
 
 
 def test_no_font_is_no_failure(tmp_path):

@@ -47,7 +47,7 @@ def test_every_icon_of_the_design_is_shipped() -> None:
 
 def test_the_licences_are_beside_the_files() -> None:
     assert "ISC License" in resources.path("icons", "LICENSE.txt").read_text("utf-8")
-    for name in ("Inter", "JetBrainsMono"):
+    for name in ("Inter", "JetBrainsMono", "MPLUS1p"):
         text = resources.path("fonts", f"LICENSE-{name}.txt").read_text("utf-8")
         assert "SIL Open Font License, Version 1.1" in text
 

@@ -349,8 +349,9 @@ async function start(bridge: Bridge): Promise<void> {
   giveBlocklyOurWords(language);
   trimMenu();
   useOwnKeys();
-  // Blockly measures text once; the font has to be there before.
-  await Promise.allSettled([document.fonts.load('600 15px Inter'), document.fonts.load('500 14px Inter')]);
+  // Blockly measures text once, so the fonts must be loaded before.
+  const fonts = ['600 15px Inter', '500 14px Inter', ...(language === 'ja' ? ['600 15px "M PLUS 1p"'] : [])];
+  await Promise.allSettled(fonts.map((font) => document.fonts.load(font)));
   const editor = new Editor(bridge, beginning.pinned, beginning.theme);
   followModality();
   const inbox = new Inbox((name, payload) => {

@@ -73,7 +73,7 @@ export async function pictureOf(workspace: Blockly.WorkspaceSvg, white: boolean,
   const made = document.createElementNS(SVG, 'svg');
   for (const [name, value] of Object.entries({width, height, viewBox: `${left} ${top} ${width} ${height}`})) made.setAttribute(name, `${value}`);
   const looks = document.createElementNS(SVG, 'style');
-  const weights = new Set(drawn.flatMap((each) => [...each?.querySelectorAll('text') ?? []].map((text) => text.getAttribute('font-weight'))));
+  const fonts = new Set(drawn.flatMap((each) => [...each?.querySelectorAll('text') ?? []].flatMap(fontsOf)));
   const defs = document.createElementNS(SVG, 'defs');
   defs.append(...patterns.values());
   made.append(looks, defs);
@@ -83,7 +83,7 @@ export async function pictureOf(workspace: Blockly.WorkspaceSvg, white: boolean,
     made.append(ground);
   }
   made.append(...drawn.filter((each) => each !== null));
-  looks.textContent = (await Promise.all([...weights].map(fontFace))).join('\n');
+  looks.textContent = (await Promise.all([...fonts].map(fontFace))).join('\n');
   return {svg: new XMLSerializer().serializeToString(made), width, height};
 }
 
@@ -201,41 +201,52 @@ function wrapped(words: string, width: number, font: string): string[] {
   const lines: string[] = [];
   for (const paragraph of words.split('\n')) {
     let line = '';
-    for (const word of paragraph.split(' ')) {
-      const longer = line ? `${line} ${word}` : word;
-      if (line && pen.measureText(longer).width > width) {
-        lines.push(line);
+    for (const word of paragraph.match(WORDS) ?? []) {
+      if (line && pen.measureText((line + word).trimEnd()).width > width) {
+        lines.push(line.trimEnd());
         line = word;
-      } else line = longer;
+      } else line += word;
     }
-    lines.push(line);
+    lines.push(line.trimEnd());
   }
   return lines;
 }
 
-const FONTS: Readonly<Record<string, string>> = {'400': 'Regular', '500': 'Medium', '600': 'SemiBold', '700': 'Bold'};
+const WEIGHTS: Readonly<Record<string, string>> = {'400': 'Regular', '500': 'Medium', '600': 'SemiBold', '700': 'Bold'};
+const JAPANESE_WEIGHTS: Readonly<Record<string, string>> = {'400': 'Regular', '500': 'Regular', '600': 'Bold', '700': 'Bold'};
+const JAPANESE = /[\u3000-\u30ff\u3400-\u9fff\uff00-\uffef]/;
+/** A word with the spaces after it, or a single Japanese character: lines may break after each. */
+const WORDS = /[\u3000-\u30ff\u3400-\u9fff\uff00-\uffef] *|[^ \u3000-\u30ff\u3400-\u9fff\uff00-\uffef]+ *| +/g;
 
 const faces = new Map<string, Promise<string>>();
 
-/** The font itself, so that the picture looks the same where it is not installed; read once. */
-async function fontFace(weight: string | null): Promise<string> {
-  const file = FONTS[weight ?? ''];
-  if (!file) return '';
-  if (!faces.has(file)) {
-    const read = readFace(file, weight!);
-    read.catch(() => faces.delete(file));  // the next picture tries again
-    faces.set(file, read);
-  }
-  return faces.get(file)!;
+/** The bundled fonts of a text, as "file weight family". */
+function fontsOf(text: SVGTextElement): string[] {
+  const weight = text.getAttribute('font-weight') ?? '';
+  if (!(weight in WEIGHTS)) return [];
+  const found = [`Inter-${WEIGHTS[weight]}.otf ${weight} Inter`];
+  if (JAPANESE.test(text.textContent ?? '')) found.push(`MPLUS1p-${JAPANESE_WEIGHTS[weight]}.ttf ${weight} "M PLUS 1p"`);
+  return found;
 }
 
-async function readFace(file: string, weight: string): Promise<string> {
-  const answer = await fetch(`fonts/Inter-${file}.otf`);
+/** Returns the rule that embeds a font, so that the picture looks the same where the font isn't installed; cached. */
+async function fontFace(font: string): Promise<string> {
+  if (!faces.has(font)) {
+    const [file, weight, ...family] = font.split(' ');
+    const read = readFace(file!, weight!, family.join(' '));
+    read.catch(() => faces.delete(font));  // the next picture tries again
+    faces.set(font, read);
+  }
+  return faces.get(font)!;
+}
+
+async function readFace(file: string, weight: string, family: string): Promise<string> {
+  const answer = await fetch(`fonts/${file}`);
   const data = await new Promise<string>((done, failed) => {
     const reader = new FileReader();
     reader.onload = () => done(String(reader.result));
     reader.onerror = () => failed(reader.error ?? new Error('a font cannot be read'));
     void answer.blob().then((blob) => reader.readAsDataURL(blob), failed);
   });
-  return `@font-face { font-family: Inter; font-weight: ${weight}; src: url(${data}); }`;
+  return `@font-face { font-family: ${family}; font-weight: ${weight}; src: url(${data}); }`;
 }

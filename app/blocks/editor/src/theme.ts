@@ -2,7 +2,7 @@
 import * as Blockly from 'blockly/core';
 import {SAME_STYLE, categories, colour, roles} from './tokens';
 
-const FONT = 'Inter, "Noto Sans", "Noto Sans CJK JP", sans-serif';
+const FONT = 'Inter, "Noto Sans", "M PLUS 1p", "Noto Sans CJK JP", sans-serif';
 let made = 0;
 
 export function makeTheme(): Blockly.Theme {
@@ -52,5 +52,6 @@ export function setCssVariables(dark: boolean): void {
   const style = document.documentElement.style;
   for (const [role, value] of roles()) style.setProperty(`--nep-${role}`, value);
   for (const [name, {primary}] of categories()) style.setProperty(`--nep-block-${name}`, primary);
+  style.setProperty('--nep-families', FONT);
   style.setProperty('color-scheme', dark ? 'dark' : 'light');
 }

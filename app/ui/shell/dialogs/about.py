@@ -19,7 +19,7 @@ TITLE = "NEP Studio"
 LINES = (
     lazy("See what robots say, and tell them what to do."),
     lazy("NEP Studio is free software (MIT licence)."),
-    lazy("Inter and JetBrains Mono: SIL Open Font License 1.1. Icons: Lucide, ISC licence."),
+    lazy("Inter, JetBrains Mono and M PLUS 1p: SIL Open Font License 1.1. Icons: Lucide, ISC licence."),
 )
 WIDE = 460
 
