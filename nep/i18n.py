@@ -72,7 +72,7 @@ LEAST_SHARE = 0.9
 """Minimum translated share of a language that users can select."""
 LOCALE = Path(__file__).with_name("locale")
 
-_BLOCK_PLACEHOLDER = re.compile(r"%[A-Za-z_]\w*")
+_BLOCK_PLACEHOLDER = re.compile(r"%[A-Za-z_][A-Za-z0-9_]*")
 _PRINTF_PLACEHOLDER = re.compile(r"%(?:\(\w+\)[sdr]|\d)")
 _LIST_PATTERNS = {
     "and": {"2": "{0} and {1}", "start": "{0}, {1}", "middle": "{0}, {1}", "end": "{0} and {1}"},
@@ -303,7 +303,7 @@ def day_text(day: int, month: int, year: int | None = None) -> str:
         if year is None
         else words.fact("day_of_year", "{day} {month} {year}")
     )
-    return pattern.format(day=day, month=words.months()[month - 1], year=year)
+    return pattern.format(day=day, month=words.months()[month - 1], month_number=month, year=year)
 
 
 def holes(text: str) -> frozenset[str]:

@@ -205,7 +205,7 @@ def update(folder: Path = LOCALE) -> None:
 
 def add(language: str, folder: Path = LOCALE) -> None:
     """Add a language with all texts untranslated."""
-    about = f"# NEP Studio in '{language}'; docs/translate.md tells the way."
+    about = f"# NEP Studio in '{language}'; see docs/translate.md."
     catalog = Catalog(
         locale=language, header_comment=about, project="NEP Studio", creation_date=_MADE, fuzzy=False
     )
@@ -263,7 +263,8 @@ def facts(language: str, catalog: Catalog) -> dict[str, object]:
     locale = Locale.parse(FORMATS.get(language, language))
     entries = [each for each in catalog if each.id]
     signs = locale.number_symbols["latn"]
-    day, with_year = (locale.datetime_skeletons[name].pattern for name in ("MMMMd", "yMMMMd"))
+    day = locale.datetime_skeletons["MMMMd"].pattern
+    with_year = locale.date_formats["long"].pattern
     return {
         "name": (locale.get_language_name() or language).capitalize(),
         "share": round(sum(is_done(each.string) for each in entries) / max(1, len(entries)), 3),
@@ -282,14 +283,15 @@ def _pattern(locale: Locale, kind: str) -> dict[str, str]:
 
 
 def _date(pattern: str) -> str:
-    # `d 'de' MMMM` becomes "{day} de {month}".
-    return re.sub(r"'([^']*)'|(y+)|(M+)|(d+)", _date_part, pattern)
+    # `d 'de' MMMM` becomes "{day} de {month}", `M月d日` becomes "{month_number}月{day}日".
+    return re.sub(r"'([^']*)'|(y+)|(MMM+)|(M+)|(d+)", _date_part, pattern)
 
 
 def _date_part(found: re.Match[str]) -> str:
     if found[1] is not None:
         return str(found[1])
-    return "{year}" if found[2] else "{month}" if found[3] else "{day}"
+    names = ("{year}", "{month}", "{month_number}", "{day}")
+    return next(name for name, part in zip(names, found.groups()[1:], strict=True) if part)
 
 
 def is_done(string: str | Sequence[str] | None) -> bool:

@@ -16,8 +16,10 @@ from app.blocks.model.fields import (
     VariableField,
 )
 from app.blocks.model.workspace import Placed
+from nep.i18n import _
 
 _PLACE = re.compile(r"%([A-Z][A-Z0-9_]*)")
+_JAPANESE = re.compile(r"[\u3040-\u30ff\u4e00-\u9fff]")
 _MAX_LENGTH = 80
 
 
@@ -43,7 +45,8 @@ def reading(
             return variables.get(id, id or argument.value)
         if isinstance(argument, Field) and not argument.silent:
             words = _field(argument, placed)
-            return f"“{words}”" if is_text and isinstance(argument, TextField) else words
+            is_quoted = is_text and isinstance(argument, TextField)
+            return _("“{name}”").format(name=words) if is_quoted else words
         if isinstance(argument, ValueInput):
             if not argument.is_there(placed.fields):
                 return ""
@@ -57,20 +60,27 @@ def reading(
 
 
 def label(placed: Placed, block: Block) -> str:
-    """Return the words that name a block: "wait until", "is below", "turn"; those before its first gap."""
+    """Return the words that name a block: "wait until", "is below", "turn"; those before its first slot.
+
+    In Japanese, where the verb comes last, slots are shown as "…".
+    """
     if block.robot is not None and block.robot.kind == "action":
         return block.robot.title
     pieces = _PLACE.split(block.text)  # words, argument, words, argument, …, words
-    found = ""
+    found, is_verb_last = "", bool(_JAPANESE.search(block.text))
     for number, piece in enumerate(pieces):
         argument = block.argument(piece) if number % 2 else None
         if isinstance(argument, (ValueInput, StatementInput)):
-            if found.strip():
+            if is_verb_last:
+                found += "…"
+            elif found.strip():
                 break
         elif isinstance(argument, ChoiceField) and argument.name != "ROBOT":
             found += _field(argument, placed)
         elif argument is None:
             found += piece
+    if is_verb_last:
+        return "".join(found.split()) or label_of_type(block.type)
     return " ".join(found.split()) or label_of_type(block.type)
 
 

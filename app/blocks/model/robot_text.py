@@ -18,7 +18,7 @@ from app.robots.description.description import Parameter
 from app.robots.description.inputs import pretty_number, pretty_unit, to_words
 from nep.i18n import _, pgettext
 
-_PLACE = re.compile(r"%([A-Za-z_]\w*)")
+_PLACE = re.compile(r"%([A-Za-z_][A-Za-z0-9_]*)")
 _RESERVED = ("ROBOT", "LIVE", "FIELD", "SENSOR", "SIDE", "LIMIT", "X_NAME", "X_INPUT", "X_FIELD", "ICON")
 _NUMBERS = ("number", "integer", "angle")
 

@@ -34,7 +34,7 @@ def explain(error: Exception, label: str, block: str | None) -> BehaviourError:
     if isinstance(error, BehaviourError):
         error.block = error.block or block
         return error
-    name = f"“{label}”" if label else _("this block")
+    name = _("“{name}”").format(name=label) if label else _("this block")
     if isinstance(error, AppError):
         return BehaviourError(f"{name}: {error.sentence}.", block)
     if isinstance(error, ZeroDivisionError):

@@ -36,7 +36,7 @@ HOLD_S = 3.0
 MOST_KEPT = 64
 """Number of remembered commands: a robot answers a replaced one soon after."""
 REPLACES = "replace"
-_PLACE = re.compile(r"%([A-Za-z_]\w*)")
+_PLACE = re.compile(r"%([A-Za-z_][A-Za-z0-9_]*)")
 
 Decorator = Callable[[Callable[..., None]], Callable[..., None]]
 
@@ -369,7 +369,9 @@ class RobotHandle:
 
 def _waiting_text(robot: Robot, call: RobotCall) -> str:
     found = [(robot.action(name), name) for name in dict.fromkeys(call.waits_for)]
-    titles = [f"“{action.title if action is not None else name}”" for action, name in found]
+    titles = [
+        _("“{name}”").format(name=action.title if action is not None else name) for action, name in found
+    ]
     return _("{robot} is waiting for {actions}").format(robot=robot.name, actions=listed(titles))
 
 

@@ -12,7 +12,7 @@ from app.robots.description.description import Robot
 from nep.i18n import ENGLISH, language, translate
 from nep.system.plugins import discover
 
-_HOLE = re.compile(r"%[A-Za-z_]\w*")
+_HOLE = re.compile(r"%[A-Za-z_][A-Za-z0-9_]*")
 
 
 class Catalogue:
