@@ -80,7 +80,7 @@ def did_you_mean(word: str, known: Sequence[str]) -> str:
     near = nearest(word, known)
     if near is not None:
         return _("did you mean '{near}'?").format(near=near)
-    return _("known are {names}").format(names=", ".join(f"'{name}'" for name in known))
+    return _("known names: {names}").format(names=", ".join(f"'{name}'" for name in known))
 
 
 def nearest(word: str, known: Sequence[str]) -> str | None:
@@ -111,7 +111,9 @@ class WaitTimeoutError(NepError):
     def __init__(self, what: str, timeout_s: float) -> None:
         self.what: str = what
         self.timeout_s = timeout_s
-        super().__init__(_("{what} did not come within {seconds:g} s").format(what=what, seconds=timeout_s))
+        super().__init__(
+            _("timed out after {seconds:g} s while waiting for {what}").format(what=what, seconds=timeout_s)
+        )
 
 
 class ServiceTimeoutError(WaitTimeoutError):
@@ -125,7 +127,7 @@ class ServiceTimeoutError(WaitTimeoutError):
 
     def __init__(self, service: str, timeout_s: float) -> None:
         self.service = service
-        super().__init__(_("an answer of '{service}'").format(service=service), timeout_s)
+        super().__init__(_("a reply from '{service}'").format(service=service), timeout_s)
 
 
 class NoServerError(WaitTimeoutError):
@@ -149,7 +151,8 @@ class NoServerError(WaitTimeoutError):
             step = _("start it, or check the address '{address}'").format(address=address)
         elif service in self.known:
             step = _(
-                "its server can't be reached; programs of the original NEP serve their own computer only"
+                "its server can't be reached; programs of the original NEP accept calls from their own "
+                "computer only"
             )
         elif near is not None:
             step = _("did you mean '{near}'?").format(near=near)
@@ -199,7 +202,7 @@ class NoValueError(NepError, KeyError):
         step = (
             _("did you mean '{near}'?").format(near=near)
             if near is not None
-            else _("'keys' tells what there is")
+            else _("'keys' lists the existing keys")
         )
         super().__init__(
             _("the blackboard has no '{key}'; {step}").format(key=escaped(shortened(key, 200)), step=step)
@@ -221,7 +224,7 @@ class BadKeyError(NepError, ValueError):
         self.key = key
         self.reason = reason
         super().__init__(
-            _("'{key}' cannot be a key; {reason}").format(key=escaped(shortened(key, 200)), reason=reason)
+            _("'{key}' is not a valid key; {reason}").format(key=escaped(shortened(key, 200)), reason=reason)
         )
 
 
@@ -276,8 +279,8 @@ class ServerGoneError(NepError):
         self.service = service
         super().__init__(
             _(
-                "the server of '{service}' ended while it was called; look whether the call was carried out, "
-                "and call again"
+                "the server of '{service}' stopped during the call; check whether the call was executed "
+                "before you call again"
             ).format(service=service)
         )
 
@@ -296,12 +299,13 @@ class ClosedError(NepError):
         if is_forked:
             super().__init__(
                 _(
-                    "{what} stayed with the program when it was forked, and is closed here; make a new "
-                    "node in the child"
+                    "{what} belongs to the parent process and can't be used after a fork; create a new "
+                    "node in "
+                    "the child process"
                 ).format(what=what)
             )
         else:
-            super().__init__(_("{what} is closed; make a new one").format(what=what))
+            super().__init__(_("{what} is closed; create a new one").format(what=what))
 
 
 class BadTopicError(NepError, ValueError):
@@ -316,7 +320,7 @@ class BadTopicError(NepError, ValueError):
         self.topic = topic
         self.reason = reason
         super().__init__(
-            _("'{topic}' cannot be a topic; {reason}").format(
+            _("'{topic}' is not a valid topic name; {reason}").format(
                 topic=escaped(shortened(topic, 200)), reason=reason
             )
         )
@@ -334,7 +338,7 @@ class BadNameError(NepError, ValueError):
         self.name = name
         self.reason = reason
         super().__init__(
-            _("'{name}' cannot be a node's name; {reason}").format(
+            _("'{name}' is not a valid node name; {reason}").format(
                 name=escaped(shortened(name, 200)), reason=reason
             )
         )
@@ -352,7 +356,7 @@ class UnknownBackendError(NepError):
         self.name = name
         self.known = tuple(known)
         super().__init__(
-            _("no back end '{name}'; {did_you_mean}").format(
+            _("unknown back end '{name}'; {did_you_mean}").format(
                 name=quotable(name), did_you_mean=did_you_mean(name.lower(), self.known)
             )
         )
@@ -385,8 +389,8 @@ class PluginsMissingError(NepError):
         self.attribute = attribute
         super().__init__(
             _(
-                "no module of '{package}' binds '{attribute}'; name the package to the tool that "
-                "froze this program"
+                "no module of '{package}' defines '{attribute}'; include the package when you freeze "
+                "this program"
             ).format(package=package, attribute=attribute)
         )
 
@@ -406,14 +410,13 @@ class MasterUnreachable(NepError):  # noqa: N818 - the name is part of the wire 
         self.is_known = is_known
         if not is_known:
             super().__init__(
-                _(
-                    "no computer is called '{address}' here; look for a typing error, or write its "
-                    "address in numbers"
-                ).format(address=address.rpartition(":")[0]),
+                _("unknown computer '{address}'; check the spelling, or use its IP address").format(
+                    address=address.rpartition(":")[0]
+                ),
             )
             return
         super().__init__(
-            _("no master answers at '{address}' (waited {seconds:g} s); start one with 'nep master'").format(
+            _("no master replied at '{address}' (waited {seconds:g} s); start one with 'nep master'").format(
                 address=address, seconds=waited_s
             ),
         )
@@ -442,20 +445,20 @@ class AddressInUseError(NepError):
         self.address = address
         if not is_own:
             super().__init__(
-                _("'{address}' is no address of this computer; use one of its own, or '127.0.0.1'").format(
-                    address=address
-                )
+                _(
+                    "'{address}' is not an address of this computer; use one of its addresses, or '127.0.0.1'"
+                ).format(address=address)
             )
             return
         if address.endswith(":*"):
             super().__init__(
-                _("no port of '{address}' is free; end programs that have many connections").format(
+                _("no port of '{address}' is free; close programs that have many connections").format(
                     address=address[:-2]
                 )
             )
             return
         super().__init__(
-            _("'{address}' is in use by another program; close it or choose another port").format(
+            _("'{address}' is in use by another program; close that program or choose another port").format(
                 address=address
             )
         )
@@ -477,10 +480,12 @@ class TooManyFilesError(NepError):
         if opened is not None and limit is not None:
             has = _("this program has {opened} of {limit} files open").format(opened=opened, limit=limit)
         else:
-            has = _("this program has as many files open as it may")
-        step = _("close what it no longer needs, or start it after 'ulimit -n {files}'")
+            has = _("this program has reached its limit of open files")
+        step = _(
+            "close unused nodes and files, or raise the limit with 'ulimit -n {files}' before you start it"
+        )
         step = step.format(files=max(8192, 2 * (limit or 0)))
-        super().__init__(_("no room for {what}: {has}; {step}").format(what=what, has=has, step=step))
+        super().__init__(_("can't create {what}: {has}; {step}").format(what=what, has=has, step=step))
 
 
 class EncodeError(NepError, ValueError):
@@ -564,7 +569,7 @@ class RecordingsUnavailableError(NepError):
 
     def __init__(self, needs: str) -> None:
         self.needs = needs
-        super().__init__(_("recordings need what is not installed; {needs}").format(needs=needs))
+        super().__init__(_("recordings need packages that are not installed; {needs}").format(needs=needs))
 
 
 class WrongTypeError(TypeError, ValueError):

@@ -112,7 +112,7 @@ def _iter_pieces(value: object, max_length: int, depth: int) -> Iterator[str]:
     elif isinstance(value, str | bytes | bytearray):
         yield repr(value[: max_length + 1])
     elif type(value) is int and value.bit_length() > _MAX_INT_BITS:
-        yield _("a number of {count} digits").format(count=int(value.bit_length() * 0.30103) + 1)
+        yield _("an integer with {count} digits").format(count=int(value.bit_length() * 0.30103) + 1)
     else:
         yield _safe_str(value)
 

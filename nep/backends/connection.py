@@ -53,7 +53,7 @@ Configuration = Hybrid | Direct
 def for_messages(configuration: Configuration) -> Configuration:
     """Return `configuration` if it can carry messages. Raises `NepError`."""
     if isinstance(configuration, Direct) and configuration.wire == "tcp":
-        raise NepError(_("plain TCP carries calls of services only; leave out wire='tcp' for a topic"))
+        raise NepError(_("plain TCP supports only service calls; omit wire='tcp' for a topic"))
     return configuration
 
 
@@ -63,7 +63,7 @@ def checked_mode(mode: str) -> Mode:
         return _MODES[mode]
     except KeyError:
         raise NepError(
-            _("no mode '{mode}'; {did_you_mean}").format(
+            _("unknown mode '{mode}'; {did_you_mean}").format(
                 mode=quotable(str(mode)), did_you_mean=did_you_mean(mode, tuple(_MODES))
             )
         ) from None
@@ -73,5 +73,5 @@ def checked_port(port: str | int) -> int:
     """Parse a port number from 1 to 65535. Raises `NepError`."""
     text = str(port)
     if not text.isascii() or not text.isdigit() or len(text) > 5 or not 1 <= int(text) <= 65535:
-        raise NepError(_("'{port}' is no port; use a number from 1 to 65535").format(port=quotable(text)))
+        raise NepError(_("'{port}' is not a port; use a number from 1 to 65535").format(port=quotable(text)))
     return int(text)

@@ -379,7 +379,7 @@ def check_calls(service: str, count: int, used: int, size: int) -> None:
         raise NepError(_("the call cannot be sent: {reason}").format(reason=too_large(size)))
     if count >= CALLS_MAX or (used and used + size > CALLS_MAX_BYTES):
         raise NepError(
-            _("{count} calls of '{service}' are under way; wait for their answers first").format(
+            _("{count} calls of '{service}' are in flight; wait for their replies first").format(
                 count=count, service=service
             )
         )
@@ -394,12 +394,12 @@ def fitting(reply: Reply) -> Reply:
 
 def refusal(service: str, *, is_closed: bool) -> Reply:
     """Return the reply that rejects a call."""
-    reason = _("'{service}' closes") if is_closed else _("'{service}' has too many calls that wait")
+    reason = _("'{service}' is closing") if is_closed else _("'{service}' has too many pending calls")
     return failure(CallKind.REFUSED, "", reason.format(service=service))
 
 
 def too_large(size: int) -> str:
     """Return the error text for a payload of `size` bytes."""
-    return _("it has {size} bytes, {most} are allowed; send large data as messages").format(
+    return _("it has {size} bytes, but calls allow at most {most}; publish large data on a topic").format(
         size=size, most=PAYLOAD_MAX_BYTES
     )

@@ -43,18 +43,18 @@ class TcpTransport(ZeromqTransport):
 
     def graph(self, configuration: Configuration, timeout_s: float) -> GraphView:  # noqa: ARG002
         """Raise `NepError`: plain TCP has no master."""
-        raise NepError(_("plain TCP has no master, so nobody knows who is there"))
+        raise NepError(_("plain TCP has no master, so there is no list of nodes"))
 
 
 def _over_tcp(configuration: Configuration) -> Direct:
     if not isinstance(configuration, Direct):
-        reason = _("plain TCP has no master; name the address of both sides with 'node.direct(ip, port)'")
+        reason = _("plain TCP has no master; give both sides the address with 'node.direct(ip, port)'")
         raise NepError(reason)
     return replace(configuration, wire="tcp")
 
 
 def _no_topics(name: str) -> NepError:
-    reason = _("plain TCP has servers and clients only; make a node with 'zeromq' for '{name}'")
+    reason = _("plain TCP supports only servers and clients; use a node with 'zeromq' for '{name}'")
     return NepError(reason.format(name=name))
 
 

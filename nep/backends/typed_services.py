@@ -78,7 +78,7 @@ class TypedService:
         kind, number, data = answer["kind"], answer["codec"], answer["data"]
         found = next((each for each in _KINDS if each == kind), None)
         if found is None or not isinstance(number, int) or not isinstance(data, bytes):
-            raise WireError(_("it is no answer of a service"), len(body))
+            raise WireError(_("it is not a reply of a service"), len(body))
         return Reply(found, data, number)
 
     # ---- for servers
@@ -94,7 +94,7 @@ class TypedService:
             return AskedCall(codec.encode(request).data, codec.number, None)
         number, limit_ms, data = request["codec"], request["timeout_ms"], request["data"]
         if not isinstance(number, int) or not isinstance(limit_ms, int) or not isinstance(data, bytes):
-            raise WireError(_("it is no call of a service"), len(body))
+            raise WireError(_("it is not a service call"), len(body))
         return AskedCall(data, number, limit_ms / 1000 if limit_ms else None)
 
     def body_of_reply(self, reply: Reply) -> bytes:
@@ -107,5 +107,5 @@ class TypedService:
             return self.answer.encode({"kind": kind, "codec": reply.codec, "data": data})
         codec = codec_numbered(reply.codec)
         if codec is None or reply.kind != CallKind.ANSWER:
-            raise DecodeError(self.name, len(reply.data), _("it is no answer of a service"))
+            raise DecodeError(self.name, len(reply.data), _("it is not a reply of a service"))
         return self.answer.encode(codec.decode(reply.data, {}))

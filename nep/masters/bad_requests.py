@@ -27,7 +27,8 @@ _ALERT_INTERVAL_S = 1.0
 _MAX_REASON_LENGTH = 200
 """Maximum length of a reason, which may quote untrusted input."""
 _HINT = lazy(
-    "It may be of another version of nep, or no nep program; see what connects to the master's port."
+    "It may use another version of nep, or not be a nep program. Check which program connects "
+    "to the master's port."
 )
 
 
@@ -80,8 +81,8 @@ class BadRequests:
         ]
         if len(shown) > _MAX_ALERTS:
             sentence = ngettext(
-                "{count} more program sends what the master does not understand",
-                "{count} more programs send what the master does not understand",
+                "{count} more program sends requests that the master can't read",
+                "{count} more programs send requests that the master can't read",
                 len(shown) - _MAX_ALERTS,
             ).format(count=len(shown) - _MAX_ALERTS)
             alerts.append(Alert("request:", sentence, _(_HINT)))
@@ -97,14 +98,14 @@ def describe_sender(node_id: str, node_name: str, peer: str) -> tuple[str, str]:
     if node_id:
         return node_id, f"“{node_name}”"
     if not peer:
-        return peer, _("A program on a computer that is not known")
+        return peer, _("A program on an unknown computer")
     return peer, _("A program on {host}").format(host=peer)
 
 
 def _sentence(sender: _Sender) -> str:
     words = ngettext(
-        "{program} sends what the master does not understand (once): {reason}",
-        "{program} sends what the master does not understand ({count} times so far): {reason}",
+        "{program} sent a request that the master can't read: {reason}",
+        "{program} sent {count} requests that the master can't read: {reason}",
         sender.count,
     )
     return words.format(program=sender.name, count=sender.count, reason=sender.reason)

@@ -154,7 +154,7 @@ class Graph:
                 self._authorize(request, sender, out)
             if isinstance(request, AddPublisher | AddSubscriber) and now < self._learning_until:
                 if len(self._waiting) >= _MAX_WAITING:
-                    reason = _("too many programs register while the master is starting; ask again")
+                    reason = _("too many programs are registering while the master starts; try again")
                     raise WireError(reason, code="busy")
                 self._waiting.append((request, call, sender, is_foreign))
                 return tuple(out)
@@ -238,26 +238,26 @@ class Graph:
         node_id = node_of(request)
         member = None if node_id is None else self._registry.members.get(node_id)
         if member is not None and member.route != sender and not isinstance(request, Renew):
-            raise WireError(_("a node speaks for itself only"), code="speaker")
+            raise WireError(_("a node can only send requests for itself"), code="speaker")
 
     def _authorize_node(self, node: NodeRecord, sender: str, out: list[Outgoing]) -> None:
         if node.key and not is_proven(node):
-            reason = _("the node's id '{id}' does not come from its key").format(id=node.id)
+            reason = _("the node id '{id}' does not match the node's key").format(id=node.id)
             raise WireError(reason, code="node-key")
         if not node.key and sender != node.id:
             raise WireError(
-                _("a node needs a key that proves its id, or its id as its routing id; update nep"),
+                _("a node needs a key that proves its id, or its id as routing id; update nep"),
                 code="node-unproven",
             )
         other = self._registry.speaking.get(sender)
         if other is not None and other.node.id != node.id:
-            reason = _("this connection speaks for the node '{id}' already").format(id=other.node.id)
+            reason = _("this connection already belongs to the node '{id}'").format(id=other.node.id)
             raise WireError(reason, code="connection")
         known = self._registry.members.get(node.id)
         if known is None or known.route == sender:
             return
         if not node.key:
-            reason = _("the node '{id}' is another program's").format(id=node.id)
+            reason = _("the id '{id}' belongs to a node of another program").format(id=node.id)
             raise WireError(reason, code="node-taken")
         if not is_proven(known.node):
             self._unregister_node(known, out, is_closed=False)
@@ -267,7 +267,7 @@ class Graph:
     ) -> None:
         if record.number and not is_proven(node, record):
             raise WireError(
-                _("the id {id} does not come from the node's key and the number {number}").format(
+                _("the id {id} does not match the node's key and the number {number}").format(
                     id=record.id, number=record.number
                 ),
                 code="record-key",
@@ -280,7 +280,7 @@ class Graph:
         theirs = (owner.publishers if is_publisher else owner.subscribers)[record.id].record
         if not is_proven(node, record) or is_proven(owner.node, theirs):
             raise WireError(
-                _("the id {id} is that of another program's publisher or subscriber").format(id=record.id),
+                _("the id {id} belongs to a publisher or subscriber of another program").format(id=record.id),
                 code="record-taken",
             )
         if is_publisher:
@@ -295,7 +295,7 @@ class Graph:
         needed = count if isinstance(request, Join) else held + 1
         if needed > max(held, RECORDS_MAX):
             raise WireError(
-                _("a node has {RECORDS_MAX} publishers and subscribers at most").format(
+                _("a node can have at most {RECORDS_MAX} publishers and subscribers").format(
                     RECORDS_MAX=RECORDS_MAX
                 ),
                 code="limit",
@@ -304,7 +304,7 @@ class Graph:
         total = len(registry.publisher_owners) + len(registry.subscriber_owners)
         if needed > max(held, GUARANTEED_RECORDS) and total + needed - held > ALL_RECORDS_MAX:
             raise WireError(
-                _("the graph has {ALL_RECORDS_MAX} publishers and subscribers, which is the most").format(
+                _("the graph already has {ALL_RECORDS_MAX} publishers and subscribers, the maximum").format(
                     ALL_RECORDS_MAX=ALL_RECORDS_MAX
                 ),
                 code="limit",
@@ -323,8 +323,9 @@ class Graph:
         if len(needed) > max(len(held), PATTERNS_MAX) or total > limit:
             raise WireError(
                 _(
-                    "a node has {PATTERNS_MAX} subscribers with wildcards at most, and all nodes together "
-                    "{ALL_PATTERNS_MAX}"
+                    "a node can have at most {PATTERNS_MAX} subscribers with wildcards, and all nodes "
+                    "together "
+                    "at most {ALL_PATTERNS_MAX}"
                 ).format(PATTERNS_MAX=PATTERNS_MAX, ALL_PATTERNS_MAX=ALL_PATTERNS_MAX),
                 code="limit",
             )

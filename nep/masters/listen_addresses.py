@@ -31,12 +31,16 @@ def check_hosts(hosts: Iterable[str], addresses: Iterable[OwnAddress]) -> tuple[
             address = ipaddress.IPv4Address(host)
         except ValueError:
             raise NepError(
-                _("'{host}' is no IPv4 address; write it as '192.168.1.20'").format(host=host)
+                _("'{host}' is not an IPv4 address; write it as '192.168.1.20'").format(host=host)
             ) from None
         if host != ANY and host not in known and not address.is_loopback:
-            others = ", ".join(sorted(known)) or _("none that others can reach; join a network first")
+            others = ", ".join(sorted(known)) or _(
+                "none that other computers can reach; connect to a network first"
+            )
             raise NepError(
-                _("'{host}' is no address of this computer; it has {others}").format(host=host, others=others)
+                _("'{host}' is not an address of this computer; its addresses: {others}").format(
+                    host=host, others=others
+                )
             )
     return checked
 
@@ -119,9 +123,11 @@ class ListenAddresses:
         return Alert(
             f"listen:{host}",
             _(
-                "This computer has the address {host} no more, so other computers do not reach its programs"
+                "This computer no longer has the address {host}, so other computers can't reach its programs"
             ).format(host=host),
-            _("Let them connect at {now} instead.").format(now=now) if now else _("Join the network again."),
+            _("Use the address {now} on the other computers.").format(now=now)
+            if now
+            else _("Reconnect to the network."),
         )
 
     def _bind(self, host: str) -> None:

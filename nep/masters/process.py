@@ -79,7 +79,9 @@ def view(address: str | None = None, timeout_s: float = 2.0) -> GraphView:
     chosen = master_address(address)
     reply = _request(Look(), chosen, timeout_s)
     if not isinstance(reply, Seen):
-        raise RequestRefusedError(_("the master at '{chosen}' shows no graph").format(chosen=chosen))
+        raise RequestRefusedError(
+            _("the master at '{chosen}' did not reply with its graph").format(chosen=chosen)
+        )
     return reply.view
 
 
@@ -149,7 +151,7 @@ def _read(body: bytes) -> Reply | None:
         answer = decode_answer(body)[1]
     except WireError as error:
         raise RequestRefusedError(
-            _("the master's answer cannot be read: {reason}").format(reason=error.reason)
+            _("the master's reply can't be read: {reason}").format(reason=error.reason)
         ) from error
     if isinstance(answer, Refused):
         raise RequestRefusedError(answer.reason)

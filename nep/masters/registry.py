@@ -497,7 +497,10 @@ def check_request(request: Request) -> None:
         return
     _check_node(request.node)
     if isinstance(request, Join) and request.managed:
-        raise WireError(_("only what is attached to the master manages nodes"), code="managed")
+        raise WireError(
+            _("only programs attached to the master, such as its gateway, can manage other nodes"),
+            code="managed",
+        )
     for record in records_of(request):
         _check_registration(record)
 
@@ -522,7 +525,9 @@ def check_record(record: PublisherRecord | SubscriberRecord) -> None:
 def _check_node(node: NodeRecord) -> None:
     if not _NODE_ID.fullmatch(node.id):
         raise WireError(
-            _("'{id}' is no id of a node; it has 16 hexadecimal digits").format(id=shortened(node.id, 40)),
+            _("'{id}' is not a node id; node ids have 16 hexadecimal digits").format(
+                id=shortened(node.id, 40)
+            ),
             code="node-id",
         )
     try:
@@ -535,9 +540,9 @@ def _check_node(node: NodeRecord) -> None:
     _check_word("key", node.key, 200)
     _check_word("computer", node.computer, 64)
     if node.pid is not None and not 0 <= node.pid <= _PID_MAX:
-        raise WireError(_("{pid} is no number of a process").format(pid=node.pid), code="pid")
+        raise WireError(_("{pid} is not a process id").format(pid=node.pid), code="pid")
     if not 0 <= node.since_ns <= COUNT_MAX:
-        reason = _("{since_ns} is no time at which a node began").format(since_ns=node.since_ns)
+        reason = _("{since_ns} is not a valid start time of a node").format(since_ns=node.since_ns)
         raise WireError(reason, code="since")
 
 
@@ -545,7 +550,9 @@ def _check_registration(record: PublisherRecord | SubscriberRecord) -> None:
     check_record(record)
     if not 1 <= record.id <= COUNT_MAX:
         raise WireError(
-            _("{id} is no id of a publisher or subscriber; it is from 1 to 2^63-1").format(id=record.id),
+            _("{id} is not the id of a publisher or subscriber; it must be from 1 to 2^63-1").format(
+                id=record.id
+            ),
             code="record-id",
         )
     _check_word("type", record.msg_type, 200)
@@ -553,7 +560,7 @@ def _check_registration(record: PublisherRecord | SubscriberRecord) -> None:
         _check_word("codec", record.codec, 50)
         if len(record.endpoints) > _ENDPOINTS_MAX:
             raise WireError(
-                _("a publisher has {count} endpoints; {most} are allowed").format(
+                _("a publisher has {count} endpoints; at most {most} are allowed").format(
                     count=len(record.endpoints), most=_ENDPOINTS_MAX
                 ),
                 code="endpoint-count",
@@ -562,9 +569,9 @@ def _check_registration(record: PublisherRecord | SubscriberRecord) -> None:
             if not is_tcp_endpoint(endpoint) and not is_nanomsg_endpoint(endpoint):
                 shown_endpoint = escaped(shortened(endpoint, 80))
                 raise WireError(
-                    _("'{said}' is no endpoint of a publisher; it is written 'tcp://HOST:PORT'").format(
-                        said=shown_endpoint
-                    ),
+                    _(
+                        "'{said}' is not an endpoint of a publisher; it must be written as 'tcp://HOST:PORT'"
+                    ).format(said=shown_endpoint),
                     code="endpoint",
                 )
 
@@ -573,12 +580,12 @@ def _check_word(what: str, word: str, most: int) -> None:
     control = control_in(word)
     if len(word) > most or control:
         hint = (
-            _("the character '{control}' is not allowed in it").format(control=control)
+            _("the character '{control}' is not allowed").format(control=control)
             if control
-            else _("use {most} letters at most").format(most=most)
+            else _("use at most {most} characters").format(most=most)
         )
         raise WireError(
-            _("'{word}' cannot be its {what}; {hint}").format(
+            _("'{word}' is not a valid {what}; {hint}").format(
                 word=escaped(shortened(word, 40)), what=what, hint=hint
             ),
             code="text",

@@ -295,7 +295,7 @@ class MasterServer:
     def _serve(self, sender: bytes, body: list[bytes], peer: str) -> None:
         asked = decode_request(body[-1] if len(body) == 1 else b"")
         if isinstance(asked.request, Listen) and self._listening.hosts and peer != "127.0.0.1":
-            reason = _("who may connect is decided on the master's own computer")
+            reason = _("this setting can be changed only on the master's own computer")
             asked = ReceivedRequest(asked.call, WireError(reason, code="listen"))
         name = _name_of(sender)
         reason = self._apply(asked, name)
@@ -385,7 +385,7 @@ class MasterServer:
 
     def _refusal(self, error: WireError | None = None) -> Refused:
         error = error or WireError(
-            _("the master could not carry this out; its log says why"), code="internal"
+            _("the master failed to execute the request; see its log"), code="internal"
         )
         return Refused(self._graph.epoch, self._graph.revision, error.reason, error.code)
 

@@ -229,7 +229,10 @@ def _service_alerts(services: Mapping[str, ServiceInfo], registry: Registry) -> 
                     count=len(servers),
                     nodes=_names(registry.members[each.node_id].node.name for each in servers),
                 ),
-                _("Clients call the first one, and another when that ends. Give one of them another name."),
+                _(
+                    "Clients call the first server and use another one only when it stops. Rename one of the "
+                    "services."
+                ),
             )
 
 
@@ -246,7 +249,11 @@ def _original_client_alerts(services: Mapping[str, ServiceInfo], registry: Regis
                     service=name,
                     servers=_names(registry.members[each.node_id].node.name for each in servers),
                 ),
-                _("Let both use a fixed address: nep.client(ip, port) there, node.direct(ip, port) here."),
+                _(
+                    "Use a fixed address in both programs: nep.client(ip, port) in the client, "
+                    "node.direct(ip, "
+                    "port) in the server."
+                ),
             )
 
 
@@ -263,8 +270,8 @@ def _name_alerts(registry: Registry) -> Iterator[Alert]:
         if count > 1:
             yield Alert(
                 f"name:{name}",
-                _("{count} programs call themselves “{name}”").format(count=count, name=name),
-                _("Give each program a name of its own; all of them go on working."),
+                _("{count} programs are named “{name}”").format(count=count, name=name),
+                _("Give each program a different name. All of them keep working."),
             )
 
 
@@ -273,10 +280,10 @@ def _missing_alerts(registry: Registry) -> Iterator[Alert]:
         if member.hung:
             yield Alert(
                 f"missing:{member.node.id}",
-                _("“{node}” does not answer {others}").format(
+                _("“{node}” does not respond to {others}").format(
                     node=member.node.name, others=_names(_names_of(registry, member.hung))
                 ),
-                _("It may be busy or stopped in a debugger. What is published meanwhile may not reach it."),
+                _("It may be busy or stopped in a debugger. Messages published in the meantime may be lost."),
             )
 
 
@@ -296,29 +303,29 @@ def _topic_alerts(
         ]
         yield Alert(
             f"type:{topic}",
-            _("The topic “{topic}” has {count} types: it is published by {nodes}").format(
+            _("The topic “{topic}” has {count} types. Publishers: {nodes}").format(
                 topic=topic, count=len(types), nodes=listed(parts)
             ),
-            _("Use the same type in all programs, or give one of the topics another name."),
+            _("Use the same type in all programs, or rename one of the topics."),
         )
     for member, publisher in publishing:
         if publisher.problem:
             yield Alert(
                 f"encode:{topic}",
-                _("“{node}” cannot send on “{topic}”: {problem}").format(
+                _("“{node}” can't send on “{topic}”: {problem}").format(
                     node=member.node.name, topic=topic, problem=publisher.problem
                 ),
-                _("Look at the program: nobody gets these messages."),
+                _("Fix the program: its messages are not being sent."),
             )
             break
     for member, subscriber in subscribing:
         if subscriber.problem:
             yield Alert(
                 f"message:{topic}",
-                _("“{node}” cannot read “{topic}”: {problem}").format(
+                _("“{node}” can't read “{topic}”: {problem}").format(
                     node=member.node.name, topic=topic, problem=subscriber.problem
                 ),
-                _("Look at the program that publishes it."),
+                _("Check the program that publishes this topic."),
             )
             return
 

@@ -95,7 +95,7 @@ def _plain_value(value: object) -> object:
     to_list = getattr(value, "tolist", None)
     if callable(to_list):
         return to_list()
-    raise TypeError(_("'{kind}' has no form in it").format(kind=type(value).__name__))
+    raise TypeError(_("'{kind}' can't be encoded as JSON").format(kind=type(value).__name__))
 
 
 def numpy_option() -> int:
@@ -118,7 +118,7 @@ def _encode_json(payload: object) -> Encoded:
     except (TypeError, RecursionError) as error:
         # orjson's own limit is 254 levels
         is_deep = isinstance(error, RecursionError) or "Recursion limit" in str(error)
-        reason = too_deep() if is_deep else str(error.__cause__ or error) or _("it does not fit")
+        reason = too_deep() if is_deep else str(error.__cause__ or error) or _("it can't be encoded")
         raise EncodeError("json", type(payload).__name__, reason) from error
     if json_is_too_deep(data):
         raise EncodeError("json", type(payload).__name__, too_deep())
@@ -165,7 +165,7 @@ def _encode_string(payload: object) -> Encoded:
     try:
         return Encoded(text.encode("utf-8"))
     except UnicodeEncodeError as error:
-        raise EncodeError("string", "str", _("it holds half of a surrogate pair")) from error
+        raise EncodeError("string", "str", _("it contains an unpaired surrogate")) from error
 
 
 def _decode_string(data: bytes | memoryview, _extension: Mapping[str, object]) -> object:
@@ -173,7 +173,7 @@ def _decode_string(data: bytes | memoryview, _extension: Mapping[str, object]) -
         return str(data, "utf-8")
     except UnicodeDecodeError as error:
         raise DecodeError(
-            "string", len(data), _("byte {start} is no UTF-8").format(start=error.start)
+            "string", len(data), _("byte {start} is not valid UTF-8").format(start=error.start)
         ) from error
 
 
@@ -284,7 +284,7 @@ def codec(name: str) -> Codec:
         return CODECS[name]
     except KeyError:
         raise DecodeError(
-            name, 0, _("no such codec; {did_you_mean}").format(did_you_mean=did_you_mean(name, tuple(CODECS)))
+            name, 0, _("unknown codec; {did_you_mean}").format(did_you_mean=did_you_mean(name, tuple(CODECS)))
         ) from None
 
 

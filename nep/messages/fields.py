@@ -30,9 +30,10 @@ def parse_path(text: str) -> Path:
         found = _STEP.match(text, at)
         if found is None or (text[at] != "." and text[at] != "[" and at > 0):
             raise NepError(
-                _("'{text}' is no field; write it like 'pose.x', 'joints[3]' or '.' for everything").format(
-                    text=quotable(text)
-                )
+                _(
+                    "'{text}' is not a field path; write it like 'pose.x', 'joints[3]' or '.' for the "
+                    "whole value"
+                ).format(text=quotable(text))
             )
         index, quoted, plain = found.groups()
         if index is not None:
@@ -41,7 +42,7 @@ def parse_path(text: str) -> Path:
             steps.append(plain if quoted is None else re.sub(r"\\(.)", r"\1", quoted))
         at = found.end()
     if not steps:
-        raise NepError(_("a field needs a name, like 'pose.x'"))
+        raise NepError(_("a field path needs a name, such as 'pose.x'"))
     return tuple(steps)
 
 

@@ -46,7 +46,7 @@ __all__ = [
 JPEG_QUALITY = 90
 MAX_WIDTH = 65_535
 """Maximum width in pixels."""
-_NEEDS = lazy("install the picture codec with: pip install 'nep-studio[image]'")
+_NEEDS = lazy("install the image codec with: pip install 'nep-studio[image]'")
 _FAST_PNG_OPTIONS = [16, 1]  # IMWRITE_PNG_COMPRESSION: the fastest that compresses
 _NAMED_LAYOUTS = {
     "mono8": ("u1", 1), "bgr8": ("u1", 3), "bgra8": ("u1", 4), "rgb8": ("u1", 3), "rgba8": ("u1", 4),
@@ -168,14 +168,16 @@ def _has_png(frame: NDArray[Any]) -> bool:
 
 def _as_jpeg(frame: NDArray[Any], quality: int) -> Encoded:
     if frame.dtype.name != "uint8" or _channels(frame) not in (1, 3):
-        reason = _("a JPEG has 'uint8' and one or three channels; choose 'png', 'raw' or 'auto'")
+        reason = _("a JPEG image needs 'uint8' and one or three channels; choose 'png', 'raw' or 'auto'")
         raise EncodeError("image", type(frame).__name__, reason)
     return _as_file(frame, "jpeg", [1, quality])  # 1 = IMWRITE_JPEG_QUALITY
 
 
 def _as_png(frame: NDArray[Any]) -> Encoded:
     if not _has_png(frame):
-        reason = _("a PNG has 'uint8' or 'uint16' and one, three or four channels; choose 'raw' or 'auto'")
+        reason = _(
+            "a PNG image needs 'uint8' or 'uint16' and one, three or four channels; choose 'raw' or 'auto'"
+        )
         raise EncodeError("image", type(frame).__name__, reason)
     return _as_file(frame, "png", _FAST_PNG_OPTIONS)
 
@@ -205,7 +207,9 @@ def _as_file(frame: NDArray[Any], kind: str, options: list[int]) -> Encoded:
     except opencv.error:  # such as a JPEG with more than 65535 rows
         is_made, buffer = False, None
     if not is_made:
-        reason = _("OpenCV cannot make a {kind} of it; publish 'nep.raw_image(…)' of it").format(kind=kind)
+        reason = _("OpenCV can't encode this image as {kind}; publish 'nep.raw_image(…)' instead").format(
+            kind=kind
+        )
         raise EncodeError("image", type(frame).__name__, reason)
     return Encoded(buffer.tobytes(), {"shape": _shape(frame), "encoding": kind})
 
@@ -249,13 +253,11 @@ def _validated(payload: object) -> NDArray[Any]:
         raise EncodeError(
             "image",
             kind,
-            _("its numbers are '{dtype}'; use {types}").format(dtype=payload.dtype, types=_(_TYPE_NAMES)),
+            _("its elements are '{dtype}'; use {types}").format(dtype=payload.dtype, types=_(_TYPE_NAMES)),
         )
     is_picture = payload.ndim == 2 or (payload.ndim == 3 and 1 <= payload.shape[2] <= 4)
     if not is_picture or 0 in payload.shape:
-        reason = _("its shape {shape} is none of a picture; use (height, width, 3)").format(
-            shape=payload.shape
-        )
+        reason = _("{shape} is not the shape of an image; use (height, width, 3)").format(shape=payload.shape)
         raise EncodeError("image", kind, reason)
     frame: NDArray[Any] = payload
     try:
@@ -310,9 +312,9 @@ def read_file(file: ImageFile, reduced: int = 1) -> NDArray[Any]:
     try:
         picture = opencv.imdecode(np.frombuffer(file.data, np.uint8), flag)
     except (opencv.error, MemoryError) as error:
-        raise DecodeError("image", len(file.data), _("they are a picture larger than can be read")) from error
+        raise DecodeError("image", len(file.data), _("the image is too large to decode")) from error
     if picture is None:
-        raise DecodeError("image", len(file.data), _("they are no picture that OpenCV reads"))
+        raise DecodeError("image", len(file.data), _("OpenCV can't decode the image"))
     return _apply_orientation(picture, file.orientation)
 
 
@@ -346,13 +348,13 @@ def raw_array(data: memoryview, layout: RawLayout, shape: object) -> NDArray[Any
     sides = shape[:2] if isinstance(shape, list | tuple) else ()
     if len(sides) < 2 or not all(type(side) is int for side in sides):
         raise DecodeError(
-            "image", data.nbytes, _("'{shape}' is no shape of a picture").format(shape=str(shape)[:60])
+            "image", data.nbytes, _("'{shape}' is not the shape of an image").format(shape=str(shape)[:60])
         )
     height, width = sides
     pixel_bytes = layout.channels * numbers.itemsize
     if min(height, width) < 1 or height * width * pixel_bytes != data.nbytes:
         reason = _(
-            "a picture of {width} x {height} pixels with {pixel_bytes} bytes each has another size"
+            "the data size does not match an image of {width} x {height} pixels with {pixel_bytes} bytes each"
         ).format(width=width, height=height, pixel_bytes=pixel_bytes)
         raise DecodeError("image", data.nbytes, reason)
     check_size(width, height, pixel_bytes, data.nbytes)

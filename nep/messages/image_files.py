@@ -90,13 +90,13 @@ def examine(data: bytes | memoryview) -> ImageFile:
         return _Jpeg(file).read()
     size = len(file)
     if not size:
-        raise DecodeError("image", 0, _("there is nothing in it"))
+        raise DecodeError("image", 0, _("the image is empty"))
     for start, name in _UNSUPPORTED_FORMATS.items():
         if head.startswith(start):
             raise DecodeError(
-                "image", size, _("it is {name}, and only JPEG and PNG are read").format(name=name)
+                "image", size, _("it is a {name} file, but only JPEG and PNG are supported").format(name=name)
             )
-    raise DecodeError("image", size, _("they are no picture: neither JPEG nor PNG"))
+    raise DecodeError("image", size, _("it is neither a JPEG nor a PNG image"))
 
 
 def check_size(width: int, height: int, pixel_bytes: float, size_bytes: int) -> None:
@@ -112,16 +112,16 @@ def check_size(width: int, height: int, pixel_bytes: float, size_bytes: int) -> 
         raise DecodeError(
             "image",
             size_bytes,
-            _("a picture of {width} × {height} pixels is none").format(width=width, height=height),  # noqa: RUF001
+            _("an image can't have {width} × {height} pixels").format(width=width, height=height),  # noqa: RUF001
         )
     if width * height > MOST_PIXELS:
-        reason = _("{width} × {height} pixels are too many, {most} million are read").format(  # noqa: RUF001
+        reason = _("{width} × {height} pixels are too many; the limit is {most} million").format(  # noqa: RUF001
             width=width, height=height, most=MOST_PIXELS // 10**6
         )
         raise DecodeError("image", size_bytes, reason)
     needed = width * height * pixel_bytes
     if needed > MOST_BYTES:
-        reason = _("{width} × {height} pixels take {needed} MB, {most} are given").format(  # noqa: RUF001
+        reason = _("{width} × {height} pixels need {needed} MB; the limit is {most} MB").format(  # noqa: RUF001
             width=width, height=height, needed=number(needed / 1000000.0, ".0f"), most=MOST_BYTES // 10**6
         )
         raise DecodeError("image", size_bytes, reason)
@@ -140,9 +140,7 @@ class _Reader:
         return int.from_bytes(self.data[at : at + count], "big")
 
     def broken(self, reason: str) -> DecodeError:
-        reason = _("they are no picture that can be read, but a broken {upper}: {reason}").format(
-            upper=self.kind.upper(), reason=reason
-        )
+        reason = _("the {upper} image is damaged: {reason}").format(upper=self.kind.upper(), reason=reason)
         return DecodeError("image", self.size, reason)
 
 
@@ -163,47 +161,51 @@ class _Jpeg(_Reader):
                 continue
             length = self.number(at, 2)
             if length < 2 or at + length > self.size:
-                raise self.broken(_("it ends too early"))
+                raise self.broken(_("it is truncated"))
             if marker in _FRAME_MARKERS:
                 if frame is not None:
-                    raise self.broken(_("it has two heads"))
+                    raise self.broken(_("it has two header chunks"))
                 frame = self._frame(marker, at, length)
             elif marker == _SCAN:
                 if frame is None:
-                    raise self.broken(_("its pixels come before their size"))
+                    raise self.broken(_("its pixels come before the frame header"))
                 return self._checked(frame, orientation, at)
             elif marker == _APP1:
                 orientation = _orientation(self.data[at + 2 : at + length]) or orientation
             elif marker not in _TABLE_MARKERS:
-                raise self.broken(_("what 'ff{marker}' is nobody knows").format(marker=number(marker, "02x")))
+                raise self.broken(
+                    _("it has the unknown marker 'ff{marker}'").format(marker=number(marker, "02x"))
+                )
             at += length
         raise self.broken(_("it has too many segments"))
 
     def _marker(self, at: int) -> tuple[int, int]:
         if self.number(at, 1) != 0xFF:
-            reason = _("it ends too early") if at >= self.size else _("its segments do not follow each other")
+            reason = (
+                _("it is truncated") if at >= self.size else _("a segment is not where the previous one ends")
+            )
             raise self.broken(reason)
         found = _FILL_BYTES.match(self.data, at)
         at = found.end() if found is not None else at
         if at >= self.size:
-            raise self.broken(_("it ends too early"))
+            raise self.broken(_("it is truncated"))
         return self.data[at], at + 1
 
     def _frame(self, marker: int, at: int, length: int) -> _Frame:
         bits, height, width = self.number(at + 2, 1), self.number(at + 3, 2), self.number(at + 5, 2)
         components = self.number(at + 7, 1)
         if length != 8 + 3 * components or components not in (1, 3, 4):
-            raise self.broken(_("it has {components} colours").format(components=components))
+            raise self.broken(_("it has {components} colour components").format(components=components))
         if bits != 8:
             raise DecodeError(
                 "image",
                 self.size,
-                _("a JPEG of {bits} bits for a colour is not read, a PNG is").format(bits=bits),
+                _("a JPEG image with {bits} bits per colour is not supported; use PNG").format(bits=bits),
             )
         sampling = [self.number(at + 9 + 3 * each, 1) for each in range(components)]
         factors = [(each >> 4, each & 15) for each in sampling]
         if not all(1 <= across <= 4 and 1 <= down <= 4 for across, down in factors):
-            raise self.broken(_("its colours have no size"))
+            raise self.broken(_("its colour components have invalid sampling factors"))
         return _Frame(width, height, components, _FRAME_MARKERS[marker], factors)
 
     def _checked(self, frame: _Frame, orientation: int, at: int) -> ImageFile:
@@ -217,7 +219,7 @@ class _Jpeg(_Reader):
             # a scan of a few bytes makes the decoder process all pixels again
             scans = bytes(self.data[at:]).count(b"\xff\xda") + 1
             if scans > MAX_SCANS or scans * frame.width * frame.height > MAX_SCANNED_PIXELS:
-                reason = _("{width} × {height} pixels in {scans} passes take too long").format(  # noqa: RUF001
+                reason = _("{width} × {height} pixels in {scans} passes take too long to decode").format(  # noqa: RUF001
                     width=frame.width, height=frame.height, scans=scans
                 )
                 raise DecodeError("image", self.size, reason)
@@ -253,12 +255,12 @@ class _Png(_Reader):
 
     def read(self) -> ImageFile:
         if self.size < 33 or self.data[8:16] != b"\0\0\0\x0dIHDR":
-            raise self.broken(_("it does not begin with its size"))
+            raise self.broken(_("the header chunk is missing"))
         width, height = self.number(16, 4), self.number(20, 4)
         depth, colour = self.data[24], self.data[25]
         if depth not in _DEPTHS.get(colour, ()):
             raise self.broken(
-                _("colour type {colour} has no depth of {depth} bits").format(colour=colour, depth=depth)
+                _("colour type {colour} does not allow {depth} bits").format(colour=colour, depth=depth)
             )
         needed, kinds, orientation = self._chunks()
         channels = 4 if b"tRNS" in kinds and colour in (2, 3) else _CHANNELS[colour]
@@ -281,10 +283,10 @@ class _Png(_Reader):
         for _piece in range(MAX_SEGMENTS):
             kind, end = bytes(self.data[at + 4 : at + 8]), at + 12 + self.number(at, 4)
             if kind == b"IHDR" and kind in kinds:
-                raise self.broken(_("it has two heads"))
+                raise self.broken(_("it has two header chunks"))
             if kind in _REQUIRED_CHUNKS:
                 if end > self.size:  # OpenCV allocates the declared size, up to 4 GB, before it checks
-                    raise self.broken(_("it ends too early"))
+                    raise self.broken(_("it is truncated"))
                 kinds.add(kind)
                 if needed and needed[-1][1] == at:
                     needed[-1] = needed[-1][0], end

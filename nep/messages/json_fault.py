@@ -85,7 +85,7 @@ def _stricter_fault(text: str) -> JsonFault | None:
             return JsonFault(1, 1, _("too many nested levels"))
         if "infinity" in error.msg:
             return JsonFault(1, 1, _("a number is too large"))
-        return _at(text, error.pos, _("half of a surrogate pair is not a character"))
+        return _at(text, error.pos, _("an unpaired surrogate is not a character"))
     return None
 
 
@@ -121,15 +121,15 @@ def _at(
 def _explain(text: str, error: json.JSONDecodeError) -> JsonFault:
     position, message = error.pos, error.msg
     if not text.strip():
-        example = _("there is no text; write JSON, such as {example}").format(example='{"x": 1}')
+        example = _("the text is empty; write JSON, such as {example}").format(example='{"x": 1}')
         return _at(text, 0, example)
     if message.startswith(("Unterminated", "Invalid control")):
         return _open_string(text, position)
     if message.startswith("Invalid \\"):
         fix = JsonFix(position, position, "\\") if text[position : position + 1] == "\\" else None
-        return _at(text, position, _("a text contains a single \\; write \\\\"), fix)
+        return _at(text, position, _("a text contains a single \\; use \\\\"), fix)
     if message.startswith("Extra data"):
-        return _at(text, position, _("something follows after the end of the first value"))
+        return _at(text, position, _("there is extra text after the first value"))
     if message.startswith("Illegal trailing comma"):
         return _trailing_comma(text, text.rfind(",", 0, position + 1))
     return _unexpected(text, position, message)
@@ -152,7 +152,7 @@ def _unexpected(text: str, position: int, message: str) -> JsonFault:
 
 
 def _trailing_comma(text: str, position: int) -> JsonFault:
-    return _at(text, position, _("there is a comma too many"), JsonFix(position, position + 1, ""))
+    return _at(text, position, _("there is an extra comma"), JsonFix(position, position + 1, ""))
 
 
 def _missing_comma(text: str, position: int, end: int) -> JsonFault:
@@ -160,7 +160,7 @@ def _missing_comma(text: str, position: int, end: int) -> JsonFault:
     if sign in {"}", "]"}:
         return _at(text, position, _("{sign} does not match the opening bracket").format(sign=sign))
     if position == end and (sign.isalnum() or sign in "._"):
-        return _at(text, position, _("JSON has no such number"))
+        return _at(text, position, _("JSON does not support this number"))
     return _at(text, end, _("a comma is missing between two values"), JsonFix(end, end, ","))
 
 
@@ -187,7 +187,7 @@ def _missing_value(text: str, position: int, *, is_name: bool) -> JsonFault:
         inside = text[position + 1 : end] if end > position else ""
         is_plain = bool(inside) and not any(sign in inside for sign in '"\\\n')
         fix = JsonFix(position, end + 1, f'"{inside}"') if is_plain else None
-        return _at(text, position, _("JSON takes double quotes, not single ones"), fix)
+        return _at(text, position, _("JSON needs double quotes, not single quotes"), fix)
     if word is None:
         reason = _("a name in double quotes is expected") if is_name else _("a value is expected")
         return _at(text, position, reason)
@@ -195,11 +195,11 @@ def _missing_value(text: str, position: int, *, is_name: bool) -> JsonFault:
     if known is not None and not is_name:
         fix = JsonFix(position, word.end(), known)
         return _at(
-            text, position, _("JSON writes {right}, not {word}").format(word=word[0], right=known), fix
+            text, position, _("use {right} instead of {word} in JSON").format(word=word[0], right=known), fix
         )
     shown = shortened(word[0], _MAX_WORD_LENGTH)
     fix = JsonFix(position, word.end(), f'"{word[0]}"')
-    return _at(text, position, _("{word} needs double quotes around it").format(word=shown), fix)
+    return _at(text, position, _("{word} needs double quotes").format(word=shown), fix)
 
 
 def _open_string(text: str, position: int) -> JsonFault:
@@ -207,7 +207,7 @@ def _open_string(text: str, position: int) -> JsonFault:
     sign = text[position : position + 1]
     if sign == "\t":
         fix = JsonFix(position, position + 1, "\\t")
-        return _at(text, position, _("a text contains a tab; write \\t"), fix)
+        return _at(text, position, _("a text contains a tab character; use \\t"), fix)
     if sign and sign not in {'"', "\n", "\r"}:
         return _at(text, position, _("a text contains an invisible character; delete it"))
     start = text.rfind("\n", 0, position) + 1

@@ -26,14 +26,14 @@ def pack(value: object, default: Callable[[object], object] | None = None) -> by
     try:
         packed: bytes = msgpack.packb(value, use_bin_type=True, default=default, datetime=True)
     except (TypeError, ValueError, OverflowError, RecursionError) as error:
-        raise ValueError(str(error) or _("it does not fit")) from error
+        raise ValueError(str(error) or _("it can't be encoded")) from error
     return packed
 
 
 def clamp_int(value: object) -> int:
     """Return the nearest int that msgpack can encode. Raises `TypeError` for other types."""
     if not isinstance(value, int):
-        raise TypeError(_("a '{kind}' has no form in msgpack").format(kind=type(value).__name__))
+        raise TypeError(_("a '{kind}' can't be encoded as msgpack").format(kind=type(value).__name__))
     return max(_MIN_INT, min(_MAX_INT, value))
 
 
@@ -57,7 +57,7 @@ def unpack(data: bytes | memoryview) -> object:
     except (TypeError, OverflowError):  # rare: a list as key, or a timestamp beyond datetime's range
         return _unpack_rare(data)
     except (ValueError, msgpack.UnpackException, RecursionError) as error:
-        raise ValueError(str(error) or _("the bytes end too early")) from error
+        raise ValueError(str(error) or _("the data is truncated")) from error
     return value
 
 
@@ -70,9 +70,9 @@ def _unpack_rare(data: bytes | memoryview) -> object:
         except OverflowError:
             continue
         except (ValueError, TypeError, msgpack.UnpackException, RecursionError) as error:
-            raise ValueError(str(error) or _("the bytes end too early")) from error
+            raise ValueError(str(error) or _("the data is truncated")) from error
         return value
-    raise ValueError(_("a timestamp in it is no time"))
+    raise ValueError(_("a timestamp is invalid"))
 
 
 def _map(pairs: list[tuple[object, object]]) -> dict[object, object]:
@@ -108,7 +108,7 @@ def unpack_bounded(data: bytes, most_lists: int, longest: int) -> object:
             max_map_len=longest,
         )
     except (ValueError, TypeError, msgpack.UnpackException, RecursionError) as error:
-        raise ValueError(str(error) or _("the bytes end too early")) from error
+        raise ValueError(str(error) or _("the data is truncated")) from error
     return value
 
 
@@ -119,5 +119,5 @@ def unpack_first(data: bytes) -> object:
     try:
         value: object = unpacker.unpack()
     except (ValueError, TypeError, msgpack.UnpackException, RecursionError) as error:
-        raise ValueError(str(error) or _("the bytes end too early")) from error
+        raise ValueError(str(error) or _("the data is truncated")) from error
     return value

@@ -155,7 +155,7 @@ def _int() -> ValueShape:
         if not isinstance(plain, int) or isinstance(plain, bool):
             raise wrong_type(value, shape.expected)
         if not _MIN_INT <= plain <= _MAX_INT:
-            raise ShapeMismatch(_("is beyond 64 bits; give {wanted}").format(wanted=shape.expected))
+            raise ShapeMismatch(_("does not fit into 64 bits; give {wanted}").format(wanted=shape.expected))
         return int(plain)
 
     shape.read, shape.write = read, write
@@ -185,7 +185,7 @@ def _check_letters(value: str) -> None:
     try:
         value.encode("utf-8")
     except UnicodeEncodeError:
-        raise ShapeMismatch(_("holds half of a surrogate pair; give whole letters")) from None
+        raise ShapeMismatch(_("contains an unpaired surrogate; give valid Unicode text")) from None
 
 
 def _bool() -> ValueShape:
@@ -232,7 +232,7 @@ def _datetime_shape(kind: type[datetime | date | time]) -> ValueShape:
         if is_one(value):  # msgpack has times
             return value
         if not isinstance(value, str):
-            raise wrong_type(value, _("text such as {example}").format(example=_EXAMPLES[kind]))
+            raise wrong_type(value, _("a string such as {example}").format(example=_EXAMPLES[kind]))
         whole = f"{value[:-1]}+00:00" if value.endswith("Z") else value  # Python 3.10 does not parse "Z"
         try:
             return kind.fromisoformat(whole)

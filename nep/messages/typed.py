@@ -85,9 +85,10 @@ def message_type(declared: type) -> MessageType:
     name = text("MSG_TYPE", getattr(declared, "MSG_TYPE", declared.__name__))
     if codec_for(name) is not JSON:
         raise ValueError(
-            _("the messages of '{type}' are called '{name}', which are no maps; set MSG_TYPE in it").format(
-                type=declared.__name__, name=name
-            )
+            _(
+                "the message type of '{type}' is '{name}', a built-in type without fields; set MSG_TYPE to "
+                "another name"
+            ).format(type=declared.__name__, name=name)
         )
     return MessageType(name, _whole_shape(declared), dict if is_map else declared)
 
@@ -107,7 +108,7 @@ def _whole_shape(declared: type) -> ValueShape:
         return _shape(declared, declared.__name__, {})
     except RecursionError:
         raise ValueError(
-            _("the types in '{name}' have too many levels; put a dataclass between them").format(
+            _("the types in '{name}' are nested too deeply; use a dataclass for the inner levels").format(
                 name=declared.__name__
             )
         ) from None
@@ -135,7 +136,7 @@ def typed_codec(declared: MessageType, base: Codec) -> Codec:
         except ShapeMismatch as mismatch:
             place, reason = mismatch.place, mismatch.sentence
         except RecursionError:
-            place, reason = "", _("it holds itself, or too many levels")
+            place, reason = "", _("it contains itself, or has too many levels")
         raise EncodeError(declared.name, type(payload).__name__, reason, place)
 
     return replace(base, encode=encode, check=check)
@@ -267,7 +268,7 @@ def _require_distinct(shape: ValueShape | None, hint: object, where: str) -> Val
     if shape is None:
         raise ValueError(
             _(
-                "{where} is a '{type}', of which two are the same in JSON; use one of them, or two fields"
+                "{where} is a '{type}', two types that look the same in JSON; use one of them, or two fields"
             ).format(where=where, type=_name_of(hint))
         )
     return shape
@@ -276,7 +277,7 @@ def _require_distinct(shape: ValueShape | None, hint: object, where: str) -> Val
 def _no_form(hint: object, where: str) -> ValueError:
     return ValueError(
         _(
-            "{where} is a '{type}', which typed messages cannot carry; docs/types.md lists what they can"
+            "{where} is a '{type}', which typed messages don't support; see docs/types.md for supported types"
         ).format(where=where, type=_name_of(hint))
     )
 
@@ -291,9 +292,9 @@ def _hints(declared: type) -> dict[str, Any]:
         return typing.get_type_hints(declared, include_extras=True)
     except (NameError, TypeError, AttributeError, SyntaxError) as error:
         raise ValueError(
-            _("the types in '{name}' cannot be read: {error}; define them outside of functions").format(
-                name=declared.__name__, error=error
-            )
+            _(
+                "the type hints of '{name}' can't be resolved: {error}; define the types outside of functions"
+            ).format(name=declared.__name__, error=error)
         ) from error
 
 
@@ -368,9 +369,10 @@ def _check_constructor(declared: type, names: Collection[str]) -> None:
         is_open = each.kind in {each.VAR_POSITIONAL, each.VAR_KEYWORD} or each.default is not each.empty
         if not is_open and (each.name not in names or each.kind is each.POSITIONAL_ONLY):
             raise ValueError(
-                _("{where} is needed to make one, and is no field that is sent; give it a default").format(
-                    where=f"{declared.__name__}.{each.name}"
-                )
+                _(
+                    "{where} is required by the constructor but is not a field that is sent; give it a "
+                    "default"
+                ).format(where=f"{declared.__name__}.{each.name}")
             )
 
 
@@ -379,7 +381,7 @@ def _construct(declared: type, arguments: Mapping[str, object]) -> object:
         return declared(**arguments)
     except Exception as error:
         raise ShapeMismatch(  # `__post_init__` may raise anything
-            _("is refused by '{name}': {error}").format(
+            _("was rejected by '{name}': {error}").format(
                 name=declared.__name__, error=escaped(shortened(str(error), 2 * _MAX_NAME_LENGTH))
             )
         ) from error
@@ -405,7 +407,7 @@ def _fill_map(shape: ValueShape, declared: type, known: dict[object, ValueShape]
             for name, part in value.items():
                 if name not in shapes:
                     raise ShapeMismatch(
-                        _("is no field of '{name}'; {did_you_mean}").format(
+                        _("is not a field of '{name}'; {did_you_mean}").format(
                             name=declared.__name__, did_you_mean=did_you_mean(str(name), tuple(shapes))
                         )
                     )

@@ -23,7 +23,7 @@ def is_pattern_for(backend: Backend, topic: str, configuration: Configuration | 
         return False
     if not backend.has_patterns:
         raise ValueError(
-            _("the back end '{name}' takes no wildcards; subscribe to each topic by its name").format(
+            _("the back end '{name}' does not support wildcards; subscribe to each topic by its name").format(
                 name=backend.name
             )
         )
@@ -39,7 +39,7 @@ def codec_with(codec: Codec, image: ImageFormat | None) -> Codec:
             _("image is a '{kind}'; give a 'nep.ImageFormat'").format(kind=type(image).__name__)
         )
     if codec is not CODECS["image"]:
-        raise ValueError(_("image is for pictures; publish them as 'image'"))
+        raise ValueError(_("image applies only to images; publish them as 'image'"))
     return replace(codec, encode=image.encode)
 
 
@@ -50,9 +50,7 @@ def history_for(backend: Backend, history: int, configuration: Configuration) ->
     if history and (is_original or not backend.has_history):
         where = _("the original wire") if is_original else _("the back end '{name}'")
         raise ValueError(
-            _("{where} keeps no history for subscribers that come late; leave out history").format(
-                where=where.format(name=backend.name)
-            )
+            _("{where} does not support history; omit history").format(where=where.format(name=backend.name))
         )
     return history
 
@@ -61,6 +59,6 @@ def quality_for(backend: Backend, qos: str) -> str:
     """Validate a quality of service and return it. Raises `ValueError`."""
     if qos and not backend.qos:
         raise ValueError(
-            _("the back end '{name}' has no qualities of service; leave out qos").format(name=backend.name)
+            _("the back end '{name}' does not support quality of service; omit qos").format(name=backend.name)
         )
     return one_of("qos", qos, ("", *backend.qos))

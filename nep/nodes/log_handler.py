@@ -368,8 +368,8 @@ class LogHandler(logging.Handler):
         count, self._dropped = self._dropped, 0
         self._reported_at = self._clock()
         text = ngettext(
-            "{count} log record was left out: more than {rate_hz} a second",
-            "{count} log records were left out: more than {rate_hz} a second",
+            "{count} log record was dropped: the limit is {rate_hz} per second",
+            "{count} log records were dropped: the limit is {rate_hz} per second",
             count,
         ).format(count=count, rate_hz=number(self._rate_hz))
         return LogRecord("warning", text, "nep.log", self._node, time.time_ns(), pid=os.getpid()).to_plain()

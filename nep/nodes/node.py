@@ -434,7 +434,7 @@ class Node(ServiceNode):
         if not isinstance(configuration, Hybrid | Direct):
             kind = type(configuration).__name__
             raise WrongTypeError(
-                _("configuration is a '{kind}'; make one with 'node.hybrid' or 'node.direct'").format(
+                _("configuration is a '{kind}'; create one with 'node.hybrid' or 'node.direct'").format(
                     kind=kind
                 )
             )
@@ -611,7 +611,9 @@ class Node(ServiceNode):
 def _check_user_topic(topic: str) -> str:
     # Service names start with a reserved prefix.
     if check_topic(topic).startswith(PREFIX):
-        raise BadTopicError(topic, _("names that begin with '{prefix}' are services'").format(prefix=PREFIX))
+        raise BadTopicError(
+            topic, _("names that start with '{prefix}' are reserved for services").format(prefix=PREFIX)
+        )
     return topic
 
 
@@ -633,7 +635,7 @@ def spin(*nodes: Node, timeout_s: float | None = None) -> None:
         ClosedError: This is a forked child process.
     """
     if not nodes or not all(isinstance(each, Node) for each in nodes):
-        raise WrongTypeError(_("spin was given something else than nodes; give it one node or more"))
+        raise WrongTypeError(_("spin got an argument that is not a node; give one or more nodes"))
     works = dict.fromkeys(each._work for each in nodes)  # noqa: SLF001 - private to this module
     spin_all(tuple(works), seconds("timeout_s", timeout_s))
 

@@ -235,9 +235,9 @@ class Publisher:
             return
         codec, data, extension = self._spec.codec.name, payload.data, payload.extension
         if not isinstance(data, _BYTES_TYPES):
-            raise EncodeError(codec, type(data).__name__, _("give its 'bytes'"))
+            raise EncodeError(codec, type(data).__name__, _("publish its 'bytes'"))
         if extension is not None and not isinstance(extension, Mapping):
-            raise EncodeError(codec, type(extension).__name__, _("an extension is a map"))
+            raise EncodeError(codec, type(extension).__name__, _("an extension must be a map"))
 
     def _skip(self, payload: object) -> None:
         # Counts a message without subscribers; encodes it from time to time to detect errors.

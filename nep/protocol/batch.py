@@ -82,13 +82,15 @@ def entries(body: bytes) -> list[BatchEntry]:
     count = _COUNT.unpack_from(body)[0] if len(body) >= _COUNT.size else 0
     if not 1 <= count <= BATCH_MAX:
         raise WireError(
-            _("a batch has 1 to {most} messages, this one {count}").format(most=BATCH_MAX, count=count),
+            _("a batch must have 1 to {most} messages, but this one has {count}").format(
+                most=BATCH_MAX, count=count
+            ),
             len(body),
             code="batch-count",
         )
     table = table_of(count)
     if len(body) < table.size:
-        raise WireError(_("a batch ends within its table"), len(body), code="batch-table")
+        raise WireError(_("the table of a batch is incomplete"), len(body), code="batch-table")
     numbers = table.unpack_from(body)
     sizes, stamps = numbers[1 : count + 1], numbers[count + 1 :]
     if table.size + sum(sizes) != len(body):

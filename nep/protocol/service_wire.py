@@ -131,7 +131,7 @@ class _Native:
     def read_call(self, parts: Sequence[bytes | memoryview]) -> CallHeader:
         kind, codec, limit_ms, number, data = _read(parts)
         if kind != CallKind.CALL:
-            raise WireError(_("it is no call of a service"), code="call-kind")
+            raise WireError(_("it is not a service call"), code="call-kind")
         return CallHeader(number, codec, limit_ms / 1000 if limit_ms else None, data)
 
     def answer(self, number: int, reply: Reply) -> list[bytes | memoryview]:
@@ -140,13 +140,13 @@ class _Native:
     def read_answer(self, parts: Sequence[bytes | memoryview]) -> ReadAnswer:
         kind, codec, _limit, number, data = _read(parts)
         if kind not in {CallKind.ANSWER, CallKind.ERROR, CallKind.REFUSED}:
-            raise WireError(_("it is no answer of a service"), code="call-kind")
+            raise WireError(_("it is not a reply of a service"), code="call-kind")
         return ReadAnswer(number, Reply(CallKind(kind), data, codec))
 
 
 def _read(parts: Sequence[bytes | memoryview]) -> tuple[int, int, int, int, bytes | memoryview]:
     if len(parts) != 2 or len(parts[0]) != _HEADER.size:
-        reason = _("a call has two parts, the first of {size} bytes").format(size=_HEADER.size)
+        reason = _("a call must have two parts, the first of {size} bytes").format(size=_HEADER.size)
         raise WireError(reason, code="call-parts")
     version, kind, codec, limit_ms, number = _HEADER.unpack(parts[0])
     if version != _VERSION:
@@ -186,7 +186,9 @@ class _Original:
 
 def _single_part(parts: Sequence[bytes | memoryview]) -> bytes | memoryview:
     if len(parts) != 2 or len(parts[0]):
-        raise WireError(_("REQ and REP send an empty part and one with the payload"), code="call-parts")
+        raise WireError(
+            _("a REQ or REP message needs an empty part followed by the payload"), code="call-parts"
+        )
     return parts[1]
 
 
@@ -223,9 +225,11 @@ def check_service(name: str) -> str:
     """Validate a service name and return it. Raises `BadTopicError`."""
     check_topic(name)
     if name.startswith(PREFIX):
-        raise BadTopicError(name, _("'{prefix}' is put before it by nep itself").format(prefix=PREFIX))
+        raise BadTopicError(name, _("leave out '{prefix}'; nep adds it").format(prefix=PREFIX))
     if name.startswith(SURVEY):
-        raise BadTopicError(name, _("names that begin with '{prefix}' are surveys'").format(prefix=SURVEY))
+        raise BadTopicError(
+            name, _("names that start with '{prefix}' are reserved for surveys").format(prefix=SURVEY)
+        )
     check_topic(topic_of(name))
     return name
 

@@ -146,24 +146,22 @@ def check_topic(topic: str) -> str:
     Raises `BadTopicError` with the reason.
     """
     if not isinstance(topic, str):
-        raise BadTopicError(str(topic), _("a topic is a 'str'"))
+        raise BadTopicError(str(topic), _("a topic name must be a 'str'"))
     try:
         size = len(topic.encode("utf-8"))
     except UnicodeEncodeError:
-        raise BadTopicError(ascii(topic), _("it is no Unicode text")) from None
+        raise BadTopicError(ascii(topic), _("it is not valid Unicode text")) from None
     if not 1 <= size <= TOPIC_MAX_BYTES:
         raise BadTopicError(
-            topic, _("it has {size} bytes, 1 to {most} are allowed").format(size=size, most=TOPIC_MAX_BYTES)
+            topic, _("it has {size} bytes; 1 to {most} are allowed").format(size=size, most=TOPIC_MAX_BYTES)
         )
     for letter in topic:
         if letter.isspace() or letter == "{":
             raise BadTopicError(
-                topic, _("the character '{ascii}' is not allowed in it").format(ascii=ascii(letter)[1:-1])
+                topic, _("the character '{ascii}' is not allowed").format(ascii=ascii(letter)[1:-1])
             )
     if control := control_in(topic):
-        raise BadTopicError(
-            topic, _("the character '{control}' is not allowed in it").format(control=control)
-        )
+        raise BadTopicError(topic, _("the character '{control}' is not allowed").format(control=control))
     return topic
 
 
@@ -173,14 +171,14 @@ def check_node_name(name: str) -> str:
     Raises `BadNameError` with the reason.
     """
     if not isinstance(name, str):
-        raise BadNameError(str(name), _("a name is a 'str'"))
+        raise BadNameError(str(name), _("a node name must be a 'str'"))
     if control := control_in(name):
-        raise BadNameError(name, _("the character '{control}' is not allowed in it").format(control=control))
+        raise BadNameError(name, _("the character '{control}' is not allowed").format(control=control))
     size = len(name.encode("utf-8"))
     if not 1 <= size <= NODE_NAME_MAX_BYTES:
         raise BadNameError(
             name,
-            _("it has {size} bytes, 1 to {most} are allowed").format(size=size, most=NODE_NAME_MAX_BYTES),
+            _("it has {size} bytes; 1 to {most} are allowed").format(size=size, most=NODE_NAME_MAX_BYTES),
         )
     return name
 
@@ -279,14 +277,16 @@ def read_header(part: bytes) -> Header:
     """Parse a header. Raises `WireError`, also for an unknown version."""
     if len(part) != HEADER_BYTES:
         raise WireError(
-            _("a header has {size} bytes, this one has {count}").format(size=HEADER_BYTES, count=len(part)),
+            _("a header must have {size} bytes, but this one has {count}").format(
+                size=HEADER_BYTES, count=len(part)
+            ),
             len(part),
             code="header-size",
         )
     version, codec, flags, size, seq, stamp_ns, publisher = _HEADER.unpack(part)
     if version != VERSION:
         raise WireError(
-            _("its version is {version}, this nep reads version {own}; update nep").format(
+            _("its version is {version}, but this nep reads version {own}; update nep").format(
                 version=version, own=VERSION
             ),
             len(part),
@@ -335,7 +335,9 @@ def apart(part: bytes) -> tuple[bytes, bytes, bytes]:
     """Split a message of one part into topic, header and payload. Raises `WireError` if it is too short."""
     cut = part.find(b"\0") + 1
     if not cut or len(part) < cut + HEADER_BYTES:
-        raise WireError(_("a message has 3 or 4 parts, this one has 1"), len(part), code="part-count")
+        raise WireError(
+            _("a message must have 3 or 4 parts, but this one has 1"), len(part), code="part-count"
+        )
     return part[:cut], part[cut : cut + HEADER_BYTES], part[cut + HEADER_BYTES :]
 
 
@@ -355,7 +357,7 @@ def split(parts: Sequence[bytes | memoryview]) -> Parts:
         WireError: The parts violate the specification; checked in the order of docs/wire.md.
     """
     if not parts:
-        raise WireError(_("a message has 3 or 4 parts, this one has none"), code="part-count")
+        raise WireError(_("a message must have 3 or 4 parts, but this one has none"), code="part-count")
     first, *rest = apart(bytes(parts[0])) if len(parts) == 1 else parts
     topic = _topic_in(bytes(first))
     header, payload, extension = split_rest(rest, is_one_part=len(parts) == 1)
@@ -370,11 +372,11 @@ def split_rest(
     ``is_one_part`` is True if they were split from one part; only then a batch is allowed.
     """
     if not rest:
-        raise WireError(_("a message has 3 or 4 parts, this one has 1"), code="part-count")
+        raise WireError(_("a message must have 3 or 4 parts, but this one has 1"), code="part-count")
     header = read_header(bytes(rest[0]))
     expected_count, part_count = 4 if header.flags & EXTENSION else 3, len(rest) + 1
     if part_count not in {3, 4}:
-        reason = _("a message has 3 or 4 parts, this one has {there}").format(there=part_count)
+        reason = _("a message must have 3 or 4 parts, but this one has {there}").format(there=part_count)
         raise WireError(reason, code="part-count")
     if part_count != expected_count:
         raise WireError(
@@ -403,4 +405,6 @@ def _topic_in(part: bytes) -> str:
             raise WireError(_("its topic does not end with a zero byte"), len(part), code="topic-end")
         return check_topic(part[:-1].decode("utf-8"))
     except (UnicodeDecodeError, BadTopicError) as error:
-        raise WireError(_("invalid topic: {error}").format(error=error), len(part), code="topic") from error
+        raise WireError(
+            _("invalid topic name: {error}").format(error=error), len(part), code="topic"
+        ) from error

@@ -77,7 +77,9 @@ class Bookmarks:
     def add(self, at_ns: int, name: str = "") -> Bookmark:
         """Add a bookmark within the recording's time. Raises `RecordingError` if it can't be saved."""
         if len(self._saved) >= MAX_BOOKMARKS:
-            reason = _("it has {most} bookmarks, and there is no room for more").format(most=MAX_BOOKMARKS)
+            reason = _("it already has {most} bookmarks, the maximum; delete one first").format(
+                most=MAX_BOOKMARKS
+            )
             raise RecordingError(str(self._recording.path), reason)
         at_ns = max(self._recording.start_ns, min(at_ns, self._recording.end_ns))
         bookmark = Bookmark(at_ns, name[:_MAX_NAME_LENGTH])
@@ -100,7 +102,7 @@ class Bookmarks:
 
     def _index_of(self, bookmark: Bookmark) -> int:
         if bookmark not in self._saved:
-            raise ValueError(_("a note of the recording cannot be changed"))
+            raise ValueError(_("a note made during the recording can't be changed"))
         return self._saved.index(bookmark)
 
     # ---- on the disk
@@ -123,7 +125,7 @@ class Bookmarks:
         try:
             text = orjson.dumps(plain, option=orjson.OPT_INDENT_2)
         except TypeError as error:  # a lone surrogate
-            raise RecordingError(str(self.path), _("the name has letters that are none")) from error
+            raise RecordingError(str(self.path), _("the name contains invalid characters")) from error
         try:
             if self._is_damaged:
                 replace_file(self.path, self.path.with_name(f"{self.path.name}.damaged"))

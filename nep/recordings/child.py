@@ -124,7 +124,7 @@ class RecorderService:
         op = order.get("op") if isinstance(order, dict) else None
         carry_out = self._commands.get(op) if isinstance(op, str) else None
         if carry_out is None or not isinstance(order, dict):
-            self._problem(str(op), _("that is no order"))
+            self._problem(str(op), _("unknown command"))
             return
         path = order.get("path")
         with self._lock:
@@ -136,7 +136,7 @@ class RecorderService:
         except (NepError, OSError) as error:
             self._problem(op, str(error), path)
         except (TypeError, ValueError, KeyError, OverflowError) as error:
-            words = _("the order cannot be understood: {error}").format(error=error)
+            words = _("the command is invalid: {error}").format(error=error)
             self._problem(op, words, path)
 
     def close(self) -> None:
@@ -167,7 +167,7 @@ class RecorderService:
     def _record(self, order: Mapping[str, Any]) -> None:
         path = _text(order, "path")
         if self._recording is not None:
-            self._problem("record", _("a recording is being made already"), path)
+            self._problem("record", _("a recording is already running"), path)
             return
         selection = _selection(order)
         seconds, most_bytes = order.get("seconds"), order.get("size_bytes")
@@ -213,7 +213,7 @@ class RecorderService:
 
     def _start_ring(self, order: Mapping[str, Any]) -> None:
         if self._ring is not None:
-            self._problem("ring", _("the flight recorder is on already"))
+            self._problem("ring", _("the flight recorder is already on"))
             return
         selection = _selection(order)
         ring = FlightRecorder(
@@ -238,7 +238,7 @@ class RecorderService:
             return
         self._copies = [each for each in self._copies if each.is_alive()]
         if len(self._copies) >= _MAX_COPIES:
-            self._problem("keep", _("the last seconds are being kept already"), path)
+            self._problem("keep", _("the last seconds are already being saved"), path)
             return
         ring = self._ring[0]
         seconds, note = float(order.get("seconds", 60.0)), _text(order, "note", "")
@@ -314,7 +314,7 @@ def _plain(status: RecordingStatus | RingStatus) -> dict[str, object]:
 def _positive(seconds: object) -> float:
     # Raises `ValueError`.
     if isinstance(seconds, bool) or not isinstance(seconds, int | float) or not 0.0 < seconds < _MAX_SECONDS:
-        raise ValueError(_("{given} is no time").format(given=seconds))
+        raise ValueError(_("{given} is not a time").format(given=seconds))
     return float(seconds)
 
 

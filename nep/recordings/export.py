@@ -99,7 +99,7 @@ def export(
         RecordingsUnavailableError: A package is not installed.
     """
     if kind not in FORMATS:
-        raise ValueError(_("no format '{kind}'").format(kind=kind))
+        raise ValueError(_("unknown format '{kind}'").format(kind=kind))
     topics, counted = _suitable_topics(recording, kind, part, progress)
     if kind == "mcap":
         return [_mcap(recording, folder, replace(part, topics=topics), counted)]
@@ -115,7 +115,7 @@ def export(
         for topic in topics:
             path = folder / _file_name(topic, used_names, suffix)
             if path.exists():
-                raise RecordingError(str(path), _("there is such a file already; choose another name"))
+                raise RecordingError(str(path), _("the file already exists; choose another name"))
             unfinished = path.with_name(f"{path.name}.part")
             source = _Source(recording, topic, part, counted)
             try:
@@ -148,13 +148,13 @@ def _suitable_topics(
     ]
     if not topics:
         reason = {
-            "mcap": _("it has no such topic"),
-            "pictures": _("no topic has pictures"),
-            "mp4": _("no topic has pictures"),
+            "mcap": _("it does not contain the selected topics"),
+            "pictures": _("no topic has images"),
+            "mp4": _("no topic has images"),
         }.get(kind, _("no topic has values for a table"))
         raise RecordingError(str(recording.path), reason)
     if kind != "mcap" and len(topics) > MAX_FILES:
-        sentence = _("it has {count} such topics; choose {most} of them at most")
+        sentence = _("it has {count} suitable topics; choose at most {most}")
         raise RecordingError(str(recording.path), sentence.format(count=len(topics), most=MAX_FILES))
     counts = _counts(recording, topics, part)
     if kind != "mcap":
@@ -162,7 +162,9 @@ def _suitable_topics(
     if not any(counts.values()):
         is_all = part.start_ns is None and part.end_ns is None
         reason = (
-            _("it has no message that can be decoded") if is_all else _("nothing of it came in that part")
+            _("it has no message that can be decoded")
+            if is_all
+            else _("it has no messages in the selected part")
         )
         raise RecordingError(str(recording.path), reason)
     return topics, _Progress(sum(counts.values()), progress)
@@ -312,7 +314,7 @@ def _mcap(recording: Recording, folder: Path, part: Part, counted: _Progress) ->
     except OSError as error:
         raise disk_error(folder, error) from error
     if path.exists():
-        raise RecordingError(str(path), _("there is such a file already; choose another name"))
+        raise RecordingError(str(path), _("the file already exists; choose another name"))
     try:
         span = (part.start_ns, part.end_ns)
         count = copy_part(recording, unfinished, span, part.topics or (), counted.add)
@@ -471,5 +473,5 @@ def _film(source: _Source, path: Path, fps: float, container: Container) -> int:
     finally:
         film.remove()
     if not count:
-        raise RecordingError(str(path), _("no picture of it can be read"))
+        raise RecordingError(str(path), _("none of its images can be read"))
     return count

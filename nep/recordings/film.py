@@ -54,7 +54,7 @@ def available_container(opencv: Any, folder: Path) -> Container:  # noqa: ANN401
             writer.release()
             if is_open:
                 return container
-    raise RecordingError(str(folder), _("OpenCV cannot write films here"))
+    raise RecordingError(str(folder), _("OpenCV can't write videos on this computer"))
 
 
 def frame_of(opencv: Any, message: Message) -> Any:  # noqa: ANN401 - an array
@@ -98,12 +98,10 @@ class Film:
             self._size = (width // 2 * 2 or 2, height // 2 * 2 or 2)
             self._film = self._container.writer(self._opencv, self._written, self._fps, self._size)
             if not self._film.isOpened():
-                raise RecordingError(str(self._path), _("OpenCV cannot write films here"))
+                raise RecordingError(str(self._path), _("OpenCV can't write videos on this computer"))
             self._start_ns = log_ns
         if log_ns - self._start_ns > LONGEST_S * 1e9:
-            raise RecordingError(
-                str(self._path), _("its pictures are of more than a day; choose a part of it for a film")
-            )
+            raise RecordingError(str(self._path), _("its images span more than a day; choose a shorter part"))
         until = int((log_ns - self._start_ns) * self._fps / 1e9)
         while self._last is not None and self._frames < until:
             self._film.write(self._last)
@@ -126,7 +124,7 @@ class Film:
         count = int(film.get(self._opencv.CAP_PROP_FRAME_COUNT))
         film.release()
         if count != self._frames:
-            raise RecordingError(str(self._path), _("the film could not be written; the disk may be full"))
+            raise RecordingError(str(self._path), _("the video can't be written; the disk may be full"))
         replace_file(self._written, self._path)
 
     def close(self) -> None:

@@ -188,7 +188,7 @@ class Playback:
     def speed(self, speed: float) -> None:
         if not SPEED_MIN <= speed <= SPEED_MAX:
             raise ValueError(
-                _("{speed:g} is no speed; give {least:g} to {most:g}").format(
+                _("{speed:g} is not a valid speed; give {least:g} to {most:g}").format(
                     speed=speed, least=SPEED_MIN, most=SPEED_MAX
                 )
             )
@@ -203,7 +203,7 @@ class Playback:
             start_ns = max(start_ns, self._recording.start_ns)
             end_ns = min(end_ns, self._recording.end_ns)
             if start_ns >= end_ns:
-                raise ValueError(_("the part to be played again has no length"))
+                raise ValueError(_("the part to repeat is empty"))
             self._loop = (start_ns, end_ns)
             if not start_ns <= self._position_ns <= end_ns:
                 self.seek(start_ns)

@@ -125,7 +125,7 @@ def repair(
     check_packages()
     target = repaired_path(path) if target is None else target
     if target.exists():
-        raise RecordingError(str(target), _("there is such a file already; choose another name"))
+        raise RecordingError(str(target), _("the file already exists; choose another name"))
     unfinished = target.with_name(f"{target.name}.part")
     try:
         file = path.open("rb")
@@ -168,17 +168,17 @@ def _read_back(path: Path, writer: FileWriter) -> tuple[int, int]:
     with path.open("rb") as file:
         index = read_index(file, path)
         if not index.is_complete:
-            raise RecordingError(str(path), _("what was recovered cannot be read back"))
+            raise RecordingError(str(path), _("the recovered messages can't be read back"))
         for info in index.chunks:
             try:
                 chunk = read_chunk(file, info)
             except ValueError as error:
-                raise RecordingError(str(path), _("what was recovered cannot be read back")) from error
+                raise RecordingError(str(path), _("the recovered messages can't be read back")) from error
             for record in messages_in(chunk):
                 if isinstance(record, RawMessage):
                     counts[record.channel] = counts.get(record.channel, 0) + 1
     if counts != writer.counts:
-        raise RecordingError(str(path), _("what was recovered cannot be read back"))
+        raise RecordingError(str(path), _("the recovered messages can't be read back"))
     return writer.start_ns or 0, writer.end_ns
 
 
@@ -194,7 +194,7 @@ class _Repair:
         self._search_budget = open_budget(path, self._size)
         file.seek(0)
         if file.read(len(MAGIC)) != MAGIC and not self._find_chunk(0):
-            raise RecordingError(str(path), _("it is no MCAP file"))
+            raise RecordingError(str(path), _("it is not an MCAP file"))
         self._definitions = self._known_definitions(path)
         self._table = ChannelTable(self._definitions.channels)
         self._counts = _Counts()

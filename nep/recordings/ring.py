@@ -233,7 +233,7 @@ class FlightRecorder:
             ValueError: `seconds` or `size_bytes` is not positive.
         """
         if not 0.0 < seconds < _MAX_SECONDS or size_bytes < 1:
-            raise ValueError(_("a ring has more than 0 seconds and bytes"))
+            raise ValueError(_("the duration and the size of the flight recorder must be above 0"))
         path = Path(folder)
         self._clock = LogClock() if clock is None else clock
         try:
@@ -275,19 +275,17 @@ class FlightRecorder:
             ValueError: `seconds` is not positive.
         """
         if not 0.0 < seconds < _MAX_SECONDS:
-            raise ValueError(_("a ring has more than 0 seconds and bytes"))
+            raise ValueError(_("the duration and the size of the flight recorder must be above 0"))
         target = Path(path)
         if not self._writer.flush():
-            raise RecordingError(str(target), self._writer.problem or _("the disk does not answer"))
+            raise RecordingError(str(target), self._writer.problem or _("the disk does not respond"))
         segments = self._segments.take(seconds)
         if not segments:
-            raise RecordingError(str(target), _("no message has come yet"))
+            raise RecordingError(str(target), _("no messages received yet"))
         try:
             return self._copy_segments(target, segments, note)
         except FileExistsError:
-            raise RecordingError(
-                str(target), _("there is such a file already; choose another name")
-            ) from None
+            raise RecordingError(str(target), _("the file already exists; choose another name")) from None
         except OSError as error:
             raise disk_error(target, error) from error
         finally:
@@ -317,7 +315,7 @@ class FlightRecorder:
             writer.close()
             _remove(target)
             if isinstance(error, ValueError):
-                raise RecordingError(str(target), _("what was to be kept is damaged on the disk")) from error
+                raise RecordingError(str(target), _("the saved seconds are damaged on the disk")) from error
             raise
         count = sum(each.received - each.unkept for each in totals.values())
         return KeptRecording(target, count, (writer.end_ns - (writer.start_ns or writer.end_ns)) / 1e9)

@@ -38,7 +38,7 @@ class SplitFiles:
         try:
             file = FileWriter(path, self._table)
         except FileExistsError:
-            raise RecordingError(str(path), _("there is such a file already; choose another name")) from None
+            raise RecordingError(str(path), _("the file already exists; choose another name")) from None
         except OSError as error:
             raise disk_error(path, error) from error
         self.paths.append(path)

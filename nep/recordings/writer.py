@@ -184,9 +184,7 @@ class RecordingWriter:
             try:
                 self._destination: Destination = OneFile(FileWriter(whole), limits.least_free_bytes)
             except FileExistsError:
-                raise RecordingError(
-                    str(whole), _("there is such a file already; choose another name")
-                ) from None
+                raise RecordingError(str(whole), _("the file already exists; choose another name")) from None
             except OSError as error:
                 raise disk_error(whole, error) from error
         else:
@@ -316,7 +314,7 @@ class RecordingWriter:
             self._lock.notify_all()
         self._thread.join(timeout_s)
         if self._thread.is_alive():
-            raise ClosedError(_("a recording whose disk does not answer"))
+            raise ClosedError(_("a recording whose disk does not respond"))
         return self.status
 
     def __enter__(self) -> Self:
@@ -340,9 +338,10 @@ class RecordingWriter:
             self._fail(
                 RecordingError(
                     str(self._destination.file.path),
-                    _("it ended by an error of nep's own, {error}; what came before is kept").format(
-                        error=repr(error)
-                    ),
+                    _(
+                        "recording stopped because of an internal error, {error}; everything recorded "
+                        "before is saved"
+                    ).format(error=repr(error)),
                 )
             )
         finally:

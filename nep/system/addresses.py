@@ -68,7 +68,7 @@ def master_address(address: str | None = None) -> str:
     """
     if address is not None and not isinstance(address, str):
         raise WrongTypeError(
-            _("an address is a 'str' such as '{example}', not a '{kind}'").format(
+            _("an address must be a 'str' such as '{example}', not a '{kind}'").format(
                 example=DEFAULT_MASTER, kind=type(address).__name__
             )
         )
@@ -80,7 +80,7 @@ def master_address(address: str | None = None) -> str:
         chosen, host, port = f"{chosen}:{_DEFAULT_PORT}", chosen, str(_DEFAULT_PORT)
     if not _HOST.fullmatch(host) or not _is_valid_host(host) or not _is_port(port):
         raise NepError(
-            _("'{chosen}' is no address of a master; write it as '{example}'").format(
+            _("'{chosen}' is not an address of a master; write it as '{example}'").format(
                 chosen=quotable(chosen), example=DEFAULT_MASTER
             )
         )
@@ -95,19 +95,19 @@ def checked_host(host: object) -> str:
     if isinstance(host, str) and _is_ipv6(host):
         raise NepError(
             _(
-                "'{host}' is an IPv6 address, which nep does not speak; use one such as '127.0.0.1', "
-                "or the computer's name"
+                "'{host}' is an IPv6 address, which nep does not support; use an IPv4 address such as "
+                "'127.0.0.1', or the computer's name"
             ).format(host=quotable(host))
         )
     if isinstance(host, str) and "://" in host:
         raise NepError(
-            _(
-                "'{host}' is a URL; write the address alone, such as '127.0.0.1', or the computer's name"
-            ).format(host=quotable(host))
+            _("'{host}' is a URL; use only the address, such as '127.0.0.1', or the computer's name").format(
+                host=quotable(host)
+            )
         )
     if not isinstance(host, str) or not _HOST.fullmatch(host) or not _is_valid_host(host):
         raise NepError(
-            _("'{host}' is no address of a computer; use one such as '127.0.0.1', or a name").format(
+            _("'{host}' is not an address of a computer; use one such as '127.0.0.1', or a name").format(
                 host=quotable(str(host))
             )
         )
@@ -230,10 +230,7 @@ def in_numbers(address: str) -> str:
         return f"{look_up(host)}:{address.rpartition(':')[2]}"
     except (OSError, UnicodeError) as error:
         raise NepError(
-            _(
-                "no computer is called '{host}' here; look for a typing error, or write its address "
-                "in numbers"
-            ).format(host=host)
+            _("unknown computer '{host}'; check the spelling, or use its IP address").format(host=host)
         ) from error
 
 

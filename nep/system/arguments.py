@@ -44,7 +44,7 @@ def text(name: str, value: object) -> str:
     if len(value) > _MAX_LENGTH or control_in(value):
         shown = escaped(shortened(value, 40))
         raise ValueError(
-            _("{name} is '{said}'; use {most} letters at most, and none that controls").format(
+            _("{name} is '{said}'; use at most {most} characters, without control characters").format(
                 name=name, said=shown, most=_MAX_LENGTH
             )
         )
@@ -75,13 +75,13 @@ def at_least(name: str, value: object, least: int) -> int:
     """Validate an int of at least `least` and return it. Raises `ValueError`."""
     if not isinstance(value, int) or isinstance(value, bool):
         raise WrongTypeError(
-            _("{name} is {value}; give a whole number from {least} on").format(
+            _("{name} is {value}; give a whole number of at least {least}").format(
                 name=name, value=_shown(value), least=least
             )
         )
     if value < least:
         raise ValueError(
-            _("{name} is {value}; give a whole number from {least} on").format(
+            _("{name} is {value}; give a whole number of at least {least}").format(
                 name=name, value=_shown(value), least=least
             )
         )
@@ -151,7 +151,7 @@ def plain_function(name: str, value: F) -> F:
     """Validate a callable that is not a coroutine function, and return it. Raises `ValueError`."""
     if is_coroutine_function(function(name, value)):
         raise ValueError(
-            _("{name} is a coroutine function, which nobody awaits here; give a plain function").format(
+            _("{name} is a coroutine function, which is not awaited here; give a plain function").format(
                 name=name
             )
         )

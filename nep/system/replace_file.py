@@ -37,7 +37,7 @@ def replace_file(
             if getattr(error, "winerror", None) not in _OPEN_FILE_ERRORS:
                 raise
             if tried == _MAX_ATTEMPTS:
-                reason = _("another program has the file open; close it there")
+                reason = _("another program has the file open; close the file there")
                 raise PermissionError(error.errno, reason, str(old)) from error
             wait(_PAUSE_S)
         else:

@@ -145,8 +145,8 @@ class Terminal(io.TextIOBase):
             dropped, self._lines_dropped = self._lines_dropped, 0
         if dropped:
             text += ngettext(
-                "… {count} line left out: nobody read this for a while",
-                "… {count} lines left out: nobody read this for a while",
+                "… {count} line dropped because the output was not read",
+                "… {count} lines dropped because the output was not read",
                 dropped,
             ).format(count=dropped)
             text += "\n"

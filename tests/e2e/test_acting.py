@@ -75,7 +75,7 @@ def test_a_message_is_written_armed_and_sent_until_stop(studio: Studio, address:
     studio.says(f"Master {address}", 40)
     with lamp(address) as seen:
         fingers.do("publish a mess", "Publish a message")
-        write(studio, fingers, "Name of the message", "Warm light")
+        write(studio, fingers, "Message name", "Warm light")
         write(studio, fingers, "Topic", "/lamp", kind="TopicEdit")
         fingers.press("Escape")  # what is offered
         write(studio, fingers, "Message", '{"level": 0.4 "on": true}')

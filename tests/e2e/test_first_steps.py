@@ -65,4 +65,4 @@ def test_after_kill_9_the_second_start_does_not_offer_them_again(start: Callable
     first.kill()
     second = start()
     second.says("Learn in five minutes")
-    assert not second.all("Not now", kind="Button")
+    assert not second.all("Cancel", kind="Button")

@@ -49,7 +49,7 @@ def test_it_moves_only_after_let_it_move_and_asks_once(table: Studio) -> None:
     press(table, "Try turn")
     table.says("Allow Table to move?")
     table.says("“turn” moves Table.")
-    table.click("Not now")
+    table.click("Cancel")
     until(lambda: not table.all("Allow motion"), "the question has gone")
     assert not table.all("Cancel turn")
     press(table, "Try turn")

@@ -115,10 +115,10 @@ FOUND = (
     ),
     Finding(
         "port:7000", "warning", "The AirPlay Receiver holds port 7000, where programs of nep up to 0.5.4.5,"
-        " nep-js and C# ask.", "Switch it off in the system settings, under General, AirDrop & Handoff.",
+        " nep-js and C# ask.", "Turn it off in System Settings, under General > AirDrop & Handoff.",
     ),
     Finding("versions", "info", "NEP Studio 0.1.0, Python 3.11.7, pyzmq 27.3.0, libzmq 4.3.5, Linux 6.18."),
-    Finding("loopback", "ok", "Programs of this computer can reach each other (127.0.0.1)."),
+    Finding("loopback", "ok", "Programs on this computer can reach each other (127.0.0.1)."),
     Finding("files", "ok", "A program may open 20000 files."),
 )  # fmt: skip
 

@@ -101,7 +101,7 @@ def _with_unlisted(workspace: Workspace) -> Workspace:
                 names[id] = name
                 nameless.discard(id)
             else:
-                names[id] = _("variable without a name")
+                names[id] = _("unnamed variable")
                 nameless.add(id)
     return replace(workspace, variables=names, nameless=frozenset(nameless))
 

@@ -12,8 +12,8 @@ import unicodedata
 
 from nep.i18n import _, lazy
 
-NOT_A_NUMBER = lazy("This needs a number.")
-SEPARATORS = lazy("Write a number with at most one comma or point, such as 1234.5 or 1234,5.")
+NOT_A_NUMBER = lazy("Enter a number.")
+SEPARATORS = lazy("Enter a number with at most one decimal comma or point, such as 1234.5 or 1234,5.")
 _NUMBER = re.compile(r"[+-]?(?:\d+[.,]?\d*|[.,]\d+)(?:e[+-]?\d+)?", re.ASCII | re.IGNORECASE)
 _GROUPED = re.compile("[+-]?[0-9][0-9.,' _\N{RIGHT SINGLE QUOTATION MARK}]*", re.ASCII)
 

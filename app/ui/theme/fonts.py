@@ -1,4 +1,4 @@
-"""Bundled fonts: Inter for text, M PLUS 1p for Japanese, JetBrains Mono for topics, paths, values and programs."""
+"""Bundled fonts: Inter for text, M PLUS 1p for Japanese, JetBrains Mono for topics and values."""
 
 from __future__ import annotations
 

@@ -92,7 +92,7 @@ forks.in_child(_forked)
 
 def _hub(configuration: Configuration) -> _Hub:
     if not isinstance(configuration, Hybrid):
-        raise NepError(_("the back end 'memory' has no direct connections; use 'zeromq' for them"))
+        raise NepError(_("the back end 'memory' does not support direct connections; use 'zeromq'"))
     with _hubs_lock:
         return _hubs.setdefault(configuration.master, _Hub())
 

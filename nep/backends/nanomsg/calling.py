@@ -60,7 +60,7 @@ class NanomsgClient(ClientCalls[_Call]):
         on_close: Callable[[NanomsgClient], object],
     ) -> None:
         if framing is ORIGINAL and spec.codec.number != _JSON:
-            raise NepError(_("a call without a master is JSON; leave out msg_type, or use wire='native'"))
+            raise NepError(_("calls without a master use JSON; omit msg_type, or use wire='native'"))
         super().__init__(spec)
         self._socket = socket
         self._framing = framing

@@ -37,12 +37,15 @@ def check_direct(direct: Direct) -> None:
     """Raise `NepError` for a mode or wire that nanomsg doesn't support."""
     if direct.mode == "many2many":
         raise NepError(
-            _("the back end 'nanomsg' has no direct connections of mode 'many2many'; use 'one2many'")
+            _(
+                "the back end 'nanomsg' does not support direct connections of mode 'many2many'; "
+                "use 'one2many'"
+            )
         )
     if direct.wire != "original":
         raise NepError(
             _(
-                "direct connections of 'nanomsg' carry frames of the original NEP; leave out wire='{wire}'"
+                "direct connections of 'nanomsg' use the format of the original NEP; omit wire='{wire}'"
             ).format(wire=direct.wire)
         )
 
@@ -63,7 +66,7 @@ def dial(socket: Any, address: str) -> str:  # noqa: ANN401 - pynng is not typed
         socket.dial(f"tcp://{address}", block=False)
     except library().NNGException as error:
         raise NepError(
-            _("'{address}' cannot be connected to; use a computer's address and a port up to 65535").format(
+            _("cannot connect to '{address}'; use a computer's address and a port up to 65535").format(
                 address=address
             )
         ) from error
@@ -153,8 +156,8 @@ class DirectPublisher:
         if warns:
             _logger.warning(
                 _(
-                    "a message on '{topic}' has {size} bytes; programs that use libnanomsg take no more than "
-                    "{most} and say nothing, so send less at once"
+                    "a message on '{topic}' has {size} bytes; programs that use libnanomsg silently drop "
+                    "messages of more than {most} bytes, so send smaller messages"
                 ).format(topic=self.spec.topic, size=len(frame), most=_LIBNANOMSG_MAX_BYTES)
             )
 

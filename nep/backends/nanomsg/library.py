@@ -42,8 +42,8 @@ def library(load: Callable[[str], ModuleType] = importlib.import_module) -> Any:
     if _inherited:
         raise NepError(
             _(
-                "'nanomsg' does not work in a program that was forked from one that uses it; start it anew, "
-                "with multiprocessing by the method 'spawn'"
+                "'nanomsg' does not work in a forked process of a program that uses it; start the process "
+                "with multiprocessing's method 'spawn'"
             )
         )
     try:

@@ -149,8 +149,10 @@ class NanomsgSubSocket(UnbatchedReader):
             source.endpoint = f"tcp://{places[0]}"
             return
         source.refused = endpoint
-        source.problem = _("the endpoint '{shown}' of '{name}' cannot be connected to: {why}").format(
-            shown=ascii(endpoint[:100])[1:-1], name=remote.node_name, why=why or _("it is none of 'nanomsg'")
+        source.problem = _("cannot connect to the endpoint '{shown}' of '{name}': {why}").format(
+            shown=ascii(endpoint[:100])[1:-1],
+            name=remote.node_name,
+            why=why or _("it is not an endpoint of 'nanomsg'"),
         )
         if self.refusals.add(source.problem):
             _logger.warning("subscription to '%s': %s", self._name, source.problem)

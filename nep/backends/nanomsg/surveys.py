@@ -47,7 +47,7 @@ class NanomsgSurveyor:
         self, spec: ClientSpec, direct: Direct, on_close: Callable[[NanomsgSurveyor], object]
     ) -> None:
         if spec.codec.number != _JSON:
-            raise NepError(_("a survey without a master is JSON; leave out msg_type"))
+            raise NepError(_("surveys without a master use JSON; omit msg_type"))
         self.spec = spec
         self.is_closed = False
         self.late = 0

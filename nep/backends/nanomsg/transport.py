@@ -90,8 +90,8 @@ class NanomsgTransport(ZeromqTransport):
         if not is_loopback(address):
             raise NepError(
                 _(
-                    "nodes of 'nanomsg' meet on one computer only; use its own master, or 'zeromq' to reach "
-                    "the one at '{address}'"
+                    "nodes of 'nanomsg' must be on the same computer as their master; use a master on this "
+                    "computer, or 'zeromq' to reach the master at '{address}'"
                 ).format(address=address)
             )
         return super()._session(address)

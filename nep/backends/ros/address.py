@@ -20,7 +20,9 @@ def address_of(given: str | None) -> str:
     """
     text = given or os.environ.get("ROS_MASTER_URI") or f"127.0.0.1:{_PORT}"
     if not isinstance(text, str):
-        raise NepError(_("an address is a 'str' such as '{example}'").format(example=f"127.0.0.1:{_PORT}"))
+        raise NepError(
+            _("an address must be a 'str' such as '{example}'").format(example=f"127.0.0.1:{_PORT}")
+        )
     try:
         parts = urlsplit(text if "://" in text else f"http://{text}")
         host, port = parts.hostname, _PORT if parts.port is None else parts.port
@@ -28,7 +30,7 @@ def address_of(given: str | None) -> str:
         host, port = None, 0
     if not host or not port:
         raise NepError(
-            _("'{chosen}' is no address of a ROS master; write it as '{example}'").format(
+            _("'{chosen}' is not an address of a ROS master; write it as '{example}'").format(
                 chosen=quotable(text), example=f"127.0.0.1:{_PORT}"
             )
         )

@@ -87,8 +87,8 @@ def not_installed(name: str, what: str) -> NepError:
     known = escaped(shortened(name, 100))
     return NepError(
         _(
-            "there is no {what} '{name}' here; look for a typing error, or install it with "
-            "'sudo apt install python3-{package}'"
+            "unknown {what} '{name}'; check the spelling, or install it with 'sudo apt install "
+            "python3-{package}'"
         ).format(what=what, name=known, package=known.partition("/")[0].replace("_", "-").lower())
     )
 
@@ -177,7 +177,7 @@ def to_ros(ros_type: str, codec: str, encoded: Encoded) -> bytes:
         kind = _check_file(encoded, type(data).__name__).encode()
         return b"".join((head, _LENGTH.pack(len(kind)), kind, _LENGTH.pack(len(data)), data))
     if extension:
-        raise WireError(_("a '{name}' has no room for an extension").format(name=ros_type), len(data))
+        raise WireError(_("a '{name}' can't carry an extension").format(name=ros_type), len(data))
     if codec == "image" and ros_type == _COMPRESSED and _magic(data):
         known = picture_info(data)
         if known is None:
@@ -259,7 +259,8 @@ def version_error(ros_type: str) -> NepError:
     """Return the error for a type with another definition on the other side."""
     return NepError(
         _(
-            "its '{ros_type}' has other fields than the one known here; use the same version on both sides"
+            "its '{ros_type}' has other fields than the definition on this computer; use the same "
+            "version on both sides"
         ).format(ros_type=escaped(shortened(ros_type, 100)))
     )
 
@@ -267,7 +268,8 @@ def version_error(ros_type: str) -> NepError:
 def _mismatch(msg_type: str, ros_type: str) -> NepError:
     return NepError(
         _(
-            "it carries '{ros_type}', which a subscriber of '{msg_type}' does not read; subscribe to that"
+            "it publishes '{ros_type}', which a subscriber of '{msg_type}' can't read; subscribe with "
+            "that type"
         ).format(ros_type=ros_type, msg_type=msg_type)
     )
 
@@ -276,14 +278,16 @@ def _read_sized(body: memoryview, at: int) -> tuple[memoryview, int]:
     # Returns the bytes after the length at `at`, and the offset of their end.
     (size,) = _LENGTH.unpack_from(body, at)
     if at + 4 + size > len(body):
-        raise WireError(_("it is cut off"), len(body))
+        raise WireError(_("it is truncated"), len(body))
     return body[at + 4 : at + 4 + size], at + 4 + size
 
 
 def _read_all(body: memoryview, at: int) -> memoryview:
     data, end = _read_sized(body, at)
     if end != len(body):
-        raise WireError(_("{count} bytes are too many").format(count=len(body) - end), len(body))
+        raise WireError(
+            _("{count} unexpected bytes follow the message").format(count=len(body) - end), len(body)
+        )
     return data
 
 
@@ -295,7 +299,7 @@ def _from_array(body: memoryview) -> Unpacked:
     (count,) = _LENGTH.unpack_from(body, 0)
     at = 4
     if count * 12 > len(body):
-        raise WireError(_("it is cut off"), len(body))
+        raise WireError(_("it is truncated"), len(body))
     for _number in range(count):
         _label, at = _read_sized(body, at)
         at += 8
@@ -324,15 +328,15 @@ def _from_raw(body: memoryview) -> Unpacked:
     layout = raw_layout(encoding)
     if layout is None:
         raise WireError(
-            _("its encoding '{name}' is not read; send one such as 'bgr8', 'mono8' or '16UC1'").format(
-                name=encoding
-            )
+            _(
+                "its encoding '{name}' is not supported; use an encoding such as 'bgr8', 'mono8' or '16UC1'"
+            ).format(name=encoding)
         )
     size = int(layout.numbers[-1])
     row = width * layout.channels * size
     if step < row or step * height != len(pixels):
         raise WireError(
-            _("{width} x {height} pixels of '{name}' do not fit {size} bytes").format(
+            _("{width} x {height} pixels of '{name}' don't match {size} bytes").format(
                 width=width, height=height, name=encoding, size=len(pixels)
             )
         )

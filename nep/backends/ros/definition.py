@@ -128,7 +128,9 @@ class Definition:
             raise DecodeError(self.name, len(reader.data), reason) from None
         if reader.left:
             raise DecodeError(
-                self.name, len(reader.data), _("{count} bytes are too many").format(count=reader.left)
+                self.name,
+                len(reader.data),
+                _("{count} unexpected bytes follow the message").format(count=reader.left),
             )
         return values
 
@@ -208,7 +210,7 @@ class _Parser:
 
     def _definition_error(self, part: str) -> NepError:
         return NepError(
-            _("the definition of '{name}' cannot be read; see '{part}' in it").format(
+            _("the definition of '{name}' cannot be read; check '{part}'").format(
                 name=escaped(shortened(self._name, 100)), part=escaped(shortened(part, 60))
             )
         )
@@ -244,7 +246,7 @@ def _integer(name: str) -> FieldKind:
         if not low <= number <= high:
             raise _FieldError(
                 path,
-                _("is {value}; '{name}' goes from {low} to {high}").format(
+                _("is {value}; '{name}' must be from {low} to {high}").format(
                     value=shortened(str(number), 40), name=name, low=low, high=high
                 ),
             )
@@ -266,7 +268,7 @@ def _float(name: str) -> FieldKind:
             out += packing.pack(as_float(value))
         except (OverflowError, TypeError, ValueError, struct.error):
             raise _FieldError(
-                path, _("is {value}, which is no '{name}'").format(value=_describe(value), name=name)
+                path, _("is {value}, which is not a '{name}'").format(value=_describe(value), name=name)
             ) from None
 
     return FieldKind(
@@ -282,7 +284,7 @@ def _time(name: str) -> FieldKind:
             out += packing.pack(*_secs_of(value, path, name))
         except struct.error:
             raise _FieldError(
-                path, _("is {value}, which is no '{name}'").format(value=_describe(value), name=name)
+                path, _("is {value}, which is not a '{name}'").format(value=_describe(value), name=name)
             ) from None
 
     def read(reader: _Reader, _path: str) -> object:
@@ -319,7 +321,7 @@ def _write_string(value: object, path: str, out: bytearray) -> None:
         try:
             value = value.encode("utf-8")
         except UnicodeEncodeError:
-            raise _FieldError(path, _("holds half of a surrogate pair")) from None
+            raise _FieldError(path, _("contains an unpaired surrogate")) from None
     if not isinstance(value, bytes):
         raise _type_error(path, value, "string")
     out += _LENGTH.pack(len(value))
@@ -375,7 +377,7 @@ def _bytes_of(value: object, path: str, name: str) -> bytes | bytearray | memory
     try:
         return bytes(value)
     except (TypeError, ValueError):
-        raise _FieldError(path, _("holds what is no number from 0 to 255")) from None
+        raise _FieldError(path, _("contains a value that is not an integer from 0 to 255")) from None
 
 
 def _reads_bytes(reader: _Reader, _path: str, count: int) -> object:
@@ -409,7 +411,9 @@ def _reads_list(kind: FieldKind) -> Callable[[_Reader, str, int], object]:
 
     def read(reader: _Reader, path: str, count: int) -> object:
         if count * kind.min_bytes > reader.left:
-            raise _FieldError(path, _("has {count} elements, more than can be there").format(count=count))
+            raise _FieldError(
+                path, _("has {count} elements, more than the data can hold").format(count=count)
+            )
         if format_char:
             return list(struct.unpack(f"<{count}{format_char}", reader.take(count * size)))
         return [kind.read(reader, path) for _number in range(count)]
@@ -457,13 +461,13 @@ def _read_fields(fields: tuple[DefinitionField, ...], reader: _Reader, path: str
     values: dict[str, object] = {}
     reader.messages_left -= 1
     if reader.messages_left < 0:
-        raise _FieldError(path, _("has more inside than can be there"))
+        raise _FieldError(path, _("contains more nested messages than the data can hold"))
     for each in fields:
         where = f"{path}.{each.name}" if path else each.name
         try:
             values[each.name] = each.kind.read(reader, where)
         except struct.error:
-            raise _FieldError(where, _("is cut off")) from None
+            raise _FieldError(where, _("is truncated")) from None
     return values
 
 

@@ -85,8 +85,8 @@ def library() -> Any:  # noqa: ANN401 - not typed
     if _inherited:
         raise NepError(
             _(
-                "'ros' does not work in a program that was forked from one that uses it; start it anew, "
-                "with multiprocessing by the method 'spawn'"
+                "'ros' does not work in a forked process of a program that uses it; start the process with "
+                "multiprocessing's method 'spawn'"
             )
         )
     return sys.modules.get("rospy") or load_rospy()

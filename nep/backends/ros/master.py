@@ -36,7 +36,7 @@ class RosMasterUnreachable(MasterUnreachable):
         NepError.__init__(
             self,
             _(
-                "no ROS master answers at '{address}' (waited {seconds:g} s); start one with 'roscore', or "
+                "no ROS master replied at '{address}' (waited {seconds:g} s); start one with 'roscore', or "
                 "with 'rosmaster --core'"
             ).format(address=address, seconds=waited_s),
         )

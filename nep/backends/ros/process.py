@@ -45,7 +45,8 @@ def ros_topic(topic: str) -> str:
     """Return `topic` if ROS allows it. Raises `BadTopicError`."""
     if not _TOPIC.fullmatch(topic) or "//" in topic or topic.endswith(("/", "~")):
         raise BadTopicError(
-            topic, _("in ROS a topic begins with a letter or '/', and has letters, digits, '_' and '/' only")
+            topic,
+            _("a ROS topic must start with a letter or '/', and contain only letters, digits, '_' and '/'"),
         )
     return topic
 
@@ -61,7 +62,7 @@ class RosShutdownError(ClosedError):
         self.is_forked = False
         NepError.__init__(
             self,
-            _("rospy was shut down in this program and cannot start in it again; start the program anew"),
+            _("rospy was shut down and can't start again in this process; restart the program"),
         )
 
 
@@ -147,8 +148,9 @@ class RosProcess:
             if known != definition.name:
                 raise NepError(
                     _(
-                        "this program publishes '{known}' on '{topic}', and ROS has one type for a topic of "
-                        "a program; publish '{name}' on another topic"
+                        "this program publishes '{known}' on '{topic}', and ROS allows only one type per "
+                        "topic "
+                        "in a program; publish '{name}' on another topic"
                     ).format(known=known, topic=topic, name=definition.name)
                 )
             made = self.rospy.Publisher(
@@ -255,8 +257,9 @@ class RosProcess:
             if self.rospy.impl.registration.get_service_manager().get_service(service) is not None:
                 raise NepError(
                     _(
-                        "this program serves '{service}' already, and ROS has one server of a name; close "
-                        "it first"
+                        "this program already serves '{service}', and ROS allows only one server of a "
+                        "service; "
+                        "close it first"
                     ).format(service=service)
                 )
             return self.rospy.Service(service, kind, handler)
@@ -357,7 +360,7 @@ def process_with(address: str, name: str, wait_s: float | None) -> RosProcess:
         if not _is_same(_process.master.address, address):
             raise NepError(
                 _(
-                    "this program is connected with the ROS master at '{known}', and ROS allows one for a "
+                    "this program is connected to the ROS master at '{known}', and ROS allows only one per "
                     "program; use another program for '{address}'"
                 ).format(known=_process.master.address, address=address)
             )
@@ -380,7 +383,7 @@ def _set_own_address(master: str) -> None:
             ipaddress.ip_address(own)
         except ValueError:
             raise NepError(
-                _("the variable ROS_IP is '{value}'; set it to the IP address of this computer").format(
+                _("ROS_IP is '{value}'; set it to the IP address of this computer").format(
                     value=escaped(shortened(own, 100))
                 )
             ) from None

@@ -44,7 +44,7 @@ class Handshakes:
                 if left <= 0.0:
                     raise TimeoutError
                 if is_over():
-                    raise ServiceConnectionError(_("nobody waits any more"))
+                    raise ServiceConnectionError(_("the call was cancelled or timed out"))
                 self._changed.wait(min(_SLICE_S, left))
             self._counts[uri] += 1
         try:
@@ -70,7 +70,7 @@ class ServiceConnection:
         except ValueError:
             host = port = None
         if parts.scheme != "rosrpc" or not host or not port:
-            raise ServiceConnectionError(_("it has no address"))
+            raise ServiceConnectionError(_("it has no valid address"))
         self._deadline = min(deadline, time.monotonic() + _HANDSHAKE_S)
         self._socket = socket.create_connection((host, port), max(0.001, self._left()))
         try:
@@ -112,7 +112,7 @@ class ServiceConnection:
     def _receive_sized(self, max_size: int) -> bytes:
         (size,) = _LENGTH.unpack(self._receive_exactly(4))
         if size > max_size:
-            raise ServiceConnectionError(_("it sends too much"))
+            raise ServiceConnectionError(_("its message is too large"))
         return self._receive_exactly(size)
 
     def _receive_exactly(self, size: int) -> bytes:
@@ -122,7 +122,7 @@ class ServiceConnection:
             self._set_timeout()
             count = self._socket.recv_into(view)
             if not count:
-                raise ServiceConnectionError(_("it is gone"))
+                raise ServiceConnectionError(_("it closed the connection"))
             view = view[count:]
         return bytes(data)
 

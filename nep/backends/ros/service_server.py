@@ -148,7 +148,7 @@ class RosServer:
             self._changed.wait_for(lambda: not self._pending_replies, max(0.0, deadline - time.monotonic()))
             self.is_closed = True
             for pending_reply in self._pending_replies:
-                pending_reply.end(None, _("the server ends"))
+                pending_reply.end(None, _("the server is closing"))
         self.process.at_shutdown.discard(self._on_rospy_shutdown)
         self._forget(self)
 

@@ -50,7 +50,7 @@ def served_type(msg_type: str) -> ServiceType:
         return installed_service(msg_type)
     if msg_type not in {"json", "msgpack"}:
         raise NepError(
-            _("a service of ROS cannot have the type '{name}'; use one such as 'std_srvs/SetBool'").format(
+            _("a ROS service can't have the type '{name}'; use a type such as 'std_srvs/SetBool'").format(
                 name=msg_type
             )
         )

@@ -123,7 +123,7 @@ class RospySubscriber(WakingSubscriber):
             try:
                 message = self._read(source, body)
             except (WireError, struct.error) as error:
-                self._reject(error.reason if isinstance(error, WireError) else _("it is cut off"))
+                self._reject(error.reason if isinstance(error, WireError) else _("it is truncated"))
                 return
             dropped = self.inbox.put(message)
             self.received += 1 - dropped
@@ -153,7 +153,7 @@ class RospySubscriber(WakingSubscriber):
             found = unpacker(self.spec.msg_type, ros_type, text, md5sum)
         except NepError as error:
             who = escaped(shortened(header.get("callerid", "").lstrip("/"), 100))
-            problem = _("'{name}' is not read: {why}").format(name=who, why=str(error))
+            problem = _("messages from '{name}' can't be read: {why}").format(name=who, why=str(error))
             return _Source(None, None, problem)
         is_latched = header.get("latching") == "1"
         codec = found.codec

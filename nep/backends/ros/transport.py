@@ -39,7 +39,7 @@ _BATCH_S = 0.005  # at most 200 calls of a sink per second
 
 def _address(configuration: Configuration) -> str:
     if not isinstance(configuration, Hybrid):
-        raise NepError(_("the back end 'ros' has no direct connections; use 'zeromq' for them"))
+        raise NepError(_("the back end 'ros' does not support direct connections; use 'zeromq'"))
     return configuration.master
 
 
@@ -127,7 +127,7 @@ class RospyPublisher:
                 self._report_drops(dropped)
 
     def _report_drops(self, dropped: int) -> None:
-        reason = _("subscribers are too slow for it, and the oldest messages for them are dropped")
+        reason = _("subscribers are too slow; their oldest messages are dropped")
         for _each in range(dropped):
             if self._drops.add(reason):
                 _logger.warning("'%s' has dropped %d message(s) so far: %s",

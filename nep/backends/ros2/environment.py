@@ -32,12 +32,12 @@ def domain(master: str | None, environment: Mapping[str, str] = os.environ) -> s
     """Return the domain for a node's `master`; the default is $ROS_DOMAIN_ID, then "0". Raises `NepError`."""
     if master is not None and not isinstance(master, str):
         raise WrongTypeError(
-            _("a domain of ROS 2 is a 'str' such as '5', not a '{kind}'").format(kind=type(master).__name__)
+            _("a ROS 2 domain must be a 'str' such as '5', not a '{kind}'").format(kind=type(master).__name__)
         )
     said = (master or "").strip()
     if said and not _is_domain(said):
         raise NepError(
-            _("'{said}' is no domain of ROS 2; use a number from 0 to {most}").format(
+            _("'{said}' is not a ROS 2 domain; use a number from 0 to {most}").format(
                 said=said[:40], most=_DOMAINS - 1
             )
         )
@@ -64,7 +64,7 @@ def _configured_range(environment: Mapping[str, str]) -> str:
     said = environment.get("ROS_AUTOMATIC_DISCOVERY_RANGE", "").strip().upper()
     if said not in _VALID_RANGES:
         raise NepError(
-            _("ROS_AUTOMATIC_DISCOVERY_RANGE is '{said}'; use SUBNET, LOCALHOST or OFF").format(
+            _("ROS_AUTOMATIC_DISCOVERY_RANGE is '{said}'; set it to SUBNET, LOCALHOST or OFF").format(
                 said=said[:40]
             )
         )

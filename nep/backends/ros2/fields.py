@@ -106,7 +106,7 @@ def to_message(types: Types, name: str, payload: object, path: str = "") -> Any:
         if key not in fields:
             raise RosFieldError(
                 _join_path(path, escaped(str(key)[:100])),
-                _("is no field of '{name}'; it has {fields}").format(
+                _("is not a field of '{name}'; its fields: {fields}").format(
                     name=name, fields=", ".join(f"'{each}'" for each in fields) or _("none")
                 ),
             )
@@ -162,7 +162,9 @@ def _scalar(field: RosField, value: object, path: str) -> str | bool | int | flo
     if not low <= value <= high:
         raise RosFieldError(
             path,
-            _("is not from {least} to {most}, as '{kind}' is").format(least=low, most=high, kind=field.kind),
+            _("must be from {least} to {most}, the range of '{kind}'").format(
+                least=low, most=high, kind=field.kind
+            ),
         )
     return value - 256 if field.kind == "byte" and value > 127 else value  # rosbags stores bytes as signed
 
@@ -186,14 +188,15 @@ def _text(field: RosField, value: object, path: str) -> str:
     if not isinstance(value, str):
         raise RosFieldError(path, _("is a '{kind}'; give a 'str'").format(kind=_kind(value)))
     if "\0" in value:
-        raise RosFieldError(path, _("holds a zero byte, which ends a string of ROS"))
+        raise RosFieldError(path, _("contains a null character, which is not allowed in ROS strings"))
     try:
         size = len(value.encode())
     except UnicodeEncodeError:
-        raise RosFieldError(path, _("holds half of a surrogate pair")) from None
+        raise RosFieldError(path, _("contains an unpaired surrogate")) from None
     if field.max_text_bytes and size > field.max_text_bytes:
         raise RosFieldError(
-            path, _("has {size} bytes, {most} are allowed").format(size=size, most=field.max_text_bytes)
+            path,
+            _("has {size} bytes; at most {most} are allowed").format(size=size, most=field.max_text_bytes),
         )
     return value
 
@@ -206,7 +209,10 @@ def _items(types: Types, field: RosField, value: object, path: str) -> Any:  # n
     dimensions = getattr(value, "ndim", 1)
     if dimensions != 1:
         raise RosFieldError(
-            path, _("has {count} dimensions; give one, such as by 'ravel()'").format(count=dimensions)
+            path,
+            _("has {count} dimensions; use one dimension, for example with 'ravel()'").format(
+                count=dimensions
+            ),
         )
     if field.is_message or field.kind == "string":
         single = RosField(field.name, field.kind, field.is_message, max_text_bytes=field.max_text_bytes)
@@ -222,7 +228,7 @@ def _items(types: Types, field: RosField, value: object, path: str) -> Any:  # n
         )
     if field.size and len(items) > field.size:
         raise RosFieldError(
-            path, _("has {count} items, {most} are allowed").format(count=len(items), most=field.size)
+            path, _("has {count} items; at most {most} are allowed").format(count=len(items), most=field.size)
         )
     return items
 

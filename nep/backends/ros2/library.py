@@ -48,8 +48,8 @@ def dds(load: Callable[[str], ModuleType] = importlib.import_module) -> Dds:
     if _inherited:
         raise NepError(
             _(
-                "'ros2' does not work in a program that was forked from one that uses it; start it anew, "
-                "with multiprocessing by the method 'spawn'"
+                "'ros2' does not work in a forked process of a program that uses it; start the process "
+                "with multiprocessing's method 'spawn'"
             )
         )
     try:
@@ -69,7 +69,8 @@ def typesys(load: Callable[[str], ModuleType] = importlib.import_module) -> Any:
 def _unavailable() -> BackendUnavailableError:
     if sys.platform != "darwin" and platform.machine().lower() not in _MACHINES_WITH_WHEELS:
         needs = _(
-            "Cyclone DDS has no wheel for '{machine}'; build 'cyclonedds' 11 there, and install 'rosbags'"
+            "Cyclone DDS has no wheel for '{machine}'; build 'cyclonedds' 11 on that computer and "
+            "install 'rosbags'"
         )
         return BackendUnavailableError("ros2", needs.format(machine=platform.machine()))
     return BackendUnavailableError("ros2", _("install it with 'pip install nep-studio[ros2]'"))

@@ -81,8 +81,8 @@ class MessageTypes:
         if name not in self._fields:
             raise NepError(
                 _(
-                    "no type of message '{name}' is known; {did_you_mean}, or set {variable} to a folder of "
-                    ".msg files"
+                    "unknown message type '{name}'; {did_you_mean} (or set {variable} to a folder of "
+                    ".msg files)"
                 ).format(name=name, did_you_mean=_near(name, self.names), variable=FOLDERS)
             )
         return name
@@ -150,9 +150,10 @@ class MessageTypes:
             known = [each for each in self._fields.get(name, fields) if each.name != PLACEHOLDER]
             if known != [each for each in fields if each.name != PLACEHOLDER]:
                 raise NepError(
-                    _("'{name}' is known with other fields; choose another name, or start anew").format(
-                        name=name
-                    )
+                    _(
+                        "'{name}' is already defined with other fields; choose another name, or restart "
+                        "the program"
+                    ).format(name=name)
                 )
             if name not in self._fields:
                 self._store.register({name: found})
@@ -169,13 +170,14 @@ class MessageTypes:
             package = path.parent.parent.name if path.parent.name == "msg" else path.parent.name
             if len(texts) >= _MOST_FILES or path.stat().st_size > _LARGEST_FILE:
                 raise NepError(
-                    _("'{path}' is too large, or one too many; choose a folder with .msg files only").format(
-                        path=path
-                    )
+                    _(
+                        "'{path}' is too large, or there are too many files; choose a folder with .msg "
+                        "files only"
+                    ).format(path=path)
                 )
             texts[type_name(f"{package}/msg/{path.stem}")] = path.read_text(encoding="utf-8")
         if not texts:
-            raise NepError(_("there is no .msg file in '{folder}'; choose another").format(folder=folder))
+            raise NepError(_("no .msg files in '{folder}'; choose another folder").format(folder=folder))
         wrong = self._add(texts)
         if len(wrong) == len(texts):
             raise next(iter(wrong.values()))
@@ -201,9 +203,10 @@ class MessageTypes:
             changed = sorted(name for name in fields if name in self._fields and name not in same)
             if changed:
                 raise NepError(
-                    _("'{name}' is known with other fields; choose another name, or start anew").format(
-                        name=changed[0]
-                    )
+                    _(
+                        "'{name}' is already defined with other fields; choose another name, or restart "
+                        "the program"
+                    ).format(name=changed[0])
                 )
             self._store.register({name: found[name] for name in fields if name not in same})
             self._read_definitions()
@@ -211,8 +214,10 @@ class MessageTypes:
 
     def _missing(self, fields: Mapping[str, Sequence[RosField]]) -> dict[str, NepError]:
         # Types that use unknown types.
-        wide = _("'{name}' has a wide string, '{field}', which 'ros2' cannot carry; use a string")
-        unknown = _("'{name}' uses '{kind}' for its field '{field}', which is not known; add it, too")
+        wide = _(
+            "'{name}' has the field '{field}' of type wstring, which 'ros2' does not support; use a string"
+        )
+        unknown = _("'{name}' uses the unknown type '{kind}' for its field '{field}'; add that type, too")
         return {
             name: NepError(
                 (wide if field.kind.endswith(f"/{_WIDE}") else unknown).format(
@@ -233,7 +238,7 @@ def _near(name: str, known: tuple[str, ...]) -> str:
 
 def _near_any(name: str, known: tuple[str, ...]) -> str:
     said = did_you_mean(name, known)
-    return said if len(said) < 200 else _("look at 'nep.backends.ros2.message_types().names'")
+    return said if len(said) < 200 else _("see 'nep.backends.ros2.message_types().names'")
 
 
 _types: dict[str, MessageTypes] = {}

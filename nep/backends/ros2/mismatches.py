@@ -75,14 +75,17 @@ def _type_of(parties: Sequence[Party]) -> str:
 def _other_type(topic: str, writers: Sequence[Party], readers: Sequence[Party]) -> Alert:
     return Alert(
         f"ros2-type:{topic}",
-        _("{readers} hears nothing of {writers} on “{topic}”: it wants “{wanted}”, and gets “{sent}”").format(
+        _(
+            "{readers} does not receive “{topic}” from {writers}: it requests “{wanted}”, but the "
+            "publisher offers “{sent}”"
+        ).format(
             readers=_named(readers),
             writers=_named(writers),
             topic=topic,
             wanted=_type_of(readers),
             sent=_type_of(writers),
         ),
-        _("Use the same type in all programs, or give one of the topics another name."),
+        _("Use the same type in all programs, or rename one of the topics."),
     )
 
 
@@ -92,7 +95,10 @@ def _other_definition(topic: str, writers: Sequence[Party], readers: Sequence[Pa
         _("{readers} and {writers} have different definitions of “{kind}” on “{topic}”").format(
             readers=_named(readers), writers=_named(writers), kind=_type_of(readers), topic=topic
         ),
-        _("Give both programs the same .msg file, and ROS_DISTRO the same release; what is read is wrong."),
+        _(
+            "Use the same .msg file and the same ROS_DISTRO for both programs; until then, received "
+            "values are wrong."
+        ),
     )
 
 
@@ -100,7 +106,8 @@ def _unreliable(topic: str, writers: Sequence[Party], readers: Sequence[Party]) 
     return Alert(
         f"ros2-reliability:{topic}",
         _(
-            "{readers} hears nothing of {writers} on “{topic}”: it wants “reliable”, and gets “best effort”"
+            "{readers} does not receive “{topic}” from {writers}: it requests “reliable”, but the "
+            "publisher offers “best effort”"
         ).format(readers=_named(readers), writers=_named(writers), topic=topic),
         _("Subscribe with qos='sensor' or qos='best_effort', or publish with qos='reliable'."),
     )
@@ -110,8 +117,8 @@ def _not_latched(topic: str, writers: Sequence[Party], readers: Sequence[Party])
     return Alert(
         f"ros2-durability:{topic}",
         _(
-            "{readers} hears nothing of {writers} on “{topic}”: it wants what was published before, too "
-            "(“transient local”), which is not kept (“volatile”)"
+            "{readers} does not receive “{topic}” from {writers}: it requests earlier messages "
+            "(“transient local”), but the publisher does not keep them (“volatile”)"
         ).format(readers=_named(readers), writers=_named(writers), topic=topic),
         _("Publish with latched=True, or subscribe with the durability “volatile”."),
     )

@@ -30,8 +30,8 @@ def dds_topic(topic: str) -> str:
         raise BadTopicError(
             topic,
             _(
-                "ROS 2 allows letters of ASCII, digits, '/' and '_', no digit behind a '/' and no '__'; "
-                "choose such a name"
+                "ROS 2 allows only ASCII letters, digits, '/' and '_', no digit after '/' and no '__'; "
+                "choose another name"
             ),
         )
     return f"rt/{topic.removeprefix('/')}"
@@ -58,7 +58,7 @@ def type_name(msg_type: str) -> str:
     found = _TYPE.fullmatch(msg_type)
     if found is None:
         raise NepError(
-            _("'{name}' is no type of a message of ROS; write it as 'std_msgs/msg/String'").format(
+            _("'{name}' is not a ROS message type; write it as 'std_msgs/msg/String'").format(
                 name=quotable(msg_type)
             )
         )

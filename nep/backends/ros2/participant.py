@@ -185,8 +185,8 @@ class Participant:
                 _delete(self._domain)
             raise NepError(
                 _(
-                    "Cyclone DDS cannot begin: {error}; look at CYCLONEDDS_URI and the network, and whether "
-                    "{most} programs are in the domain already"
+                    "Cyclone DDS cannot start: {error}; check CYCLONEDDS_URI, the network, and whether the "
+                    "domain already has {most} programs"
                 ).format(error=error, most=PARTICIPANTS_MAX)
             ) from error
         self._began_at = time.monotonic()

@@ -181,7 +181,8 @@ class Ros2Publisher:
             codes = self._participant.dds.core.DDSException
             if error.code == codes.DDS_RETCODE_BAD_PARAMETER:  # cyclonedds validates every message
                 raise WireError(
-                    _("they are no message of type '{name}'").format(name=self._mapping.ros_type), len(cdr)
+                    _("the bytes are not a message of type '{name}'").format(name=self._mapping.ros_type),
+                    len(cdr),
                 ) from error
             if error.code != codes.DDS_RETCODE_TIMEOUT:
                 raise

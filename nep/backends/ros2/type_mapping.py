@@ -99,7 +99,7 @@ def _check_map(name: str, payload: object) -> None:
 def _pack_cdr(encoded: Encoded) -> bytes:
     data = _plain_data(encoded)
     if len(data) < 4 or data[:1] != b"\0" or data[1] > 1:
-        raise WireError(_("the bytes of a ROS message begin with CDR's four"), len(data))
+        raise WireError(_("a ROS message must begin with the 4 bytes of the CDR header"), len(data))
     return data
 
 
@@ -112,7 +112,7 @@ def _plain_data(encoded: Encoded) -> bytes:
         extension_part(encoded.extension)
     data = encoded.data if isinstance(encoded.data, bytes) else bytes(encoded.data)
     if len(data) > _MAX_CDR_BYTES:
-        raise WireError(_("a message of ROS has less than 4 GB"), len(data))
+        raise WireError(_("a ROS message must be smaller than 4 GB"), len(data))
     return data
 
 
@@ -125,7 +125,7 @@ def _encode_text(payload: object) -> Encoded:
 
 
 def _zero_reason() -> str:
-    return _("it holds a zero byte, which ends a string of ROS; use the type 'bytes'")
+    return _("it contains a null character, which is not allowed in ROS strings; use the type 'bytes'")
 
 
 def _pack_text(encoded: Encoded) -> bytes:
@@ -138,7 +138,7 @@ def _pack_text(encoded: Encoded) -> bytes:
 def _unpack_text(cdr: bytes) -> memoryview:
     (size,) = _read_numbers(cdr, "I", 4)
     if not 0 < size <= len(cdr) - 8 or cdr[7 + size] != 0:
-        raise WireError(_("it is no text of ROS"), len(cdr))
+        raise WireError(_("it is not a ROS string"), len(cdr))
     return memoryview(cdr)[8 : 7 + size]
 
 
@@ -152,14 +152,14 @@ def _unpack_bytes(cdr: bytes) -> bytes | memoryview:
     if dimensions:
         return _data_field(_BYTES_TYPE, cdr)
     if size > len(cdr) - 16:
-        raise WireError(_("it is no array of bytes of ROS"), len(cdr))
+        raise WireError(_("it is not a ROS byte array"), len(cdr))
     return memoryview(cdr)[16 : 16 + size]
 
 
 def _read_numbers(cdr: bytes, form: str, at: int) -> tuple[int, ...]:
     # The header has the byte order. Raises `WireError`.
     if len(cdr) < at + 4 * len(form) or cdr[0] != 0 or cdr[1] > 1:
-        raise WireError(_("it is no message of ROS"), len(cdr))
+        raise WireError(_("it is not a ROS message"), len(cdr))
     return struct.unpack_from(f"{'<' if cdr[1] else '>'}{form}", cdr, at)
 
 
@@ -183,7 +183,7 @@ def _encode_image(payload: object) -> Encoded:
 
 def _raw_reason() -> str:
     return _(
-        "a compressed image of ROS is a JPEG or PNG; publish 'uint8' or 'uint16', or a map as "
+        "a compressed ROS image is a JPEG or PNG; publish 'uint8' or 'uint16', or a map as "
         "'sensor_msgs/msg/Image'"
     )
 

@@ -79,15 +79,15 @@ def place_name(master: str | None = None) -> str:
     """Validate a place; the default is $NEP_ZENOH_CONFIG, then "local". Raises `NepError`."""
     if master is not None and not isinstance(master, str):
         raise WrongTypeError(
-            _("a place of 'zenoh' is a 'str', not a '{kind}'").format(kind=type(master).__name__)
+            _("a zenoh address must be a 'str', not a '{kind}'").format(kind=type(master).__name__)
         )
     place = master or os.environ.get(CONFIG_VARIABLE, "") or "local"
     if _LOCAL.fullmatch(place) or place.endswith(_FILES) or _endpoints_in(place):
         return place
     raise NepError(
         _(
-            "'{place}' is no place where nodes of 'zenoh' meet; use 'local', an endpoint such as "
-            "'tcp/192.168.1.5:7447', or a configuration file of zenoh such as 'zenoh.json5'"
+            "'{place}' is not a zenoh address; use 'local', an endpoint such as "
+            "'tcp/192.168.1.5:7447', or a zenoh configuration file such as 'zenoh.json5'"
         ).format(place=place)
     )
 
@@ -185,7 +185,7 @@ def _load_config(path: Path) -> Any:  # noqa: ANN401 - zenoh is not typed
         config = library().Config.from_file(str(path.expanduser()))
     except library().ZError as error:
         raise NepError(
-            _("'{path}' is no configuration of zenoh: {error}; see its DEFAULT_CONFIG.json5").format(
+            _("'{path}' is not a zenoh configuration: {error}; see DEFAULT_CONFIG.json5 of zenoh").format(
                 path=path, error=_without_location(error)
             )
         ) from error
@@ -204,12 +204,13 @@ def _open(config: Any, place: str) -> Any:  # noqa: ANN401 - zenoh is not typed
         message = _without_location(error)
         if _SECURED.search(message) is not None:
             reason = _(
-                "zenoh cannot open a session at '{place}': {error}; is a router there, and does each side "
-                "trust the other one's certificate?"
+                "zenoh cannot open a session at '{place}': {error}; check that a router is running there "
+                "and that each side trusts the certificate of the other"
             )
         else:
             reason = _(
-                "zenoh cannot open a session at '{place}': {error}; is a router there, and may it be used?"
+                "zenoh cannot open a session at '{place}': {error}; check that a router is running there "
+                "and that it allows this connection"
             )
         raise NepError(reason.format(place=place, error=message)) from error
 

@@ -124,16 +124,16 @@ def _own_folder(folder: Path) -> Path:
         found = folder.lstat()
     except OSError as error:
         raise NepError(
-            _("nodes cannot meet at '{folder}': {error}; set XDG_RUNTIME_DIR to a folder of yours").format(
-                folder=folder, error=error.strerror or error
-            )
+            _(
+                "can't use '{folder}' to connect nodes: {error}; set XDG_RUNTIME_DIR to a folder of yours"
+            ).format(folder=folder, error=error.strerror or error)
         ) from error
     is_ours = sys.platform == "win32" or found.st_uid == os.getuid()
     if not stat.S_ISDIR(found.st_mode) or not is_ours:
         raise NepError(
             _(
-                "nodes cannot meet at '{folder}': it is somebody else's; set XDG_RUNTIME_DIR to a folder of "
-                "yours"
+                "can't use '{folder}' to connect nodes: it belongs to another user; set XDG_RUNTIME_DIR to "
+                "a folder of yours"
             ).format(folder=folder)
         )
     return folder

@@ -303,7 +303,7 @@ class ZenohSession:
         """
         if self._opened.is_router_lost:
             raise NepError(
-                _("no router of zenoh answers at '{place}' now; start it, and it is found again").format(
+                _("no zenoh router replied at '{place}'; start it, and this node reconnects").format(
                     place=",".join(self._opened.routers)
                 )
             )

@@ -171,7 +171,7 @@ class ZenohSubscriber(WakingSubscriber):
         # Call with the lock of the inboxes held.
         try:
             if not rest[0]:
-                raise WireError(_("it has no header; a program of another kind published it"), len(rest[-1]))
+                raise WireError(_("it has no header; the publisher is not a nep program"), len(rest[-1]))
             if first == topic_parser.topic and _is_latched(rest[0]) and self._is_early(topic_parser, rest):
                 return
             self._append(topic_parser.parser.parse(first, rest))

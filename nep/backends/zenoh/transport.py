@@ -150,8 +150,10 @@ class ZenohTransport:
         if isinstance(configuration, Direct):
             raise NepError(
                 _(
-                    "the back end 'zenoh' has no direct connections; leave the configuration out: no master "
-                    "is needed, and master='tcp/192.168.1.5:7447' gives the node a router of another computer"
+                    "the back end 'zenoh' does not support direct connections; omit the configuration (no "
+                    "master is needed), or use master='tcp/192.168.1.5:7447' to connect to a router on "
+                    "another "
+                    "computer"
                 )
             )
         with self._opening:  # open only one session per place

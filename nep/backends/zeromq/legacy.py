@@ -83,7 +83,7 @@ def from_frame(topic: str, msg_type: str, codec: str, frame: bytes) -> bytes | N
     try:
         return base64.b64decode(frame, validate=True)
     except binascii.Error as error:
-        raise WireError(_("a picture is not base64"), len(frame)) from error
+        raise WireError(_("an image is not base64"), len(frame)) from error
 
 
 def attach(socket: Socket, direct: Direct, *, is_publisher: bool) -> str:
@@ -272,7 +272,7 @@ class OriginalSubSocket(UnbatchedReader):
                 return None
             if len(parts) != 1:
                 self.refusals.add(
-                    _("a message of the original NEP has one part, this one has {count}").format(
+                    _("a message of the original NEP must have one part, but this one has {count}").format(
                         count=len(parts)
                     )
                 )

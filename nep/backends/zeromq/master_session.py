@@ -282,7 +282,7 @@ class MasterSession:
         reply = self._calls.ask(Look(), timeout_s)
         if not isinstance(reply, Seen):
             raise RequestRefusedError(
-                _("the master at '{address}' shows no graph").format(address=self.address)
+                _("the master at '{address}' did not reply with its graph").format(address=self.address)
             )
         return reply.view
 
@@ -451,7 +451,7 @@ class MasterSession:
             return
         was_known = self._clock.offset() is not None
         if len(answer.times) != 2:
-            self._calls.refusals.add(_("the times of a renewal are two"))
+            self._calls.refusals.add(_("a reply to a renewal must have two times"))
         elif self._clock.add(sent, *answer.times, self._read_at) and not was_known:
             self._renewal_timer.due_at = self._read_at.steady_ns / 1e9  # other nodes wait for it
 
@@ -476,7 +476,7 @@ class MasterSession:
             if len(clock_times) == 2 and is_clock(clock_times[0] // 2, clock_times[1] // 2)
         }
         if len(found) < len(answer.clocks):
-            self._calls.refusals.add(_("a clock differs as no clock can"))
+            self._calls.refusals.add(_("a reported clock difference is impossible"))
         return found
 
     def _update_clocks(self, clocks: Mapping[str, ClockDifference]) -> None:

@@ -155,10 +155,10 @@ class RpcClient:
         except WireError as error:
             self._reject(error)
             raise RequestRefusedError(
-                _("the master's answer cannot be read: {reason}").format(reason=error.reason)
+                _("the master's reply can't be read: {reason}").format(reason=error.reason)
             ) from error
         if isinstance(reply, Push):
-            raise RequestRefusedError(_("the master's answer is none"))
+            raise RequestRefusedError(_("the master's message is not a reply"))
         return reply
 
     def tell(self, request: Request, then: Then | None = None) -> None:

@@ -73,7 +73,7 @@ _DONTWAIT = int(zmq.DONTWAIT)  # plain ints: looking up pyzmq's enum members cos
 _EVENTS = int(zmq.EVENTS)
 _RCVMORE = int(zmq.RCVMORE)
 _POLLIN = int(zmq.POLLIN)
-_TOO_SHORT = lazy("a message has 3 or 4 parts, this one ends earlier")
+_TOO_SHORT = lazy("a message must have 3 or 4 parts, but this one is incomplete")
 
 
 class CarefulParser:
@@ -153,7 +153,9 @@ class CarefulParser:
             source.has_echoed = True
         if not is_possible:
             raise WireError(
-                _("its publisher's number leaps from {last} to {seq}").format(last=last, seq=header.seq),
+                _("the sequence number of its publisher jumps from {last} to {seq}").format(
+                    last=last, seq=header.seq
+                ),
                 code="seq-leap",
             )
 
@@ -171,7 +173,7 @@ class CarefulParser:
         if header.flags & SHARED:
             if self._shared is None:
                 raise WireError(
-                    _("its payload lies in shared memory, which nobody offered"), code="shared-memory"
+                    _("its payload is in shared memory that no publisher offered"), code="shared-memory"
                 )
             shared = self._shared.take(header.publisher, payload, may_copy=codec.name == "bytes")
             if shared is None:
@@ -203,7 +205,7 @@ class CarefulParser:
 
 
 def _other_topic() -> WireError:
-    return WireError(_("a message begins with something else than its topic"), code="first-part")
+    return WireError(_("a message does not begin with its topic"), code="first-part")
 
 
 class SubSocket:
@@ -271,7 +273,9 @@ class SubSocket:
             else:
                 other = endpoint.startswith("nanomsg://")
                 self._report_problem(
-                    source, endpoint, _("it is one of 'nanomsg'") if other else _("it is none")
+                    source,
+                    endpoint,
+                    _("it is an endpoint of 'nanomsg'") if other else _("it is not a valid endpoint"),
                 )
 
     def _disconnect_replaced(self, remote: RemotePublisher, endpoint: str) -> None:
@@ -314,7 +318,7 @@ class SubSocket:
         name = source.remote.node_name if source.remote is not None else ""
         shown = ascii(endpoint[:100])[1:-1]
         source.refused = endpoint
-        source.problem = _("the endpoint '{shown}' of '{name}' cannot be connected to: {why}").format(
+        source.problem = _("cannot connect to the endpoint '{shown}' of '{name}': {why}").format(
             shown=shown, name=name, why=why
         )
         if self.refusals.add(source.problem):
@@ -601,7 +605,7 @@ class SubSocket:
         if rest and bytes(rest[-1][: len(self._hello)]).startswith((self._topic, self._hello)):
             following = bytes(rest.pop())
             self.refusals.add(
-                _("a message has 3 or 4 parts, this one has {count}").format(count=len(rest) + 1)
+                _("a message must have 3 or 4 parts, but this one has {count}").format(count=len(rest) + 1)
             )
             return following, None
         more = self._has_more()

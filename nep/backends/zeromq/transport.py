@@ -261,7 +261,7 @@ class ZeromqTransport:
             reply = session.add_subscriber(record, subscriber, spec.wait_s)
             if spec.is_pattern and not reply.pattern:
                 raise NepError(
-                    _("the master at '{address}' is older and knows no wildcards; start a newer one").format(
+                    _("the master at '{address}' is too old to support wildcards; update it").format(
                         address=session.address
                     )
                 )
@@ -444,7 +444,9 @@ class ZeromqTransport:
     def graph(self, configuration: Configuration, timeout_s: float) -> GraphView:
         """Return the current graph. See `Transport.graph`."""
         if isinstance(configuration, Direct):
-            raise NepError(_("a direct connection has no master; ask with a hybrid one"))
+            raise NepError(
+                _("a direct connection has no master, so there is no graph; use a node with a master")
+            )
         with self._opening():
             return self._session(configuration.master).query_graph(timeout_s)
 

@@ -104,12 +104,12 @@ class Parameters:
         )
         with self._lock:
             if name in self._known:
-                raise ParameterError(name, shown(default), _("it is declared already; use 'set'"))
+                raise ParameterError(name, shown(default), _("it is already declared; use 'set'"))
             if len(self._known) >= _MAX_PARAMETERS:
                 raise ParameterError(
                     name,
                     shown(default),
-                    _("a node has {most} parameters at most").format(most=_MAX_PARAMETERS),
+                    _("a node can have at most {most} parameters").format(most=_MAX_PARAMETERS),
                 )
             if self._topic is None:
                 self._topic = self._host.open_parameters(place_of(self._host.id), self._handle_request)
@@ -172,7 +172,7 @@ class Parameters:
                 if after.value == before.value and type(after.value) is type(before.value):
                     continue
                 if before.is_read_only and not is_own:
-                    raise ParameterError(name, shown(value), _("only its node may set it"))
+                    raise ParameterError(name, shown(value), _("only its node can change it"))
                 changed[name] = after
             if not changed:
                 return
@@ -186,8 +186,8 @@ class Parameters:
     def _unknown_error(self, name: str) -> ParameterError:
         known = tuple(self._known)
         shown = escaped(bounded_str(name, 60))
-        hint = did_you_mean(shown, known) if known else _("there are none")
-        return ParameterError(shown, "", _("there is none; {said}").format(said=hint))
+        hint = did_you_mean(shown, known) if known else _("the node has no parameters")
+        return ParameterError(shown, "", _("it does not exist; {said}").format(said=hint))
 
     # ---- for others
 
@@ -203,7 +203,7 @@ class Parameters:
         # Runs in a thread of the server.
         values = request.get("set", {}) if isinstance(request, Mapping) else None
         if not isinstance(values, Mapping) or not all(isinstance(each, str) for each in values):
-            return {"refused": _("a call of parameters is a map; 'set' in it maps names to values")}
+            return {"refused": _("a call to the parameters must be a map; its 'set' maps names to values")}
         try:
             self._set(values, is_own=False)
         except Exception as error:  # noqa: BLE001 - an exception of a callback rejects the change

@@ -73,9 +73,9 @@ class NodeParameter:
         found = self._convert(value if self.form is None else self._plain(self.form, value))
         if isinstance(found, int | float) and not isinstance(found, bool):
             if self.minimum is not None and found < self.minimum:
-                raise self._error(value, _("the least is {least}").format(least=self.minimum))
+                raise self._error(value, _("the minimum is {least}").format(least=self.minimum))
             if self.maximum is not None and found > self.maximum:
-                raise self._error(value, _("the most is {most}").format(most=self.maximum))
+                raise self._error(value, _("the maximum is {most}").format(most=self.maximum))
         if self.choices and found not in self.choices:
             names = listed([shown(each) for each in self.choices], "or")
             raise self._error(value, _("use {choices}").format(choices=names))
@@ -113,7 +113,9 @@ class NodeParameter:
         if len(data) > _VALUE_MAX_BYTES:
             raise self._error(
                 value,
-                _("it has {size} bytes, {most} are allowed").format(size=len(data), most=_VALUE_MAX_BYTES),
+                _("it has {size} bytes; at most {most} are allowed").format(
+                    size=len(data), most=_VALUE_MAX_BYTES
+                ),
             )
         return cast("object", orjson.loads(data))
 
@@ -155,12 +157,14 @@ def declared(
         raise ParameterError(
             check_topic(name),
             shown(default),
-            _("its type is {kinds}").format(kinds=listed([f"'{each}'" for each in KINDS], "or")),
+            _("its type must be {kinds}").format(kinds=listed([f"'{each}'" for each in KINDS], "or")),
         )
     for each in (minimum, maximum):
         if each is not None and (word not in {"int", "float"} or not _is_finite(each)):
             raise ParameterError(
-                check_topic(name), shown(default), _("only numbers have limits, and finite ones")
+                check_topic(name),
+                shown(default),
+                _("only numbers can have limits, and the limits must be finite"),
             )
     bare = NodeParameter(check_topic(name), None, word, None, _clean_description(description), form=form)
     if len(choices) > _CHOICES_MAX:

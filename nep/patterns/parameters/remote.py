@@ -45,8 +45,8 @@ class RemoteParameters:
         """
         found = {bounded_str(each.get("name")): each for each in self.list()}
         if name not in found:
-            hint = did_you_mean(name, tuple(found)) if found else _("there are none")
-            raise NepError(_("no parameter '{name}'; {said}").format(name=escaped(name), said=hint))
+            hint = did_you_mean(name, tuple(found)) if found else _("the node has no parameters")
+            raise NepError(_("unknown parameter '{name}'; {said}").format(name=escaped(name), said=hint))
         return found[name].get("value")
 
     def set(self, name: str, value: object) -> None:
@@ -92,7 +92,7 @@ def node_with_parameters(graph: GraphView, name: str) -> str:
         return found[0]
     if found:
         raise NepError(
-            _("{count} nodes are called '{name}'; use an id: {ids}").format(
+            _("{count} nodes are named '{name}'; use an id: {ids}").format(
                 count=len(found), name=escaped(name), ids=", ".join(sorted(found))
             )
         )
@@ -100,4 +100,4 @@ def node_with_parameters(graph: GraphView, name: str) -> str:
         raise NepError(_("the node '{name}' has declared no parameters").format(name=escaped(name)))
     known = tuple(sorted(set(able.values())))
     hint = did_you_mean(name, known) if known else _("no node has parameters")
-    raise NepError(_("no node is called '{name}'; {said}").format(name=escaped(name), said=hint))
+    raise NepError(_("no node is named '{name}'; {said}").format(name=escaped(name), said=hint))

@@ -173,14 +173,14 @@ class Client:
         Raises `NepError` if the last reply was not read.
         """
         if self._sent is not None:
-            raise NepError(_("take the last answer first; use 'listen_info'"))
+            raise NepError(_("the previous reply has not been read; call 'listen_info' first"))
         self._sent = self.call_async(request)
 
     def listen_info(self) -> object:
         """Return the reply to `send_info`. Raises the exceptions of `call`."""
         sent, self._sent = self._sent, None
         if sent is None:
-            raise NepError(_("nothing was sent; call 'send_info' first"))
+            raise NepError(_("no request was sent; call 'send_info' first"))
         done = threading.Event()
         sent.add_done_callback(lambda _ended: done.set())
         while not done.wait(SLICE_S):
@@ -206,14 +206,16 @@ class Client:
         if outcome.kind == CallKind.ANSWER:
             codec = codec_numbered(outcome.codec)
             if codec is None:
-                reason = _("this version has no such codec; update nep")
+                reason = _("this version does not know the codec of the reply; update nep")
                 raise DecodeError(str(outcome.codec), len(outcome.data), reason)
             return self._types.answer.read(codec.decode(outcome.data, {}), len(outcome.data))
         name, reason = read_failure(outcome.data)
         if outcome.kind == CallKind.ERROR:
             raise ServiceError(self.service, name, reason)
         raise RequestRefusedError(
-            _("the server of '{service}' refused: {reason}").format(service=self.service, reason=reason)
+            _("the server of '{service}' rejected the call: {reason}").format(
+                service=self.service, reason=reason
+            )
         )
 
     def _with_known(self, error: NoServerError) -> NoServerError:

@@ -101,7 +101,7 @@ class ServiceRegistry:
             plain_function("callback", callback)
         at_least("threads", threads, 0)
         if threads and callback is None:
-            raise ValueError(_("threads need a callback to run; give one"))
+            raise ValueError(_("threads need a callback; give a callback"))
         transport = self._service_transport()
         id_, number = self._new_id()
         spec = ServerSpec(id_, service, configuration, self._wait_s, number, msg_type)
@@ -166,7 +166,7 @@ class ServiceRegistry:
     def _service_transport(self) -> ServiceTransport:
         if not hasattr(self._transport, "server"):
             raise NepError(
-                _("the back end '{backend}' has no services; use 'zeromq' for them").format(
+                _("the back end '{backend}' does not support services; use 'zeromq'").format(
                     backend=self._backend.name
                 )
             )
@@ -176,7 +176,7 @@ class ServiceRegistry:
         transport = self._service_transport()
         if not hasattr(transport, "survey"):
             raise NepError(
-                _("the back end '{backend}' has no surveys; use 'zeromq' for them").format(
+                _("the back end '{backend}' does not support surveys; use 'zeromq'").format(
                     backend=self._backend.name
                 )
             )
@@ -241,7 +241,7 @@ class ServiceRegistry:
 def codec_checked(codec: Codec) -> Codec:
     """Return a codec if calls can use it. Raises `NepError`."""
     if codec.name == "image":
-        raise NepError(_("a call cannot be a picture; publish it on a topic"))
+        raise NepError(_("a call can't carry an image; publish it on a topic"))
     if codec_numbered(codec.number) is not codec:  # a back end's codec without a number
-        raise NepError(_("'{name}' is no type for calls; use 'json' or 'msgpack'").format(name=codec.name))
+        raise NepError(_("'{name}' can't be used for calls; use 'json' or 'msgpack'").format(name=codec.name))
     return codec

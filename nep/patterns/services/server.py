@@ -135,7 +135,7 @@ class Server:
 
     def _execute(self, call: IncomingCall) -> None:
         if call.is_late:
-            call.answer(failure(CallKind.REFUSED, "", _("nobody waits for the answer any more")))
+            call.answer(failure(CallKind.REFUSED, "", _("the client no longer waits for the reply")))
             return
         try:
             request = self._decode_request(call)
@@ -174,14 +174,14 @@ class Server:
     def _decode_request(self, call: IncomingCall) -> object:
         codec = codec_numbered(call.codec)
         if codec is None:
-            reason = _("this version has no such codec; update nep")
+            reason = _("this version does not know the codec of the reply; update nep")
             raise DecodeError(str(call.codec), len(call.data), reason)
         return self._types.request.read(codec.decode(call.data, {}), len(call.data))
 
     def _encode_reply(self, answer: object, number: int) -> Reply:
         codec = codec_numbered(number)
         if codec is None:
-            reason = _("this version has no such codec; update nep")
+            reason = _("this version does not know the codec of the reply; update nep")
             raise EncodeError(str(number), type(answer).__name__, reason)
         answer_type = self._types.answer
         value = {} if answer is None and answer_type.is_any else answer
@@ -202,12 +202,13 @@ class Server:
         seconds("timeout_s", timeout_s)
         if self._callback is not None:
             raise NepError(
-                _("the callback of '{service}' answers; make a server without one").format(
-                    service=self.service
-                )
+                _(
+                    "the callback of '{service}' sends the replies; to use this function, create a server "
+                    "without a callback"
+                ).format(service=self.service)
             )
         if self._open_request is not None:
-            raise NepError(_("answer the last request first; use 'send_info'"))
+            raise NepError(_("the previous request has no reply yet; call 'send_info' first"))
         deadline = None if timeout_s is None else time.monotonic() + timeout_s
         while not self._transport.calls.is_closed:
             left = SLICE_S if deadline is None else min(SLICE_S, deadline - time.monotonic())
@@ -239,7 +240,7 @@ class Server:
         with self._open_request_lock:
             call = self._open_request
             if call is None:
-                raise NepError(_("there is no request to answer; call 'listen_info' first"))
+                raise NepError(_("no request to reply to; call 'listen_info' first"))
             reply = self._encode_reply(answer, call.codec)
             self._open_request = None
         call.answer(reply)

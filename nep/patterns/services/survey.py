@@ -151,7 +151,7 @@ class Surveyor:
                 raise NepError(f"{name}: {reason}" if name else reason)
             codec = codec_numbered(outcome.codec)
             if codec is None:
-                raise NepError(_("this version has no such codec; update nep"))
+                raise NepError(_("this version does not know the codec of the reply; update nep"))
             return self._types.answer.read(codec.decode(outcome.data, {}), len(outcome.data))
         except WaitTimeoutError:  # slow, but not a failure
             raise
@@ -172,7 +172,7 @@ class Surveyor:
     def listen_json(self) -> tuple[bool, object]:
         """Return (True, next answer), or (False, {}) after the time limit or the last answer."""
         if self._sent is None:
-            raise NepError(_("nothing was asked; call 'send_json' first"))
+            raise NepError(_("no request was sent; call 'send_json' first"))
         for answer in self._sent:
             return True, answer
         return False, {}

@@ -146,7 +146,7 @@ class Alarms:
         carrier = self._carriers.get(action.kind)
         self._running_count += 1
         if carrier is None:
-            self._results.put((event, action, MAX_TRIES, False, _("it can't be done here")))
+            self._results.put((event, action, MAX_TRIES, False, _("this action is not available here")))
             return
         done = partial(self._action_done, event, action, tries)
         try:

@@ -55,7 +55,7 @@ class AlarmCommands:
         except NepError as error:
             done(False, str(error))
             return
-        template = _("sent to {topic}") if has_subscribers else _("nobody hears {topic}")
+        template = _("sent to {topic}") if has_subscribers else _("{topic} has no subscribers")
         done(has_subscribers, template.format(topic=action.name))
 
     def close(self) -> None:
@@ -92,13 +92,13 @@ def _reply_handler(service: str, done: Done) -> Callable[[Future[object]], None]
     def on_reply(ended: Future[object]) -> None:
         error = None if ended.cancelled() else ended.exception()
         if isinstance(error, NoServerError):
-            done(False, _("nobody serves {service}").format(service=service))
+            done(False, _("{service} has no server").format(service=service))
         elif isinstance(error, WaitTimeoutError):
-            template = _("{service} did not answer within {seconds} s")
+            template = _("{service} did not reply within {seconds} s")
             done(False, template.format(service=service, seconds=number(CALL_S)))
         elif error is not None or ended.cancelled():
             done(False, _("{service}: {reason}").format(service=service, reason=str(error or "")))
         else:
-            done(True, _("{service} answered").format(service=service))
+            done(True, _("{service} replied").format(service=service))
 
     return on_reply

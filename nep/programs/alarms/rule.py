@@ -189,7 +189,7 @@ def problem_of(rule: AlarmRule) -> RuleProblem | None:
     _check_condition(rule.condition, check)
     check.number("calm_s", rule.calm_s, MIN_CALM_S, MAX_CALM_S)
     if len(rule.actions) > MAX_ACTIONS:
-        template = _("it has more than {most} actions; make two alarms of it")
+        template = _("it has more than {most} actions; split it into two alarms")
         check.found.append(RuleProblem("do", template.format(most=MAX_ACTIONS)))
     for action in rule.actions:
         _check_action(action, check)
@@ -199,7 +199,9 @@ def problem_of(rule: AlarmRule) -> RuleProblem | None:
 def _check_condition(condition: AlarmCondition, check: _Check) -> None:
     if not condition.name:
         key, template = (
-            ("node", _("no node is named")) if condition.is_about_node else ("topic", _("no topic is named"))
+            ("node", _("the node name is missing"))
+            if condition.is_about_node
+            else ("topic", _("the topic name is missing"))
         )
         check.found.append(RuleProblem(key, template))
         return
@@ -208,7 +210,7 @@ def _check_condition(condition: AlarmCondition, check: _Check) -> None:
     else:
         check.named("topic", check_topic, condition.name)
         if is_pattern(condition.name) and condition.kind != "appears":
-            template = _("it has wildcards, and only 'appears' may have them; name one topic")
+            template = _("it has wildcards, which only 'appears' allows; use the name of a topic")
             check.found.append(RuleProblem("topic", template))
     if condition.is_about_value:
         check.named("value", parse_path, condition.path)
@@ -225,7 +227,7 @@ def _check_limit(condition: AlarmCondition, check: _Check) -> None:
     elif condition.kind in NUMBER_KINDS:
         check.number("than", limit, -_MAX_NUMBER, _MAX_NUMBER)
     elif condition.kind in NEEDS_LIMIT and not _is_scalar(limit):
-        check.found.append(RuleProblem("than", _("it must be a number, a text, true, false or null")))
+        check.found.append(RuleProblem("than", _("it must be a number, a string, true, false or null")))
     check.number("margin", condition.margin, 0, _MAX_NUMBER)
 
 
@@ -240,7 +242,7 @@ def _check_time(condition: AlarmCondition, check: _Check) -> None:
 
 def _check_action(action: AlarmAction, check: _Check) -> None:
     if action.kind in NAMED_ACTIONS and not action.name:
-        check.found.append(RuleProblem(action.kind, _("it has no name")))
+        check.found.append(RuleProblem(action.kind, _("the name is missing")))
     elif action.kind == "call":
         check.named("call", check_service, action.name)
     elif action.kind == "send":

@@ -111,7 +111,7 @@ def read_alarms(path: Path) -> AlarmFile:
             data = file.read(_MAX_BYTES + 1)
     except (OSError, ValueError) as error:  # NUL in a file name raises ValueError
         reason = getattr(error, "strerror", None) or str(error)
-        template = _("'{path}' cannot be read: {reason}; 'nep watch --example' shows what a file looks like")
+        template = _("'{path}' cannot be read: {reason}; 'nep watch --example' prints an example")
         raise NepError(
             template.format(path=escaped(str(path)), reason=reason[:1].lower() + reason[1:])
         ) from error
@@ -131,18 +131,19 @@ def read_text(data: bytes, path: str, *, lenient: bool = False) -> AlarmFile:
     """
     path = escaped(path)
     if len(data) > _MAX_BYTES:
-        template = _("'{path}' is larger than {most} bytes, so it is no file of alarms; give another")
+        template = _("'{path}' is larger than {most} bytes, so it is not an alarm file; choose another file")
         raise NepError(template.format(path=path, most=_MAX_BYTES))
     try:
         text = data.decode("utf-8-sig")
     except UnicodeDecodeError as error:
         line = data[: error.start].count(b"\n") + 1
-        template = _("line {line} of '{path}' is no UTF-8; save it as UTF-8")
+        template = _("line {line} of '{path}' is not UTF-8; save the file as UTF-8")
         raise NepError(template.format(line=line, path=path)) from error
     fault = find_json_fault(text, allow_nan=True)
     if fault is not None:
         template = _(
-            "'{path}' is not valid JSON: line {line}, column {column}: {reason}; see 'nep watch --example'"
+            "'{path}' is not valid JSON: line {line}, column {column}: {reason}; 'nep watch --example' "
+            "prints an example"
         )
         raise NepError(template.format(path=path, line=fault.line, column=fault.column, reason=fault.reason))
     return _Reader(path, text, lenient=lenient).file(json.loads(text))
@@ -220,7 +221,11 @@ class _Reader:
             try:
                 rule = self._rule(each, index)
                 if rule.id in ids:
-                    self._fail("id", _("another alarm has it, too; give each its own, or none"), index)
+                    self._fail(
+                        "id",
+                        _("another alarm already has this id; give each alarm its own id, or none"),
+                        index,
+                    )
             except _InvalidAlarm as wrong:
                 if not self._lenient:
                     raise NepError(str(wrong)) from None
@@ -232,19 +237,20 @@ class _Reader:
 
     def _root(self, value: object) -> list[object]:
         if not isinstance(value, dict):
-            self._fail("", _('it is no file of alarms; it begins with {"format": 1, "alarms": ['))
+            self._fail("", _('it is not an alarm file; it must begin with {"format": 1, "alarms": ['))
         version = value.get("format", FORMAT)
         if not isinstance(version, int) or isinstance(version, bool) or version < 1:
             self._fail("format", _("it must be {format}").format(format=FORMAT))
         if version > FORMAT:
             template = _(
-                "'{path}' is of a newer version of nep (format {found}, known is {format}); update nep"
+                "'{path}' was written by a newer version of nep (format {found}; this version reads "
+                "{format}); update nep"
             )
             raise NewerAlarmsError(template.format(path=self._path, found=version, format=FORMAT))
         self._check_keys(value, _ROOT_KEYS, None)
         alarms = value.get("alarms")
         if not isinstance(alarms, list):
-            self._fail("alarms", _('no alarms are in it; write "alarms": [...]'))
+            self._fail("alarms", _('the list of alarms is missing; write "alarms": [...]'))
         if len(alarms) > MOST_ALARMS:
             self._fail("alarms", _("there are more than {most} alarms").format(most=MOST_ALARMS))
         return alarms
@@ -256,20 +262,20 @@ class _Reader:
 
     def _rule(self, entry: object, index: int) -> AlarmRule:
         if not isinstance(entry, dict):
-            self._fail("", _('it is no alarm; write {"when": {...}, "do": [...]}'), index)
+            self._fail("", _('it is not an alarm; write {"when": {...}, "do": [...]}'), index)
         self._check_keys(entry, _RULE_KEYS, index)
         when = entry.get("when")
         if not isinstance(when, dict):
-            self._fail("when", _('it does not say when; write "when": {"topic": ..., "is": ...}'), index)
+            self._fail("when", _('the condition is missing; write "when": {"topic": ..., "is": ...}'), index)
         do = entry.get("do", [])
         if not isinstance(do, list):
-            self._fail("do", _("it must be a list of what is done"), index)
+            self._fail("do", _("it must be a list of actions"), index)
         is_on = entry.get("on", True)
         if not isinstance(is_on, bool):
             self._fail("on", _("it must be true or false"), index)
         rule_id = entry.get("id") or new_id()
         if not isinstance(rule_id, str) or len(rule_id) > 64:
-            self._fail("id", _("it must be a short text"), index)
+            self._fail("id", _("it must be a short string"), index)
         rule = AlarmRule(
             rule_id,
             self._condition(when, index),
@@ -288,22 +294,22 @@ class _Reader:
         kind = when.get("is")
         if not isinstance(kind, str) or kind not in KINDS:
             if kind is None:
-                self._fail("when", _('it does not say what; write "is": "silent"'), index)
-            template = _("there is no '{kind}'; {did_you_mean}")
+                self._fail("when", _('the condition is missing; write "is": "silent"'), index)
+            template = _("unknown condition '{kind}'; {did_you_mean}")
             shown = quotable(str(kind))
             self._fail("is", template.format(kind=shown, did_you_mean=did_you_mean(shown, KINDS)), index)
         subject = "node" if kind in NODE_KINDS else "topic"
         other = "topic" if kind in NODE_KINDS else "node"
         if other in when:
-            template = _("'{kind}' is about a {subject}; write \"{subject}\": ...")
+            template = _("'{kind}' needs a {subject}; write \"{subject}\": ...")
             self._fail(other, template.format(kind=kind, subject=subject), index)
         name, path = when.get(subject, ""), when.get("value", "")
         if not isinstance(name, str) or not isinstance(path, str):
-            self._fail(subject if not isinstance(name, str) else "value", _("it must be a text"), index)
+            self._fail(subject if not isinstance(name, str) else "value", _("it must be a string"), index)
         if path and kind not in VALUE_KINDS:
-            self._fail("value", _("'{kind}' is about no value; leave it out").format(kind=kind), index)
+            self._fail("value", _("'{kind}' does not use a value; remove the value").format(kind=kind), index)
         if kind in NEEDS_LIMIT and "than" not in when:
-            self._fail("is", _('it does not say how much; write "than": ...'), index)
+            self._fail("is", _('the limit is missing; write "than": ...'), index)
         return AlarmCondition(
             kind,
             name,
@@ -317,7 +323,7 @@ class _Reader:
         if isinstance(entry, str):
             if entry not in _SIMPLE_ACTIONS:
                 known = [*_SIMPLE_ACTIONS, *(kind for kind in ACTION_KINDS if kind not in _SIMPLE_ACTIONS)]
-                template = _("there is no action '{kind}'; {did_you_mean}")
+                template = _("unknown action '{kind}'; {did_you_mean}")
                 shown = quotable(entry)
                 self._fail("do", template.format(kind=shown, did_you_mean=did_you_mean(shown, known)), index)
             return AlarmAction(entry)
@@ -334,13 +340,13 @@ class _Reader:
             return AlarmAction("keep", seconds=self._number(entry, "keep_s", 60.0, index))
         name, msg_type = entry[kind], entry.get("type", "json")
         if not isinstance(name, str) or not isinstance(msg_type, str) or not msg_type:
-            self._fail(kind if not isinstance(name, str) else "type", _("it must be a text"), index)
+            self._fail(kind if not isinstance(name, str) else "type", _("it must be a string"), index)
         payload = entry.get("message" if kind == "send" else "with", {} if kind == "call" else None)
         return AlarmAction(kind, name, payload, msg_type)
 
     def _scalar(self, value: object, index: int) -> Scalar:
         if value is not None and not isinstance(value, str | int | float):
-            self._fail("than", _("it must be a number, a text, true, false or null"), index)
+            self._fail("than", _("it must be a number, a string, true, false or null"), index)
         return value
 
     def _number(self, table: Mapping[str, object], key: str, default: float, index: int) -> float:
@@ -352,7 +358,7 @@ class _Reader:
     def _check_keys(self, table: Mapping[str, object], known: Sequence[str], index: int | None) -> None:
         for key in table:
             if key not in known:
-                template = _("there is no '{key}' here; {did_you_mean}")
+                template = _("unknown key '{key}'; {did_you_mean}")
                 shown = quotable(key)
                 self._fail(key, template.format(key=shown, did_you_mean=did_you_mean(shown, known)), index)
 

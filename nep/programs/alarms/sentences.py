@@ -22,21 +22,21 @@ __all__ = [
 ]
 
 _MAX_SHOWN_CHARACTERS = 40
-_DO_NOTHING = lazy("say it in the list of alarms")
+_DO_NOTHING = lazy("add it to the alarm list")
 
 _CONDITIONS: Mapping[str, str] = {
     "silent": lazy("{subject} is silent for {time}"),
     "rate_below": lazy("{subject} has fewer than {limit}"),
     "rate_above": lazy("{subject} has more than {limit}"),
-    "loses": lazy("{subject} loses more than {limit} in {time}"),
-    "appears": lazy("a topic {subject} appears"),
+    "loses": lazy("{subject} loses more than {limit} of its messages in {time}"),
+    "appears": lazy("{subject} appears"),
     "below": lazy("{subject} is below {limit}"),
     "above": lazy("{subject} is above {limit}"),
     "equals": lazy("{subject} is {limit}"),
     "is_not": lazy("{subject} is not {limit}"),
     "changes": lazy("{subject} changes"),
-    "leaves": lazy("{subject} leaves"),
-    "comes": lazy("{subject} comes"),
+    "leaves": lazy("{subject} disconnects"),
+    "comes": lazy("{subject} connects"),
 }
 _LASTING_CONDITIONS: Mapping[str, str] = {
     "rate_below": lazy("{subject} has fewer than {limit} for {time}"),
@@ -45,26 +45,26 @@ _LASTING_CONDITIONS: Mapping[str, str] = {
     "above": lazy("{subject} is above {limit} for {time}"),
     "equals": lazy("{subject} is {limit} for {time}"),
     "is_not": lazy("{subject} is not {limit} for {time}"),
-    "leaves": lazy("{subject} is away for {time}"),
+    "leaves": lazy("{subject} is disconnected for {time}"),
 }
 _EVENTS: Mapping[str, str] = {
     "silent": lazy("{subject} is silent"),
     "rate_below": lazy("{subject} has {seen}, fewer than {limit}"),
     "rate_above": lazy("{subject} has {seen}, more than {limit}"),
-    "loses": lazy("{subject} loses {seen}"),
+    "loses": lazy("{subject} loses {seen} of its messages"),
     "appears": lazy("the topic {seen} has appeared"),
     "below": lazy("{subject} is {seen}, below {limit}"),
     "above": lazy("{subject} is {seen}, above {limit}"),
     "equals": lazy("{subject} is {seen}"),
     "is_not": lazy("{subject} is {seen}, not {limit}"),
-    "changes": lazy("{subject} has changed to {seen}"),
-    "leaves": lazy("{subject} has left"),
-    "comes": lazy("{subject} has come"),
+    "changes": lazy("{subject} changed to {seen}"),
+    "leaves": lazy("{subject} disconnected"),
+    "comes": lazy("{subject} connected"),
 }
 _ACTIONS: Mapping[str, str] = {
     "banner": lazy("show a banner"),
     "sound": lazy("play a sound"),
-    "keep": lazy("keep the last {time}"),
+    "keep": lazy("save the last {time}"),
     "run": lazy("run “{name}”"),
     "call": lazy("call {name}"),
     "send": lazy("send to {name}"),
@@ -97,7 +97,7 @@ def value_words(value: object) -> str:
 def limit_words(condition: AlarmCondition, value: Scalar) -> str:
     """Format a limit or value with the unit of the condition."""
     if condition.kind in {"rate_below", "rate_above"} and isinstance(value, int | float):
-        return _("{count} messages a second").format(count=number(value, ".4g"))
+        return _("{count} messages per second").format(count=number(value, ".4g"))
     if condition.kind == "loses" and isinstance(value, int | float):
         return _("{count} %").format(count=number(value, ".3g"))
     return value_words(value)

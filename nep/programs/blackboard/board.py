@@ -190,7 +190,7 @@ class Blackboard:
         """
         node = self._node
         if node is None:
-            raise NepError(_("this blackboard has no node; make it with 'nep.Blackboard(node)'"))
+            raise NepError(_("this blackboard has no node; create it with 'nep.Blackboard(node)'"))
         lives = _lifetime(lives_s)
         watch = BlackboardWatch(
             topic,
@@ -574,7 +574,7 @@ def _copied_value(key: Key, value: object) -> object:
     try:
         return copied(value)
     except (ValueError, RecursionError) as error:
-        raise BadValueError(key_text(key), _("it is too deep, or holds itself")) from error
+        raise BadValueError(key_text(key), _("it contains itself, or has too many levels")) from error
 
 
 def _public(entry: StoredEntry, now: float) -> BlackboardEntry:

@@ -131,7 +131,7 @@ class Entries:
         Entries above and below its key are replaced. Raises `BadValueError` if it exceeds the memory limit.
         """
         if entry.bytes > self._max_bytes:
-            template = _("it takes {size} bytes, and there is room for {most}")
+            template = _("it needs {size} bytes, but at most {most} are allowed")
             raise BadValueError(key_text(entry.key), template.format(size=entry.bytes, most=self._max_bytes))
         before = self.get(entry.key)
         if entry.expires <= now or (before is not None and _is_newer(before, entry, now)):

@@ -34,22 +34,22 @@ def parse_key(key: str | Sequence[str]) -> Key:
     elif isinstance(key, tuple) and all(isinstance(each, str) for each in key):
         names = key
     else:
-        raise BadKeyError(str(type(key).__name__), _("give a text such as 'human.1.position'"))
+        raise BadKeyError(str(type(key).__name__), _("give a string such as 'human.1.position'"))
     if not names or names == ("",):
         raise BadKeyError("", _("it is empty; give a name such as 'human.1.position'"))
     if len(names) > MAX_LEVELS:
-        raise BadKeyError(key_text(names), _("use {most} names at most").format(most=MAX_LEVELS))
+        raise BadKeyError(key_text(names), _("use at most {most} names").format(most=MAX_LEVELS))
     if sum(map(len, names)) > _MAX_CHARACTERS:
         raise _too_long(key_text(names))
     try:
         "".join(names).encode()
     except UnicodeEncodeError:
-        raise BadKeyError(key_text(names), _("it holds half of a surrogate pair")) from None
+        raise BadKeyError(key_text(names), _("it contains an unpaired surrogate")) from None
     return names
 
 
 def _too_long(key: str) -> BadKeyError:
-    return BadKeyError(key, _("use {most} letters at most").format(most=_MAX_CHARACTERS))
+    return BadKeyError(key, _("use at most {most} characters").format(most=_MAX_CHARACTERS))
 
 
 def _names(text: str) -> Key:
@@ -57,7 +57,7 @@ def _names(text: str) -> Key:
     while True:
         match = _NAME.match(text, at)
         if match is None:  # unreachable: the pattern matches the empty text
-            raise BadKeyError(text, _("give a text such as 'human.1.position'"))
+            raise BadKeyError(text, _("give a string such as 'human.1.position'"))
         found.append(_ESCAPE.sub(r"\1", match[1]))
         if not text[match.end(1) :]:
             return tuple(found)

@@ -95,7 +95,7 @@ class BlackboardServer:
         else:
             given = fields.get("values")
             if not isinstance(given, Mapping) or not given:
-                raise NepError(_("nothing is to be set; give 'key' and 'value', or a map 'values'"))
+                raise NepError(_("the values are missing; give 'key' and 'value', or a map 'values'"))
             values = given
         for key, value in values.items():
             self._board.put(key if isinstance(key, str) else bounded_str(key), value, lives_s=lives_s)
@@ -122,7 +122,9 @@ class BlackboardServer:
 def _request(request: object) -> Mapping[object, object]:
     if not isinstance(request, Mapping):
         raise NepError(
-            _("a blackboard is asked with a map, such as {example}").format(example='{"key": "human.1"}')
+            _("a request to a blackboard must be a map, such as {example}").format(
+                example='{"key": "human.1"}'
+            )
         )
     return request
 
@@ -130,7 +132,7 @@ def _request(request: object) -> Mapping[object, object]:
 def _text(fields: Mapping[object, object], field: str, default: str | None = None) -> str:
     value = fields.get(field, default)
     if not isinstance(value, str):
-        raise BadKeyError(bounded_str(value), _("give a text such as 'human.1.position'"))
+        raise BadKeyError(bounded_str(value), _("give a string such as 'human.1.position'"))
     return value
 
 

@@ -144,7 +144,9 @@ def checked_name(name: str) -> str:
     check_node_name(f"{NODE_PREFIX}{name}")
     if not name or len(name) > _MAX_NAME_LENGTH:
         raise NepError(
-            _("a bridge's name has 1 to {most} letters; choose another").format(most=_MAX_NAME_LENGTH)
+            _("a bridge's name must have 1 to {most} characters; choose another").format(
+                most=_MAX_NAME_LENGTH
+            )
         )
     return name
 
@@ -156,7 +158,7 @@ def side_of(backend: str, master: str = "", network: str = "") -> SideConfigurat
         place = found.master(master or None)
     except ValueError as error:  # also invalid numbers
         raise NepError(
-            _("'{master}' is no place where nodes of '{backend}' meet; see docs/backends.md").format(
+            _("'{master}' is not a valid master address for '{backend}'; see docs/backends.md").format(
                 master=master, backend=found.name
             )
         ) from error
@@ -177,16 +179,16 @@ def checked_topic_names(a: str, b: str) -> None:
         found = _WILDCARD.findall(name)
         if len(found) > 1:
             raise NepError(
-                _("'{name}' has {count} wildcards; use one '*', or '**' to match slashes, too").format(
+                _("'{name}' has {count} wildcards; use a single '*', or '**' to match slashes, too").format(
                     name=name, count=len(found)
                 )
             )
         wildcards.append("".join(found))
     if wildcards[0] != wildcards[1]:
         raise NepError(
-            _("'{a}' and '{b}' do not go together; use the same '*' or '**' in both, or in none").format(
-                a=a, b=b
-            )
+            _(
+                "'{a}' and '{b}' have different wildcards; use the same '*' or '**' in both, or in neither"
+            ).format(a=a, b=b)
         )
 
 
@@ -194,7 +196,7 @@ def direction_named(name: str) -> Direction:
     """Return the direction with this name. Raises `NepError`."""
     if name not in DIRECTIONS:
         raise NepError(
-            _("'{name}' is no direction; {did_you_mean}").format(
+            _("'{name}' is not a direction; {did_you_mean}").format(
                 name=quotable(name), did_you_mean=did_you_mean(name, tuple(DIRECTIONS))
             )
         )
@@ -211,7 +213,7 @@ def join_line(
     (a_side, a_topic), (b_side, b_topic) = _side_and_topic(a), _side_and_topic(b)
     a_topic, b_topic = a_topic or b_topic, b_topic or a_topic
     if not a_topic:
-        raise NepError(_("no topic is named; write it as 'zeromq:/topic ros:/topic'"))
+        raise NepError(_("the topic name is missing; write it as 'zeromq:/topic ros:/topic'"))
     checked_topic_names(a_topic, b_topic)
     check_apart(a_side, b_side)
     topic = BridgeTopic(TopicEnd(a_topic), TopicEnd(b_topic), direction_named(direction), max_rate_hz)
@@ -238,7 +240,8 @@ def _side_and_topic(word: str) -> tuple[SideConfiguration, str]:
     if not colon or not backend:
         raise NepError(
             _(
-                "'{word}' is no BACKEND:TOPIC; write it as 'zeromq:/topic' or 'zeromq@HOST:7780:/topic'"
+                "'{word}' is not in the form BACKEND:TOPIC; write it as 'zeromq:/topic' or "
+                "'zeromq@HOST:7780:/topic'"
             ).format(word=quotable(word))
         )
     return side_of(backend, master), topic

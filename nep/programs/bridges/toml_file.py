@@ -93,13 +93,13 @@ def read_configuration(path: Path) -> BridgeConfiguration:
     except (OSError, ValueError) as error:  # NUL in a file name raises ValueError
         reason = getattr(error, "strerror", None) or str(error)
         raise NepError(
-            _(
-                "'{path}' cannot be read: {reason}; 'nep bridge --example' shows what a file looks like"
-            ).format(path=shown, reason=reason[:1].lower() + reason[1:])
+            _("'{path}' cannot be read: {reason}; 'nep bridge --example' prints an example").format(
+                path=shown, reason=reason[:1].lower() + reason[1:]
+            )
         ) from error
     if len(data) > _MAX_BYTES:
         raise NepError(
-            _("'{path}' is larger than {most} bytes, so it is no file of a bridge; give another").format(
+            _("'{path}' is larger than {most} bytes, so it is not a bridge file; choose another file").format(
                 path=shown, most=_MAX_BYTES
             )
         )
@@ -108,7 +108,7 @@ def read_configuration(path: Path) -> BridgeConfiguration:
     except UnicodeDecodeError as error:
         line = data[: error.start].count(b"\n") + 1
         raise NepError(
-            _("line {line} of '{path}' is no UTF-8; save it as UTF-8").format(line=line, path=shown)
+            _("line {line} of '{path}' is not UTF-8; save the file as UTF-8").format(line=line, path=shown)
         ) from error
     return read_text(text, shown, path.stem)
 
@@ -130,7 +130,7 @@ def _toml_sentence(path: str, text: str, said: str) -> str:
     line = int(at.group(1)) if at and at.group(1) else text.count("\n") + 1
     reason = escaped(shortened(_TOML_POSITION.sub("", said).strip(), _MAX_REASON_LENGTH))
     return _(
-        "line {line} of '{path}' is no TOML: {reason}; 'nep bridge --example' shows what a file looks like"
+        "line {line} of '{path}' is not valid TOML: {reason}; 'nep bridge --example' prints an example"
     ).format(line=line, path=path, reason=reason[:1].lower() + reason[1:])
 
 
@@ -152,9 +152,11 @@ class _Reader:
         self._checked(lambda: check_apart(a, b), "b", "")
         topics = table.get("topics")
         if not isinstance(topics, list) or not topics or not all(isinstance(each, dict) for each in topics):
-            self._fail("topics", "", _('no topic is named; write [[topics]] and a = "/a/topic" below it'))
+            self._fail("topics", "", _('no topics are listed; write [[topics]] and a = "/a/topic" below it'))
         if len(topics) > _MAX_TOPICS:
-            self._fail("topics", "", _("there are more than {most}; use patterns").format(most=_MAX_TOPICS))
+            self._fail(
+                "topics", "", _("there are more than {most} topics; use patterns").format(most=_MAX_TOPICS)
+            )
         found = tuple(self._topic(each, number, a, b) for number, each in enumerate(topics))
         self._check_once(found)
         return BridgeConfiguration(name, a, b, found)
@@ -172,14 +174,14 @@ class _Reader:
         self._check_keys(section, _SIDE_KEYS, side)
         backend = self._text(section, "backend", side)
         if not backend:
-            self._fail("backend", side, _('no back end is named; write backend = "zeromq"'))
+            self._fail("backend", side, _('the back end is missing; write backend = "zeromq"'))
         self._checked(lambda: backend_named(backend), "backend", side)
         master, network = (self._text(section, key, side) for key in ("master", "network"))
         if len(network) > _MAX_NETWORK_LENGTH:
             self._fail(
                 "network",
                 side,
-                _("it has more than {most} letters; shorten it").format(most=_MAX_NETWORK_LENGTH),
+                _("it has more than {most} characters; shorten it").format(most=_MAX_NETWORK_LENGTH),
             )
         return self._checked(lambda: side_of(backend, master, network), "master", side)
 
@@ -190,7 +192,7 @@ class _Reader:
         on_a, on_b = (self._text(section, side, "topics", number) for side in SIDES)
         on_a, on_b = on_a or on_b, on_b or on_a
         if not on_a:
-            self._fail("a", "topics", _('the topic has no name; write a = "/a/topic"'), number)
+            self._fail("a", "topics", _('the topic name is missing; write a = "/a/topic"'), number)
         key = "b" if section.get("b") else "a"
         self._checked(lambda: checked_topic_names(on_a, on_b), key, "topics", number)
         direction = self._text(section, "direction", "topics", number, default="both")
@@ -218,7 +220,7 @@ class _Reader:
             self._fail(
                 key,
                 "topics",
-                _("the back end '{name}' has no qualities of service; leave it out").format(
+                _("the back end '{name}' does not support quality of service; remove this line").format(
                     name=backend.name
                 ),
                 number,
@@ -227,7 +229,7 @@ class _Reader:
             self._fail(
                 key,
                 "topics",
-                _("there is no quality '{word}'; {did_you_mean}").format(
+                _("unknown quality of service '{word}'; {did_you_mean}").format(
                     word=_shown(word), did_you_mean=did_you_mean(word, backend.qos)
                 ),
                 number,
@@ -243,7 +245,7 @@ class _Reader:
             self._fail(
                 "max_rate_hz",
                 "topics",
-                _("it is no number from 0.000001 to 1000000; write one such as 10, or leave it out"),
+                _("it is not a number from 0.000001 to 1000000; use a number such as 10, or leave it out"),
                 number,
             )
         return float(value)
@@ -258,7 +260,7 @@ class _Reader:
                     self._fail(
                         "a",
                         "topics",
-                        _("'{topic}' goes that way already; leave one of the two out").format(
+                        _("'{topic}' is already forwarded in that direction; remove one of the two").format(
                             topic=_shown(topic.end(side).name)
                         ),
                         number,
@@ -272,7 +274,7 @@ class _Reader:
     ) -> None:
         for key in table:
             if key not in known:
-                said = _("there is no such key; {did_you_mean}")
+                said = _("unknown key; {did_you_mean}")
                 self._fail(key, where, said.format(did_you_mean=did_you_mean(key, known)), number)
 
     def _text(
@@ -280,7 +282,7 @@ class _Reader:
     ) -> str:
         value = table.get(key, default)
         if not isinstance(value, str):
-            self._fail(key, where, _("it is no text; put it into quotes"), number)
+            self._fail(key, where, _("it is not a string; put it in quotes"), number)
         return value
 
     def _checked(self, check: Callable[[], _CHECKED], key: str, where: str, number: int = 0) -> _CHECKED:

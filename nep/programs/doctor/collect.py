@@ -48,10 +48,10 @@ else:
 __all__ = ["PORTS", "collect_facts", "collect_in_steps", "loopback_problem", "start_obstacle"]
 
 PORTS: Mapping[int, str] = {
-    7000: lazy("where programs of nep up to 0.5.4.5, nep-js and C# ask"),
-    50000: lazy("where programs of nep 0.5.4.8 ask"),
-    7777: lazy("where tools of the original NEP hear of topics"),
-    12345: lazy("where original nodes are told to end"),
+    7000: lazy("which programs of nep up to 0.5.4.5, nep-js and C# connect to"),
+    50000: lazy("which programs of nep 0.5.4.8 connect to"),
+    7777: lazy("from which tools of the original NEP read the topics"),
+    12345: lazy("which shuts down programs of the original NEP"),
 }
 _GRAPH_TIMEOUT_S = 1.0
 _MAX_CLOCK_AHEAD_S = 0.5
@@ -87,7 +87,7 @@ def collect_in_steps(
     yield ("clock", "versions"), facts
     facts = replace(facts, loopback=loopback_problem())
     yield ("loopback",), facts
-    state = (_("The ports of original programs"), default_file(0).parent)
+    state = (_("Ports of programs of the original NEP"), default_file(0).parent)
     facts = replace(facts, folders=tuple(_folder(purpose, path) for purpose, path in (state, *folders)))
     yield ("folders",), facts
     facts = replace(

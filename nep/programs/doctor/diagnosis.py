@@ -62,11 +62,12 @@ def _packages(facts: Facts) -> Iterator[Finding]:
             "package:nep",
             "error",
             _(
-                "The original package nep {version} is installed beside NEP Studio; both are called “nep”."
+                "The original package nep {version} is installed together with NEP Studio; both packages "
+                "are named “nep”."
             ).format(version=each.version),
             _(
-                "Take it out and put NEP Studio back; give programs of the original a Python "
-                "environment of their own."
+                "Uninstall it and reinstall NEP Studio. Use a separate Python environment for programs of "
+                "the original NEP."
             ),
             command="pip uninstall -y nep && pip install --force-reinstall --no-deps nep-studio",
         )
@@ -74,24 +75,24 @@ def _packages(facts: Facts) -> Iterator[Finding]:
         yield Finding(
             "package:files",
             "error",
-            _("Files of the original NEP lie in {folder}: {names}.").format(
+            _("The folder {folder} contains files of the original NEP: {names}.").format(
                 folder=facts.nep_file, names=", ".join(facts.strange_files)
             ),
-            _("Install NEP Studio anew."),
+            _("Reinstall NEP Studio."),
             command="pip install --force-reinstall --no-deps nep-studio",
         )
     if facts.shadow:
         yield Finding(
             "package:shadow",
             "warning",
-            _("{file} hides the package “nep” from programs that are started in this folder.").format(
+            _("{file} hides the package “nep” from programs that start in this folder.").format(
                 file=facts.shadow
             ),
-            _("Give that file another name."),
+            _("Rename that file."),
         )
     if not originals and not facts.strange_files:
         yield Finding(
-            "package", "ok", _("“import nep” gives the one in {folder}.").format(folder=facts.nep_file)
+            "package", "ok", _("“import nep” uses the package in {folder}.").format(folder=facts.nep_file)
         )
     yield from _python_namesake(facts)
     if facts.node_packages:
@@ -107,8 +108,8 @@ def _python_namesake(facts: Facts) -> Iterator[Finding]:
                 version=facts.path_package.version, folder=facts.path_package.place
             ),
             _(
-                "Programs of the original NEP need it and connect through the gateway. Start other programs "
-                "with the Python of NEP Studio."
+                "Programs of the original NEP need this package and connect through the gateway. Start "
+                "other programs with the Python of NEP Studio."
             ),
         )
 
@@ -129,18 +130,18 @@ def _node_package(packages: Sequence[PackageFact]) -> Finding:
             "package:nep-js",
             "warning",
             _(
-                "JavaScript programs in this folder import nep-js {version} of another project from "
-                "{folder}, which hides NEP Studio's in {hidden}."
+                "JavaScript programs in this folder import another project's nep-js {version} from "
+                "{folder} instead of NEP Studio's in {hidden}."
             ).format(version=imported.version, folder=imported.place, hidden=ours.place),
-            _("Uninstall the other package, or start programs of the original NEP in a folder of their own."),
+            _("Uninstall the other package, or keep programs of the original NEP in a separate folder."),
             command=f'npm uninstall --prefix "{Path(imported.place).parent.parent}" nep-js',
         )
     return Finding(
         "package:nep-js",
         "info",
         _(
-            "JavaScript programs in this folder import nep-js {version} from {folder}, which is not NEP "
-            "Studio's."
+            "JavaScript programs in this folder import nep-js {version} from {folder}, which is not "
+            "part of NEP Studio."
         ).format(version=imported.version, folder=imported.place),
         _(
             "Programs of the original NEP connect through the gateway. For other programs, install the file "
@@ -155,23 +156,24 @@ def _files(facts: Facts) -> Iterator[Finding]:
         yield Finding(
             "files",
             "warning",
-            _("A program may open {files} files only; that is enough for about {topics} topics.").format(
+            _("The open-file limit is {files}, enough for about {topics} topics.").format(
                 files=files.soft, topics=files.soft // _FILES_PER_TOPIC
             ),
-            _("Allow more in the terminal from which you start programs."),
+            _("Raise the limit in the terminal from which you start programs."),
             command=f"ulimit -n {min(8192, files.hard or 8192)}",
         )
     elif files.soft is not None:
-        yield Finding("files", "ok", _("A program may open {files} files.").format(files=files.soft))
+        yield Finding("files", "ok", _("Open-file limit: {files}.").format(files=files.soft))
     opened, limit = files.master_open, files.master_limit
     if opened is not None and limit is not None and opened > FILES_WARNING_RATIO * limit:
         yield Finding(
             "files:master",
             "warning",
-            _("The master has {opened} of at most {limit} files open; soon nobody else can join.").format(
-                opened=opened, limit=limit
-            ),
-            _("End the master and start it from a terminal that allows more."),
+            _(
+                "The master has {opened} of at most {limit} files open. At the limit, no more programs can "
+                "connect."
+            ).format(opened=opened, limit=limit),
+            _("Stop the master and start it from a terminal with a higher limit."),
             command="ulimit -n 8192 && nep master",
         )
 
@@ -183,10 +185,10 @@ def _programs(facts: Facts) -> Iterator[Finding]:
                 f"files:{program.pid}",
                 "warning",
                 _(
-                    "The program of “{name}” has {opened} of at most {limit} files open; soon it can "
-                    "make no publisher or subscriber, and nobody can connect to it."
+                    "The program of “{name}” has {opened} of at most {limit} files open. At the limit, it "
+                    "can't create publishers or subscribers, and other programs can't connect to it."
                 ).format(name=program.name, opened=program.opened, limit=program.limit),
-                _("Let it close what it no longer needs, or start it from a terminal that allows more."),
+                _("Close what the program no longer needs, or start it from a terminal with a higher limit."),
                 command="ulimit -n 8192",
             )
 
@@ -199,7 +201,7 @@ def _folders(facts: Facts) -> Iterator[Finding]:
             yield Finding(
                 f"folder:{folder.path}",
                 "ok",
-                _("{purpose} can be kept in {path}.").format(purpose=folder.purpose, path=folder.path),
+                _("{purpose} can be saved in {path}.").format(purpose=folder.purpose, path=folder.path),
             )
 
 
@@ -207,10 +209,10 @@ def _folder_problem(folder: FolderFact) -> Finding:
     return Finding(
         f"folder:{folder.path}",
         "error",
-        _("{purpose} can't be kept in {path}: {problem}.").format(
+        _("{purpose} can't be saved in {path}: {problem}.").format(
             purpose=folder.purpose, path=folder.path, problem=folder.problem
         ),
-        _("Make the folder yours and writable, or make room on the disk."),
+        _("Check that you own the folder and can write to it, and that the disk has free space."),
     )
 
 
@@ -219,8 +221,8 @@ def _clock(facts: Facts) -> Iterator[Finding]:
         yield Finding(
             "clock",
             "warning",
-            _("The clock of this computer is wrong: it says that 2024 has not begun."),
-            _("Set it, so that ages of messages are right."),
+            _("The clock of this computer is wrong: it shows a date before 2024."),
+            _("Set the clock: message ages depend on it."),
         )
 
 

@@ -113,7 +113,7 @@ def _publisher(view: GraphView, each: PublisherInfo, address: str, tried: dict[s
         if any(server.node_id == each.node_id for server in service.servers)
     ]
     return PublisherFact(
-        node.name if node is not None else _("a program that has left"),
+        node.name if node is not None else _("a program that has disconnected"),
         node.host if node is not None else "",
         node.generation if node is not None else "native",
         each.count if is_native else None,

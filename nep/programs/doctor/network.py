@@ -22,12 +22,12 @@ def loopback(facts: Facts) -> Iterator[Finding]:
         yield Finding(
             "loopback",
             "error",
-            _("Programs of this computer cannot reach each other: {problem}.").format(problem=facts.loopback),
-            _("Switch the loopback interface on; a firewall or a sandbox may have switched it off."),
+            _("Programs on this computer can't reach each other: {problem}.").format(problem=facts.loopback),
+            _("Turn on the loopback interface. A firewall or a sandbox may have turned it off."),
             command="ip link set lo up" if facts.platform == "linux" else "",
         )
     else:
-        yield Finding("loopback", "ok", _("Programs of this computer can reach each other (127.0.0.1)."))
+        yield Finding("loopback", "ok", _("Programs on this computer can reach each other (127.0.0.1)."))
 
 
 def masters(facts: Facts) -> Iterator[Finding]:
@@ -58,8 +58,10 @@ def _unknown_host(facts: Facts) -> Finding:
     return Finding(
         "master:unknown",
         "error",
-        _("No computer is called “{host}” here, so no master is found.").format(host=host_of(facts.address)),
-        _("Look for a typing error, or write its address in numbers."),
+        _("Can't find a computer named “{host}”, so the master can't be reached.").format(
+            host=host_of(facts.address)
+        ),
+        _("Check the spelling, or use the IP address."),
     )
 
 
@@ -67,12 +69,12 @@ def _loopback_only(facts: Facts) -> Finding:
     return Finding(
         "master:closed",
         "error",
-        _("The master at {own} serves this computer only, so nobody reaches it at {address}.").format(
+        _("The master at {own} accepts only this computer, so it can't be reached at {address}.").format(
             own=facts.answers_at, address=facts.address
         ),
         _(
-            "Let other computers connect, in the settings of the Studio that started it, or use {own} in "
-            "programs of this computer (NEP_MASTER)."
+            "Allow other computers to connect in the settings of the Studio that started the master, "
+            "or set NEP_MASTER to {own} for the programs on this computer."
         ).format(own=facts.answers_at),
     )
 
@@ -81,10 +83,10 @@ def _hung(facts: Facts, holder: ProcessFact) -> Finding:
     return Finding(
         "master:hung",
         "error",
-        _("The master at {master} does not answer; it hangs or is halted.").format(
+        _("The master at {master} does not reply; it is hung or suspended.").format(
             master=_master(facts, holder)
         ),
-        _("End it and start a new one; programs that have found each other go on meanwhile."),
+        _("Stop it and start a new one. Programs that are already connected keep exchanging messages."),
         command=_kill(facts, holder),
     )
 
@@ -95,12 +97,12 @@ def _port_taken(facts: Facts, holder: ProcessFact | None) -> Finding:
     return Finding(
         "master:foreign",
         "error",
-        _("Port {number} is held by {program}, which is no master.").format(
+        _("{program} uses port {number} but is not a master.").format(
             number=number, program=_holder_text(holder)
         ),
         _(
-            "End that program, or start the master on port {other} and tell it to all programs "
-            "(NEP_MASTER=127.0.0.1:{other})."
+            "Close that program, or start the master on port {other} and set "
+            "NEP_MASTER=127.0.0.1:{other} for all programs."
         ).format(other=other),
         command=f"nep master --port {other}",
     )
@@ -111,10 +113,10 @@ def _not_running(facts: Facts) -> Finding:
     return Finding(
         "master:none",
         "error",
-        _("No master runs at {address}, so new programs cannot find each other.").format(
+        _("No master is running at {address}, so new programs can't find each other.").format(
             address=facts.address
         ),
-        _("Start one."),
+        _("Start a master."),
         command="nep master" if number == "7780" else f"nep master --port {number}",
     )
 
@@ -124,12 +126,12 @@ def _not_loopback(facts: Facts) -> Finding:
     return Finding(
         "master:network",
         "error",
-        _("No master runs at {address}: one begins at {own}, for this computer.").format(
+        _("No master is running at {address}. A new one will start at {own}, for this computer only.").format(
             address=facts.address, own=own
         ),
         _(
-            "Use {own} in programs of this computer (NEP_MASTER), and let other computers connect in the "
-            "settings of Studio."
+            "Set NEP_MASTER to {own} for the programs on this computer, and allow other computers to "
+            "connect in the settings of Studio."
         ).format(own=own),
     )
 
@@ -137,20 +139,23 @@ def _not_loopback(facts: Facts) -> Finding:
 def _unreached(facts: Facts) -> Finding:
     host, _colon, port = facts.address.rpartition(":")
     if facts.reach == "timeout":
-        sentence = _("Nothing answers at {address}, so no master is found.")
+        sentence = _("{address} does not respond, so the master can't be reached.")
         fix = _(
-            "{host} is switched off, in another network, or its firewall keeps programs out. Let NEP Studio "
-            "(Python) through the firewall there."
+            "{host} is off, is in another network, or has a firewall that blocks the connection. Allow "
+            "NEP Studio (Python) in its firewall."
         )
     elif facts.reach == "refused":
-        sentence = _("{host} is there, but nobody listens at its port {port} for other computers.")
-        fix = _("Start NEP Studio on that computer, and let other computers connect in its settings.")
+        sentence = _("{host} can be reached, but accepts no connections from other computers on port {port}.")
+        fix = _("Start NEP Studio on that computer and allow other computers to connect in its settings.")
     elif facts.reach:
-        sentence = _("There is no way to {address}, so no master is found.")
-        fix = _("Look whether both computers are in the same network.")
+        sentence = _("This computer has no route to {address}, so the master can't be reached.")
+        fix = _("Check that both computers are on the same network.")
     else:
-        sentence = _("{host} answers at port {port}, but no master does.")
-        fix = _("It hangs, or another program holds that port. Start NEP Studio anew on that computer.")
+        sentence = _("{host} responds at port {port}, but the master does not.")
+        fix = _(
+            "NEP Studio is not responding there, or another program uses that port. Restart NEP Studio "
+            "on that computer."
+        )
     holes = {"address": facts.address, "host": host, "port": port}
     return Finding("master:unreached", "error", sentence.format(**holes), fix.format(**holes))
 
@@ -166,19 +171,19 @@ def _running(facts: Facts, holder: ProcessFact | None) -> Finding:
         people = f"{nodes}, {topics}"
     if holder is not None and holder.since_s is not None:
         since = ago(facts.now_s - holder.since_s)
-        words = _("A master runs at {master} for {since}: {people}")
+        words = _("A master has been running at {master} for {since}: {people}")
     else:
         since = ""
-        words = _("A master runs at {master}: {people}")
+        words = _("A master is running at {master}: {people}")
     sentence = words.format(master=_master(facts, holder), since=since, people=people)
     if facts.answered_s is not None and facts.answered_s > SLOW_S:
         return Finding(
             "master:slow",
             "warning",
-            _("{sentence}. It took {seconds} s to answer.").format(
+            _("{sentence}. It took {seconds} s to reply.").format(
                 sentence=sentence, seconds=number(facts.answered_s, ".1f")
             ),
-            _("This computer is very busy; look for the program that is."),
+            _("This computer is very busy. Check which program uses its processor."),
         )
     return Finding("master", "ok", f"{sentence}.")
 
@@ -189,13 +194,13 @@ def _version_mismatch(facts: Facts, holder: ProcessFact | None) -> Iterator[Find
         return
     if install.version != own:
         words = _(
-            "The master at {master} is of NEP Studio {version} ({place}); this is {own}. "
-            "What is new or mended may not work with it."
+            "The master at {master} belongs to NEP Studio {version} ({place}); this is {own}. New "
+            "features and fixes may not work with it."
         )
     elif holder.since_s is not None and holder.since_s < install.since_s:
         words = _(
-            "The master at {master} has run since before NEP Studio {own} was installed, so it is of the one "
-            "before. What is new or mended may not work with it."
+            "The master at {master} was started before NEP Studio {own} was installed, so it is an "
+            "older version. New features and fixes may not work with it."
         )
     else:
         return
@@ -204,8 +209,8 @@ def _version_mismatch(facts: Facts, holder: ProcessFact | None) -> Iterator[Find
         "warning",
         words.format(master=_master(facts, holder), version=install.version, place=install.place, own=own),
         _(
-            "End it: an open Studio starts a new one, else type “nep master”. Programs that have "
-            "found each other go on."
+            "Stop it. If Studio is open, it starts a new master; otherwise, run “nep master”. Programs "
+            "that are already connected keep exchanging messages."
         ),
         command=_kill(facts, holder),
     )
@@ -226,9 +231,10 @@ def _multiple_masters(facts: Facts) -> Iterator[Finding]:
         "master:several",
         "warning",
         _(
-            "{count} masters run on this computer: {places}. Programs of one don't see those of the other."
+            "{count} masters are running on this computer: {places}. Programs connected to different "
+            "masters can't see each other."
         ).format(count=len(facts.masters), places=places),
-        _("End all but one, or give every program the same NEP_MASTER."),
+        _("Stop all but one, or set the same NEP_MASTER for every program."),
     )
 
 
@@ -267,10 +273,10 @@ def clocks(facts: Facts) -> Iterator[Finding]:
         yield Finding(
             f"clock:{clock.host}",
             "warning",
-            _("The clock of {host} is {seconds} s ahead, so ages of its messages are wrong.").format(
+            _("The clock of {host} is {seconds} s ahead, so the ages of its messages are wrong.").format(
                 host=clock.host, seconds=number(clock.ahead_s, ".1f")
             ),
-            _("Let both computers set their clocks by the network."),
+            _("Turn on automatic time (NTP) on both computers."),
         )
 
 
@@ -284,7 +290,7 @@ def _master(facts: Facts, holder: ProcessFact | None) -> str:
 
 def _holder_text(holder: ProcessFact | None) -> str:
     if holder is None:
-        return _("a program that the system does not name")
+        return _("an unknown program")
     return with_process(f"“{holder.name}”", holder.pid)
 
 
@@ -297,9 +303,9 @@ def not_served(finding_id: str, program: str, generation: str) -> Finding:
     return Finding(
         finding_id,
         "error",
-        _("“{program}” uses nep {generation}, which no other version understands.").format(
+        _("“{program}” uses nep {generation}, which is not compatible with any other version.").format(
             program=program, generation=generation
         ),
-        _("Install 0.5.4.8 or 0.5.4.5 for this program."),
+        _("Install nep 0.5.4.8 or 0.5.4.5 for this program."),
         command="pip install nep==0.5.4.8",
     )

@@ -18,7 +18,11 @@ _AIRPLAY = ("ControlCe", "AirPlay", "rapportd")
 def ports(facts: Facts) -> Iterator[Finding]:
     """Report which programs hold the ports that programs of the original NEP connect to."""
     if not facts.joins_originals:
-        yield Finding("ports", "info", _("Programs of the original NEP are not joined (NEP_GATEWAY=0)."))
+        yield Finding(
+            "ports",
+            "info",
+            _("Programs of the original NEP can't connect because the gateway is off (NEP_GATEWAY=0)."),
+        )
         return
     asked = [port for port in facts.ports if port.port != KILL_PORT]
     own = [port for port in asked if port.is_taken and _is_masters(facts, port)]
@@ -29,8 +33,8 @@ def ports(facts: Facts) -> Iterator[Finding]:
     yield from _free([port for port in asked if not port.is_taken and facts.view is not None])
     if own:
         words = ngettext(
-            "The master holds port {ports}, where programs of the original NEP ask.",
-            "The master holds ports {ports}, where programs of the original NEP ask.",
+            "The master uses port {ports}, which programs of the original NEP connect to.",
+            "The master uses ports {ports}, which programs of the original NEP connect to.",
             len(own),
         )
         yield Finding("ports", "ok", words.format(ports=_numbers(own)))
@@ -57,8 +61,8 @@ def _airplay(port: PortFact) -> Finding:
     return Finding(
         "ports:airplay",
         "warning",
-        _("The AirPlay Receiver holds port 7000, {purpose}.").format(purpose=_(port.purpose)),
-        _("Switch it off in the system settings, under General, AirDrop & Handoff."),
+        _("The AirPlay Receiver uses port 7000, {purpose}.").format(purpose=_(port.purpose)),
+        _("Turn it off in System Settings, under General > AirDrop & Handoff."),
     )
 
 
@@ -67,34 +71,34 @@ def _taken(ports: Sequence[PortFact]) -> Iterator[Finding]:
         return
     holders = [_holder(port.holder) for port in ports]
     if len(ports) == 1:
-        sentence = _("Port {port}, {purpose}, is held by {program}.").format(
+        sentence = _("Port {port}, {purpose}, is in use by {program}.").format(
             port=ports[0].port, purpose=_(ports[0].purpose), program=holders[0]
         )
     elif len(set(holders)) == 1:
-        sentence = _("Ports {ports}, where programs of the original NEP ask, are held by {program}.").format(
-            ports=_numbers(ports), program=holders[0]
-        )
+        sentence = _(
+            "Ports {ports}, which programs of the original NEP need, are in use by {program}."
+        ).format(ports=_numbers(ports), program=holders[0])
     else:
         each = [
-            _("{port} by {program}").format(port=port.port, program=holder)
+            _("{port} ({program})").format(port=port.port, program=holder)
             for port, holder in zip(ports, holders, strict=True)
         ]
-        sentence = _("Ports where programs of the original NEP ask are held: {each}.").format(
+        sentence = _("Ports that programs of the original NEP need are in use: {each}.").format(
             each=listed(each)
         )
     yield Finding(
         "ports:taken",
         "warning",
         sentence,
-        _("End that program to let programs of the original NEP join. Nothing else needs these ports."),
+        _("Close that program to let programs of the original NEP connect. Nothing else needs these ports."),
     )
 
 
 def _free(ports: Sequence[PortFact]) -> Iterator[Finding]:
     if ports:
         words = ngettext(
-            "Nobody listens on port {ports}, where programs of the original NEP ask.",
-            "Nobody listens on ports {ports}, where programs of the original NEP ask.",
+            "The gateway for programs of the original NEP is not running: port {ports} is not in use.",
+            "The gateway for programs of the original NEP is not running: ports {ports} are not in use.",
             len(ports),
         )
         why = _("The master was started without its gateway.")
@@ -105,9 +109,9 @@ def _kill_port(port: PortFact) -> Finding:
     return Finding(
         f"port:{KILL_PORT}",
         "info",
-        _("Port 12345 is held by {program}; original nodes take orders to end from there.").format(
-            program=_holder(port.holder)
-        ),
+        _(
+            "{program} uses port 12345, where programs of the original NEP listen for the shutdown message."
+        ).format(program=_holder(port.holder)),
     )
 
 

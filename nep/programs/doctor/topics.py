@@ -26,10 +26,10 @@ def topic_findings(facts: TopicFacts) -> tuple[Finding, ...]:
             Finding(
                 "topic:name",
                 "error",
-                _("“{topic}” is no name of a topic: {reason}.").format(
+                _("“{topic}” is not a valid topic name: {reason}.").format(
                     topic=facts.topic, reason=facts.bad_name
                 ),
-                _("Choose one that is there."),
+                _("Choose an existing topic."),
             ),
         )
     if not facts.publishers:
@@ -62,20 +62,20 @@ def _normalized(topic: str) -> str:
 
 
 def _unpublished(facts: TopicFacts) -> Iterator[Finding]:
-    sentence = _("Nobody publishes {topic}.").format(topic=facts.topic)
+    sentence = _("{topic} has no publisher.").format(topic=facts.topic)
     near = meant_topic(facts.topic, facts.others)
     service = facts.topic if facts.topic in facts.services else ""
     if near is not None:
         yield Finding("topic:near", "error", sentence, _near_words(facts, near), instead=near)
     elif service:
-        words = _("There is a service of this name: it answers who calls it, and publishes nothing.")
+        words = _("A service has this name. Services reply to calls; they don't publish.")
         yield Finding("topic:service", "error", sentence, words, instead=service)
     else:
-        words = _("Start the program that does; what is published now: {topics}.")
+        words = _("Start the program that publishes it. Topics published now: {topics}.")
         known = sorted(name for name in facts.others if not name.startswith("/nep/"))  # hide nep's own topics
         some = known[:_MAX_NAMED]
         if not some:
-            words = _("Start the program that does; nothing else is published, either.")
+            words = _("Start the program that publishes it. No other topics are published either.")
         more = len(known) - len(some)
         names = [*some, _("{count} more").format(count=more)] if more else some
         yield Finding("topic:nobody", "error", sentence, words.format(topics=listed(names) if names else ""))
@@ -83,18 +83,20 @@ def _unpublished(facts: TopicFacts) -> Iterator[Finding]:
         yield Finding(
             "topic:shared",
             "info",
-            _("Other computers may connect to the master at {address}.").format(address=facts.address),
+            _("Other computers can connect to the master at {address}.").format(address=facts.address),
             _(
-                "Is the program on another computer? Then it needs the master's address in the network as "
-                "its NEP_MASTER, and the master's computer a firewall that lets NEP Studio (Python) through."
+                "Is the program on another computer? Set its NEP_MASTER to the master's network address, "
+                "and allow NEP Studio (Python) in the firewall of the master's computer."
             ),
         )
     elif is_loopback(facts.address):
         yield Finding(
             "topic:closed",
             "info",
-            _("The master at {address} serves programs of this computer only.").format(address=facts.address),
-            _("Is the program on another computer? Then let other computers connect."),
+            _("The master at {address} accepts only programs on this computer.").format(
+                address=facts.address
+            ),
+            _("Is the program on another computer? Allow other computers to connect."),
         )
 
 
@@ -102,7 +104,7 @@ def _near_words(facts: TopicFacts, near: str) -> str:
     rate_hz = facts.others[near]
     if rate_hz is None:
         return _("Did you mean {topic}?").format(topic=near)
-    words = _("Did you mean {topic}? Its publishers send {rate} messages a second.")
+    words = _("Did you mean {topic}? Its publishers send {rate} messages per second.")
     return words.format(topic=near, rate=number(rate_hz, ".3g" if rate_hz < 100 else ".0f"))
 
 
@@ -118,23 +120,25 @@ def _publisher(facts: TopicFacts, each: PublisherFact) -> Iterator[Finding]:
 def _unreached(each: PublisherFact) -> Finding:
     place = each.endpoint.removeprefix("tcp://")
     if each.reach == "elsewhere":
-        sentence = _("“{node}” publishes for its own computer, {host}, only.")
+        sentence = _("“{node}” can be reached only from its own computer, {host}.")
         fix = _(
-            "It knows its master by an address of that computer alone. Start it with the address in the "
-            "network as its NEP_MASTER."
+            "Its NEP_MASTER is an address that works only on that computer. Restart it with the "
+            "master's network address as NEP_MASTER."
         )
     elif each.reach == "timeout":
-        sentence = _("Nothing answers at {place} ({host}), where “{node}” publishes.")
+        sentence = _("“{node}” publishes at {place} ({host}), but that address does not respond.")
         fix = _(
-            "A firewall keeps programs out there, or it is another network. Let Python through the firewall "
-            "of {host}."
+            "A firewall blocks the connection, or the computers are in different networks. Allow "
+            "Python in the firewall of {host}."
         )
     elif each.reach == "refused":
-        sentence = _("Nobody listens at {place} ({host}) any more, where “{node}” published.")
-        fix = _("The program has ended or hangs. Start it again.")
+        sentence = _("“{node}” published at {place} ({host}), but nothing is listening there now.")
+        fix = _("The program has stopped or is not responding. Start it again.")
     else:
-        sentence = _("There is no way to {place} ({host}), where “{node}” publishes.")
-        fix = _("Look whether both computers are in the same network.")
+        sentence = _(
+            "“{node}” publishes at {place} ({host}), but this computer has no route to that address."
+        )
+        fix = _("Check that both computers are on the same network.")
     holes = {"node": each.node, "host": each.host, "place": place}
     return Finding(f"topic:address:{each.node}", "error", sentence.format(**holes), fix.format(**holes))
 
@@ -146,20 +150,18 @@ def _silence(facts: TopicFacts, each: PublisherFact) -> Iterator[Finding]:
     if quiet_s is None and each.sent:
         return
     if quiet_s is None or each.last_s is None:
-        sentence = _("“{node}” is there, but has sent nothing on {topic} yet.")
-        fix = _("Look at that program: what does it wait for?")
+        sentence = _("“{node}” is connected but has sent nothing on {topic} yet.")
+        fix = _("Check what that program is waiting for.")
     else:
-        sentence = _("“{node}” is there, but has sent nothing on {topic} for {ago}.")
+        sentence = _("“{node}” is connected but has sent nothing on {topic} for {ago}.")
         at = time.strftime("%H:%M:%S", time.localtime(each.last_s))
-        words = _("Its last message came at {at}. Look at that program: what does it wait for?")
+        words = _("Its last message was at {at}. Check what that program is waiting for.")
         if each.sent:
-            words = _(
-                "Its last message was number {count}, at {at}. Look at that program: what does it wait for?"
-            )
+            words = _("Its last message was number {count}, at {at}. Check what that program is waiting for.")
         fix = words.format(count=number(each.sent or 0, ".0f"), at=at)
     remedy = next(iter(each.remedies), "")
     if remedy:
-        fix += " " + _("It offers the service “{service}”.").format(service=remedy)
+        fix += " " + _("It has the service “{service}”.").format(service=remedy)
     yield Finding(
         f"topic:silent:{each.node}",
         "error",
@@ -178,35 +180,37 @@ def _arrival(facts: TopicFacts, *, is_explained: bool) -> Iterator[Finding]:
         yield Finding(
             "topic:unreadable",
             "error",
-            _("Messages of {topic} come, but can't be read: {reason}.").format(
+            _("Messages on {topic} arrive but can't be read: {reason}.").format(
                 topic=facts.topic, reason=facts.unreadable
             ),
-            _("Look at their bytes in the Inspector, and at the program that sends them: {nodes}.").format(
+            _("Check the raw bytes in the Inspector, and the program that sends them: {nodes}.").format(
                 nodes=_publisher_text(facts.publishers)
             ),
         )
     elif facts.received:
-        words = _("Messages of {topic} come here, and can be read.")
+        words = _("Messages on {topic} arrive and can be read.")
         yield Finding("topic", "ok", words.format(topic=facts.topic))
     elif facts.refused:
         yield Finding(
             "topic:wire",
             "error",
-            _("What comes on {topic} is of a version of NEP that this one does not read.").format(
+            _("Messages on {topic} come from a version of NEP that this version can't read.").format(
                 topic=facts.topic
             ),
-            _("Give all programs the same version: {nodes}.").format(nodes=_publisher_text(facts.publishers)),
+            _("Use the same version of NEP in all programs: {nodes}.").format(
+                nodes=_publisher_text(facts.publishers)
+            ),
         )
     elif not is_explained:
         yield Finding(
             "topic:blocked",
             "error",
-            _("{topic} is sent by {nodes}, but nothing came here in {seconds} s.").format(
+            _("{nodes} sends {topic}, but no messages were received in {seconds} s.").format(
                 topic=facts.topic,
                 nodes=_publisher_text(facts.publishers),
                 seconds=number(facts.listened_s, ".1f"),
             ),
-            _("This computer or its network may be very busy, or a firewall lets nothing through."),
+            _("This computer or its network may be overloaded, or a firewall blocks the messages."),
         )
 
 

@@ -165,12 +165,16 @@ class NativeNetwork:
                 return message.data
             created = image_codec.encode(message.payload)
             if image_codec.raw_layout((created.extension or {}).get("encoding")) is not None:
-                raise EncodeError("image", "picture", _("they read JPEG and PNG, which have no such numbers"))
+                raise EncodeError(
+                    "image",
+                    "picture",
+                    _("they support only JPEG and PNG, which can't store this number type"),
+                )
             return created.data
         except (DecodeError, EncodeError) as error:
             self.report(
                 f"message:{message.topic}",
-                _("Original programs get no pictures of “{topic}”: {error}").format(
+                _("Programs of the original NEP don't receive the images of “{topic}”: {error}").format(
                     topic=message.topic, error=error
                 ),
             )
@@ -197,10 +201,10 @@ class NativeNetwork:
             self._retry_at[topic] = now + _RETRY_S
             why, hint = str(error), ""
             if isinstance(error, BadTopicError):
-                why, hint = error.reason, _("Give the topic another name.")
+                why, hint = error.reason, _("Rename the topic.")
             self.report(
                 id,
-                _("“{topic}” stays among programs of the original NEP: {why}").format(topic=topic, why=why),
+                _("“{topic}” is not forwarded to native programs: {why}").format(topic=topic, why=why),
                 hint,
             )
             return None
@@ -223,8 +227,8 @@ class NativeNetwork:
             self.report(
                 "gateway:full",
                 ngettext(
-                    "{count} message did not reach original programs in the last second",
-                    "{count} messages did not reach original programs in the last second",
+                    "{count} message did not reach programs of the original NEP in the last second",
+                    "{count} messages did not reach programs of the original NEP in the last second",
                     lost,
                 ).format(count=lost),
             )

@@ -104,7 +104,7 @@ class Shape:
             if self.codec == "json" and frame.startswith((b"{", b"[", b'"')):
                 return frame
             raise FrameError(
-                _("A message on “{topic}” does not begin with the topic").format(topic=self.topic)
+                _("A message on “{topic}” does not begin with the topic name").format(topic=self.topic)
             )
         if self.codec == "json":
             self._check_version(frame, own)
@@ -113,11 +113,12 @@ class Shape:
     def _check_version(self, frame: bytes, own: bytes) -> None:
         if frame.startswith(own):
             raise FrameError(
-                _("A message on “{topic}” begins with the topic").format(topic=self.topic), version="0.5.4.6"
+                _("A message on “{topic}” begins with the topic name").format(topic=self.topic),
+                version="0.5.4.6",
             )
         if frame[:1] == b'"' and _is_json_in_json(frame):
             raise FrameError(
-                _("A message on “{topic}” is JSON inside JSON").format(topic=self.topic), version="0.5.4.7"
+                _("A message on “{topic}” is JSON encoded twice").format(topic=self.topic), version="0.5.4.7"
             )
 
 
@@ -171,7 +172,7 @@ def _from_base64(data: bytes) -> bytes:
     try:
         return base64.b64decode(data, validate=True)
     except binascii.Error as error:
-        raise FrameError(_("A picture is not base64")) from error
+        raise FrameError(_("An image is not base64")) from error
 
 
 def _is_json_in_json(frame: bytes) -> bool:

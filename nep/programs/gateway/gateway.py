@@ -199,7 +199,7 @@ class Gateway:
             if base is not None and not self._open(line, base):
                 self._outside.report(
                     f"port:{base}",
-                    _("Port {first} or {second} of “{topic}” is taken by another program").format(
+                    _("Another program is using port {first} or {second}, which “{topic}” needs").format(
                         first=base, second=base + 1, topic=line.topic
                     ),
                     _("Close that program, then restart the programs of the original NEP on this topic."),
@@ -213,7 +213,8 @@ class Gateway:
         base = self._port_for(line)
         if len(self._port_map.registrations) >= _MAX_REGISTRATIONS and not self._programs.make_room():
             raise RequestError(
-                _("{count} programs have asked already").format(count=_MAX_REGISTRATIONS), line.topic
+                _("{count} programs are already registered, the maximum").format(count=_MAX_REGISTRATIONS),
+                line.topic,
             )
         registration = self._registration(request, line)
         self._port_map.add(registration)
@@ -229,13 +230,13 @@ class Gateway:
             return known
         if not has_room(_FILES_PER_PAIR + SPARE):
             raise RequestError(
-                _("the master has too many files open; end programs, or restart it"), line.topic
+                _("the master has too many files open; close programs, or restart the master"), line.topic
             )
         for base in self._port_map.candidates(self._programs.is_used):
             if self._open(line, base):
                 self._port_map.assign(line, base)
                 return base
-        raise RequestError(_("no ports are left between 9000 and 9999"), line.topic)
+        raise RequestError(_("all ports from 9000 to 9999 are in use"), line.topic)
 
     def _open(self, line: TopicLine, base: int) -> bool:
         if line.is_service:
@@ -263,10 +264,10 @@ class Gateway:
         except OSError as error:
             self._outside.report(
                 "gateway:file",
-                _("The list of the ports of original programs cannot be kept: {strerror}").format(
+                _("Can't save the ports of programs of the original NEP: {strerror}").format(
                     strerror=error.strerror
                 ),
-                _("Restart the programs of the original NEP when the master was restarted."),
+                _("After a restart of the master, restart the programs of the original NEP."),
             )
         else:
             self._outside.resolve("gateway:file")

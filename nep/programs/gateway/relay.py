@@ -178,10 +178,12 @@ class Relay:
         if pair.line.codec == "json" and lost_numbers(frame, data):
             self._alerts.report(
                 f"nan:{pair.line.topic}",
-                _("“{topic}” has NaN or infinity; JSON has neither, and native programs get null").format(
-                    topic=pair.line.topic
-                ),
-                _("Let the program that publishes it send null where it has no value."),
+                _(
+                    "“{topic}” contains NaN or infinity, which JSON does not support: native programs "
+                    "receive "
+                    "null instead"
+                ).format(topic=pair.line.topic),
+                _("Change the publishing program to send null for missing values."),
             )
         for other in self._pairs_of(key):
             if other is pair:
@@ -222,11 +224,18 @@ class Relay:
         pair.unserved[role] = version
         names = [f"“{name}”" for name in self._program_names(pair.line, role)]
         if not names:
-            words = _("A program on “{topic}” uses nep {version}, which no other version understands")
+            words = _(
+                "A program on “{topic}” uses nep {version}, which is not compatible with any other version"
+            )
         elif len(names) == 1:
-            words = _("{programs} on “{topic}” uses nep {version}, which no other version understands")
+            words = _(
+                "{programs} on “{topic}” uses nep {version}, which is not compatible with any other version"
+            )
         else:
-            words = _("One of {programs} on “{topic}” uses nep {version}, which no other version understands")
+            words = _(
+                "One of {programs} on “{topic}” uses nep {version}, which is not compatible with any other "
+                "version"
+            )
         self._alerts.report(
             f"version:{pair.line.topic}:{role}",
             words.format(programs=", ".join(names), topic=pair.line.topic, version=version),

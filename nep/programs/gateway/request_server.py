@@ -70,7 +70,7 @@ class RequestServer:
             (self._ports.requests_b, "nep 0.5.4.8"),
         ):
             if port and port not in self._request_sockets:
-                words = _("Port {port} is taken by another program; programs of {version} cannot join")
+                words = _("Another program is using port {port}: programs of {version} can't connect")
                 bound = self._bind(zmq.ROUTER, port, words.format(port=port, version=versions))
                 if bound is not None:
                     self._request_sockets[port] = bound
@@ -78,7 +78,7 @@ class RequestServer:
             self._broadcast_socket = self._bind(
                 zmq.PUB,
                 self._ports.broadcast,
-                _("Port {port} is taken by another program; tools of the original NEP show no topics").format(
+                _("Another program is using port {port}: tools of the original NEP can't show topics").format(
                     port=self._ports.broadcast
                 ),
             )
@@ -135,7 +135,7 @@ class RequestServer:
             self._alerts.report(
                 f"port:{port}",
                 taken,
-                _("Close that program: another master, or on macOS the AirPlay Receiver."),
+                _("Close that program. It may be another master, or the AirPlay Receiver on macOS."),
             )
             return None
         self._alerts.resolve(f"port:{port}")

@@ -65,7 +65,7 @@ def checked_origin(origin: str) -> str:
     is_origin = parts.scheme in _DEFAULT_PORTS and bool(parts.hostname) and parts.path in {"", "/"}
     if not is_origin or parts.query or parts.fragment or parts.username:
         raise NepError(
-            _("'{origin}' is no origin of a page; write it as 'http://192.168.1.5:8000'").format(
+            _("'{origin}' is not the origin of a page; write it as 'http://192.168.1.5:8000'").format(
                 origin=quotable(origin)
             )
         )
@@ -100,9 +100,9 @@ class Access:
                 return ""
         except NepError:
             pass
-        return _("pages of '{origin}' may not connect; allow them with --origin {option}").format(
-            origin=quotable(origin), option=quotable(origin)
-        )
+        return _(
+            "pages from '{origin}' are not allowed to connect; allow them with --origin {option}"
+        ).format(origin=quotable(origin), option=quotable(origin))
 
     def is_given(self, path: str, authorization: str | None) -> bool | None:
         """Return whether the token in the URL or in the header is right, None when there is none.

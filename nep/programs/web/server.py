@@ -350,7 +350,7 @@ class WebServer:
             return TooManyFilesError("a web server", opened(), limit())
         if isinstance(error, PermissionError):
             return NepError(
-                _("the port {port} needs rights that you don't have; choose one above 1023").format(
+                _("port {port} needs administrator rights; choose a port above 1023").format(
                     port=self.settings.port
                 )
             )
@@ -382,15 +382,17 @@ class WebServer:
         origin = origins[0] if origins else None
         refusal: _Rejection | None
         if len(origins) > 1:
-            refusal = _Rejection(HTTPStatus.FORBIDDEN, "other", _("a connection has one Origin"))
+            refusal = _Rejection(
+                HTTPStatus.FORBIDDEN, "other", _("the request has more than one Origin header")
+            )
         elif len(self._pages) + self._locked >= MAX_PAGES:
-            refusal = _Rejection(HTTPStatus.SERVICE_UNAVAILABLE, "limit", _("there are too many connections"))
+            refusal = _Rejection(HTTPStatus.SERVICE_UNAVAILABLE, "limit", _("too many connections"))
         elif said := access.origin_refusal(origin, own_origin(connection)):
             refusal = _Rejection(HTTPStatus.FORBIDDEN, "origin", said)
         elif self._kept_out.refuses(connection, request):
             refusal = _Rejection(HTTPStatus.FORBIDDEN, "kept out", _("the user disconnected this page"))
         elif not (self.settings.rosbridge or is_offered(request.headers.get_all("Sec-WebSocket-Protocol"))):
-            refusal = _Rejection(HTTPStatus.FORBIDDEN, "other", _("rosbridge is switched off"))
+            refusal = _Rejection(HTTPStatus.FORBIDDEN, "other", _("rosbridge is turned off"))
         else:
             refusal = self._token_refusal(connection, request, access)
         if refusal is None:
@@ -416,7 +418,7 @@ class WebServer:
         )
         found = answer(asked, self.settings.access)
         if found.is_token_refused:
-            self._turn_away(connection, "token", _("a page was opened without the token or with a wrong one"))
+            self._turn_away(connection, "token", _("a page connected without the token or with a wrong one"))
         headers = Headers(found.headers)
         headers["Connection"] = "close"
         headers["Content-Length"] = str(len(found.body))

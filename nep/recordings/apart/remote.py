@@ -113,7 +113,7 @@ class _Pipe:
                 start_new_session=True,  # Ctrl+C in the terminal is for the parent
             )
         except OSError as error:
-            reason = _("the process that reads it can't be started: {error}")
+            reason = _("the process that reads it can't start: {error}")
             raise RecordingError(str(path), reason.format(error=error)) from error
         self._lock = threading.Lock()
         self._was_ended = False
@@ -154,12 +154,12 @@ class _Pipe:
                     answer = self._answers.get(timeout=timeout_s)
                 except queue.Empty:
                     self._kill()
-                    raise RecordingTooLargeError(str(path), _("reading it takes too long")) from None
+                    raise RecordingTooLargeError(str(path), _("it takes too long to read")) from None
                 if answer is None:
                     self._answers.put(None)
                     self._check(path)
                     self._kill()
-                    reason = _("the process that reads it has ended; the file may be damaged")
+                    reason = _("the process that reads it stopped; the file may be damaged")
                     raise RecordingError(str(path), reason)
                 if "progress" not in answer:
                     break

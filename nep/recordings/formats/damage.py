@@ -25,12 +25,12 @@ def damage_words(damage: Sequence[Damage], start_ns: int) -> str:
     if len(damage) > _MAX_NAMED:
         places += "; …"
     summary = ngettext(
-        "{count} piece of the file is damaged and was skipped ({places})",
-        "{count} pieces of the file are damaged and were skipped ({places})",
+        "{count} part of the file is damaged and was skipped ({places})",
+        "{count} parts of the file are damaged and were skipped ({places})",
         len(damage),
     ).format(count=len(damage), places=places)
     if any(each is None for each in known):
-        return _("{damage}; how many messages are missing is not known").format(damage=summary)
+        return _("{damage}; the number of missing messages is unknown").format(damage=summary)
     missing = sum(each or 0 for each in known)
     return ngettext(
         "{damage}; {count} message is missing", "{damage}; {count} messages are missing", missing
@@ -39,6 +39,6 @@ def damage_words(damage: Sequence[Damage], start_ns: int) -> str:
 
 def _format_place(each: Damage, start_ns: int) -> str:
     if not each.end_ns:
-        return _("{size} bytes after byte {offset}").format(size=each.length, offset=each.offset)
+        return _("{size} bytes at byte {offset}").format(size=each.length, offset=each.offset)
     begin, end = ((at_ns - start_ns) / 1e9 for at_ns in (each.start_ns, each.end_ns))
     return _("{begin} s to {end} s").format(begin=number(begin, ".1f"), end=number(end, ".1f"))

@@ -86,11 +86,11 @@ class OneFile:
     def check_file(self) -> None:
         """Check that the file was not moved or deleted and the disk is not full. Raises `RecordingError`."""
         if _identity(self.file.path) != self._identity:
-            raise RecordingError(
-                str(self.file.path), _("somebody has moved or deleted it while it was written")
-            )
+            raise RecordingError(str(self.file.path), _("the file was moved or deleted during recording"))
         if shutil.disk_usage(self.file.path.parent).free < self._least_free_bytes:
-            raise RecordingError(str(self.file.path), _("the disk is full; what came before is kept"))
+            raise RecordingError(
+                str(self.file.path), _("the disk is full; everything recorded before is saved")
+            )
 
     def finish(self) -> None:
         """Write the summary and close the file. Raises `OSError`."""
@@ -112,7 +112,7 @@ def _identity(path: Path) -> tuple[int, int] | None:
 def disk_error(path: Path, error: OSError) -> RecordingError:
     """Return the error of a recording for an I/O error."""
     if error.errno in {errno.ENOSPC, errno.EDQUOT if hasattr(errno, "EDQUOT") else errno.ENOSPC, errno.EFBIG}:
-        reason = _("the disk is full; what came before is kept")
+        reason = _("the disk is full; everything recorded before is saved")
     else:
         reason = (error.strerror or str(error)).lower()
     return RecordingError(str(path), reason)

@@ -52,9 +52,9 @@ class ReadBudget:
         """Count work. Raises `RecordingTooLargeError` beyond the limit."""
         self._left -= work_bytes
         if self._left < 0:
-            raise RecordingTooLargeError(str(self._path), _("it holds more than can be read at once"))
+            raise RecordingTooLargeError(str(self._path), _("it is too large to read"))
         if self._until is not None and self._clock() > self._until:
-            raise RecordingTooLargeError(str(self._path), _("reading it takes too long"))
+            raise RecordingTooLargeError(str(self._path), _("it takes too long to read"))
 
 
 def open_budget(path: Path, size_bytes: int) -> ReadBudget:

@@ -133,7 +133,9 @@ def test_alerts_of_the_disk_come_and_go(made):
     }
     made.say("figures", recording=status(unkept=3), ring=None, free_bytes=2_000_000_000)
     assert "recorder:low" not in made.told()
-    made.say("ended", path="a.mcap", status=status(problem="the disk is full; what came before is kept"))
+    made.say(
+        "ended", path="a.mcap", status=status(problem="the disk is full; everything recorded before is saved")
+    )
     assert made.told()["recorder:ended"] == (
         "error",
         "The recording stopped: the disk is full; what came before is kept.",

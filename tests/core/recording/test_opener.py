@@ -59,9 +59,9 @@ def path(tmp_path: Path) -> Path:
 
 def test_a_file_that_takes_too_much_is_listed_as_not_scanned(path: Path) -> None:
     plain = RecordingFacts(path, path.stat().st_size, 1.0)
-    made = read_facts(plain, Failing(RecordingTooLargeError(str(path), "reading it takes too long")))
+    made = read_facts(plain, Failing(RecordingTooLargeError(str(path), "it takes too long to read")))
     assert (made.path, made.is_read, made.problem) == (path, True, "")
-    assert "reading it takes too long" in made.not_scanned
+    assert "it takes too long to read" in made.not_scanned
     made = read_facts(plain, Failing(RecordingError(str(path), "the process has ended")))
     assert "the process has ended" in made.problem
 

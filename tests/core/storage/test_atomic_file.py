@@ -254,7 +254,7 @@ def test_one_that_stays_open_is_a_sentence(tmp_path: Path) -> None:
     def replace(new: Path, old: Path) -> None:
         raise busy(32)
 
-    with pytest.raises(PermissionError, match="another program has the file open; close it there"):
+    with pytest.raises(PermissionError, match="another program has the file open; close the file there"):
         replace_file(tmp_path / "new", tmp_path / "old", replace=replace, pause=waited.append)
     assert 0 < sum(waited) <= 1
 

@@ -48,7 +48,7 @@ def test_actions_are_done_once_in_their_order_and_written_down() -> None:
     assert hands.done == [("on", "stop"), ("on", "banner")]
     (record,) = scene.alarms.history
     assert [deed.kind for deed in record.deeds] == ["stop", "banner", "sound"]
-    assert record.deeds[-1].words == "it can't be done here"  # nobody carries out a sound
+    assert record.deeds[-1].words == "this action is not available here"  # nobody carries out a sound
     assert record.words == "r of /d is 0, below 1"
     assert not scene.alarms.is_busy
 

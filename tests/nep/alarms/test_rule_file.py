@@ -61,7 +61,7 @@ def test_the_example_is_right() -> None:
     [
         ({"when": {"topic": "/t", "is": "bellow", "than": 1}}, "there is no 'bellow'; did you mean 'below'"),
         ({"when": {"topic": "/t"}}, "it does not say what"),
-        ({"when": {"is": "silent"}}, "no topic is named"),
+        ({"when": {"is": "silent"}}, "the topic name is missing"),
         ({"when": {"node": "n", "is": "silent"}}, "is about a topic"),
         ({"when": {"topic": "/t", "is": "below", "value": "x"}}, 'write "than"'),
         ({"when": {"topic": "/t", "is": "below", "value": "x", "than": "1"}}, "must be a number"),
@@ -76,7 +76,7 @@ def test_the_example_is_right() -> None:
         ({"when": {"topic": "/t", "is": "rate_below", "than": 0}}, "0.001 to 1e+06"),
         ({"when": {"topic": "/t", "is": "silent"}, "do": ["baner"]}, "did you mean 'banner'"),
         ({"when": {"topic": "/t", "is": "silent"}, "do": [{"cal": "x"}]}, "an action is"),
-        ({"when": {"topic": "/t", "is": "silent"}, "do": [{"call": ""}]}, "it has no name"),
+        ({"when": {"topic": "/t", "is": "silent"}, "do": [{"call": ""}]}, "the name is missing"),
         ({"when": {"topic": "/t", "is": "silent"}, "do": ["stop"] * 11}, "more than 10 actions"),
         ({"when": {"topic": "/t", "is": "silent"}, "calm_s": 0}, "0.5 to 3600"),
         ({"when": {"topic": "/t", "is": "silent"}, "onn": True}, "there is no 'onn' here; did you mean 'on'"),

@@ -89,7 +89,7 @@ def test_a_node_whose_name_another_takes_says_so_instead_of_waiting(ros: str) ->
             assert first.line().startswith("shutdown request: "), "rospy prints it"
             for _each in range(6):
                 assert first.line() == (
-                    "rospy was shut down in this program and cannot start in it again; start the program anew"
+                    "rospy was shut down and can't start again in this process; restart the program"
                 )
             assert first.line() == "[]"
             said, errors = first.end()

@@ -273,7 +273,7 @@ def test_what_a_stranger_puts_or_answers_is_refused_and_counted(
         token.undeclare()
         calls.undeclare()
     assert sub.received == 0
-    assert "it has no header; a program of another kind published it" in caplog.text
+    assert "it has no header; the publisher is not a nep program" in caplog.text
     pub = node.new_pub("t")
     pub.publish(1)
     assert sub.listen(timeout_s=30.0) == (True, 1)

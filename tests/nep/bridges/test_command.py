@@ -247,7 +247,7 @@ def test_on_a_terminal_a_table_stands_in_its_place_and_warnings_above_it(file, n
         (("zeromq:/t",), "'zeromq:/t' is only one end; add the other one, such as 'ros:/chatter'"),
         (("zeromq:/t", "zeromk:/t"), "no back end 'zeromk'; did you mean 'zeromq'?"),
         (("zeromq", "zenoh:/t"), "'zeromq' is no BACKEND:TOPIC; write it as 'zeromq:/topic' or"),
-        (("zeromq:", "zenoh:"), "no topic is named; write it as 'zeromq:/topic ros:/topic'"),
+        (("zeromq:", "zenoh:"), "the topic name is missing; write it as 'zeromq:/topic ros:/topic'"),
         (("zeromq:/a/*", "zenoh:/b"), "'/a/*' and '/b' do not go together; use the same '*' or '**'"),
         (("zeromq:/t", "zmq:/u"), "both sides are the network 'zeromq:"),
         (("zeromq:/t", "zenoh:/t", "--direction", "a-b"), "'a-b' is no direction; did you mean 'a->b'?"),

@@ -89,7 +89,10 @@ def test_who_is_not_there_at_all():
     many = {f"/t{number}": None for number in range(40)} | {"/nep/log": None}
     assert found(topic="/x", publishers=(), others=many)["topic:nobody"].mend.endswith("/t12 and 35 more.")
     alone = found(topic="/speech", publishers=(), others={})
-    assert alone["topic:nobody"].mend == "Start the program that does; nothing else is published, either."
+    assert (
+        alone["topic:nobody"].mend
+        == "Start the program that publishes it. No other topics are published either."
+    )
     assert "topic:closed" not in alone  # it serves other computers
     assert alone["topic:shared"].severity == "info"
     assert "firewall" in alone["topic:shared"].mend

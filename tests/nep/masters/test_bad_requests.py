@@ -64,7 +64,7 @@ def test_what_a_stranger_wrote_does_not_write_lines_of_its_own() -> None:
 def test_strangers_count_by_computer_and_nodes_by_themselves() -> None:
     assert describe_sender("00000000000000ff", "camera", "10.0.0.1") == ("00000000000000ff", "“camera”")
     assert describe_sender("", "", "10.0.0.1") == ("10.0.0.1", "A program on 10.0.0.1")
-    assert describe_sender("", "", "") == ("", "A program on a computer that is not known")
+    assert describe_sender("", "", "") == ("", "A program on an unknown computer")
 
 
 def test_the_master_logs_the_first_then_rarely_and_shows_an_alert(

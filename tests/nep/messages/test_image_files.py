@@ -86,8 +86,8 @@ def test_no_bomb_takes_memory_in_the_library_or_in_studio() -> None:
         ("png of a chunk of gigabytes", "a broken PNG: it ends too early"),
         ("png with two heads", "a broken PNG: it has two heads"),
         ("jpeg of 12 bits", "a JPEG of 12 bits for a colour is not read"),
-        ("nothing", "there is nothing in it"),
-        ("a word", "they are no picture: neither JPEG nor PNG"),
+        ("nothing", "the image is empty"),
+        ("a word", "it is neither a JPEG nor a PNG image"),
     ],
 )
 def test_the_sentence_says_what_was_refused_and_why(name: str, words: str) -> None:

@@ -140,7 +140,7 @@ def test_what_cannot_be_sent_so_is_refused_and_named(
 @pytest.mark.parametrize(
     ("msg_type", "image", "sentence"),
     [
-        ("json", ImageFormat(), "image is for pictures; publish them as 'image'"),
+        ("json", ImageFormat(), "image applies only to images; publish them as 'image'"),
         ("image", "jpeg", "image is a 'str'; give a 'nep.ImageFormat'"),
     ],
 )

@@ -258,7 +258,7 @@ def test_a_type_may_hold_itself() -> None:
     tree = Tree([Tree(), Tree([Tree()])])
     assert read(Tree, sent(tree)) == tree
     tree.parent = tree
-    assert unsent(tree) == ("it holds itself, or too many levels", "")
+    assert unsent(tree) == ("it contains itself, or has too many levels", "")
     deep = b'{"children":[' * 500 + b"]}" * 500
     with pytest.raises(nep.DecodeError):
         read_bytes(Tree, deep * 4)

@@ -40,7 +40,7 @@ def node(request: pytest.FixtureRequest, master: Master) -> Iterator[nep.Node]:
             r"msg_type is 'json\\x00'; use 200 letters at most, and none that controls",
         ),
         ({"msg_type": "x" * 201}, "characters\\)'; use 200 letters at most"),
-        ({"topic": b"t"}, "a topic is a 'str'"),
+        ({"topic": b"t"}, "a topic name must be a 'str'"),
         ({"qos": "sensor"}, "has no qualities of service; leave out qos"),
         (
             {"configuration": "direct"},
@@ -62,7 +62,7 @@ def test_a_subscriber_of_wrong_arguments_is_not_made(
         ({"latched": 1}, "latched is 1; give True or False"),
         ({"latched": "no"}, "latched is 'no'; give True or False"),
         ({"msg_type": None}, "msg_type is a 'NoneType'; give a 'str'"),
-        ({"topic": 5}, "a topic is a 'str'"),
+        ({"topic": 5}, "a topic name must be a 'str'"),
         ({"qos": "sensor"}, "has no qualities of service; leave out qos"),
     ],
 )
@@ -92,7 +92,7 @@ def test_a_callback_is_a_function(node: nep.Node) -> None:
         ({"max_messages": 0}, "max_messages is 0; give a whole number from 1 on"),
         ({"max_messages": True}, "max_messages is True; give a whole number from 1 on"),
         ({"with_message": 1}, "with_message is 1; give True or False"),
-        ({"topic": 5}, "a topic is a 'str'"),
+        ({"topic": 5}, "a topic name must be a 'str'"),
         ({"qos": "sensor"}, "has no qualities of service; leave out qos"),
     ],
 )

@@ -151,7 +151,7 @@ def test_topics_that_are_allowed(topic: str) -> None:
         ("a\u2028", r"the character '\\u2028'"),
         ("a\x85", r"the character '\\x85'"),
         ("\ud800", "no Unicode text"),
-        (7, "a topic is a 'str'"),
+        (7, "a topic name must be a 'str'"),
     ],
 )
 def test_topics_that_are_not(topic: str, reason: str) -> None:

@@ -180,7 +180,7 @@ def test_where_no_film_can_be_written_that_is_said(tmp_path, monkeypatch):
     monkeypatch.setattr("nep.recordings.film.CONTAINERS", ())
     with (
         Recording(tmp_path / "a.mcap") as recording,
-        pytest.raises(RecordingError, match="OpenCV cannot write films here"),
+        pytest.raises(RecordingError, match="OpenCV can't write videos on this computer"),
     ):
         export(recording, "mp4", tmp_path / "out")
     assert not list((tmp_path / "out").iterdir())
@@ -237,7 +237,7 @@ def test_sentences(recording, tmp_path, monkeypatch):
     record(tmp_path / "b.mcap", [[json_message(1)]])
     with (
         Recording(tmp_path / "b.mcap") as plain,
-        pytest.raises(RecordingError, match="no topic has pictures"),
+        pytest.raises(RecordingError, match="no topic has images"),
     ):
         export(plain, "mp4", tmp_path)
     with pytest.raises(ValueError, match="no format"):

@@ -152,7 +152,7 @@ def test_sentences(tmp_path):
 
 def test_nothing_is_kept_of_nothing_and_of_a_ring_that_has_ended(tmp_path):
     ring = FlightRecorder(tmp_path / "ring", clock=TestClock(), limits=limits())
-    with pytest.raises(RecordingError, match="no message has come yet"):
+    with pytest.raises(RecordingError, match="no messages received yet"):
         ring.keep(tmp_path / "a.mcap", 1.0)
     ring.post([json_message(1)])
     for wrong in (0.0, -1.0, float("nan"), float("inf")):

@@ -188,7 +188,7 @@ def test_its_menus(qtbot, view, them, window) -> None:
     them.click(BLOCK.format("one"))
     them.press(Qt.Key.Key_F10, Qt.KeyboardModifier.ShiftModifier)
     row = "[...document.querySelectorAll('.blocklyMenuItem')].find(e => e.textContent.includes({}))"
-    label = json.dumps("Put into the backpack")
+    label = json.dumps("Add to backpack")
     them.wait_for(f"!!{row.format(label)}")
     assert "Ctrl+Shift+P" in them.ask(f"{row.format(label)}.textContent")
     them.ask(f"{row.format(label)}.setAttribute('data-test', 'row')")
@@ -197,7 +197,7 @@ def test_its_menus(qtbot, view, them, window) -> None:
     open_it(them, 1)
     box = them.box(f"{IN_SHEET} > .blocklyPath")
     QTest.mouseClick(them.target, Qt.RightButton, pos=QPoint(round(box["left"]) + 14, round(box["top"]) + 14))
-    label = json.dumps("Remove from the backpack")
+    label = json.dumps("Remove from backpack")
     them.wait_for(f"!!{row.format(label)}")
     assert not them.ask(f"!!{row.format(json.dumps('Put into'))}")
 

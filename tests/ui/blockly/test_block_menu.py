@@ -93,7 +93,7 @@ def test_the_menu_of_a_block_has_rows_for_fingers_and_says_the_keys(view, them, 
     rows = open_menu(them, "loop")
     looked_at(them, f"menu-{'dark' if dark else 'light'}")
     assert rows[:5] == ["Run from here", "Duplicate", "Copy", "Cut", "Paste"]
-    assert {"Fold up", "Switch off", "Help"} <= set(rows)
+    assert {"Collapse", "Disable block", "Help"} <= set(rows)
     assert rows[-1] == "Delete 3 blocks"
     heights = (
         "[...document.querySelectorAll('.blocklyContextMenu .blocklyMenuItem')].map(e => e.offsetHeight)"
@@ -122,21 +122,21 @@ def test_the_menu_of_the_canvas(qtbot, them):
 
 
 def test_a_block_that_is_off_is_skipped_and_the_next_one_runs(qtbot, them):
-    choose(them, "first", "Switch off")
+    choose(them, "first", "Disable block")
     them.wait_for("document.querySelector('[data-id=first]').classList.contains('blocklyDisabled')")
     looked_at(them, "off")
     made = compile_behaviour(them.newest(), [])
     assert "wait(3)" not in made.source
     assert "wait(1)" in made.source
     assert not made.problems
-    assert "Switch on" in open_menu(them, "first")
+    assert "Enable block" in open_menu(them, "first")
     them.press(Qt.Key_Escape)
-    choose(them, "first", "Switch on")
+    choose(them, "first", "Enable block")
     qtbot.waitUntil(lambda: "wait(3)" in compile_behaviour(them.newest(), []).source, timeout=WAIT_MS)
 
 
 def test_a_script_that_is_off_is_grey_as_a_whole(qtbot, them):
-    choose(them, "start", "Switch off")
+    choose(them, "start", "Disable block")
     them.wait_for("document.querySelectorAll('.blocklyDisabled').length >= 5")
     made = compile_behaviour(them.newest(), [])
     assert "wait(" not in made.source
@@ -176,5 +176,5 @@ def test_pause_here_marks_the_block_is_kept_in_the_file_and_undone(qtbot, view, 
     assert compile_behaviour(them.newest(), []).breakpoints == ()
     view.load(kept)
     them.wait_for("document.querySelectorAll('.nepPauseMark').length", 1)
-    choose(them, "first", "Do not pause here")
+    choose(them, "first", "Don't pause here")
     qtbot.waitUntil(lambda: "data" not in str(them.newest()), timeout=WAIT_MS)

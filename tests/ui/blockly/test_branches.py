@@ -125,7 +125,7 @@ def test_the_menu_adds_branches_by_keys_alone(qtbot, view, person):
 
 def test_folded_up_it_still_says_its_branches(person):
     them: Person = person(state=full())
-    choose(them, "if", "Fold up")
+    choose(them, "if", "Collapse")
     them.wait_for("document.querySelector('[data-id=if]').classList.contains('blocklyCollapsed')")
     looked_at(them, "branches-folded")
     words = str(them.ask("document.querySelector('[data-id=if] > .blocklyField').textContent"))

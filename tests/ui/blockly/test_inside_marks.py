@@ -78,11 +78,11 @@ def test_a_click_on_a_mark_unfolds_the_block_and_leads_to_what_is_meant(qtbot, v
 def test_the_menu_leads_there_and_names_only_what_is_inside(them):
     double_click(them, "loop")
     them.wait_for(MARKS, [])
-    choose(them, "a", "Do not pause here")
+    choose(them, "a", "Don't pause here")
     double_click(them, "loop")
     them.wait_for(MARKS, BOTH[1:])
     rows = open_menu(them, "loop")
-    assert "Show where it pauses inside" not in rows
+    assert "Show where the program pauses inside" not in rows
     them.press(Qt.Key_Escape)
-    choose(them, "loop", "Show the note inside")
+    choose(them, "loop", "Show the note inside this block")
     them.wait_for(FOCUSED, "b")

@@ -165,7 +165,7 @@ def test_down_in_an_empty_search_goes_to_the_categories(view, them):
 
 def test_finding_blocks_in_the_workspace_goes_round_and_leaves_the_keys_there(view, them):
     view.open_find()
-    goes_to(them, "Find in the blocks")
+    goes_to(them, "Find in blocks")
     count = "document.querySelector('.nepFind span').textContent"
     now = "[...document.querySelectorAll('.nepFoundNow')].map(e => e.dataset.id)"
     QTest.keyClicks(them.target, "wa")
@@ -210,7 +210,7 @@ def test_f1_explains_the_block_that_the_keys_are_on_and_else_is_the_windows(qtbo
     qtbot.waitUntil(lambda: view._on_block, timeout=WAIT_MS)
     press(them, Qt.Key_F1)
     them.wait_for(f"({CARD}).includes('Waits that many seconds')")
-    goes_to(them, "Close the help")
+    goes_to(them, "Close help")
     assert "secondsa number; 2 by default" in them.ask(CARD)
     press(them, Qt.Key_Escape)
     goes_to(them, "wait")
@@ -264,9 +264,9 @@ def test_a_button_on_a_block_has_its_words_and_obeys_enter(qtbot, view, person):
     press(them, Qt.Key_Tab)
     to_the_canvas(them)
     press(them, Qt.Key_Down, Qt.Key_Right)
-    goes_to(them, "take the last gap away")
+    goes_to(them, "remove the last slot")
     press(them, Qt.Key_Right)
-    goes_to(them, "add one gap")
+    goes_to(them, "add a slot")
     press(them, Qt.Key_Return)
     qtbot.waitUntil(lambda: them.tops()[0]["extraState"] == {"items": 1}, timeout=WAIT_MS)
 

@@ -137,7 +137,7 @@ def test_a_topic_that_is_not_there_yet_can_be_typed(qtbot, view, person):
     them = person({"type": "events_message", "id": "on", "x": 56, "y": 56})
     them.click("[data-id=on] .blocklyDropdownField", dx=12, dy=10)
     topics = "[...document.querySelectorAll('.blocklyMenuItemContent')].map(e => e.textContent)"
-    them.wait_for(topics, ["/blackboard", "/faces", "other topic…"])
+    them.wait_for(topics, ["/blackboard", "/faces", "Other topic…"])
     for key in (Qt.Key_End, Qt.Key_Return):
         them.press(key)
     them.wait_for("document.activeElement.className", "blocklyDialogInput")

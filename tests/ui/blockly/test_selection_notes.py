@@ -101,7 +101,7 @@ def test_all_are_blocks_and_notes_and_a_note_among_them_deletes_all(qtbot, them,
     them.press(Qt.Key_A, Qt.ControlModifier)
     them.wait_for(CHOSEN, ["a", "d", "one", "start", "two"])
     click_head(them, "two", button=Qt.RightButton)
-    qtbot.waitUntil(lambda: "Delete all that is selected" in them.ask(ROWS), timeout=WAIT_MS)
+    qtbot.waitUntil(lambda: "Delete the selection" in them.ask(ROWS), timeout=WAIT_MS)
     them.press(Qt.Key_Escape)
     them.wait_for("document.querySelector('.blocklyContextMenu') === null")
     them.wait_for("document.activeElement.dataset.id", "two")

@@ -201,7 +201,7 @@ def test_the_pages_own_words_come_from_the_window(qtbot, monkeypatch):
     them.wait_for("document.querySelector('.nepSearch input')?.placeholder === 'Buscar un bloque'")
     titles = them.ask("[...document.querySelectorAll('.nepZoom button')].map(e => e.title)")
     assert "Zoom in" in titles  # nobody has translated it
-    assert them.ask("document.querySelector('.nepFind input').placeholder") == "Find in the blocks"
+    assert them.ask("document.querySelector('.nepFind input').placeholder") == "Find in blocks"
 
 
 ENDING = """

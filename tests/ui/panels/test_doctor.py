@@ -128,7 +128,7 @@ def test_a_command_is_copied(qtbot, panel, window) -> None:
 
 
 def test_studio_starts_the_master_and_looks_again_when_it_is_there(qtbot, panel, window) -> None:
-    missing = Finding("master:none", "error", "No master runs.", "Start one.", "nep master")
+    missing = Finding("master:none", "error", "No master runs.", "Start a master.", "nep master")
     window.session.doctor.found = (missing,)
     qtbot.mouseClick(panel.again, Qt.MouseButton.LeftButton)
     panel.refresh()

@@ -563,7 +563,7 @@ def test_its_ctrl_f_goes_before_the_window_s(qtbot, panel, window) -> None:
     panel.refresh()
     panel.window().activateWindow()
     qtbot.waitUntil(panel.window().isActiveWindow)
-    other = QAction("Find in the blocks", panel)
+    other = QAction("Find in blocks", panel)
     other.setShortcut(QKeySequence("Ctrl+F"))
     asked: list[str] = []
     other.triggered.connect(lambda: asked.append("other"))

@@ -306,13 +306,11 @@ def test_something_else_is_saved_as_one_of_several_kinds(sheet: FileSheet, folde
     (folder / "Tea 1.svg").write_text("<svg/>")
 
     def ask(name: str) -> None:
-        sheet.ask_save_as(
-            "Save a picture", folder / name, kinds, lambda p, k: taken.append((p.name, k.words))
-        )
+        sheet.ask_save_as("Save as image", folder / name, kinds, lambda p, k: taken.append((p.name, k.words)))
 
     ask("Tea 1")
     assert (sheet.heading.text(), sheet.ending.text(), sheet.name.text()) == (
-        "Save a picture",
+        "Save as image",
         ".png",
         "Tea 1",
     )

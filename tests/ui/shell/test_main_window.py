@@ -767,7 +767,7 @@ def test_nothing_is_offered_where_something_else_is_at_hand(
 ) -> None:
     monkeypatch.setattr(window, "begin", lambda: None)
     if instead == "work of last time":
-        window.banner.offer("Put back?", "It was not saved.", ("Restore", bool), ("Not now", bool))
+        window.banner.offer("Put back?", "It was not saved.", ("Restore", bool), ("Cancel", bool))
     elif instead == "open work":
         window.session.document.edited({"blocks": {"blocks": [{"type": "events_started"}]}})
     elif instead == "an earlier version":

@@ -84,13 +84,13 @@ def test_who_is_new_is_offered_the_first_steps_before_all_else(qtbot, page: Star
     while len(order) < 4:
         order.append(button.text())
         button = button.nextInFocusChain()
-    assert order == ["First steps", "Not now", "Use the virtual robot", "New behaviour"]
+    assert order == ["First steps", "Cancel", "Use the virtual robot", "New behaviour"]
 
 
 def test_not_now_makes_it_one_of_three(qtbot, page: StartPage) -> None:
     before = cards(page)
     page.offer_first_steps()
-    (no,) = [each for each in page.findChildren(Button) if each.text() == "Not now"]
+    (no,) = [each for each in page.findChildren(Button) if each.text() == "Cancel"]
     no.setFocus()
     QTest.mouseClick(no, Qt.MouseButton.LeftButton)
     assert not page.offers_first_steps

@@ -23,7 +23,7 @@ def keys(texts: list[str]) -> list[str]:
 
 
 def test_beginnings_come_first_and_nothing_is_twice() -> None:
-    assert keys(["Cut", "Copy", "Copy as a picture", "Paste", "Última", "42"]) == ["C", "O", "A", "P", "U"]
+    assert keys(["Cut", "Copy", "Copy as image", "Paste", "Última", "42"]) == ["C", "O", "A", "P", "U"]
     assert letters_of(["aa", "aA", ""]) == [0, -1, -1]
 
 

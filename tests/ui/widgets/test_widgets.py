@@ -101,8 +101,8 @@ def test_a_press_on_the_track_goes_there(slider: SliderWithUnit) -> None:
     [
         ("2", "The maximum is 1 m."),
         ("-3", "The minimum is -1 m."),
-        ("far", "This needs a number."),
-        ("nan", "This needs a number."),
+        ("far", "Enter a number."),
+        ("nan", "Enter a number."),
     ],
 )
 def test_a_wrong_number_stays_and_is_explained(slider: SliderWithUnit, typed: str, sentence: str) -> None:
@@ -244,7 +244,7 @@ def test_an_empty_state_leads_on(qtbot, theme: Theme) -> None:
         "bot",
         "No robot",
         "Connect one.",
-        [EmptyAction("Use it", lambda: done.append("used"), primary=True)],
+        [EmptyAction("Apply", lambda: done.append("used"), primary=True)],
     )
     shown(qtbot, made)
     QTest.mouseClick(made.findChildren(Button)[0], Qt.MouseButton.LeftButton)

@@ -51,7 +51,7 @@ export function backpackButton(): HTMLButtonElement {
 /** The button says how many stacks are in it. */
 function dress(): void {
   const count = contents.length;
-  const words = count ? t('Backpack ({count})', {count}) : t('Backpack: keeps blocks for other files');
+  const words = count ? t('Backpack ({count})', {count}) : t('Backpack: stores blocks to use in other files');
   if (!button) return;
   button.title = words;
   button.setAttribute('aria-label', words);
@@ -105,7 +105,7 @@ export function registerBackpack(ask: (asked: string) => void, shown: () => Back
   const may = (block: Blockly.BlockSvg | null | undefined): block is Blockly.BlockSvg =>
     Boolean(block) && !block!.isInFlyout && !block!.isShadow();
   Blockly.ShortcutRegistry.registry.register({
-    name: PACK, keyCodes: [ctrl(Blockly.utils.KeyCodes.P, Blockly.utils.KeyCodes.SHIFT)], displayText: () => t('Put into the backpack'),
+    name: PACK, keyCodes: [ctrl(Blockly.utils.KeyCodes.P, Blockly.utils.KeyCodes.SHIFT)], displayText: () => t('Add to backpack'),
     preconditionFn: (workspace) => !workspace.isDragging() && may(focusedBlock()),
     callback: (_workspace, event) => {
       event.preventDefault();
@@ -181,8 +181,8 @@ class BackpackSheet extends Sheet {
       const {id: _id, x: _x, y: _y, ...rest} = withOwnVariables(structuredClone(block), this.targetWorkspace, names);
       return {kind: 'block', ...rest};
     });
-    const none = [t('The backpack is empty.'), t('Drag blocks onto its button:'), t('they are kept for other files'),
-      t('and for the next start.')].map((text) => ({kind: 'label', text}));
+    const none = [t('The backpack is empty.'), t('Drag blocks to the backpack button'), t('to use them in other files'),
+      t('and the next time you start Studio.')].map((text) => ({kind: 'label', text}));
     this.setTitle(shown.length ? t('Backpack ({count})', {count: shown.length}) : t('Backpack'));
     this.head.querySelector('.nepEmpty')?.toggleAttribute('hidden', !shown.length);
     withoutTypeChecks(() =>
@@ -223,7 +223,7 @@ class BackpackSheet extends Sheet {
     group.setAttribute('aria-hidden', 'true');
     group.setAttribute('transform', `translate(${-GUTTER}, 6)`);
     const title = document.createElementNS(SVG, 'title');
-    title.textContent = t('Remove from the backpack');
+    title.textContent = t('Remove from backpack');
     const back = document.createElementNS(SVG, 'circle');
     for (const name of ['cx', 'cy', 'r']) back.setAttribute(name, String(SIDE / 2));
     const icon = document.createElementNS(SVG, 'g');

@@ -181,7 +181,7 @@ export class Bin {
 
   private fill(sheet: BinSheet): void {
     sheet.setTitle(t('Deleted blocks'));
-    const none = [t('Nothing was deleted here yet.'), t('Deleted blocks wait here'), t('until the behaviour is closed.')]
+    const none = [t('No deleted blocks yet.'), t('Deleted blocks stay here'), t('until you close the behaviour.')]
       .map((text) => ({kind: 'label', text}));
     const all = [...this.entries].reverse().map((state) => {
       const {x: _x, y: _y, ...rest} = structuredClone(state);

@@ -30,9 +30,9 @@ export interface ChoiceConfig extends Blockly.FieldConfig {
 
 /** What people may type: the words of the last option, and those of the question. */
 const TYPED = {
-  topic: {other: () => t('other topic…'), name: () => t('Name of the topic')},
-  field: {other: () => t('other field…'), name: () => t('Name of the field')},
-  message: {other: () => t('New message…'), name: () => t('Name of the message')},
+  topic: {other: () => t('Other topic…'), name: () => t('Topic name')},
+  field: {other: () => t('Other field…'), name: () => t('Field name')},
+  message: {other: () => t('New message…'), name: () => t('Message name')},
 };
 
 const OTHER = '\u0000other';

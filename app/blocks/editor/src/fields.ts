@@ -203,7 +203,7 @@ export class FieldColourChip extends Blockly.Field {
     other.value = this.value_ ?? '';
     other.spellcheck = false;
     other.maxLength = 7;
-    other.setAttribute('aria-label', t('other colour, # and six digits'));
+    other.setAttribute('aria-label', t('another colour: # and six hexadecimal digits'));
     other.oninput = () => other.classList.toggle('wrong', this.doClassValidation_(other.value) === null);
     other.onkeydown = (event) => {
       if (event.key === 'Enter' && this.doClassValidation_(other.value) !== null) this.choose(other.value);

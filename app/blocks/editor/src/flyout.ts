@@ -165,7 +165,7 @@ export class Flyout extends Blockly.VerticalFlyout {
   /** The one in its head. */
   protected makeButton(): HTMLButtonElement {
     const pin = document.createElement('button');
-    const words = t('Keep the blocks open');
+    const words = t('Pin the block list');
     pin.type = 'button';
     pin.title = words;
     pin.setAttribute('aria-label', words);

@@ -54,7 +54,7 @@ export class EmptyCanvas {
     this.robot.classList.add('primary');
     this.button(buttons, 'lightbulb', t('Show me'), (event) => this.showMe(event.detail === 0));
     this.button(buttons, 'blocks', t('Open an example'), () => ask('examples'));
-    this.byKeys.textContent = t('Without the mouse: {toolbox} and the arrow keys find it, Enter takes it, Enter again puts it down.',
+    this.byKeys.textContent = t('With the keyboard: press {toolbox}, choose it with the arrow keys, press Enter to pick it up and Enter again to place it.',
       {toolbox: keyWords(Blockly.ShortcutItems.names.FOCUS_TOOLBOX)});
     this.box.append(this.place, this.where, this.byKeys, buttons);
     this.box.hidden = true;
@@ -98,7 +98,7 @@ export class EmptyCanvas {
     this.box.style.left = `${left}px`;
     this.box.classList.toggle('narrow', document.body.clientWidth - left < 320);
     const events = categoryOf(workspace, FIRST);
-    this.where.textContent = events ? t('It is in {category}, on the left.', {category: events.getName()}) : '';
+    this.where.textContent = events ? t('You\'ll find it under {category}, on the left.', {category: events.getName()}) : '';
   }
 
   private showMe(byKey: boolean): void {
@@ -178,8 +178,8 @@ export class Pointer {
   /** Who uses the keys is told of keys. */
   private words(isOpen: boolean, {name, then}: Wanted, category: string): string {
     const byKeys = isKeyboardLed();
-    if (isOpen) return byKeys ? t('Enter takes it, Enter again puts it down') : then;
-    const where = t('“{block}” is in {category}', {block: name, category});
+    if (isOpen) return byKeys ? t('Press Enter to pick it up and Enter again to place it') : then;
+    const where = t('You\'ll find “{block}” under {category}', {block: name, category});
     return byKeys ? `${where} (${keyWords(Blockly.ShortcutItems.names.FOCUS_TOOLBOX)})` : where;
   }
 

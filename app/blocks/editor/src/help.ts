@@ -78,7 +78,7 @@ export class HelpCard {
     const close = document.createElement('button');
     close.type = 'button';
     close.title = t('Close (Esc)');
-    close.setAttribute('aria-label', t('Close the help'));
+    close.setAttribute('aria-label', t('Close help'));
     close.append(iconElement('x', 16));
     close.onclick = () => this.close();
     head.append(tile, element('h2', '', help.title), close);
@@ -99,9 +99,9 @@ export class HelpCard {
 }
 
 function keptHelp(block: Blockly.BlockSvg): BlockHelp {
-  return {title: t('A block that is not known here'), name: '', does: String(block.getTooltip()),
-    more: t('It may belong to a robot that was never seen here, or to a newer Studio. It stays in the file as it is.'),
-    gaps: [], example: t('For example: connect the robot whose block it is.'), words: '', english: '', choices: []};
+  return {title: t('Unknown block'), name: '', does: String(block.getTooltip()),
+    more: t('It may belong to a robot that was never connected here, or to a newer version of Studio. It stays in the file unchanged.'),
+    gaps: [], example: t('For example: connect the robot that this block belongs to.'), words: '', english: '', choices: []};
 }
 
 function element(tag: string, name: string, words = ''): HTMLElement {

@@ -25,7 +25,7 @@ interface Kind {
 const KINDS: readonly Kind[] = [
   {name: 'pause', icon: 'pause', is: pausesHere, words: () => t('The program pauses inside this block. Click to see where')},
   {name: 'note', icon: 'sticky-note', is: hasNote,
-    words: (inside) => t('Inside is a note: {text}', {text: inside.map(wordsOfNote).filter(Boolean).join(' · ')})},
+    words: (inside) => t('Contains a note: {text}', {text: inside.map(wordsOfNote).filter(Boolean).join(' · ')})},
 ];
 
 /** Folded blocks, each with the marks that it shows. */

@@ -104,27 +104,27 @@ export function registerMenu(clipboard: Clipboard): void {
   block({id: 'nepPaste', weight: 13, icon: 'clipboard-paste', words: t('Paste'), shortcut: names.PASTE,
     when: own, run: (_it, place) => clipboard.paste(place)});
   line(ScopeType.BLOCK, 50);
-  block({id: 'nepCollapse', weight: 51, icon: 'fold-vertical', words: t('Fold up'),
+  block({id: 'nepCollapse', weight: 51, icon: 'fold-vertical', words: t('Collapse'),
     when: (it) => own(it) && all(it.block!).some((each) => !each.isCollapsed() && canFold(each)),
     run: (it) => step(() => all(it.block!).filter(canFold).forEach((each) => fold(each, true)))});
-  block({id: 'nepExpand', weight: 52, icon: 'unfold-vertical', words: t('Unfold'),
+  block({id: 'nepExpand', weight: 52, icon: 'unfold-vertical', words: t('Expand'),
     when: (it) => own(it) && all(it.block!).some((each) => each.isCollapsed()),
     run: (it) => step(() => all(it.block!).forEach((each) => fold(each, false)))});
-  block({id: 'nepOff', weight: 53, icon: 'power-off', words: t('Switch off'), shortcut: SWITCH,
+  block({id: 'nepOff', weight: 53, icon: 'power-off', words: t('Disable block'), shortcut: SWITCH,
     when: (it) => own(it) && all(it.block!).some((each) => !each.hasDisabledReason(OFF) && !each.getInheritedDisabled()),
     run: (it) => switchOff(it.block!, true)});
-  block({id: 'nepOn', weight: 54, icon: 'power', words: t('Switch on'), shortcut: SWITCH,
+  block({id: 'nepOn', weight: 54, icon: 'power', words: t('Enable block'), shortcut: SWITCH,
     when: (it) => own(it) && all(it.block!).some((each) => each.hasDisabledReason(OFF)), run: (it) => switchOff(it.block!, false)});
   block({id: 'nepNote', weight: 70, icon: 'sticky-note', words: t('Add a note'),
     when: (it) => own(it) && !hasNote(it.block!) && !it.block!.isCollapsed(), run: (it) => addNote(it.block!)});
   block({id: 'nepNoNote', weight: 70, icon: 'sticky-note', words: t('Remove the note'),
     when: (it) => own(it) && hasNote(it.block!), run: (it) => removeNote(it.block!)});
   block({id: 'nepPause', weight: 75, icon: 'circle-pause',
-    words: (it) => it.block && pausesHere(it.block) ? t('Do not pause here') : t('Pause here'),
+    words: (it) => it.block && pausesHere(it.block) ? t('Don\'t pause here') : t('Pause here'),
     when: (it) => own(it) && canPause(it.block!), run: (it) => togglePause(it.block!)});
-  block({id: 'nepShowNote', weight: 71, icon: 'sticky-note', words: t('Show the note inside'),
+  block({id: 'nepShowNote', weight: 71, icon: 'sticky-note', words: t('Show the note inside this block'),
     when: (it) => own(it) && hiddenIn(it.block!, 'note') !== null, run: (it) => leadTo(hiddenIn(it.block!, 'note')!)});
-  block({id: 'nepShowPause', weight: 76, icon: 'circle-pause', words: t('Show where it pauses inside'),
+  block({id: 'nepShowPause', weight: 76, icon: 'circle-pause', words: t('Show where the program pauses inside'),
     when: (it) => own(it) && hiddenIn(it.block!, 'pause') !== null, run: (it) => leadTo(hiddenIn(it.block!, 'pause')!)});
   line(ScopeType.BLOCK, 80);
   line(ScopeType.BLOCK, 98);
@@ -133,7 +133,7 @@ export function registerMenu(clipboard: Clipboard): void {
     when: (it) => own(it) && it.block!.isDeletable(), run: (it) => remove(it.block!)});
 
   Blockly.ShortcutRegistry.registry.register({
-    name: SWITCH, keyCodes: [ctrl(Blockly.utils.KeyCodes.E)], displayText: () => t('Switch off'),
+    name: SWITCH, keyCodes: [ctrl(Blockly.utils.KeyCodes.E)], displayText: () => t('Disable block'),
     preconditionFn: (workspace) => !workspace.isDragging() && !workspace.isFlyout,
     callback: () => {
       const it = focusedBlock();
@@ -162,7 +162,7 @@ export function registerMenu(clipboard: Clipboard): void {
   note({id: 'nepNoteCopy', weight: 11, icon: 'copy', words: t('Copy'), shortcut: names.COPY,
     when: () => true, run: (it) => clipboard.copy(it.comment)});
   note({id: 'nepNoteDelete', weight: 99, icon: 'trash-2', shortcut: names.DELETE,
-    words: (it) => allChosenWith(it.comment).length ? t('Delete all that is selected') : t('Remove the note'),
+    words: (it) => allChosenWith(it.comment).length ? t('Delete the selection') : t('Remove the note'),
     when: () => true, run: (it) => it.comment && !removeChosenWith(it.comment) && step(() => it.comment!.dispose())});
 }
 
@@ -181,9 +181,9 @@ interface BackpackMenu {
 }
 
 export function addToMenus(backpack: BackpackMenu): void {
-  add(ScopeType.BLOCK, {id: 'nepPack', weight: 14, icon: 'backpack', words: t('Put into the backpack'), shortcut: PACK,
+  add(ScopeType.BLOCK, {id: 'nepPack', weight: 14, icon: 'backpack', words: t('Add to backpack'), shortcut: PACK,
     when: ({block}) => backpack.may(block), run: ({block}) => block && backpack.pack(block)});
-  add(ScopeType.BLOCK, {id: 'nepUnpack', weight: 99, icon: 'trash-2', words: t('Remove from the backpack'),
+  add(ScopeType.BLOCK, {id: 'nepUnpack', weight: 99, icon: 'trash-2', words: t('Remove from backpack'),
     shortcut: names.DELETE, when: ({block}) => block !== undefined && backpack.isPacked(block),
     run: ({block}) => block && backpack.remove(block)});
   add(ScopeType.WORKSPACE, {id: 'nepOpenBackpack', weight: 13, icon: 'backpack',
@@ -197,8 +197,8 @@ export function registerPictureMenu(command: (name: string) => void): void {
   const canvas = (entry: Omit<Entry, 'when'>) => add(ScopeType.WORKSPACE,
     {...entry, when: ({workspace}) => (workspace?.getTopBlocks(false).length ?? 0) > 0});
   line(ScopeType.WORKSPACE, 60);
-  canvas({id: 'nepPicture', weight: 61, icon: 'image-down', words: t('Save a picture'), run: () => command('picture.save')});
-  canvas({id: 'nepCopyPicture', weight: 62, icon: 'image', words: t('Copy as a picture'), run: () => command('picture.copy')});
+  canvas({id: 'nepPicture', weight: 61, icon: 'image-down', words: t('Save as image'), run: () => command('picture.save')});
+  canvas({id: 'nepCopyPicture', weight: 62, icon: 'image', words: t('Copy as image'), run: () => command('picture.copy')});
   canvas({id: 'nepPrintBlocks', weight: 63, icon: 'printer', words: t('Print'), run: () => command('print.ask')});
 }
 
@@ -225,7 +225,7 @@ function step(change: () => void): void {
 }
 
 function deleteWords(block: Blockly.BlockSvg): string {
-  if (notesChosenWith(block).length) return t('Delete all that is selected');
+  if (notesChosenWith(block).length) return t('Delete the selection');
   const count = countIn(all(block));
   return count === 1 ? Blockly.Msg['DELETE_BLOCK'] ?? '' :
     (Blockly.Msg['DELETE_X_BLOCKS'] ?? '').replace('%1', String(count));

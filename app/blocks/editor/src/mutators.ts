@@ -67,7 +67,7 @@ const ITEMS = {
 function startItems(this: ItemsBlock): void {
   this.items = 0;
   const row = this.appendDummyInput('BUTTONS');
-  buttons(this, row, t('take the last gap away'), t('add one gap'), (by) => this.showItems(this.items + by));
+  buttons(this, row, t('remove the last slot'), t('add a slot'), (by) => this.showItems(this.items + by));
   const recording = Blockly.Events.isEnabled();
   if (recording) Blockly.Events.disable();
   this.showItems(3);
@@ -120,13 +120,13 @@ const BRANCHES = {
 };
 
 function lessButton(block: BranchesBlock, number: number): FieldButton {
-  return new FieldButton('minus', t('take this branch away'), () => removeBranch(block, number));
+  return new FieldButton('minus', t('remove this branch'), () => removeBranch(block, number));
 }
 
 function startBranches(this: BranchesBlock): void {
   this.elseIfs = 0;
   this.hasElse = this.beginsWithElse = this.getInput('ELSE') !== null;
-  this.appendDummyInput('MORE').appendField(new FieldButton('plus', t('add another branch'), () => addBranch(this)));
+  this.appendDummyInput('MORE').appendField(new FieldButton('plus', t('add a branch'), () => addBranch(this)));
   this.moveInputBefore('MORE', 'BODY');
   const row = this.inputList[this.inputList.findIndex((each) => each.name === 'ELSE') - 1];
   if (!this.hasElse || !row) return;
@@ -228,7 +228,7 @@ const FUNCTION = {
     this.own = inputs.map((each) => ({...each}));
     if (inputs.length) row.appendField(t('with'), 'WITH');
     this.own.forEach((each, number) => row.appendField(nameField(this, each), `INPUT${number}`));
-    buttons(this, row, t('take the last input away'), t('add one input'), (by) => shapeInputs(this, by, this.own.length - 1));
+    buttons(this, row, t('remove the last input'), t('add an input'), (by) => shapeInputs(this, by, this.own.length - 1));
   },
 };
 
@@ -240,7 +240,7 @@ function nameField(block: DefinitionBlock, input: FunctionInput): Blockly.Field 
     if (own) own.name = name;
     return name;
   });
-  field.setTooltip(t('the name of this input'));
+  field.setTooltip(t('input name'));
   return field;
 }
 

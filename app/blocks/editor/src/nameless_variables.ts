@@ -21,7 +21,7 @@ export class NamelessVariables {
     for (let state = waiting.pop(); state; state = waiting.pop()) {
       for (const id of unnamed(state)) {
         if (variables.getVariableById(id)) continue;
-        const name = this.freeName(t('variable without a name'));
+        const name = this.freeName(t('unnamed variable'));
         this.placeholders.set(id, name);
         variables.createVariable(name, '', id);
       }

@@ -6,8 +6,8 @@ import {parseNumber, type Rejection} from './typed_number';
 import {lazy, t} from './words';
 
 const SENTENCES: Readonly<Record<Rejection, string>> = {
-  'separators': lazy('Write a number with at most one comma or point, such as 1234.5 or 1234,5.'),
-  'not a number': lazy('This needs a number.'),
+  'separators': lazy('Enter a number with at most one decimal comma or point, such as 1234.5 or 1234,5.'),
+  'not a number': lazy('Enter a number.'),
 };
 /** Where a number may begin: no sentence is shown yet. */
 const UNFINISHED = /^\s*[+\u2212-]?[.,]?\s*$/;
@@ -38,7 +38,7 @@ class NumberField extends Blockly.FieldNumber {
 
   override onFinishEditing_(value: unknown): void {
     super.onFinishEditing_(value);
-    const keeps = t('The field keeps {number}.', {number: String(value)});
+    const keeps = t('The value stays {number}.', {number: String(value)});
     if (this.problem) this.explain(`${t(SENTENCES[this.problem])} ${keeps}`);
     this.problem = null;
   }

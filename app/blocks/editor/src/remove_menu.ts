@@ -83,7 +83,7 @@ export function registerRemoveMenu(): void {
   const scopeType = Blockly.ContextMenuRegistry.ScopeType.BLOCK;
   Blockly.ContextMenuRegistry.registry.register({
     id: 'nepRemoveItem', weight: 81, scopeType,
-    displayText: () => t('Take item {number} out of the list', {number: (found?.number ?? 0) + 1}),
+    displayText: () => t('Remove item {number} from the list', {number: (found?.number ?? 0) + 1}),
     preconditionFn: ({block}, event) => {
       found = block && !block.isInFlyout ? wanted(block, event) : null;
       return found ? 'enabled' : 'hidden';
@@ -109,7 +109,7 @@ export function registerRemoveMenu(): void {
       block && DEFINITIONS.includes(block.type) && !block.isInFlyout ? (block as unknown as DefinitionBlock).own[place] : undefined;
     Blockly.ContextMenuRegistry.registry.register({
       id: `nepRemoveInput${place}`, weight: 82 + place / 100, scopeType,
-      displayText: ({block}) => t('Take the input “{input}” away', {input: inputOf(block)?.name ?? ''}),
+      displayText: ({block}) => t('Remove the input “{input}”', {input: inputOf(block)?.name ?? ''}),
       preconditionFn: ({block}) => inputOf(block) ? 'enabled' : 'hidden',
       callback: ({block}) => block && changeInputs(block as unknown as DefinitionBlock, -1, place),
     });

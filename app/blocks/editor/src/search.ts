@@ -147,8 +147,8 @@ export class FindBar {
     this.bar.setAttribute('role', 'search');
     this.bar.hidden = true;
     this.words.type = 'search';
-    this.words.placeholder = t('Find in the blocks');
-    this.words.setAttribute('aria-label', t('Find in the blocks'));
+    this.words.placeholder = t('Find in blocks');
+    this.words.setAttribute('aria-label', t('Find in blocks'));
     this.words.spellcheck = false;
     this.count.setAttribute('role', 'status');
     this.words.oninput = () => this.search();

@@ -39,7 +39,7 @@ export class SearchItem extends Blockly.ToolboxItem {
     this.field.type = 'search';
     this.field.placeholder = t('Find a block');
     this.field.spellcheck = false;
-    this.field.setAttribute('aria-label', t('Find a block: type words, Enter takes the first'));
+    this.field.setAttribute('aria-label', t('Find a block: type words and press Enter to take the first result'));
     this.field.title = t('Find a block');
     this.field.onfocus = () => this.dress();
     this.field.onblur = () => {
@@ -154,8 +154,8 @@ export class SearchItem extends Blockly.ToolboxItem {
       return;
     }
     const found = this.found();
-    const none = [t('No block for “{words}”', {words: words.trim()}), t('Try a simpler word, such as “turn” or “say”,'),
-      t('or look into a category.')].map((text) => ({kind: 'label', text, gap: 8}));
+    const none = [t('No blocks match “{words}”', {words: words.trim()}), t('Try a simpler word, such as “turn” or “say”,'),
+      t('or browse the categories.')].map((text) => ({kind: 'label', text, gap: 8}));
     const {atFirst} = this;
     const number = found.length - atFirst;
     const more = {kind: 'button', text: t('Show {number} more', {number}), callbackkey: SHOW_ALL};

@@ -199,7 +199,7 @@ export class Toolbox extends Blockly.Toolbox {
   showFound(entries: unknown[] | null): void {
     if (this.selectedItem_) this.deselectItem_(this.selectedItem_);
     const flyout = this.getFlyout();
-    this.setTitle(t('Found blocks'));
+    this.setTitle(t('Search results'));
     if (entries) flyout?.show(entries as Blockly.utils.toolbox.FlyoutItemInfoArray);
     else flyout?.hide();
     this.openLast();

@@ -183,6 +183,6 @@ Blockly.Blocks[UNKNOWN_BLOCK] = {
       else this.setPreviousStatement(true);
       this.setNextStatement(true);
     }
-    this.setTooltip(t('This file uses “{block}”, which is not known here. It is kept and skipped.', {block: state.label}));
+    this.setTooltip(t('This file uses “{block}”, which this version of Studio doesn\'t know. It stays in the file and is skipped when the program runs.', {block: state.label}));
   },
 };

@@ -127,7 +127,7 @@ export function registerVariableMenu(isWatched: (id: string) => boolean): void {
       },
     });
   entry('nepWatch', 6.1, (variable) => isWatched(variable.getId()) ?
-    t('Show the value of “{name}” no longer', {name: variable.getName()}) :
+    t('Hide the value of “{name}”', {name: variable.getName()}) :
     t('Show the value of “{name}”', {name: variable.getName()}), 'variable.watch');
   entry('nepRenameVariable', 6.2, (variable) => t('Rename “{name}”', {name: variable.getName()}), 'variable.rename');
 }

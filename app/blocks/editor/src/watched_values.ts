@@ -102,7 +102,7 @@ export class WatchedValues {
     title.textContent = title.title = name;
     const close = document.createElement('button');
     close.type = 'button';
-    close.title = t('Show the value of “{name}” no longer', {name});
+    close.title = t('Hide the value of “{name}”', {name});
     close.setAttribute('aria-label', close.title);
     close.append(iconElement('x', 14));
     close.onclick = () => this.toggle(watched.id);

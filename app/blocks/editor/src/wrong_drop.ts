@@ -161,7 +161,7 @@ function atGap(block: Blockly.BlockSvg, other: Blockly.BlockSvg, gap: Blockly.Re
     return block.outputConnection ? {by: other, place, sentence: isValue(name)} : null;
   }
   if (!block.outputConnection) {
-    return {by: other, place, sentence: t('“{block}” gives no value, so no gap takes it. Put it below another block.', {block: name})};
+    return {by: other, place, sentence: t('“{block}” has no value, so it doesn\'t fit into a slot for values. Place it below another block.', {block: name})};
   }
   const check = gap.getCheck();
   const gives = block.outputConnection.getCheck();
@@ -169,7 +169,7 @@ function atGap(block: Blockly.BlockSvg, other: Blockly.BlockSvg, gap: Blockly.Re
   const kind = check[0] ?? '';
   const what = t(TAKES[kind] ?? ANOTHER);
   const owner = helpFor(other.type)?.name;
-  const sentence = owner ? t('“{block}” needs {what} here', {block: owner, what}) : t('This gap takes {what}', {what});
+  const sentence = owner ? t('“{block}” needs {what} here', {block: owner, what}) : t('This slot needs {what}', {what});
   return {by: other, place, sentence};
 }
 
@@ -177,15 +177,15 @@ function under(block: Blockly.BlockSvg, other: Blockly.BlockSvg, place: Blockly.
   const name = nameOf(block);
   if (block.outputConnection) return {by: other, place, sentence: isValue(name)};
   if (!block.previousConnection) {
-    return {by: other, place, sentence: t('“{block}” begins a script, so it stands alone', {block: name})};
+    return {by: other, place, sentence: t('“{block}” starts a script, so no block can be above it', {block: name})};
   }
-  if (!other.nextConnection) return {by: other, place, sentence: t('Nothing can follow “{block}”', {block: nameOf(other)})};
+  if (!other.nextConnection) return {by: other, place, sentence: t('“{block}” can\'t have blocks below it', {block: nameOf(other)})};
   if (block.nextConnection || !other.getNextBlock()) return null;
-  return {by: other, place, sentence: t('Nothing can follow “{block}”. Put it at the end.', {block: name})};
+  return {by: other, place, sentence: t('“{block}” can\'t have blocks below it. Place it at the end.', {block: name})};
 }
 
 function isValue(name: string): string {
-  return t('“{block}” is a value. Put it into a gap of another block.', {block: name});
+  return t('“{block}” is a value. Drag it into a slot of another block.', {block: name});
 }
 
 function nameOf(block: Blockly.BlockSvg): string {

@@ -93,7 +93,7 @@ class MessageForm(QWidget):
     def _make_fields(self) -> None:
         theme = self._theme
         self.name = QLineEdit()
-        self.name.setAccessibleName(_("Name of the message"))
+        self.name.setAccessibleName(_("Message name"))
         self.name.setMaxLength(NAME_LETTERS)
         EditMenu(theme, self.name)
         self.topic = TopicEdit(theme)

@@ -219,7 +219,7 @@ COMMANDS: tuple[C, ...] = (
     _edit("selectAll", lazy("Select all"), "Ctrl+A", "text-select"),
     C("picture.copy", lazy("Copy blocks as image"), lambda do: do.behaviours.pictures.copy(),
       "Edit", icon="image", above=True, why_not=_no_editor),
-    C("blocks.find", lazy("Find in the blocks"), lambda do: do.behaviours.find_blocks(to_add=False), "Edit",
+    C("blocks.find", lazy("Find in blocks"), lambda do: do.behaviours.find_blocks(to_add=False), "Edit",
       ("Ctrl+F",), "search", above=True),
     C("blocks.search", lazy("Find and add a block"), lambda do: do.behaviours.find_blocks(to_add=True),
       "Edit"),

@@ -64,7 +64,7 @@ class VariableCommands:
                 return
             has_name = id not in workspace.nameless
             self._ask().ask(
-                _("New name for “{name}”").format(name=old) if has_name else _("Name of the variable"),
+                _("New name for “{name}”").format(name=old) if has_name else _("Variable name"),
                 _("Rename") if has_name else _("Name it"),
                 lambda name: "" if name == old else self.refusal(name, id),
                 lambda name: self._edit({"do": "rename", "id": id, "name": name}),
@@ -125,7 +125,7 @@ class VariableCommands:
         is_number = now is not None and now.kind == "number"
         self._ask().ask(
             _("New value for “{name}”").format(name=name),
-            _("Use it"),
+            _("Apply"),
             lambda words: separators_refusal(words) if is_number else "",
             take,
             now.text if now is not None and now.kind in ("number", "text", "boolean") else "",

@@ -59,7 +59,7 @@ class MotionQuestion(QWidget):
         self.sentence = label("", "bodyLarge", role="textSecondary", wrap=True)
         self.always = Switch(theme, "")
         self.let = Button(theme, _("Allow motion"), "footprints", kind="primary", size="form")
-        self.not_now = Button(theme, _("Not now"), size="form")
+        self.not_now = Button(theme, _("Cancel"), size="form")
         self.let.clicked.connect(lambda: self._answer(let=True))
         self.not_now.clicked.connect(lambda: self._answer(let=False))
         self._lay_out(theme)

@@ -38,7 +38,7 @@ class NetworkAccessSheet(Overlay):
         self.copy = IconButton(theme, "copy", _("Copy setting"))
         self.copy.clicked.connect(lambda: QGuiApplication.clipboard().setText(self.typed.text()))
         self.yes = Button(theme, _("Allow connections"), "wifi", kind="primary", size="form")
-        self.no = Button(theme, _("Not now"), size="form")
+        self.no = Button(theme, _("Cancel"), size="form")
         self.end = Button(theme, _("This computer only"), "lock", size="form")
         self.yes.clicked.connect(self._let_in)
         self.no.clicked.connect(self.shut)
@@ -104,7 +104,7 @@ class NetworkAccessSheet(Overlay):
             paint.show_when(shown, is_open or can_open)
         paint.show_when(self.yes, can_open and not is_open)
         paint.show_when(self.end, is_open and access.is_near)
-        self.no.set_word(_("Cancel") if is_open or not can_open else _("Not now"))
+        self.no.set_word(_("Cancel"))
         self.setAccessibleName(f"{self.heading.text()} {self.warning.text()}")
 
     def _heading(self, *, is_open: bool, can_open: bool) -> str:

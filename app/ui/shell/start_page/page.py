@@ -139,7 +139,7 @@ class StartPage(QWidget):
         )
         self._learn = Button(theme, _("First steps"), size="large")
         self._learn.clicked.connect(self.learn_pressed)
-        self._not_now = Button(theme, _("Not now"), kind="ghost", size="large")
+        self._not_now = Button(theme, _("Cancel"), kind="ghost", size="large")
         self._not_now.clicked.connect(self._decline)
         self._not_now.hide()
         title, text = LEARN

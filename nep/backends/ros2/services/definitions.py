@@ -64,7 +64,7 @@ class _Part:
     def decode(self, data: bytes) -> dict[str, Any]:
         found = self.types.decode(self.name, data)
         if not isinstance(found, dict):
-            raise WireError(_("it is no message of ROS"), len(data))
+            raise WireError(_("it is not a ROS message"), len(data))
         return found
 
 
@@ -74,8 +74,7 @@ def known_service(types: MessageTypes, name: str) -> TypedService:
     if texts is None:
         raise NepError(
             _(
-                "no type of service '{name}' is known; {did_you_mean}, or set {variable} to a folder of "
-                ".srv files"
+                "unknown service type '{name}'; {did_you_mean} (or set {variable} to a folder of .srv files)"
             ).format(
                 name=name,
                 did_you_mean=did_you_mean(name, tuple(each for each in _COMMON if each != NEP_CALL)),
@@ -105,7 +104,7 @@ def _in_folders(name: str) -> tuple[str, str] | None:
             bounds = [number for number, line in enumerate(lines) if line.strip() == "---"]
             if len(bounds) != 1:
                 raise NepError(
-                    _("'{path}' is no .srv file; write '---' between the request and the answer").format(
+                    _("'{path}' is not a .srv file; write '---' between the request and the response").format(
                         path=path
                     )
                 )
@@ -121,7 +120,7 @@ def served_type(types: MessageTypes, msg_type: str) -> TypedService:
     if msg_type not in {"json", "msgpack"}:
         raise NepError(
             _(
-                "a service of ROS 2 cannot have the type '{name}'; use one such as 'std_srvs/srv/SetBool'"
+                "a ROS 2 service can't have the type '{name}'; use a type such as 'std_srvs/srv/SetBool'"
             ).format(name=msg_type)
         )
     return known_service(types, NEP_CALL)

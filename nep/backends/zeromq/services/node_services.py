@@ -147,9 +147,7 @@ class ZeromqServices:
     def survey(self, spec: ClientSpec) -> SurveyClient:
         """Create a surveyor. See `ServiceTransport.survey`."""
         if isinstance(spec.configuration, Direct):
-            raise NepError(
-                _("over 'zeromq' a survey needs a master; leave out the configuration, or use 'nanomsg'")
-            )
+            raise NepError(_("surveys of 'zeromq' need a master; omit the configuration, or use 'nanomsg'"))
         session = self._session(spec.configuration.master)
         session.wait_for_name(spec.wait_s)
 
@@ -178,7 +176,7 @@ class ZeromqServices:
         address = f"{direct.ip}:{direct.port}"
         if not is_endpoint(endpoint_of(address)):
             raise NepError(
-                _("'{address}' cannot be called; use a computer's address and a port").format(address=address)
+                _("cannot call '{address}'; use a computer's address and a port").format(address=address)
             )
         endpoint = endpoint_of(in_numbers(address))
         return self._new_client(

@@ -77,7 +77,7 @@ class TcpStream:
             self._clear_input()
             self.is_over = True
             self._abort()
-            reason = _("its size is {size} bytes; it is no call, or too large").format(size=size)
+            reason = _("it declares {size} bytes; it is not a call, or is too large").format(size=size)
             raise WireError(reason, code="call-size")
         if available < _SIZE.size + size:
             self._check_end(available)
@@ -99,7 +99,7 @@ class TcpStream:
     def _check_end(self, available: int) -> None:
         if self.is_over and available:
             self._clear_input()
-            raise WireError(_("it ends in the middle"), code="call-end")
+            raise WireError(_("it is incomplete"), code="call-end")
 
     def _clear_input(self) -> None:
         self._input = bytearray()

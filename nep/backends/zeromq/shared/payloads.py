@@ -119,7 +119,9 @@ class SharedSources:
         """
         reader = self._readers.get(publisher)
         if len(part) != _NUMBER.size:
-            raise WireError(_("it names no payload in shared memory"), len(part), code="shared-memory")
+            raise WireError(
+                _("it does not refer to a payload in shared memory"), len(part), code="shared-memory"
+            )
         return None if reader is None else reader.take(_NUMBER.unpack(part)[0], may_copy=may_copy)
 
     def leave(self, publisher: int) -> None:

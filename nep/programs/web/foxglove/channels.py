@@ -146,10 +146,10 @@ class Channels:
         if type(id_) is not int or not 0 <= id_ <= MAX_ID or id_ in self._subscriptions or channel is None:
             raise NepError(_("a subscription needs an unused 'id' and the 'channelId' of a topic"))
         if any(each.channel is channel for each in self._subscriptions.values()):
-            raise NepError(_("a channel has one subscription at a time"))
+            raise NepError(_("this channel already has a subscription"))
         if len(self._subscriptions) >= MAX_TOPICS:
             raise NepError(
-                _("this page subscribes to {count} topics, and may have no more").format(count=MAX_TOPICS)
+                _("this page already subscribes to {count} topics, the maximum").format(count=MAX_TOPICS)
             )
         topic, msg_type = channel.definition.topic, channel.msg_type
         subscriber = await self._context.in_thread(

@@ -188,7 +188,7 @@ class FoxglovePage(PageConnection):
             self._reject(error)
         except Exception:
             _logger.exception("an operation of the page '%s' failed", self.name)
-            self._reject(NepError(_("an operation failed because of an error in the server")))
+            self._reject(NepError(_("an operation failed because of an internal error of the server")))
 
     async def _carry_out(self, fields: Mapping[str, object]) -> None:
         name = str(fields.get("op"))
@@ -231,7 +231,7 @@ class FoxglovePage(PageConnection):
             )
         if len(self._advertised) >= MAX_TOPICS:
             raise NepError(
-                _("this page publishes {count} topics, and may have no more").format(count=MAX_TOPICS)
+                _("this page already publishes {count} topics, the maximum").format(count=MAX_TOPICS)
             )
         topic, schema = fields.get("topic"), schema_name if isinstance(schema_name, str) else ""
         known = self._channels.ros_type(topic, schema) if isinstance(topic, str) else ""
@@ -244,14 +244,14 @@ class FoxglovePage(PageConnection):
     async def _unadvertise(self, id_: object) -> None:
         known = self._advertised.pop(id_, None) if isinstance(id_, int) else None
         if known is None:
-            raise NepError(_("there is no channel with the id {id}").format(id=quotable(id_)))
+            raise NepError(_("unknown channel id {id}").format(id=quotable(id_)))
         if self._topics.is_advertised(known.topic):
             await self._topics.unadvertise(op.Unadvertise(known.id, known.topic))
 
     async def _publish(self, message: wire.ClientMessage) -> None:
         known = self._advertised.get(message.channel_id)
         if known is None:
-            raise NepError(_("there is no channel with the id {id}").format(id=message.channel_id))
+            raise NepError(_("unknown channel id {id}").format(id=message.channel_id))
         msg = op.parse_json(message.data)
         if not self._topics.is_advertised(known.topic):
             await self._topics.advertise(known)
@@ -264,7 +264,7 @@ class FoxglovePage(PageConnection):
         operation = op.CallService(ids, self._updates.service(request.service_id), {})
         try:
             if not operation.service:
-                raise NepError(_("there is no service with the id {id}").format(id=request.service_id))
+                raise NepError(_("unknown service id {id}").format(id=request.service_id))
             if request.encoding != wire.ENCODING:
                 raise NepError(
                     _("requests with the encoding '{encoding}' can't be read; use 'json'").format(

@@ -33,7 +33,7 @@ class FragmentBuffer:
         if self._totals.setdefault(part.id, part.total) != part.total:
             self._forget(part.id)
             raise OperationError(
-                _("the fragments of '{id}' differ in 'total'; they are forgotten").format(id=part.id), part.id
+                _("the fragments of '{id}' differ in 'total'; all were discarded").format(id=part.id), part.id
             )
         parts = self._parts.setdefault(part.id, {})
         self._size += len(part.data) - len(parts.get(part.number, ""))
@@ -43,7 +43,7 @@ class FragmentBuffer:
         if self._size > MAX_MESSAGE_BYTES:
             self._forget(part.id)
             raise OperationError(
-                _("the fragments of '{id}' have more than {most} characters; they are forgotten").format(
+                _("the fragments of '{id}' have more than {most} characters; all were discarded").format(
                     id=part.id, most=MAX_MESSAGE_BYTES
                 ),
                 part.id,

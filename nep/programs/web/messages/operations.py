@@ -238,7 +238,7 @@ def parse(data: bytes) -> Operation:
     """Return the operation in one message of a page. Raises `OperationError`."""
     fields = parse_json(data)
     if not isinstance(fields, dict):
-        raise OperationError(_("an operation is a JSON object with an 'op'"))
+        raise OperationError(_("an operation must be a JSON object with an 'op'"))
     return operation_of(fields, len(data))
 
 
@@ -251,21 +251,21 @@ def parse_json(data: bytes) -> object:
     """Return a JSON value of a page, within the limits of an operation. Raises `OperationError`."""
     if len(data) > MAX_MESSAGE_BYTES:
         raise OperationError(
-            _("an operation has {count} bytes; {most} are allowed").format(
+            _("an operation has {count} bytes; at most {most} are allowed").format(
                 count=len(data), most=MAX_MESSAGE_BYTES
             )
         )
     if json_is_too_deep(data):
-        raise OperationError(_("an operation is refused: {reason}").format(reason=too_deep()))
+        raise OperationError(_("an operation was rejected: {reason}").format(reason=too_deep()))
     if len(data) > MAX_VALUES and sum(map(data.count, (b",", b"[", b"{"))) > MAX_VALUES:
         raise OperationError(
-            _("an operation has more than {most} values; send less at once").format(most=MAX_VALUES)
+            _("an operation has more than {most} values; send less data at once").format(most=MAX_VALUES)
         )
     try:
         return orjson.loads(data)
     except orjson.JSONDecodeError as error:
         raise OperationError(
-            _("an operation is no JSON text: {reason}").format(reason=quotable(str(error)))
+            _("an operation is not valid JSON: {reason}").format(reason=quotable(str(error)))
         ) from None
 
 
@@ -298,7 +298,7 @@ class _Fields:
             raise self.wrong(name, _("a text"))
         if len(value) > most:
             raise self.error(
-                _("'{name}' has {count} characters; {most} are allowed").format(
+                _("'{name}' has {count} characters; at most {most} are allowed").format(
                     name=name, count=len(value), most=most
                 )
             )
@@ -317,13 +317,13 @@ class _Fields:
         try:
             return check_topic(given) if given else given
         except BadTopicError as error:
-            raise self.error(_("'type' is refused: {reason}").format(reason=error.reason)) from None
+            raise self.error(_("'type' is invalid: {reason}").format(reason=error.reason)) from None
 
     def own_name(self, name: str) -> str:
         """The name of a topic or a service that the page makes."""
         given = self.topic(name)
         if given.startswith(_RESERVED):
-            said = _("names below '{prefix}' are NEP's own; choose another")
+            said = _("names that start with '{prefix}' are reserved; choose another name")
             raise self.error(said.format(prefix=_RESERVED))
         return given
 
@@ -338,7 +338,7 @@ class _Fields:
         number = int(cast("float", value))
         if not least <= number <= most:
             raise self.error(
-                _("'{name}' is {number}; from {least} to {most} is allowed").format(
+                _("'{name}' is {number}; it must be from {least} to {most}").format(
                     name=name, number=bounded_str(number, 40), least=least, most=most
                 )
             )
@@ -387,9 +387,7 @@ def _operation(fields: _Fields) -> Operation:
     if known is None:
         said = did_you_mean(fields.op, tuple(_READERS))
         raise fields.error(
-            _("there is no operation '{op}'; {did_you_mean}").format(
-                op=quotable(fields.op), did_you_mean=said
-            )
+            _("unknown operation '{op}'; {did_you_mean}").format(op=quotable(fields.op), did_you_mean=said)
         )
     return known(fields)
 

@@ -172,7 +172,7 @@ def from_ros(msg: object, ros_type: str, msg_type: str) -> object:
 def _map(msg: object, ros_type: str) -> Mapping[str, object]:
     if not isinstance(msg, Mapping):
         raise PayloadError(
-            _("a message of '{type}' is a map of its fields, not {given}").format(
+            _("a message of '{type}' must be a map of its fields, not {given}").format(
                 type=escaped(ros_type), given=escaped(bounded_str(msg, 60))
             )
         )

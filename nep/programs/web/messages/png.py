@@ -26,7 +26,7 @@ def text_as_png(text: bytes) -> str:
     try:
         import numpy as np  # noqa: PLC0415 - optional and heavy
     except ImportError as error:
-        raise NepError(_("install the picture codec with: pip install 'nep-studio[image]'")) from error
+        raise NepError(_("install the image codec with: pip install 'nep-studio[image]'")) from error
     width = max(1, min(_MAX_WIDTH, math.isqrt(len(text) // 3)))
     height = -(-len(text) // (3 * width)) or 1
     pixels = np.frombuffer(text.ljust(3 * width * height, b"\n"), np.uint8).reshape(height, width, 3)
@@ -41,12 +41,14 @@ def text_in_png(data: str) -> bytes:
         is_right = file.kind == "png" and (file.channels, file.bits) == (3, 8)
         if not is_right or file.width * file.height * 3 > MAX_MESSAGE_BYTES:
             raise OperationError(
-                _("a 'png' has 8-bit RGB pixels, and {most} bytes at most").format(most=MAX_MESSAGE_BYTES)
+                _("a 'png' must have 8-bit RGB pixels and at most {most} bytes").format(
+                    most=MAX_MESSAGE_BYTES
+                )
             )
         return bytes(image_codec.read_file(file)[:, :, ::-1].tobytes().rstrip(b"\n"))
     except (binascii.Error, ValueError):
-        raise OperationError(_("the 'data' of a 'png' is no base64")) from None
+        raise OperationError(_("the 'data' of a 'png' is not valid base64")) from None
     except (DecodeError, EncodeError) as error:
         raise OperationError(_("a 'png' can't be read: {reason}").format(reason=error.reason)) from None
     except ImportError:
-        raise OperationError(_("install the picture codec with: pip install 'nep-studio[image]'")) from None
+        raise OperationError(_("install the image codec with: pip install 'nep-studio[image]'")) from None

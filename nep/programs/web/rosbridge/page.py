@@ -117,7 +117,9 @@ class Page(PageConnection):
             self._reject(error)
         except Exception:
             _logger.exception("an operation of the page '%s' failed", self.name)
-            self._reject(op.OperationError(_("an operation failed because of an error in the server")))
+            self._reject(
+                op.OperationError(_("an operation failed because of an internal error of the server"))
+            )
 
     async def _carry_out(self, operation: op.Operation) -> None:
         for _nested in range(MAX_NESTED_OPERATIONS):
@@ -129,7 +131,7 @@ class Page(PageConnection):
             operation = inner
         carry_out = self._carriers.get(type(operation))
         if carry_out is None:
-            raise op.OperationError(_("an operation is in too many fragments of fragments"), operation.id)
+            raise op.OperationError(_("an operation has too many levels of nested fragments"), operation.id)
         try:
             done = carry_out(operation)
             if done is not None:

@@ -57,7 +57,7 @@ class PageServices:
         """Call a service; its answer follows while other operations go on."""
         if len(self._calls) >= MAX_CALLS:
             raise OperationError(
-                _("this page has {count} calls in flight, and may have no more").format(count=MAX_CALLS),
+                _("this page already has {count} calls in flight, the maximum").format(count=MAX_CALLS),
                 operation.id,
             )
         task = asyncio.create_task(self._call(operation))
@@ -103,12 +103,12 @@ class PageServices:
     async def advertise(self, operation: AdvertiseService) -> None:
         """Serve a service."""
         if is_rosapi(operation.service):
-            raise OperationError(_("services of rosapi can't be served by a page"), operation.id)
+            raise OperationError(_("a page can't serve services of rosapi"), operation.id)
         if operation.service in self._servers:
             return
         if len(self._servers) >= MAX_SERVICES:
             raise OperationError(
-                _("this page serves {count} services, and may have no more").format(count=MAX_SERVICES),
+                _("this page already serves {count} services, the maximum").format(count=MAX_SERVICES),
                 operation.id,
             )
         callback = partial(self._ask_page, operation.service)
@@ -126,7 +126,7 @@ class PageServices:
 
     def _ask(self, service: str, request: object, answer: Future[object]) -> None:
         if len(self._pending) >= MAX_CALLS:
-            answer.set_exception(ServiceFailedError(_("the page has too many calls to answer")))
+            answer.set_exception(ServiceFailedError(_("the page has too many pending calls")))
             return
         id_ = f"call:{next(self._numbers)}"
         call = {"op": "call_service", "id": id_, "service": service, "args": request}
@@ -143,9 +143,7 @@ class PageServices:
         service, answer = self._pending.get(operation.id, ("", None))
         if answer is None or service != operation.service:
             raise OperationError(
-                _("no call of '{service}' with this id waits for an answer").format(
-                    service=quotable(operation.service)
-                ),
+                _("no pending call of '{service}' has this id").format(service=quotable(operation.service)),
                 operation.id,
             )
         del self._pending[operation.id]
@@ -153,7 +151,7 @@ class PageServices:
             answer.set_result(operation.values)
         else:
             reason = operation.values
-            said = bounded_str(reason) if reason else _("the page answered that it failed")
+            said = bounded_str(reason) if reason else _("the page reported an error without a reason")
             answer.set_exception(ServiceFailedError(said))
 
     async def unadvertise(self, operation: UnadvertiseService) -> None:
@@ -161,7 +159,7 @@ class PageServices:
         known = self._servers.pop(operation.service, None)
         if known is None:
             raise OperationError(
-                _("this page doesn't serve '{service}'").format(service=quotable(operation.service)),
+                _("this page does not serve '{service}'").format(service=quotable(operation.service)),
                 operation.id,
                 "warning",
             )
@@ -178,4 +176,4 @@ class PageServices:
         for id_, (name, answer) in list(self._pending.items()):
             if service in {"", name}:
                 del self._pending[id_]
-                answer.set_exception(ServiceFailedError(_("the page that serves it is gone")))
+                answer.set_exception(ServiceFailedError(_("the page that serves it has disconnected")))

@@ -85,7 +85,7 @@ class PageTopics:
     async def _open_publication(self, operation: Advertise) -> _Publication:
         if len(self._publications) >= MAX_TOPICS:
             raise OperationError(
-                _("this page publishes {count} topics, and may have no more").format(count=MAX_TOPICS),
+                _("this page already publishes {count} topics, the maximum").format(count=MAX_TOPICS),
                 operation.id,
             )
         publisher = await self._context.in_thread(self._open_publisher, operation)
@@ -132,7 +132,7 @@ class PageTopics:
         msg_type = await self._context.in_thread(self._type_of, operation.topic)
         if not msg_type:
             raise OperationError(
-                _("there is no topic '{topic}'; advertise it before you publish").format(
+                _("topic '{topic}' is not advertised; advertise it before you publish").format(
                     topic=quotable(operation.topic)
                 ),
                 operation.id,
@@ -170,7 +170,7 @@ class PageTopics:
                 )
             if known.feed.subscription_count >= MAX_SUBSCRIPTION_IDS:
                 raise OperationError(
-                    _("this page has {count} subscriptions to '{topic}', and may have no more").format(
+                    _("this page already has {count} subscriptions to '{topic}', the maximum").format(
                         count=MAX_SUBSCRIPTION_IDS, topic=quotable(operation.topic)
                     ),
                     operation.id,
@@ -182,7 +182,7 @@ class PageTopics:
     async def _open_subscription(self, operation: Subscribe, *, as_pixels: bool) -> None:
         if len(self._subscriptions) >= MAX_TOPICS:
             raise OperationError(
-                _("this page subscribes to {count} topics, and may have no more").format(count=MAX_TOPICS),
+                _("this page already subscribes to {count} topics, the maximum").format(count=MAX_TOPICS),
                 operation.id,
             )
         subscriber = await self._context.in_thread(self._open_subscriber, operation)

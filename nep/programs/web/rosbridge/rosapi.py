@@ -54,9 +54,7 @@ class RosApi:
         name = f"/{service.removeprefix('/')}".removeprefix(PREFIX)
         known = _SERVICES.get(name)
         if known is None:
-            raise NepError(
-                _("there is no service '{service}' in this rosapi").format(service=quotable(service))
-            )
+            raise NepError(_("rosapi has no service '{service}' here").format(service=quotable(service)))
         return known[1](self, args if isinstance(args, Mapping) else {})
 
     @cached_property
@@ -122,7 +120,7 @@ class RosApi:
         asked = _text(args, "type")
         found = type_definitions(bare_type(asked))
         if found is None:
-            raise NepError(_("the fields of '{type}' are not known here").format(type=quotable(asked)))
+            raise NepError(_("the fields of '{type}' are unknown").format(type=quotable(asked)))
         return {"typedefs": found}
 
     # ---- services
@@ -192,7 +190,7 @@ class RosApi:
     def _nodes_named(self, name: str) -> list[NodeInfo]:
         found = [each for each in self._view.nodes.values() if name in {each.name, each.id}]
         if not found:
-            raise NepError(_("there is no node '{name}'").format(name=quotable(name)))
+            raise NepError(_("unknown node '{name}'").format(name=quotable(name)))
         return found
 
     # ---- parameters
@@ -238,7 +236,7 @@ class RosApi:
         try:
             value = orjson.loads(_text(args, "value"))
         except orjson.JSONDecodeError:
-            raise NepError(_('the value of a parameter is a JSON text, such as 0.5 or "slow"')) from None
+            raise NepError(_('a parameter value must be JSON text, such as 0.5 or "slow"')) from None
         ids = {each.id for each in self._nodes_named(node)}
         for topic in self._view.topics.values():
             if not _has(topic.subscribers, ids):
@@ -268,7 +266,7 @@ class RosApi:
 def _text(args: Mapping[str, object], name: str) -> str:
     value = args.get(name)
     if not isinstance(value, str):
-        raise NepError(_("this service needs '{name}', a text").format(name=name))
+        raise NepError(_("this service needs '{name}', a string").format(name=name))
     return value
 
 
@@ -277,7 +275,7 @@ def _parameter(args: Mapping[str, object]) -> tuple[str, str]:
     node, colon, name = given.rpartition(":")
     if not colon or not node:
         raise NepError(
-            _("'{name}' is no parameter here; write it as 'NODE:PARAMETER'").format(name=quotable(given))
+            _("'{name}' is not a parameter here; write it as 'NODE:PARAMETER'").format(name=quotable(given))
         )
     return node.removeprefix("/"), name
 

@@ -67,10 +67,10 @@ def answer(request: PageRequest, access: Access) -> PageResponse:
     if request.method not in _METHODS:
         return _plain(HTTPStatus.METHOD_NOT_ALLOWED, _("only GET is supported"), {"Allow": "GET, HEAD"})
     if path not in {"/", "/starter.html"}:
-        return _plain(HTTPStatus.NOT_FOUND, _("there is no such page; open {url}").format(url="/"))
+        return _plain(HTTPStatus.NOT_FOUND, _("page not found; open {url}").format(url="/"))
     origin = _origin(request, access)
     if origin is None:
-        said = _("this server answers at its address only; open {url}")
+        said = _("this server replies only at its own address; open {url}")
         return _plain(HTTPStatus.FORBIDDEN, said.format(url=f"{request.own}/"))
     if access.token and not access.is_given(request.path, request.authorization):
         return _page(
@@ -159,8 +159,8 @@ def _refused_words() -> dict[str, str]:
         "language": language(),
         "title": _("Token required"),
         "sentence": _(
-            "This page needs the token of the server. Open the address that 'nep web' printed or Studio "
-            "shows, or scan its code."
+            "This page needs the server's token. Open the address shown by 'nep web' or Studio, or "
+            "scan its code."
         ),
     }
 
@@ -171,22 +171,22 @@ def _test_page_words() -> dict[str, str]:
         "title": _("Test page"),
         "topics": _("Topics"),
         "no_topics": _("No topics yet. They appear here when a program publishes."),
-        "publish_text": _("Publish a text"),
+        "publish_text": _("Publish text"),
         "topic": _("Topic"),
         "text": _("Text"),
         "hello": _("hello"),
         "publish": _("Publish"),
         "connect": _("Connect"),
-        "starter": _("Starter page for a page of your own"),
+        "starter": _("Starter page for your own page"),
         "connecting": _("Connecting…"),
         "connected": _("Connected to {address}"),
         "disconnected": _("Disconnected by the server."),
-        "refused": _("The server has another token. Open its new address, or scan its code again."),
+        "refused": _("The server's token has changed. Open its new address, or scan its code again."),
         "lost": _("Not connected. Trying again in {seconds} s."),
         "rate": _("{rate}/s, {bandwidth} kB/s"),
         "no_message": _("No message yet"),
-        "newest": _("{count} received, the newest at {time}"),
-        "picture": _("Newest picture of {topic}"),
+        "newest": _("{count} received, latest at {time}"),
+        "picture": _("Latest image of {topic}"),
         "needs_json": _("The type of this topic is {type}. Write the message as JSON."),
         "sent": _("Sent at {time}"),
         "not_sent": _("Not sent: the page is not connected."),
