@@ -53,7 +53,7 @@ def test_a_value_brings_an_alarm_on_which_calls_and_sends(session: Session) -> N
         assert asked == [{"n": 1}]
         assert heard.listen(timeout_s=5.0) == (True, {"say": "near"})
         assert {deed.kind: deed.words for deed in record.deeds} == {
-            "call": "restart answered",
+            "call": "restart replied",
             "send": "sent to /say",
             "keep": "nothing saved: the flight recorder is off",
             "run": "“Greeting” was not run: no window is open",

@@ -114,7 +114,7 @@ def test_a_recording_sends_what_was_chosen_and_a_robot_moves_only_after_asking(
         studio.click("Arm and send")
         studio.says(f"{WHEELS} commands robots.")
         studio.click("Cancel")
-        until(lambda: not studio.all("Arm sending"), "the question is answered")
+        until(lambda: not studio.all("Arm sending"), "the question is replied")
         studio.click("Play")
         until(lambda: len(heard[LAMP]) >= 5, lambda: f"the lamp hears: {heard}; {texts(studio)}")
         fingers.press("F12")

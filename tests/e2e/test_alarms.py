@@ -36,7 +36,7 @@ def test_a_right_click_makes_an_alarm_which_tells_and_goes_off(studio: Studio) -
             until(lambda: not studio.all("Dismiss"), "the banner goes")
             studio.click("Condition: silent")
             studio.pick("A topic has more messages")
-            studio.find("/distance has more than 100 messages a second for 2 s", kind="AlarmRow")
+            studio.find("/distance has more than 100 messages per second for 2 s", kind="AlarmRow")
         finally:
             talking.set()
             thread.join()

@@ -54,7 +54,7 @@ def run(studio: Studio, film: Film, fingers: Fingers) -> None:
         before = studio.outlined("stopped")
         fingers.press("F10")
         until(lambda: studio.outlined("stopped") not in ([], before), "another block is next")
-    with film.step("F12: every robot has answered"):
+    with film.step("F12: every robot has replied"):
         fingers.press("F12")
         studio.says("Pepper stopped (")
         assert not studio.outlined("running")

@@ -68,7 +68,7 @@ def test_a_persons_path_with_the_mouse_alone(start: Callable[..., Studio], tmp_p
     with film.step("Resume"):
         studio.click("Resume", kind="RunButton")
         until(lambda: studio.outlined("running"), "it glows again")
-    with film.step("Stop: every robot has answered"):
+    with film.step("Stop: every robot has replied"):
         studio.click("Stop", kind="StopButton")
         studio.says("Pepper stopped (")
         assert not studio.outlined("running")

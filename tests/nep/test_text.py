@@ -55,7 +55,7 @@ class Endless(dict[str, object]):
         (b"\xff", r"b'\xff'"),
         ("a\ud800", r"a\ud800"),
         (["\ud800"], r"['\ud800']"),
-        (10**5_000, "a number of 5001 digits"),
+        (10**5_000, "an integer with 5001 digits"),
         (ValueError(), "ValueError"),
         (ValueError("odd"), "odd"),
         (SpeechlessError(), "SpeechlessError"),

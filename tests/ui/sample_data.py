@@ -109,17 +109,15 @@ FOUND = (
     Finding(
         "master:foreign",
         "error",
-        "Port 7780 is held by “python3 server.py” (process 77), which is no master.",
-        "End that program, or start the master on port 7781 and tell it to all programs"
-        " (NEP_MASTER=127.0.0.1:7781).", "nep master --port 7781",
+        "“python3 server.py” (process 77) uses port 7780 but is not a master.",
+        "Close that program, or start the master on port 7781 and set NEP_MASTER=127.0.0.1:7781 for all programs.", "nep master --port 7781",
     ),
     Finding(
-        "port:7000", "warning", "The AirPlay Receiver holds port 7000, where programs of nep up to 0.5.4.5,"
-        " nep-js and C# ask.", "Turn it off in System Settings, under General > AirDrop & Handoff.",
+        "port:7000", "warning", "The AirPlay Receiver uses port 7000, where programs of nep up to 0.5.4.5, nep-js and C# ask.", "Turn it off in System Settings, under General > AirDrop & Handoff.",
     ),
     Finding("versions", "info", "NEP Studio 0.1.0, Python 3.11.7, pyzmq 27.3.0, libzmq 4.3.5, Linux 6.18."),
     Finding("loopback", "ok", "Programs on this computer can reach each other (127.0.0.1)."),
-    Finding("files", "ok", "A program may open 20000 files."),
+    Finding("files", "ok", "Open-file limit: 20000."),
 )  # fmt: skip
 
 

@@ -36,9 +36,7 @@ def test_with_the_loopback_down_studio_says_so_once_with_the_next_step(tmp_path:
     assert "Traceback" not in done.stderr
     alert, lines = done.stdout.splitlines()
     assert alert == (
-        "companion:master The master can't be started. Programs of this computer cannot reach each other:"
-        " network is unreachable. Switch the loopback interface on; a firewall or a sandbox may have"
-        " switched it off. help.doctor"
+        "companion:master The master can't be started. Programs of this computer cannot reach each other: network is unreachable. Turn on the loopback interface. A firewall or a sandbox may have turned it off. help.doctor"
     )
     assert lines == "1 line"
 
@@ -47,7 +45,7 @@ def test_a_firewall_that_swallows_everything_is_told_by_the_doctor() -> None:
     done = alone(
         "-m", "nep", "doctor", up=True, timeout_s=60, silent="10.9.9.1/24", NEP_MASTER="10.9.9.2:7780"
     )  # fmt: skip
-    assert "Nothing answers at 10.9.9.2:7780, so no master is found." in done.stdout, done.stderr
+    assert "10.9.9.2:7780 does not respond, so the master can't be reached." in done.stdout, done.stderr
     assert FIREWALL in " ".join(done.stdout.split())
     assert "Traceback" not in done.stderr
 
@@ -58,7 +56,7 @@ def test_behind_such_a_firewall_studio_says_what_keeps_it_from_its_master(tmp_pa
     )  # fmt: skip
     assert "Traceback" not in done.stderr
     alert, lines = done.stdout.splitlines()
-    said = "Nothing answers at 10.9.9.2:7780, so no master is found."
+    said = "10.9.9.2:7780 does not respond, so the master can't be reached."
     assert alert.startswith(f"companion:master The master does not respond. {said} {FIREWALL}")
     assert alert.endswith("help.doctor")
     assert lines == "1 line"

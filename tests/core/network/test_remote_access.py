@@ -86,7 +86,7 @@ def test_what_was_chosen_is_asked_of_the_next_master_but_only_once(world, make):
 
 def test_a_refusal_is_an_alert_with_the_way_out_until_it_works(world, make):
     reach, alerts = make()
-    world.refusal = "'192.168.1.20' is no address of this computer; it has 10.0.0.7"
+    world.refusal = "'192.168.1.20' is not an address of this computer; its addresses: 10.0.0.7"
     reach.listen_at(["192.168.1.20"])
     world.answer(reach)
     (alert,) = alerts.active

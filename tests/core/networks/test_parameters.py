@@ -86,9 +86,15 @@ def test_one_is_set_and_a_refusal_is_in_the_words_of_the_node(
     shown.set("speed", "1")
     assert shown.setting == "speed"
     assert settled(session, shown) == ""
-    assert (robot.parameters["speed"], type(robot.parameters["speed"])) == (1.0, float), "its type is kept"
+    assert (robot.parameters["speed"], type(robot.parameters["speed"])) == (1.0, float), (
+        "its type must be kept"
+    )
     tick_until(session, lambda: values(_refreshed(shown))["speed"] == 1.0)
-    for text, said in (("9", "the most is 2"), ("1,3", "1.3 shakes the head"), ("-1e9", "the least is 0")):
+    for text, said in (
+        ("9", "the maximum is 2"),
+        ("1,3", "1.3 shakes the head"),
+        ("-1e9", "the minimum is 0"),
+    ):
         shown.set("speed", text)
         assert said in settled(session, shown)
     for text in ("", "fast", "nan", "inf", "1e999", "true", "[1]"):

@@ -138,7 +138,7 @@ def test_alerts_of_the_disk_come_and_go(made):
     )
     assert made.told()["recorder:ended"] == (
         "error",
-        "The recording stopped: the disk is full; what came before is kept.",
+        "The recording stopped: the disk is full; everything recorded before is saved.",
     )
     assert made.client.state.phase == ""
     made.client.record(Path("b.mcap"))

@@ -59,7 +59,7 @@ def test_the_example_is_right() -> None:
 @pytest.mark.parametrize(
     ("alarm", "said"),
     [
-        ({"when": {"topic": "/t", "is": "bellow", "than": 1}}, "there is no 'bellow'; did you mean 'below'"),
+        ({"when": {"topic": "/t", "is": "bellow", "than": 1}}, "unknown condition 'bellow'; did you mean 'below'"),
         ({"when": {"topic": "/t"}}, "it does not say what"),
         ({"when": {"is": "silent"}}, "the topic name is missing"),
         ({"when": {"node": "n", "is": "silent"}}, "is about a topic"),
@@ -79,7 +79,7 @@ def test_the_example_is_right() -> None:
         ({"when": {"topic": "/t", "is": "silent"}, "do": [{"call": ""}]}, "the name is missing"),
         ({"when": {"topic": "/t", "is": "silent"}, "do": ["stop"] * 11}, "more than 10 actions"),
         ({"when": {"topic": "/t", "is": "silent"}, "calm_s": 0}, "0.5 to 3600"),
-        ({"when": {"topic": "/t", "is": "silent"}, "onn": True}, "there is no 'onn' here; did you mean 'on'"),
+        ({"when": {"topic": "/t", "is": "silent"}, "onn": True}, "unknown key 'onn'; did you mean 'on'"),
         ([], "it is no alarm"),
     ],
 )  # fmt: skip
@@ -105,7 +105,7 @@ def test_what_is_wrong_is_said_with_its_line(alarm: object, said: str) -> None:
         ("[]", "no file of alarms"),
         ('{"format": 2, "alarms": []}', "newer version"),
         ('{"format": true, "alarms": []}', "'format': it must be 1"),
-        ('{"alarm": []}', "there is no 'alarm' here; did you mean 'alarms'"),
+        ('{"alarm": []}', "unknown key 'alarm'; did you mean 'alarms'"),
         ('{"format": 1}', "no alarms are in it"),
         ('{"alarms": [' + "1" * 5000 + "]}", ""),
         ("[" * 100_000, ""),

@@ -372,7 +372,10 @@ def test_who_wants_reliability_does_not_hear_who_has_none(make: Make) -> None:
     assert takes.listen(timeout_s=60.0) == (True, 1)
     assert wants.listen() == (False, {})
     (alert,) = node.graph().alerts
-    assert alert.sentence == "“b” hears nothing of “a” on “t”: it wants “reliable”, and gets “best effort”"
+    assert (
+        alert.sentence
+        == "“b” does not receive “t” from “a”: it requests “reliable”, but the publisher offers “best effort”"
+    )
     wants.close()
     assert node.graph().alerts == ()
 

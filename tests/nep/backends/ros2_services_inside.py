@@ -299,7 +299,7 @@ def test_a_server_whose_type_is_not_known_is_told_at_the_call(make: Make) -> Non
 def test_surveys_are_refused(make: Make) -> None:
     node = make("node")
     for new in (node.new_surveyor, node.new_respondent):
-        with pytest.raises(nep.NepError, match="the back end 'ros2' has no surveys; use 'zeromq' for them"):
+        with pytest.raises(nep.NepError, match="the back end 'ros2' does not support surveys; use 'zeromq'"):
             new("/who")
 
 

@@ -126,7 +126,7 @@ def test_a_subscriber_hears_all_that_is_good_between_what_is_not(
         message = sub.receive(30.0)
         assert message is not None
         assert bytes(message.data) == expected
-        assert "a header has 32 bytes, this one has 5" in sub._transport.counts().problem  # type: ignore[attr-defined]
+        assert "a header must have 32 bytes, but this one has 5" in sub._transport.counts().problem  # type: ignore[attr-defined]
 
 
 @pytest.mark.parametrize("in_batches", [False, True])

@@ -153,7 +153,7 @@ def test_what_cannot_be_sent_is_the_same_with_and_without_a_listener(
     assert (pub.count, pub.refused) == (0, 2)
     eventually(lambda: [each.id for each in node.graph().alerts] == ["encode:topic"])
     (alert,) = node.graph().alerts
-    assert alert.sentence.startswith("“a” cannot send on “topic”: cannot encode a 'dict' as 'json'")
+    assert alert.sentence.startswith("“a” can't send on “topic”: cannot encode a 'dict' as 'json'")
     pub.publish(1)
     assert sub.listen(timeout_s=30.0) == (True, 1)
     assert (sub.lost, pub.count, pub.refused) == (0, 1, 2)
@@ -188,8 +188,8 @@ def test_what_is_latched_and_cannot_be_sent_leaves_what_was_latched_before(make:
         ("image", "text", "cannot encode a 'str' as 'image'; publish a 'uint8' array"),
         ("image", np.zeros((4, 4, 3), np.complex64), "its numbers are 'complex64'"),
         ("image", np.zeros((4, 0, 3), np.uint8), "is none of a picture"),
-        ("json", nep.Encoded("text"), "cannot encode a 'str' as 'json'; give its 'bytes'"),  # type: ignore[arg-type]
-        ("json", nep.Encoded(b"1", [1]), "cannot encode a 'list' as 'json'; an extension is a map"),  # type: ignore[arg-type]
+        ("json", nep.Encoded("text"), "cannot encode a 'str' as 'json'; publish its 'bytes'"),  # type: ignore[arg-type]
+        ("json", nep.Encoded(b"1", [1]), "cannot encode a 'list' as 'json'; an extension must be a map"),  # type: ignore[arg-type]
     ],
 )
 def test_a_payload_of_a_wrong_type_is_an_error_heard_or_unheard(

@@ -262,7 +262,7 @@ def test_early_messages_wait_for_the_history_and_are_bounded() -> None:
     assert early.take(5) == [b"8", b"9"], "those that the history had are left out"
     assert early.take(5) == []
     sources.get(5).has_echoed = True
-    assert not early.keep(Header(1, 1, 11, 0, 5), b"11", 2), "it has answered"
+    assert not early.keep(Header(1, 1, 11, 0, 5), b"11", 2), "it has replied"
     sources.get(5).has_echoed = False
     assert early.keep(Header(1, 1, 12, 0, 5), b"12", 2)
     now[0] = 20.0

@@ -57,7 +57,7 @@ print(sub.listen(timeout_s=30.0))
         sentence, count = program.line(), int(program.line())
         assert sentence.startswith(f"no room for a publisher of 't{count}': this program has 2")
         assert sentence.endswith(
-            " of 256 files open; close what it no longer needs, or start it after 'ulimit -n 8192'"
+            " of 256 files open; close unused nodes and files, or raise the limit with 'ulimit -n 8192' before you start it"
         )
         assert count > 60
         assert program.line() == "True"

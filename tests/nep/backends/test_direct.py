@@ -165,7 +165,7 @@ def test_many_to_many_connects_to_both_ports_of_a_proxy(node: nep.Node, port: in
 
 def test_what_cannot_be() -> None:
     with nep.node("n", "memory") as node:
-        with pytest.raises(nep.NepError, match="no mode 'one2one'; did you mean 'one2many'"):
+        with pytest.raises(nep.NepError, match="unknown mode 'one2one'; did you mean 'one2many'"):
             node.direct(mode="one2one")
         for port in ("http", 0, 65536, "-1"):
             with pytest.raises(nep.NepError, match="is no port"):

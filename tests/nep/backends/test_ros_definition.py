@@ -91,18 +91,18 @@ def test_what_is_left_out_is_zero_or_empty() -> None:
         ({"i8": 1.0}, "field 'i8' is 1.0; give a 'int8'"),
         ({"flag": 2}, "field 'flag' is 2; give a 'bool'"),
         ({"f32": "1"}, "field 'f32' is '1'; give a 'float32'"),
-        ({"f32": 1e300}, "field 'f32' is 1e+300, which is no 'float32'"),
+        ({"f32": 1e300}, "field 'f32' is 1e+300, which is not a 'float32'"),
         ({"text": 5}, "field 'text' is 5; give a 'string'"),
-        ({"text": "\ud800"}, "field 'text' holds half of a surrogate pair"),
+        ({"text": "\ud800"}, "field 'text' contains an unpaired surrogate"),
         ({"text": None}, "field 'text' is None; give a 'string'"),
-        ({"at": {"secs": -1}}, "field 'at' is a 'dict', which is no 'time'"),
-        ({"at": -0.5}, "field 'at' is -0.5, which is no 'time'"),
+        ({"at": {"secs": -1}}, "field 'at' is a 'dict', which is not a 'time'"),
+        ({"at": -0.5}, "field 'at' is -0.5, which is not a 'time'"),
         ({"at": math.nan}, "field 'at' is nan; give a 'time'"),
         ({"at": {"sec": 1}}, "field 'at.sec' does not exist; did you mean 'secs'?"),
         ({"letters": b"ab"}, "field 'letters' has 2 elements; give 3"),
         ({"words": ["a"] * 3}, "field 'words' has 3 elements; give 2"),
         ({"words": "ab"}, "field 'words' is 'ab'; give a 'string[2]'"),
-        ({"data": [256]}, "field 'data' holds what is no number from 0 to 255"),
+        ({"data": [256]}, "field 'data' contains a value that is not an integer from 0 to 255"),
         ({"data": "ab"}, "field 'data' is 'ab'; give a 'uint8[]'"),
         ({"numbers": [1, 40000]}, "field 'numbers[1]' is 40000; 'int16' goes from -32768 to 32767"),
         ({"numbers": [1, True]}, "field 'numbers[1]' is True"),
@@ -138,7 +138,7 @@ def test_every_cut_is_told_and_nothing_else_is_raised() -> None:
     for size in range(len(whole)):
         with pytest.raises(nep.DecodeError, match="cannot decode"):
             ALL.decode(whole[:size])
-    with pytest.raises(nep.DecodeError, match="1 bytes are too many"):
+    with pytest.raises(nep.DecodeError, match="1 unexpected bytes follow the message"):
         ALL.decode(whole + b"x")
 
 
@@ -213,7 +213,7 @@ def test_picture_that_cannot_be_read_is_refused() -> None:
 
 
 def test_an_extension_has_no_room() -> None:
-    with pytest.raises(WireError, match="a 'std_msgs/String' has no room for an extension"):
+    with pytest.raises(WireError, match="a 'std_msgs/String' can't carry an extension"):
         to_ros("std_msgs/String", "json", Encoded(b"{}", {"a": 1}))
 
 

@@ -260,7 +260,7 @@ for _each in range(2):
     ("own", "said"),
     [
         ("", "made"),
-        ("999.1.2.3", "the variable ROS_IP is '999.1.2.3'; set it to the IP address of this computer"),
+        ("999.1.2.3", "ROS_IP is '999.1.2.3'; set it to the IP address of this computer"),
     ],
 )
 def test_where_this_computer_is(ros: str, own: str, said: str) -> None:

@@ -592,7 +592,7 @@ def test_closing_while_a_network_is_waited_for_ends_soon():
 
 
 def test_a_back_end_or_type_that_is_not_there_is_said_at_once():
-    with pytest.raises(NepError, match="no back end 'zeromk'; did you mean 'zeromq'"):
+    with pytest.raises(NepError, match="unknown back end 'zeromk'; did you mean 'zeromq'"):
         side_of("zeromk")
     with nets("memory") as (a,), pytest.raises(NepError, match="both sides are the network"):
         check_apart(side_of(a.backend, a.master), side_of(a.backend, a.master))

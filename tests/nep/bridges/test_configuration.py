@@ -85,18 +85,18 @@ def test_the_example_is_right_where_its_back_ends_are(monkeypatch):
     ("text", "said"),
     [
         ("", "'lab.toml', a: the side 'a' is missing; write [a] and backend = \"zeromq\" below it"),
-        ("[a]\n", "line 1 of 'lab.toml', a.backend: no back end is named; write backend = \"zeromq\""),
+        ("[a]\n", "line 1 of 'lab.toml', a.backend: the back end is missing; write backend = \"zeromq\""),
         ('[a]\nbackend = "zeromk"\n', "line 2 of 'lab.toml', a.backend: no back end 'zeromk'; did you mean"),
         ("a = 7\n", "line 1 of 'lab.toml', a: the side 'a' is missing"),
         ('[a]\nbackend = "zeromq"\nmaster = "a b"\n', "line 3 of 'lab.toml', a.master: 'a b:7780' is no"),
         ('a.backend = "zeromq"\na.master = "²:²"\n', "line 1 of 'lab.toml', a.master: '²:²' is no "),
         ('[a]\nbackend = "zeromq"\n[b]\nbackend = "zmq"\n' + ONE, "line 3 of 'lab.toml', b: both sides are"),
-        (SIDES, "'lab.toml', topics: no topic is named; write [[topics]] and a = \"/a/topic\" below it"),
-        (SIDES + "[topics]\na = 1\n", "line 5 of 'lab.toml', topics: no topic is named"),
+        (SIDES, "'lab.toml', topics: no topics are listed; write [[topics]] and a = \"/a/topic\" below it"),
+        (SIDES + "[topics]\na = 1\n", "line 5 of 'lab.toml', topics: the topic name is missing"),
         (SIDES + "[[topics]]\n", "line 5 of 'lab.toml', topics[1].a: the topic has no name; write a ="),
         (SIDES + ONE + "max_rate = 5\n", "line 7 of 'lab.toml', topics[1].max_rate: there is no such key"),
         ('nam = "x"\n', "line 1 of 'lab.toml', nam: there is no such key; did you mean 'name'?"),
-        ("name = 7\n", "line 1 of 'lab.toml', name: it is no text; put it into quotes"),
+        ("name = 7\n", "line 1 of 'lab.toml', name: it is not a string; put it in quotes"),
         ('name = "a\\nb"\n', "line 1 of 'lab.toml', name: 'bridge-a\\nb' cannot be a node's name"),
         (f'name = "{"x" * 61}"\n', "line 1 of 'lab.toml', name: a bridge's name has 1 to 60 letters"),
         ('name = ""\n', "line 1 of 'lab.toml', name: a bridge's name has 1 to 60 letters"),
@@ -117,8 +117,8 @@ def test_the_example_is_right_where_its_back_ends_are(monkeypatch):
         (SIDES + ONE + "[c]\n", "line 7 of 'lab.toml', c: there is no such key; known are 'name', 'a', 'b',"),
         ("x = [\n", "line 2 of 'lab.toml' is no TOML: invalid value; 'nep bridge --example' shows"),
         ("a = 1\na = 2\n", "of 'lab.toml' is no TOML: cannot overwrite a value"),
-        (f"a = {'[' * 5000}", "line 1 of 'lab.toml' is no TOML: "),
-        (f"a = {'9' * 5000}", "line 1 of 'lab.toml' is no TOML: "),
+        (f"a = {'[' * 5000}", "line 1 of 'lab.toml' is not valid TOML: "),
+        (f"a = {'9' * 5000}", "line 1 of 'lab.toml' is not valid TOML: "),
         (SIDES + '[[topics]]\na = "/t"\n' * 1001, "'lab.toml', topics: there are more than 1000"),
     ],
 )  # fmt: skip
@@ -135,7 +135,7 @@ def test_words_of_a_back_end_for_quality_are_known(monkeypatch):
     monkeypatch.setattr("nep.programs.bridges.configuration.backend_named", lambda _name: told)
     sides = SIDES.replace('"zenoh"\n', '"zenoh"\nmaster = "other"\n')
     assert read(sides + ONE + 'b_qos = "sensor"\n').topics[0].b.qos == "sensor"
-    assert "there is no quality 'sensors'; did you mean 'sensor'?" in error(
+    assert "unknown quality of service 'sensors'; did you mean 'sensor'?" in error(
         sides + ONE + 'b_qos = "sensors"\n'
     )
 

@@ -105,7 +105,7 @@ with nep.Master("127.0.0.1:7780", learn_s=0.0), nep.node("many") as node:
     )
     if done.returncode == 77:
         pytest.skip("the range of ports cannot be made small here")
-    assert done.stdout.strip() == "no port of '127.0.0.1' is free; end programs that have many connections"
+    assert done.stdout.strip() == "no port of '127.0.0.1' is free; close programs that have many connections"
     assert "Traceback" not in done.stderr
 
 

@@ -352,7 +352,7 @@ def test_a_command_line_imports_its_own_command_alone():
     [
         (("topic", "echo", "t", "--timeout", "nan"), "nan is not a valid duration"),
         (("topic", "hz", "t", "--timeout", "-1"), "-1 is not a valid duration"),
-        (("topic", "pub", "t", "1", "--type", "a\x01"), "it is 'a\\x01'; use 200 letters at most"),
+        (("topic", "pub", "t", "1", "--type", "a\x01"), "it is 'a\\x01'; use at most 200 characters"),
         (("topic", "pub", "t", "1", "--type", "a" * 300), "(300 characters)'; use 200"),
     ],
 )

@@ -77,5 +77,5 @@ def test_delay_waits_for_what_nobody_publishes(master, type_in):
     code, out, err = type_in("topic", "delay", "/t", "--timeout", "0")
     assert code == 1
     assert "'/t' has no publisher yet" in err
-    assert "a message on '/t' did not come within 0 s" in err
+    assert "timed out after 0 s while waiting for a message on '/t'" in err
     assert "std dev" in out

@@ -64,7 +64,7 @@ def test_an_alarm_is_a_line_and_calls_a_service(master, type_in, file) -> None:
         done = type_in("watch", name, "-n", "1", "--master", master.address)
     assert done.returncode == 0
     lines = [line.split("  ", 1)[1] for line in done.stdout.splitlines()]
-    assert lines == ["range of /distance is 0.3, below 0.4", "  brake answered"]
+    assert lines == ["range of /distance is 0.3, below 0.4", "  brake replied"]
     assert asked == [{"n": 1}]
     assert "When range of /distance is below 0.4" in done.stderr
     assert "\a" not in done.stderr  # no terminal

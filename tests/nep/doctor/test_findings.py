@@ -64,10 +64,10 @@ def test_a_healthy_computer_has_no_warning():
     made = findings(HEALTHY)
     assert worst(made) == 0
     assert found()["master"].sentence == (
-        "A master runs at 127.0.0.1:7780 (process 41) for 2.0 h: 2 nodes, 0 topics."
+        "A master has been running at 127.0.0.1:7780 (process 41) for 2.0 h: 2 nodes, 0 topics."
     )
     assert found()["ports"].sentence == (
-        "The master holds ports 7000 and 50000, where programs of the original NEP ask."
+        "The master uses ports 7000 and 50000, which programs of the original NEP connect to."
     )
 
 
@@ -76,8 +76,7 @@ def test_a_master_of_another_version_is_told_with_its_mend():
     older = Install("0.1.0", NOW - 90_000, "/opt/old")
     one = found(versions=versions, master_install=older)["master:version"]
     assert one.sentence == (
-        "The master at 127.0.0.1:7780 (process 41) is of NEP Studio 0.1.0 (/opt/old); this is 0.2.0."
-        " What is new or mended may not work with it."
+        "The master at 127.0.0.1:7780 (process 41) belongs to NEP Studio 0.1.0 (/opt/old); this is 0.2.0. New features and fixes may not work with it."
     )
     assert (one.severity, one.command) == ("warning", "kill 41")
     assert one.mend.startswith("End it: an open Studio starts a new one")
@@ -117,10 +116,14 @@ def test_a_master_is_not_told_to_be_started_at_an_address_of_the_network():
 @pytest.mark.parametrize(
     ("reach", "sentence", "mend"),
     [
-        ("timeout", "Nothing answers at 10.0.0.5:7780, so no master is found.", "10.0.0.5 is switched off"),
+        (
+            "timeout",
+            "10.0.0.5:7780 does not respond, so the master can't be reached.",
+            "10.0.0.5 is switched off",
+        ),
         ("refused", "10.0.0.5 is there, but nobody listens at its port 7780", "let other computers connect"),
         ("unknown", "There is no way to 10.0.0.5:7780", "in the same network"),
-        ("", "10.0.0.5 answers at port 7780, but no master does.", "another program holds that port"),
+        ("", "10.0.0.5 responds at port 7780, but the master does not.", "another program holds that port"),
     ],
 )
 def test_a_master_on_another_computer_that_does_not_answer_is_told_by_how(reach, sentence, mend):
@@ -134,14 +137,17 @@ def test_a_master_on_another_computer_that_does_not_answer_is_told_by_how(reach,
 
 def test_a_master_whose_name_nobody_knows_is_not_told_to_be_started():
     made = found(view=None, address="lap.top:7780", master_port=None, is_known=False)
-    assert made["master:unknown"].sentence == "No computer is called “lap.top” here, so no master is found."
+    assert (
+        made["master:unknown"].sentence
+        == "Can't find a computer named “lap.top”, so the master can't be reached."
+    )
     assert "typing error" in made["master:unknown"].mend
     assert "master:none" not in made
 
 
 def test_a_foreign_program_on_the_masters_port_is_named_with_the_way_out():
     one = found(view=None, master_port=PortFact(7780, "", True, OTHER))["master:foreign"]
-    assert one.sentence == "Port 7780 is held by “python3 server.py” (process 77), which is no master."
+    assert one.sentence == "“python3 server.py” (process 77) uses port 7780 but is not a master."
     assert "7781" in one.mend
     assert one.command == "nep master --port 7781"
     unknown = found(view=None, master_port=PortFact(7780, "", True))["master:foreign"]
@@ -180,7 +186,7 @@ def test_taken_ports_of_the_originals_are_one_warning_that_names_who_holds_them(
     several = about_ports(ports=originals_ports(OTHER, None, ProcessFact(9, "redis")))["ports:taken"]
     assert "7000 by “python3 server.py” (process 77), 50000 by another program" in several.sentence
     single = about_ports(ports=originals_ports(OTHER, numbers=(50000,)))["ports:taken"]
-    assert single.sentence == "Port 50000, where some ask, is held by “python3 server.py” (process 77)."
+    assert single.sentence == "Port 50000, where some ask, is in use by “python3 server.py” (process 77)."
 
 
 def test_another_master_on_a_port_is_not_the_one_that_is_asked():
@@ -295,7 +301,7 @@ def test_originals_are_named_and_those_that_cannot_be_served_are_errors():
 
 def test_what_the_master_noticed_is_told_once():
     alerts = [
-        Alert("name:x", "2 programs call themselves “x”", "Give each a name."),
+        Alert("name:x", "2 programs are named “x”", "Give each a name."),
         Alert("port:7000", "taken"),
     ]
     made = found(view=view(alerts=alerts))
@@ -306,7 +312,7 @@ def test_what_the_master_noticed_is_told_once():
 def test_folders_clocks_and_the_loopback():
     assert found(folders=(FolderFact("/state", "Settings", "permission denied"),))[
         "folder:/state"
-    ].sentence == ("Settings can't be kept in /state: permission denied.")
+    ].sentence == ("Settings can't be saved in /state: permission denied.")
     assert "3.2 s ahead" in found(clocks=(ClockFact("lab", 3.21),))["clock:lab"].sentence
     assert found(now_s=1000.0)["clock"].severity == "warning"
     one = found(loopback="network is unreachable")["loopback"]
@@ -323,7 +329,7 @@ def test_the_report_is_plain_text_with_mends():
     made = findings(replace(HEALTHY, view=None, master_port=PortFact(7780, "", False)))
     lines = report(made).splitlines()
     assert lines[:3] == [
-        "x No master runs at 127.0.0.1:7780, so new programs cannot find each other.",
+        "x No master is running at 127.0.0.1:7780, so new programs can't find each other.",
         "    Start one.",
         "    nep master",
     ]

@@ -39,13 +39,13 @@ def test_a_publisher_that_is_silent_is_told_with_since_when_and_what_it_offers()
     (one,) = found().values()
     at = time.strftime("%H:%M:%S", time.localtime(NOW - 4))
     assert (one.id, one.severity, one.instead) == ("topic:silent:camera_driver", "error", "")
-    assert one.sentence == "“camera_driver” is there, but has sent nothing on /robot/camera for 4 s."
+    assert one.sentence == "“camera_driver” is connected but has sent nothing on /robot/camera for 4 s."
     assert one.mend.startswith(f"Its last message was number 18204, at {at}.")
     (one,) = found(**publisher(remedies=("restart_camera",))).values()
     assert one.instead == "restart_camera"
-    assert one.mend.endswith("It offers the service “restart_camera”.")
+    assert one.mend.endswith("It has the service “restart_camera”.")
     (one,) = found(**publisher(sent=0, last_s=None)).values()
-    assert one.sentence == "“camera_driver” is there, but has sent nothing on /robot/camera yet."
+    assert one.sentence == "“camera_driver” is connected but has sent nothing on /robot/camera yet."
     (one,) = found(**publisher(sent=None, generation="B")).values()  # nobody numbers what it sends
     assert "number" not in one.mend
     assert at in one.mend
@@ -53,8 +53,8 @@ def test_a_publisher_that_is_silent_is_told_with_since_when_and_what_it_offers()
 
 def test_a_name_that_nobody_publishes_is_told_with_the_one_that_is_meant():
     one = found(topic="/robot/deph", publishers=())["topic:near"]
-    assert one.sentence == "Nobody publishes /robot/deph."
-    assert one.mend == "Did you mean /robot/depth? Its publishers send 60 messages a second."
+    assert one.sentence == "/robot/deph has no publisher."
+    assert one.mend == "Did you mean /robot/depth? Its publishers send 60 messages per second."
     assert one.instead == "/robot/depth"
     assert found(topic="/onc", publishers=())["topic:near"].mend == "Did you mean /once?"
 
@@ -104,14 +104,22 @@ def test_who_is_not_there_at_all():
 @pytest.mark.parametrize(
     ("reach", "sentence", "mend"),
     [
-        ("elsewhere", "“camera_driver” publishes for its own computer, lab, only.", "NEP_MASTER"),
-        ("timeout", "Nothing answers at 10.0.0.7:41000 (lab), where “camera_driver” publishes.", "firewall"),
+        ("elsewhere", "“camera_driver” can be reached only from its own computer, lab.", "NEP_MASTER"),
+        (
+            "timeout",
+            "“camera_driver” publishes at 10.0.0.7:41000 (lab), but that address does not respond.",
+            "firewall",
+        ),
         (
             "refused",
-            "Nobody listens at 10.0.0.7:41000 (lab) any more, where “camera_driver” published.",
+            "“camera_driver” published at 10.0.0.7:41000 (lab), but nothing is listening there now.",
             "Start it again",
         ),
-        ("unknown", "There is no way to 10.0.0.7:41000 (lab), where “camera_driver” publishes.", "network"),
+        (
+            "unknown",
+            "“camera_driver” publishes at 10.0.0.7:41000 (lab), but this computer has no route to that address.",
+            "network",
+        ),
     ],
 )
 def test_an_address_that_is_not_reached(reach, sentence, mend):
@@ -124,14 +132,16 @@ def test_versions_that_do_not_fit():
     (one,) = found(**publisher(generation="0.5.4.6")).values()
     assert (one.id, one.command) == ("topic:version:camera_driver", "pip install nep==0.5.4.8")
     (wire,) = found(refused=12, **publisher(last_s=NOW)).values()
-    assert wire.sentence == "What comes on /robot/camera is of a version of NEP that this one does not read."
+    assert (
+        wire.sentence == "Messages on /robot/camera come from a version of NEP that this version can't read."
+    )
     assert "camera_driver (lab)" in wire.mend
 
 
 def test_what_comes_and_can_or_cannot_be_read():
     assert [each.severity for each in found(received=1, **publisher(last_s=NOW)).values()] == ["ok"]
     bad = found(received=1, unreadable="it is no JSON", **publisher(last_s=NOW))["topic:unreadable"]
-    assert bad.sentence == "Messages of /robot/camera come, but can't be read: it is no JSON."
+    assert bad.sentence == "Messages on /robot/camera arrive but can't be read: it is no JSON."
     blocked = found(**publisher(last_s=NOW))["topic:blocked"]
     assert blocked.sentence.startswith("/robot/camera is sent by camera_driver (lab), but nothing came here")
 

@@ -330,7 +330,7 @@ def test_no_program_without_a_key_registers_such_an_endpoint_either(master: Mast
 
 @pytest.mark.parametrize(
     ("word", "said"),
-    [("x\u202ey", r"'\u202e' is not allowed in it"), ("j" * 1000, "use 200 letters at most")],
+    [("x\u202ey", r"'\u202e' is not allowed in it"), ("j" * 1000, "use at most 200 characters")],
 )
 def test_why_a_type_is_refused_is_said(master: Master, word: str, said: str) -> None:
     with attacker_at(master) as attacker:
@@ -383,7 +383,7 @@ def test_a_node_has_no_more_than_so_many_publishers(master: Master) -> None:
         assert isinstance(attacker.ask(Join(node(), 0, many)), Found)
         more = attacker.ask(AddPublisher(node(), publisher(id=20_000)))
         assert isinstance(more, Refused)
-        assert more.reason == "a node has 5000 publishers and subscribers at most"
+        assert more.reason == "a node can have at most 5000 publishers and subscribers"
         assert isinstance(attacker.ask(RemovePublisher(OWN_ID, 1, 0)), Done)
         assert isinstance(attacker.ask(AddPublisher(node(), publisher(id=20_000))), Added)
 

@@ -24,9 +24,7 @@ def test_each_sender_is_counted_and_told_for_some_seconds() -> None:
     bad.add("b", "“B”", "the body is not valid msgpack", 10.0)
     first, second = bad.alerts(10.0)
     assert (first.id, second.id) == ("request:a", "request:b")
-    assert first.sentence == (
-        "“A” sends what the master does not understand (3 times so far): the body is not a map"
-    )
+    assert first.sentence == ("“A” sent 3 requests that the master can't read: the body is not a map")
     assert second.sentence.endswith("(once): the body is not valid msgpack")
     assert first.hint
     bad.add("a", "“A”", "the body is not a map", 19.0)
@@ -51,7 +49,7 @@ def test_strangers_without_end_take_no_memory_without_end() -> None:
     assert len(bad._senders) == 100
     told = bad.alerts(10.0)
     assert len(told) == 6
-    assert told[0].sentence == "95 more programs send what the master does not understand"
+    assert told[0].sentence == "95 more programs send requests that the master can't read"
     assert max(len(each.sentence) for each in told) < 400
 
 

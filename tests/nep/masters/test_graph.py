@@ -229,7 +229,7 @@ def test_who_does_not_answer_is_an_alert_until_it_renews(graph: Graph) -> None:
     ask(graph, AddPublisher(node("p"), publisher(2)))
     ask(graph, ReportMissing("p", 2, (1, 99)))
     (alert,) = graph.view().alerts
-    assert (alert.id, alert.sentence) == ("missing:s", "“S” does not answer “P”")
+    assert (alert.id, alert.sentence) == ("missing:s", "“S” does not respond to “P”")
     _push, reply = ask(graph, AddPublisher(node("p"), publisher(3)))
     assert isinstance(reply.answer, Added)
     assert (reply.answer.expected, reply.answer.hung) == ((), (Expected(1, "s", "S"),))
@@ -244,7 +244,7 @@ def test_alerts_on_names_types_and_messages(graph: Graph) -> None:
     ask(graph, Renew("c", 7, 0, (), (SubscriberCount(3, 1, 0, "its version is 2"),)))
     alerts = {each.id: each.sentence for each in graph.view().alerts}
     assert set(alerts) == {"name:N", "type:t", "message:t"}
-    assert alerts["message:t"] == "“C” cannot read “t”: its version is 2"
+    assert alerts["message:t"] == "“C” can't read “t”: its version is 2"
     ask(graph, Leave("b"))
     assert {each.id for each in graph.view().alerts} == {"message:t"}
 

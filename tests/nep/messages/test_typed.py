@@ -362,7 +362,7 @@ def test_what_a_class_refuses_does_not_fit() -> None:
         (Pose(position={"x": 1}), "position is a 'dict'; give a 'Point'", "position"),
         (Part(1 << 64), "number is beyond 64 bits; give a 'int'", "number"),
         (Part(-(1 << 63) - 1), "number is beyond 64 bits; give a 'int'", "number"),
-        (Part(word="\ud800"), "word holds half of a surrogate pair; give whole letters", "word"),
+        (Part(word="\ud800"), "word contains an unpaired surrogate; give valid Unicode text", "word"),
         (Vector3(10**400), "x is too large; give a 'float'", "x"),
         (Vector3(y=True), "y is a 'bool'; give a 'float'", "y"),
         (Vector3(y=None), "y is a 'NoneType'; give a 'float'", "y"),

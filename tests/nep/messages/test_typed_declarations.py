@@ -151,7 +151,10 @@ class Plain:
         (TwoLists, "TwoLists.inner is a 'list[int] | tuple[str, int]', of which two are the same in JSON"),
         (Unknown, "the types in 'Unknown' cannot be read: name 'NowhereToBeFound' is not defined"),
         (Private, "Private._inner is not sent; give it a default"),
-        (Image, "the messages of 'Image' are called 'image', which are no maps; set MSG_TYPE in it"),
+        (
+            Image,
+            "the message type of 'Image' is 'image', a built-in type without fields; set MSG_TYPE to another name",
+        ),
         (Needs, "Needs.other is needed" if sys.version_info >= (3, 11) else "the types in 'Needs' cannot"),
         (OwnConstructor, "OwnConstructor.another is needed to make one, and is no field that is sent"),
         (Empty, "MSG_TYPE is empty"),

@@ -56,7 +56,7 @@ def test_an_unheard_payload_that_cannot_be_sent_is_told_until_one_can() -> None:
     assert unsendable.count == 1
     told.now += 1.0
     assert unsendable.is_valid(1)
-    assert told.problems == ["cannot encode a 'object' as 'json'; 'object' has no form in it", ""]
+    assert told.problems == ["cannot encode a 'object' as 'json'; 'object' can't be encoded as JSON", ""]
 
 
 def test_good_and_bad_in_turn_are_logged_rarely(caplog: pytest.LogCaptureFixture) -> None:

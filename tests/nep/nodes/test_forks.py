@@ -87,8 +87,7 @@ print(len(node.graph().nodes))
     )
     with running(code, transport) as program:
         assert program.line() == (
-            "publisher 'topic' stayed with the program when it was forked, and is closed here; "
-            "make a new node in the child"
+            "publisher 'topic' belongs to the parent process and can't be used after a fork; create a new node in the child process"
         )
         assert program.line().startswith("node 'parent' stayed with the program when it was forked")
         assert program.line() == "0"

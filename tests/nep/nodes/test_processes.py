@@ -301,7 +301,7 @@ def test_without_a_master_new_pub_says_how_to_start_one(monkeypatch: pytest.Monk
         with pytest.raises(nep.MasterUnreachable) as caught:
             node.new_pub("topic")
         assert str(caught.value) == (
-            "no master answers at '127.0.0.1:1' (waited 0.2 s); start one with 'nep master'"
+            "no master replied at '127.0.0.1:1' (waited 0.2 s); start one with 'nep master'"
         )
         with pytest.raises(nep.MasterUnreachable):
             node.new_sub("topic")

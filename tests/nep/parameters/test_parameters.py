@@ -68,7 +68,7 @@ def test_others_set_them_and_are_told_why_not(make: Make) -> None:
             "the parameter 'speed' cannot be 7; the most is 2": ("speed", 7),
             "the parameter 'speed' cannot be 'fast'; give a 'float'": ("speed", "fast"),
             "the parameter 'spead': there is none; did you mean 'speed'?": ("spead", 1),
-            "the parameter 'serial' cannot be 'X2'; only its node may set it": ("serial", "X2"),
+            "the parameter 'serial' cannot be 'X2'; only its node can change it": ("serial", "X2"),
         }
         for sentence, (name, value) in refusals.items():
             with pytest.raises(nep.RequestRefusedError) as raised:
@@ -78,7 +78,7 @@ def test_others_set_them_and_are_told_why_not(make: Make) -> None:
             theirs.set_all({"speed": 0.1, "serial": "X2"})
         theirs.set_all({"speed": 1, "serial": "X1"})
         assert node.parameters["speed"] == 1.0
-        with pytest.raises(nep.NepError, match="no parameter 'spead'; did you mean 'speed'"):
+        with pytest.raises(nep.NepError, match="unknown parameter 'spead'; did you mean 'speed'"):
             theirs.get("spead")
         assert [each["read_only"] for each in theirs.list()] == [False, True]
     node.parameters["serial"] = "X2"
@@ -136,7 +136,7 @@ def test_what_is_no_call_of_parameters_is_refused(pair: tuple[nep.Node, nep.Node
 @pytest.mark.parametrize(
     ("default", "limits", "wrong", "sentence"),
     [
-        (1, {"min": 0}, -1, "the least is 0"),
+        (1, {"min": 0}, -1, "the minimum is 0"),
         (1, {}, 1.5, "give a whole number"),
         (1, {}, 2**63, "give a finite number"),
         (1, {}, True, "give a 'int'"),
@@ -185,13 +185,13 @@ def test_a_value_is_a_copy(make: Make) -> None:
     ("name", "default", "more", "sentence"),
     [
         ("x", 1, {}, "it is declared already"),
-        ("y", 5, {"max": 2}, "the most is 2"),
+        ("y", 5, {"max": 2}, "the maximum is 2"),
         ("y", 5, {"choices": (1, 2)}, "use 1 or 2"),
         ("y", 5, {"choices": (1, "a")}, "give a 'int'"),
         ("y", "a", {"max": 2}, "only numbers have limits"),
         ("y", 1, {"max": float("nan")}, "only numbers have limits"),
-        ("y", 1, {"type": bytes}, "its type is 'bool', 'int'"),
-        ("y", None, {}, "its type is 'bool', 'int'"),
+        ("y", 1, {"type": bytes}, "its type must be 'bool', 'int'"),
+        ("y", None, {}, "its type must be 'bool', 'int'"),
         ("a b", 1, {}, "cannot be a topic"),
         ("", 1, {}, "cannot be a topic"),
     ],
@@ -209,13 +209,13 @@ def test_what_cannot_be_declared(
 def test_there_is_a_most(make: Make) -> None:
     parameters = make("robot").parameters
     parameters._known = {str(n): None for n in range(1000)}  # type: ignore[misc]
-    with pytest.raises(nep.ParameterError, match="a node has 1000 parameters at most"):
+    with pytest.raises(nep.ParameterError, match="a node can have at most 1000 parameters"):
         parameters.declare("x", 1)
 
 
 def test_which_node_is_meant(master: Master) -> None:
     with nep.node("a") as one, nep.node("a") as two, nep.node("b"), nep.node("tool") as tool:
-        with pytest.raises(nep.NepError, match="no node is called 'a'; no node has parameters"):
+        with pytest.raises(nep.NepError, match="no node is named 'a'; no node has parameters"):
             tool.parameters_of("a")
         tool.new_pub("x")
         with pytest.raises(nep.NepError, match="the node 'tool' has declared no parameters"):
@@ -226,7 +226,7 @@ def test_which_node_is_meant(master: Master) -> None:
             tool.parameters_of("a")
         with tool.parameters_of(two.id, timeout_s=30.0) as theirs:
             assert theirs.get("who") == two.id
-        with pytest.raises(nep.NepError, match="no node is called 'aa'; did you mean 'a'"):
+        with pytest.raises(nep.NepError, match="no node is named 'aa'; did you mean 'a'"):
             tool.parameters_of("aa")
 
 

@@ -39,7 +39,7 @@ class Limits:
 
     def __post_init__(self) -> None:
         if self.least > self.most:
-            raise ValueError("the least is above the most")
+            raise ValueError("the minimum is above the most")
 
 
 @dataclass
@@ -80,7 +80,7 @@ def test_a_dataclass_is_an_instance_here_and_a_map_there(nodes: tuple[nep.Node, 
     [
         ({"least": "low"}, "least"),
         ({}, "least"),
-        ({"least": 2.0}, "the least is above the most"),
+        ({"least": 2.0}, "the minimum is above the most"),
         ({"least": 0.0, "names": [1]}, r"names\[0\]"),
         ([], "Limits"),
         (None, "Limits"),

@@ -162,7 +162,7 @@ def test_topics_that_are_not(topic: str, reason: str) -> None:
 def test_an_unknown_version_is_named() -> None:
     header = bytearray(wire.Header(1, 0, 1, 2, 3).pack())
     header[0] = 9
-    with pytest.raises(WireError, match="its version is 9, this nep reads version 1; update nep"):
+    with pytest.raises(WireError, match="its version is 9, but this nep reads version 1; update nep"):
         wire.read_header(bytes(header))
 
 

@@ -108,7 +108,7 @@ def test_a_publisher_that_starts_again_replaces_the_silent_one() -> None:
 
 def test_back_ends_are_found() -> None:
     assert set(discover("nep.backends", "BACKEND", Backend)) >= {"memory", "zeromq"}
-    with pytest.raises(nep.UnknownBackendError, match="no back end 'zeromk'; did you mean 'zeromq'"):
+    with pytest.raises(nep.UnknownBackendError, match="unknown back end 'zeromk'; did you mean 'zeromq'"):
         nep.node("n", "zeromk")
     with nep.node("n", "ZMQ") as node:
         assert "zeromq" in repr(node)
@@ -276,7 +276,7 @@ def test_what_is_no_address(address: str) -> None:
 
 def test_did_you_mean() -> None:
     assert did_you_mean("jsn", ["json", "string"]) == "did you mean 'json'?"
-    assert did_you_mean("xyz", ["json", "string"]) == "known are 'json', 'string'"
+    assert did_you_mean("xyz", ["json", "string"]) == "known names: 'json', 'string'"
 
 
 def test_names_of_nodes() -> None:

@@ -100,7 +100,7 @@ def test_a_behaviour_with_blocks_has_no_such_words(view: BlocklyView, person: Ca
 
 def test_show_me_leads_to_the_category_then_to_the_block_and_ends_with_it(empty: Person) -> None:
     empty.click(".nepBegin button:nth-child(2)", dx=20)
-    empty.wait_for(BUBBLE, "“when started” is in Events")
+    empty.wait_for(BUBBLE, "You'll find “when started” under Events")
     ring, row = empty.box(".nepRing"), empty.box(".blocklyToolboxCategory")
     assert abs(ring["left"] - row["left"]) < 8
     assert abs(ring["bottom"] - row["bottom"]) < 8

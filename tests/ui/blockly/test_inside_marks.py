@@ -59,7 +59,7 @@ def test_a_mark_for_each_kind_is_on_the_folded_block_and_says_what_is_inside(vie
     them.wait_for(MARKS, BOTH)
     sheet_is_seen(them, False)
     looked_at(them, f"inside-{'dark' if dark else 'light'}")
-    assert "Inside is a note: Ask Maria first" in them.ask(TITLES)
+    assert "Contains a note: Ask Maria first" in them.ask(TITLES)
 
 
 @pytest.mark.parametrize(("name", "id"), [("note", "b"), ("pause", "a")])
@@ -84,5 +84,5 @@ def test_the_menu_leads_there_and_names_only_what_is_inside(them):
     rows = open_menu(them, "loop")
     assert "Show where the program pauses inside" not in rows
     them.press(Qt.Key_Escape)
-    choose(them, "loop", "Show the note inside this block")
+    choose(them, "loop", "Show the note inside this block this block")
     them.wait_for(FOCUSED, "b")

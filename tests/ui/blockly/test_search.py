@@ -264,7 +264,11 @@ def test_who_finds_nothing_is_told_what_to_try(opened):
     QTest.keyClicks(them.target, "zzyzx")
     them.wait_for(
         f"[...document.querySelectorAll('{FLYOUT} .blocklyFlyoutLabelText')].map(e => e.textContent.trim())",
-        ["No block for “zzyzx”", "Try a simpler word, such as “turn” or “say”,", "or browse the categories."],
+        [
+            "No blocks match “zzyzx”",
+            "Try a simpler word, such as “turn” or “say”,",
+            "or browse the categories.",
+        ],
     )
 
 

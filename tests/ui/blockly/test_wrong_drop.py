@@ -62,7 +62,7 @@ def corner(them: Person, selector: str, side: str = "top") -> QPoint:
             "top",
             "“repeat forever” gives no value, so no gap takes it.",
         ),
-        ("turn", "[data-id=ever] > .blocklyPath", "bottom", "Nothing can follow “repeat forever”"),
+        ("turn", "[data-id=ever] > .blocklyPath", "bottom", "“repeat forever” can't have blocks below it"),
         ("battery", "[data-id=start] > .blocklyPath", "bottom", "“battery” is a value. Put it into a gap"),
         ("start", "[data-id=turn] > .blocklyPath", "bottom", "“when started” begins a script"),
     ],

@@ -233,7 +233,7 @@ def test_a_limit_that_is_asked_for_switches_the_alarm_on(panel) -> None:
 
 def test_the_history_is_filtered_and_saved(panel, tmp_path) -> None:
     record = AlarmRecord("x", "=cmd|' /C calc'!A0", panel.now_s() - 60, 4.0, count=2)
-    record.add(AlarmDeed("call", "restart answered"))
+    record.add(AlarmDeed("call", "restart replied"))
     panel.alarms.history.add(record)
     panel.alarms.history.add(AlarmRecord("y", "/cam is silent", panel.now_s()))
     panel.refresh()
@@ -243,7 +243,7 @@ def test_the_history_is_filtered_and_saved(panel, tmp_path) -> None:
     panel._write(tmp_path / "h.csv", None)
     lines = (tmp_path / "h.csv").read_text(encoding="utf-8").splitlines()
     assert lines[0] == "at,alarm,lasted_s,times,did"
-    assert ",'=cmd|' /C calc'!A0,4.000,2,restart answered" in lines[1]
+    assert ",'=cmd|' /C calc'!A0,4.000,2,restart replied" in lines[1]
     assert csv_text([]).count("\n") == 1
 
 

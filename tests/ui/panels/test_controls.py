@@ -320,7 +320,7 @@ def test_a_file_that_is_no_picture_says_so_and_is_not_sent(qtbot, theme, tmp_pat
     choice = child(form, PictureChoice)
     (tmp_path / "not.png").write_text("hello")
     choice.use_file(tmp_path / "not.png")
-    assert choice.sentence == "“not.png” can't be used: they are no picture: neither JPEG nor PNG."
+    assert choice.sentence == "“not.png” can't be used: it is neither a JPEG nor a PNG image."
     assert choice.thumbnail.image is None
     assert read_picture(tmp_path / "none.png")[1] == "“none.png” can't be read: no such file or directory."
     with (tmp_path / "big.png").open("wb") as big:

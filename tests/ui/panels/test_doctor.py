@@ -165,7 +165,7 @@ def test_while_it_looks_the_button_waits_and_the_last_findings_stay(panel, windo
 NEAR = Finding(
     "topic:near",
     "error",
-    "Nobody publishes /robot/deph.",
+    "/robot/deph has no publisher.",
     "Did you mean /robot/depth?",
     instead="/robot/depth",
 )

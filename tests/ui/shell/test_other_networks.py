@@ -79,7 +79,7 @@ def test_a_wrong_address_says_so_and_stays_as_it_was_typed(sheet: OtherNetworksS
     row.switch.click()
     assert not row.switch.isChecked()
     assert (row.address.text(), row.address.property("wrong")) == ("999", "true")
-    assert states(sheet)[1] == "'999' is no domain of ROS 2; use a number from 0 to 232."
+    assert states(sheet)[1] == "'999' is not a ROS 2 domain; use a number from 0 to 232."
     row.address.setText("9")
     row.switch.click()
     assert (row.switch.isChecked(), row.address.property("wrong")) == (True, "false")
