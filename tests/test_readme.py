@@ -1,4 +1,4 @@
-"""README.md: its commands and programs run in their order, each prints something and none busy-waits."""
+"""Commands and programs of README.md and docs/first-programs.md run in their order, print, and never busy-wait."""
 
 from __future__ import annotations
 
@@ -19,6 +19,7 @@ from nep.masters.master import Master
 from tests.e2e.programs import ROOT, Program
 from tests.e2e.waiting import until
 
+PAGES = ("README.md", "docs/first-programs.md")
 BLOCK = re.compile(r"^```(\w+)\n(.*?)^```$", re.MULTILINE | re.DOTALL)
 RUNS_UNTIL = "Ctrl+C ends it"
 """The comment behind a command that does not end by itself."""
@@ -33,7 +34,7 @@ pytestmark = [
 
 
 class Reader:
-    """Types README's commands and starts its programs, which run on while later ones are started."""
+    """Types the commands of the pages and starts their programs, which run on while later ones are started."""
 
     def __init__(self, stack: ExitStack) -> None:
         self._stack = stack
@@ -71,7 +72,7 @@ class Reader:
         assert program.wait(60) == (130 if is_endless else 0), (line, program.lines)
 
     def run(self, source: str) -> None:
-        """Start a program of the README."""
+        """Start a program of a page."""
         self.programs.append(self.start(["-c", source]))
 
 
@@ -107,10 +108,13 @@ def virtual_pepper(master: Master) -> Iterator[Program]:
 
 
 def test_blocks_run_in_order_and_print(virtual_pepper: Program, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setenv("NEP_MASTER", os.environ["NEP_MASTER"])  # README's own master takes its place
+    monkeypatch.setenv(
+        "NEP_MASTER", os.environ["NEP_MASTER"]
+    )  # the master of docs/first-programs.md takes its place
     with ExitStack() as stack:
         reader = Reader(stack)
-        for language, text in BLOCK.findall((ROOT / "README.md").read_text(encoding="utf-8")):
+        pages = "\n".join((ROOT / page).read_text(encoding="utf-8") for page in PAGES)
+        for language, text in BLOCK.findall(pages):
             if language == "python":
                 reader.run(text)
             else:

@@ -24,7 +24,7 @@ The newest is on top.
 
 ### Added
 
-- Pictures, see [the guide](docs/guide.md).
+- Pictures, see [the guide](docs/web.md).
 
 ## 1.1.0 (2026-11-01)
 
@@ -35,7 +35,7 @@ The newest is on top.
 
 
 def test_a_section_ends_where_the_next_begins() -> None:
-    assert section(TEXT, "1.10.0") == "### Added\n\n- Pictures, see [the guide](docs/guide.md).\n"
+    assert section(TEXT, "1.10.0") == "### Added\n\n- Pictures, see [the guide](docs/web.md).\n"
     assert section(TEXT, "1.1.0") == "- An older thing.\n"
 
 
@@ -58,7 +58,7 @@ def test_a_tag_must_be_the_version_of_the_sources() -> None:
 
 
 def test_links_to_files_become_whole_and_others_stay() -> None:
-    text = "[guide](docs/guide.md), [there](https://example.org/a.md), [below](#added), [x](mailto:a@b.org)"
+    text = "[guide](docs/web.md), [there](https://example.org/a.md), [below](#added), [x](mailto:a@b.org)"
     assert with_links(text, "https://example.org/blob/v1/") == text.replace(
         "](docs/", "](https://example.org/blob/v1/docs/"
     )
@@ -69,10 +69,10 @@ def test_the_command_prints_the_notes_or_says_why_not(
 ) -> None:
     changelog = tmp_path / "CHANGELOG.md"
     changelog.write_text(
-        f"# Changelog\n\n## {__version__}\n\n- Ñandú, [how](docs/guide.md)\n", encoding="utf-8"
+        f"# Changelog\n\n## {__version__}\n\n- Ñandú, [how](docs/web.md)\n", encoding="utf-8"
     )
     assert main([f"v{__version__}", "--links", "https://example.org"], changelog) == 0
-    assert capfdbinary.readouterr().out == "- Ñandú, [how](https://example.org/docs/guide.md)\n".encode()
+    assert capfdbinary.readouterr().out == "- Ñandú, [how](https://example.org/docs/web.md)\n".encode()
     changelog.write_text("# Changelog\n\n## Unreleased\n\n- x\n", encoding="utf-8")
     for tag in (f"v{__version__}", "v99.0.0"):
         assert main([tag], changelog) == 1

@@ -134,7 +134,7 @@ def place(tmp_path: Path) -> Path:
         (tmp_path / name).parent.mkdir(exist_ok=True)
         shutil.copyfile(ROOT / name, tmp_path / name)
     (tmp_path / "CHANGELOG.md").write_text(
-        f"# Changelog\n\n## {__version__}\n\n- [A thing](docs/guide.md)\n", encoding="utf-8"
+        f"# Changelog\n\n## {__version__}\n\n- [A thing](docs/web.md)\n", encoding="utf-8"
     )
     with_sums(tmp_path / "packages" / "package-windows", {"one-setup.exe": b"1", "one.zip": b"2"}, "\r\n")
     with_sums(tmp_path / "packages" / "package-linux", {"one.deb": b"3", "one two.tar.xz": b"4"})
@@ -167,7 +167,7 @@ def test_a_draft_has_all_packages_one_list_of_sums_and_the_notes(place: Path) ->
         f"{hashlib.sha256(content).hexdigest()}  {name}" for name, content in files.items()
     )
     assert (place / "notes.md").read_text(encoding="utf-8") == (
-        f"- [A thing](https://example.org/nep/studio/blob/{TAG}/docs/guide.md)\n"
+        f"- [A thing](https://example.org/nep/studio/blob/{TAG}/docs/web.md)\n"
     )
     said = (place / "said-to-gh").read_text(encoding="utf-8").splitlines()
     assert said[:9] == [

@@ -40,7 +40,7 @@ class Field:
 PAGES: Mapping[str, Field] = {
     "nodes": Field(
         "Nodes, publishers and subscribers",
-        'Begin with `nep.node("name")`; docs/guide.md shows how.',
+        'Begin with `nep.node("name")`; docs/first-programs.md shows how.',
         ("nep.nodes.node", "nep.nodes", "nep.backends.connection"),
     ),
     "messages": Field(
