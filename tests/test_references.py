@@ -26,6 +26,7 @@ _PATH = re.compile(rf"(?<![\w/.~-])(?:{'|'.join(HOMES)}|resources)/[\w./-]*\.(?:
 _PLACE = re.compile(rf"(?:{'|'.join(HOMES)}|resources)/[\w./-]*")
 _DECISION = re.compile(r"(?:\bADR |docs/adr/)(\d{4})")
 _LINK = re.compile(r"\]\((?!\w+:)([^)#\s]+)")
+_ANCHOR = re.compile(r"\]\((?!\w+:)([^)#\s]*)#([^)\s]+)\)")
 _QUOTED = re.compile(r"`+([^`\n]+)`+")
 _DOTTED = re.compile(r"(?:nep|app|tools|tests)(?:\.\w+)+")
 _NAME = re.compile(r"(?:[A-Z][a-z0-9]+){2,}(?:\.\w+)*|[A-Z]\w*(?:\.\w+)+")
@@ -146,6 +147,30 @@ def test_every_link_of_a_document_leads_somewhere() -> None:
     ]
     assert len(links) > 30
     assert {each for each in links if not ((ROOT / each[0]).parent / each[1]).exists()} == set()
+
+
+@cache
+def _anchors(page: Path) -> frozenset[str]:
+    """Return the anchors that GitHub generates for the headings of a page."""
+    text = re.sub(r"^```.*?^```", "", page.read_text(encoding="utf-8"), flags=re.DOTALL | re.MULTILINE)
+    headings = re.findall(r"^#+ (.+)$", text, re.MULTILINE)
+    return frozenset(re.sub(r"[^\w\- ]", "", heading.lower()).replace(" ", "-") for heading in headings)
+
+
+def test_every_anchor_of_a_link_is_a_heading() -> None:
+    links = {
+        (place, page or Path(place).name, anchor)
+        for place, text in _texts().items()
+        if place.endswith(".md")
+        for page, anchor in _ANCHOR.findall(text)
+        if not page or page.endswith(".md")
+    }
+    assert len(links) > 30
+    assert {
+        (place, page, anchor)
+        for place, page, anchor in links
+        if anchor not in _anchors(((ROOT / place).parent / page).resolve())
+    } == set()
 
 
 def test_what_is_not_there_is_found() -> None:
