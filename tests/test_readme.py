@@ -1,4 +1,4 @@
-"""Commands and programs of README.md and docs/first-programs.md run in their order, print, and never busy-wait."""
+"""Commands and programs of README.md and docs/first-programs.md run in order, print, and never busy-wait."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ pytestmark = [
 
 
 class Reader:
-    """Types the commands of the pages and starts their programs, which run on while later ones are started."""
+    """Types the commands of the pages and starts their programs, which run until the end."""
 
     def __init__(self, stack: ExitStack) -> None:
         self._stack = stack
