@@ -15,7 +15,7 @@ HOMES = ("nep", "app", "tests", "tools", "bench", "docs", "examples", "installer
 FILES = ("README.md", "CONTRIBUTING.md", "dev.py", "hatch_build.py", "pyproject.toml")
 ELSEWHERE = frozenset({
     "app/_resources/",  # where a wheel has them
-    "nep/locale/fr/LC_MESSAGES/nep-studio.po",  # an example of a language to begin
+    "nep/locale/pt_BR/LC_MESSAGES/nep-studio.po",  # example of a new language
     "nep/Json",  # types of messages
     "nep/Msgpack",
     "nep/log",
