@@ -25,7 +25,7 @@ from nep.errors import NepError
 from nep.i18n import _, begin
 from nep.system.addresses import MASTER_VARIABLE, master_address
 from nep.system.descriptors import allow_many
-from nep.system.streams import close_streams, prepare_streams, tell, words_given
+from nep.system.streams import close_streams, prepare_streams, print_error, words_given
 from nep.version import __version__
 
 PROCESSES = (
@@ -124,7 +124,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         why = why_not_imported(error)
         if not why:
             raise
-        tell(f"nep-studio: {why}")
+        print_error(f"nep-studio: {why}")
         return 2
     finally:
         close_streams()
@@ -193,7 +193,7 @@ def self_test(folder: Path, *, web: bool) -> int:
         is_root = hasattr(os, "geteuid") and os.geteuid() == 0
         test = SelfTest(prepare(folder, os.environ, is_root=is_root), {"web": web})
     except UnwritableFolderError as error:
-        tell(f"nep-studio: {error}")
+        print_error(f"nep-studio: {error}")
         return 2
 
     def show() -> int:

@@ -34,7 +34,7 @@ from app.robots.identity import controls_of
 from nep.errors import NepError
 from nep.i18n import _, listed, number
 from nep.programs.robots.moving import description_topics, moving_topics
-from nep.system.streams import tell
+from nep.system.streams import print_error
 from nep.text import escaped
 
 OK, FAILED, UNUSABLE, ROBOT_MISSING, MAY_NOT_MOVE, INTERRUPTED = 0, 1, 2, 3, 4, 130
@@ -165,7 +165,7 @@ class _Lines:
     def tell_problem(self) -> None:
         # Silent when the reader closed the stream: that is a normal end.
         if self._problem:
-            tell(
+            print_error(
                 _("the output cannot be written: {reason}; the behaviour was stopped.").format(
                     reason=self._problem
                 )

@@ -59,7 +59,7 @@ def left_out() -> float:
 def unread() -> float:
     """Seconds for a record that reaches Studio while nobody looks at the Console."""
     console, messages = Console(), records()
-    return timed(lambda: console.take(messages), 50) / len(messages)
+    return timed(lambda: console.add_messages(messages), 50) / len(messages)
 
 
 def read() -> float:
@@ -67,7 +67,7 @@ def read() -> float:
     console = Console()
 
     def take() -> None:
-        console.take(records())
+        console.add_messages(records())
         assert console.records
 
     return timed(take, 5) / 100

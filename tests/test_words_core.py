@@ -177,7 +177,7 @@ def test_alerts_of_health() -> None:
     now[0] = RESTART_TIMEOUT_S + 1
     health.check({"Pepper"}, {"Turtle"})
     for unchecked in (0, 7):
-        health.look({f"/{unchecked}": Checked(3, 2, unchecked, "Xx", last_good=False)})
+        health.update({f"/{unchecked}": Checked(3, 2, unchecked, "Xx", last_good=False)})
     health.journal("Xx")
     health.gives_up("Greeting", "Xx")
     health.settings("Xx")

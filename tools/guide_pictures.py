@@ -302,7 +302,7 @@ class GuidePictures(SelfDrive):
             self._answers[element] = json.loads(answer) if isinstance(answer, str) and answer else None
 
         if self._page_is_there() and self._editor.web is not None:
-            self._editor.web.page.runJavaScript(script, take)
+            self._editor.web.page.runJavaScript(script, take_screenshots)
 
     def _place_of(self, panel: str) -> QRect:
         bench = self._window.bench
@@ -338,7 +338,7 @@ def paint_mouse(picture: QPixmap, tip: QPoint) -> None:
     painter.end()
 
 
-def take(folder: Path, theme: str) -> int:
+def take_screenshots(folder: Path, theme: str) -> int:
     """Create the images in the language of this process; return 0 if all steps succeeded."""
     with tempfile.TemporaryDirectory(prefix="nep-guide-") as home:
         free = next(port for port in PORTS if not is_running(f"127.0.0.1:{port}", 0.2))
@@ -375,7 +375,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser.add_argument("folder", nargs="?", type=Path, default=FOLDER)
     parser.add_argument("--theme", choices=THEMES, help="only these colours, in the language of now")
     asked = parser.parse_args(arguments)
-    return take(asked.folder, asked.theme) if asked.theme else take_all(asked.folder)
+    return take_screenshots(asked.folder, asked.theme) if asked.theme else take_all(asked.folder)
 
 
 if __name__ == "__main__":

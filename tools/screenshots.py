@@ -201,7 +201,7 @@ class Pictures(SelfDrive):
         self._commands.run("inspect:/Pepper/state")
 
 
-def take(folder: Path) -> int:
+def take_screenshots(folder: Path) -> int:
     """Create the images; return 0 if all steps succeeded."""
     with tempfile.TemporaryDirectory(prefix="nep-screenshots-") as home:
         free = next(port for port in PORTS if not is_running(f"127.0.0.1:{port}", 0.2))
@@ -225,7 +225,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command line."""
     parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
     parser.add_argument("folder", nargs="?", type=Path, default=FOLDER)
-    return take(parser.parse_args(arguments).folder)
+    return take_screenshots(parser.parse_args(arguments).folder)
 
 
 if __name__ == "__main__":

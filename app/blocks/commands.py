@@ -132,11 +132,11 @@ __all__ = [
 ]  # fmt: skip
 
 
-def _say(line: str) -> None:
+def _print(line: str) -> None:
     sys.stdout.write(line + "\n")
 
 
-_runtime = Runtime(_say)
+_runtime = Runtime(_print)
 
 answer = _runtime.answer
 ask = _runtime.ask
@@ -176,7 +176,7 @@ def run(name: str) -> None:
     with new_node(f"program {name}") as node:
         found = find_robots(node, ROBOT_DISCOVERY_S)
         for claim in found.claims:
-            _say(claim)
+            _print(claim)
         owners = {robot: owner.node_id for robot, owner in found.owners.items()}
         network = Network(node, f"program {name}", found.robots, owners=owners)
         try:
@@ -192,6 +192,6 @@ def run(name: str) -> None:
                 wrong = [network.stop_words(robot) for robot in moving]
                 network.close()
     for words in wrong:
-        _say(_("{words}. Switch it off by hand.").format(words=words))
+        _print(_("{words}. Switch it off by hand.").format(words=words))
     if _runtime.error is not None:
         sys.exit(_runtime.error.sentence)

@@ -195,9 +195,9 @@ class SessionAlarms:
 
     # ---- interface of the session
 
-    def take(self, topic: str, messages: Sequence[Message]) -> None:
+    def evaluate(self, topic: str, messages: Sequence[Message]) -> None:
         """Evaluate messages of a topic. Called in the thread that receives them."""
-        self.alarms.evaluator.take(topic, messages)
+        self.alarms.evaluator.evaluate(topic, messages)
 
     def see(self, view: GraphView | None) -> None:
         """Evaluate a new graph; None when the master is lost."""
@@ -228,7 +228,7 @@ class SessionAlarms:
                 self._update_alert(rule, self.alarms.evaluator.state(rule).seen, count=0)
         self._write()
         try:
-            if self._worker.take(FILE):
+            if self._worker.pop_result(FILE):
                 self._session.alerts.resolve("alarms:kept")
         except OSError as error:
             self._written = None  # retried at the next check

@@ -63,7 +63,7 @@ class Console:
         """Add a record; text longer than `TEXT_LIMIT` is shortened visibly."""
         self._append([ConsoleRecord(self._clock(), level, origin, _shortened(text))])
 
-    def take(self, messages: Sequence[Message], dropped: int = 0) -> None:
+    def add_messages(self, messages: Sequence[Message], dropped: int = 0) -> None:
         """Add log messages from the network; ``dropped`` is the number of messages lost before them."""
         if dropped:
             self.left_out += dropped

@@ -135,7 +135,7 @@ class Session:
         self.images = Images(self.watch, self._clock)
         self.series = SeriesFeed(self.watch, self._clock_ns, self._mailbox.set_room)
         post_event = self._mailbox.post_event
-        sinks = [self._checks.look, self._mailbox.post, self._offer, self._warn]
+        sinks = [self._checks.check, self._mailbox.post, self._offer, self._warn]
         self.source: Source = make_source(self.address, sinks, post_event)
         self.networks = Networks(self.settings, sinks[1:], post_event, self.alerts)
         self.parameters = ParameterSetter(self.source.submit)
@@ -181,7 +181,7 @@ class Session:
         (self.images if live is None else live.images).offer(messages, topic)
 
     def _warn(self, topic: str, messages: Sequence[Message]) -> None:
-        self.alarms.take(topic, messages)
+        self.alarms.evaluate(topic, messages)
 
     # -- public ----------------------------------------------------------------------------------------------
 
@@ -439,8 +439,10 @@ class Session:
             self.room.add_messages(batches)
             self.room.tick()
         with self.guarded(lazy("check messages")):
-            found = self._checks.take()
-            self._health.look({topic: what for topic, what in found.items() if self._watches.watched(topic)})
+            found = self._checks.pop_results()
+            self._health.update(
+                {topic: what for topic, what in found.items() if self._watches.watched(topic)}
+            )
         if drained.lost_events:
             self.alerts.put(
                 "mailbox",
@@ -456,7 +458,7 @@ class Session:
 
     def _on_batch(self, topic: str, batch: Batch, now: float) -> None:
         if topic in LOGS:
-            self.console.take(batch.messages, batch.dropped)
+            self.console.add_messages(batch.messages, batch.dropped)
         # else these are the last messages of a subscription that has just ended
         if self._watches.watched(topic):
             topics = self.live.topics

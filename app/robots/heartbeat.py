@@ -63,10 +63,10 @@ class Heartbeat:
                 robots = list(self._robots.values())
             for publish in robots:
                 with self._errors:  # the other robots must still get theirs
-                    self._tell(publish)
+                    self._publish(publish)
             self._changed.wait(ALIVE_S if robots else None)
 
-    def _tell(self, publish: Publish) -> None:
+    def _publish(self, publish: Publish) -> None:
         alive = {"id": uuid.uuid4().hex, "op": "alive", "from": self._sender, "action": "", "input": {}}
         try:
             publish(alive)

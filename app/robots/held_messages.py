@@ -36,7 +36,7 @@ class HeldMessages:
             held = self._messages[message.publisher] = deque(maxlen=self._per_publisher)
         held.append(message)
 
-    def take(self) -> list[Message]:
+    def pop_all(self) -> list[Message]:
         """Remove and return all messages, in order within each publisher."""
         taken = [message for held in self._messages.values() for message in held]
         self._messages.clear()

@@ -82,7 +82,7 @@ class VirtualPepper(Acting):
         with self._simulation.changed:
             body = self._simulation.body
             body.volume, body.language = volume, language
-            speech = body.say(text)
+            speech = body.speak(text)
         try:
             call.feedback(word=speech.word)
             while not call.until(lambda: speech.done, for_s=FEEDBACK_S):

@@ -110,7 +110,7 @@ class VirtualWheels:
             for happening in happenings:
                 self._link.happen(happening.event, **happening.data)
             if step % _STATE_PERIOD_STEPS == 0:
-                self._shared.tell()
+                self._shared.publish_changes()
                 self._link.tell("state", state)
                 self._link.sense("pose", {"x": state["x"], "y": state["y"], "theta": state["theta_deg"]})
             if step % _SLOW_PERIOD_STEPS == 0:

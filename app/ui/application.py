@@ -321,7 +321,7 @@ def _show(
     window.can_restart = not options.alone  # other windows don't restore their tabs
     close_when_asked(window, this_run)
     hearing = QTimer(window)
-    hearing.timeout.connect(lambda: log.take(session.console.add))
+    hearing.timeout.connect(lambda: log.drain(session.console.add))
     hearing.start(LOG_INTERVAL_MS)
     speaker = session.voices.speaker = QtSpeaker()
     soon = DeferredSteps(window, steps_after(window, web=options.web))

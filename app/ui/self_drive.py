@@ -99,7 +99,7 @@ class SelfDrive(QObject):
         folder.mkdir(parents=True, exist_ok=True)
         self._timer = QTimer(self)
         self._timer.setInterval(POLL_MS)
-        self._timer.timeout.connect(self._look)
+        self._timer.timeout.connect(self._check)
         self._next()
         self._timer.start()
 
@@ -167,7 +167,7 @@ class SelfDrive(QObject):
             self._miss(self._step, f"{type(error).__name__}: {error}")
             raise
 
-    def _look(self) -> None:
+    def _check(self) -> None:
         step = self._step
         if step is None:
             return

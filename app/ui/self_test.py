@@ -264,7 +264,7 @@ class Told:
     def ended(self, well: bool, words: str) -> None:
         """Report the failure, if any; then the closing of the window is timed as the last step."""
         complaints = [each for each in self._session.console.records if each.level in REPORTED_LEVELS]
-        self._test.report.tell(
+        self._test.report.add_computer(
             console=[
                 f"{each.level} {each.origin}: {each.text}" for each in complaints[-MAX_REPORTED_RECORDS:]
             ]
@@ -293,7 +293,9 @@ def show_steps(test: SelfTest, *, web: bool) -> int:
 
     def drive(window: MainWindow) -> SelfDrive:
         test.seen(f"Qt {qVersion()}")
-        test.report.tell(qt=qVersion(), pyside=PySide6.__version__, screen=QGuiApplication.platformName())
+        test.report.add_computer(
+            qt=qVersion(), pyside=PySide6.__version__, screen=QGuiApplication.platformName()
+        )
         steps = WindowSteps(window, test, web=web).all()
         told, picture = Told(test, window.session), PICTURE.removesuffix(".png")
         return SelfDrive(window, test.place.folder, steps, told, picture)

@@ -150,7 +150,7 @@ def samples(notes: Notes, volume: float, rate_hz: int = RATE_HZ) -> bytes:
 class Engine(Protocol):
     """Speech and audio output; used in one thread that runs a Qt event loop."""
 
-    def say(self, words: str, language: str, volume: float, ended: Callable[[], None]) -> str:
+    def speak(self, words: str, language: str, volume: float, ended: Callable[[], None]) -> str:
         """Start speaking; `ended` is called once at the end. Return an error sentence, or ""."""
 
     def play(self, notes: Notes, volume: float) -> str:
@@ -193,7 +193,7 @@ class QtEngine:
             ended, self._ended = self._ended, None
             ended()
 
-    def say(self, words: str, language: str, volume: float, ended: Callable[[], None]) -> str:
+    def speak(self, words: str, language: str, volume: float, ended: Callable[[], None]) -> str:
         """Start speaking if there is a voice for the language."""
         voice = self._found_voice()
         locales = voice.availableLocales() if voice is not None else []
@@ -258,9 +258,9 @@ class _Desk(QObject):
         self._make, self._orders, self._speaker = make, orders, speaker
         self._engine: Engine | None = None
         self.loop = QEventLoop()
-        self.woken.connect(self.take, Qt.ConnectionType.QueuedConnection)
+        self.woken.connect(self.process, Qt.ConnectionType.QueuedConnection)
 
-    def take(self) -> None:
+    def process(self) -> None:
         while self._orders:
             what, given, turn = self._orders.popleft()
             if what == "end":
@@ -289,7 +289,7 @@ class _Desk(QObject):
                 return
             if what == "say":
                 language, volume = others
-                problem = self._engine.say(first, language, volume, lambda: self.ended.emit(turn))
+                problem = self._engine.speak(first, language, volume, lambda: self.ended.emit(turn))
             else:
                 problem = self._engine.play(first, *others)
         except Exception:  # noqa: BLE001 - an engine of the system may raise anything; continue without sound
@@ -328,7 +328,7 @@ class QtSpeaker(QObject):
         """Return whether a request is still valid, i.e. not cancelled by a stop. Thread-safe."""
         return not self._closed and turn >= self._turns[what]
 
-    def say(self, words: str, language: str, volume: float) -> None:
+    def speak(self, words: str, language: str, volume: float) -> None:
         """Queue a text to speak."""
         self._turns["say"] += 1
         self._busy = True

@@ -131,7 +131,7 @@ class CallQueue:
             wake()
         return True
 
-    def take(self, timeout_s: float = 0.0) -> IncomingCall | None:
+    def pop(self, timeout_s: float = 0.0) -> IncomingCall | None:
         """Remove and return the oldest call, or None; wait up to `timeout_s` seconds unless closed."""
         with self._changed:
             if timeout_s > 0.0:

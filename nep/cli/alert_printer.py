@@ -24,7 +24,7 @@ class AlertChanges:
     def __init__(self) -> None:
         self._known: dict[str, Alert] = {}
 
-    def take(self, view: GraphView) -> tuple[Sequence[Alert], Sequence[Alert]]:
+    def update(self, view: GraphView) -> tuple[Sequence[Alert], Sequence[Alert]]:
         """Return (new or changed alerts, resolved alerts) since the previous call."""
         now = {alert.id: alert for alert in view.alerts}
         resolved = [self._known.pop(id) for id in [known for known in self._known if known not in now]]
@@ -48,7 +48,7 @@ class AlertPrinter:
 
     def changed(self, view: GraphView) -> None:
         """Print the alerts that are new, changed or resolved in `view`."""
-        new, resolved = self._changes.take(view)
+        new, resolved = self._changes.update(view)
         for alert in resolved:
             sentence = escaped(_("resolved: {sentence}").format(sentence=alert.sentence))
             console(out=self._out).print(sentence, style="green", markup=False)
@@ -78,7 +78,7 @@ class AlertLog:
         """Log the alerts that are new, changed or resolved in `view`."""
         if self._node is None:
             return
-        new, resolved = self._changes.take(view)
+        new, resolved = self._changes.update(view)
         for alert in resolved:
             self._node.log.info("resolved: %s", alert.sentence)
         for alert in new:

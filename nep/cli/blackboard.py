@@ -11,7 +11,7 @@ import typer
 from nep.cli import interrupts
 from nep.cli.complete import complete_topic
 from nep.cli.options import JsonOption, MasterOption, checked_time
-from nep.cli.screen import UNKNOWN, TextColumn, duration, say, show_json, show_table
+from nep.cli.screen import UNKNOWN, TextColumn, duration, print_status, show_json, show_table
 from nep.cli.typer_words import TranslatedGroup
 from nep.cli.values import presented
 from nep.errors import NepError, NoServerError, RequestRefusedError, ServiceError
@@ -121,7 +121,7 @@ def run(
     ):
         for topic, key in map(_topic_and_key, topics or [_DEFAULT_TOPIC]):
             board.watch(topic, key=key, lives_s=lives_s)
-        say(_("running blackboard '{name}'; press Ctrl+C to stop").format(name=name))
+        print_status(_("running blackboard '{name}'; press Ctrl+C to stop").format(name=name))
         node.spin()
 
 
@@ -167,10 +167,10 @@ def show(
     if entries:
         show_table(_COLUMNS, [_row(each) for each in entries])
     else:
-        say(_("no matching values"))
+        print_status(_("no matching values"))
     more = answer.get("more") if isinstance(answer, Mapping) else 0
     if more:
-        say(_("and {count} more values").format(count=more))
+        print_status(_("and {count} more values").format(count=more))
 
 
 def _topic_and_key(word: str) -> tuple[str, str | None]:

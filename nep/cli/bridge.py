@@ -19,7 +19,7 @@ import typer
 
 from nep.cli import interrupts
 from nep.cli.options import AllowMovingOption, JsonOption
-from nep.cli.screen import UNKNOWN, cells, console, padded, rate, say, show_json, write
+from nep.cli.screen import UNKNOWN, cells, console, padded, print_status, rate, show_json, write
 from nep.errors import NepError
 from nep.i18n import _, lazy
 from nep.masters.rates import Meter
@@ -119,7 +119,7 @@ def bridge(
         report = _report_for(running, notes, as_json=as_json)
         if not as_json:
             template = _("{name}: forwarding between a ({a}) and b ({b}); press Ctrl+C to stop")
-            say(
+            print_status(
                 template.format(name=configuration.name, a=configuration.a.network, b=configuration.b.network)
             )
         _run(report, count)
@@ -175,7 +175,9 @@ def _show_configuration(configuration: BridgeConfiguration) -> None:
         ends = f"{topic.a.name} {ways[topic.direction]} {topic.b.name}"
         write(escaped(ends) + (f"  ≤ {topic.max_rate_hz:g} /s" if topic.max_rate_hz else "") + "\n")
     template = _("the file is valid: {name} connects {a} and {b}")
-    say(template.format(name=configuration.name, a=configuration.a.network, b=configuration.b.network))
+    print_status(
+        template.format(name=configuration.name, a=configuration.a.network, b=configuration.b.network)
+    )
 
 
 # ---- messages beside the table
@@ -190,7 +192,7 @@ class _Notes(logging.Handler):
 
     def emit(self, record: logging.LogRecord) -> None:
         if self.buffered is None:
-            say(record.getMessage())
+            print_status(record.getMessage())
         else:
             self.buffered.append(record.getMessage())
 

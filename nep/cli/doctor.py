@@ -35,7 +35,7 @@ def doctor(master: MasterOption = None, as_json: JsonOption = False, topic: Miss
 
     Exit code: 0 if all checks passed, 1 with warnings, 2 with errors.
     """
-    found = doctors.look(master, topic)
+    found = doctors.diagnose(master, topic)
     if as_json:
         show_json(doctors.to_plain(found))
     else:

@@ -18,7 +18,7 @@ from nep.cli.complete import complete_more, complete_topic
 from nep.cli.message_filter import MessageFilter
 from nep.cli.network import BackendOption, node_for
 from nep.cli.options import JsonOption, MasterOption, TimeoutOption
-from nep.cli.screen import UNKNOWN, cells, console, json_painter, say, show_json, size, write
+from nep.cli.screen import UNKNOWN, cells, console, json_painter, print_status, show_json, size, write
 from nep.cli.table_file import Fields, Table
 from nep.cli.topic_patterns import TopicPatterns, is_pattern
 from nep.cli.topic_wait import TopicWait
@@ -158,7 +158,7 @@ def topics_and_fields(topic: str, more: Sequence[str], graph: GraphView) -> tupl
             fields.append(word)
     both = [word for word in more if word in graph.topics and not word.startswith("/")]
     for word in both:
-        say(_("'{word}' is a topic; write .{word} for a field of that name").format(word=word))
+        print_status(_("'{word}' is a topic; write .{word} for a field of that name").format(word=word))
     return list(dict.fromkeys(topics)), fields
 
 
@@ -195,7 +195,7 @@ def _receive_all(
                         "{count} messages of '{topic}' were lost",
                         missing,
                     )
-                    say(template.format(count=missing, topic=each.topic))
+                    print_status(template.format(count=missing, topic=each.topic))
             yield from received
             waiting.mark_received({message.topic for message in received})
         elif timeout_s is not None and now - last >= timeout_s:

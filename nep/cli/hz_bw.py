@@ -16,7 +16,7 @@ from nep.cli.complete import complete_topic
 from nep.cli.network import BackendOption, node_for
 from nep.cli.options import JsonOption, MasterOption, TimeoutOption
 from nep.cli.rate_window import AgeWindow, Bandwidth, Delay, Frequency, RateWindow, ReplayFilter
-from nep.cli.screen import UNKNOWN, cells, padded, rate, say, show_json, size, write
+from nep.cli.screen import UNKNOWN, cells, padded, print_status, rate, show_json, size, write
 from nep.cli.topic_wait import TopicWait
 from nep.errors import WaitTimeoutError
 from nep.i18n import _, lazy, listed
@@ -150,7 +150,7 @@ class _Report:
                 subscription = self._subscribe(node, topic, waiting.msg_type(topic))
                 self._subscribers[topic] = opened.enter_context(subscription)
             if not as_json:
-                say(_("measuring; press Ctrl+C to stop"))
+                print_status(_("measuring; press Ctrl+C to stop"))
                 write(f"{self._line(_('topic'), [_(head) for head in self._heads])}\n")
             started = time.monotonic()
             for number in itertools.count(1):
@@ -238,7 +238,7 @@ class _DelayReport(_Report):
             window.add_age(time.monotonic(), age_s, message.size_bytes, uncertainty_s)
             if age_s is None and topic not in self._unstamped:
                 self._unstamped.add(topic)
-                say(
+                print_status(
                     _("messages of '{topic}' have no time stamp; their latency is unknown").format(
                         topic=topic
                     )
@@ -279,7 +279,7 @@ class _DelayReport(_Report):
                 "'{topic}': the clocks of the two computers are not compared; the latency includes "
                 "their difference"
             )
-            say(words.format(topic=topic))
+            print_status(words.format(topic=topic))
 
 
 def _frequency_cells(window: RateWindow, now: float) -> tuple[Frequency | None, Sequence[str]]:

@@ -13,7 +13,7 @@ import typer
 from nep.cli.complete import complete_node
 from nep.cli.network import node_for
 from nep.cli.options import JsonOption, MasterOption
-from nep.cli.screen import console, say, show_json, write
+from nep.cli.screen import console, print_status, show_json, write
 from nep.cli.values import cleaned
 from nep.errors import DecodeError, did_you_mean
 from nep.i18n import _
@@ -84,7 +84,7 @@ def log(
     min_level = LEVELS.index(level_of(level))
     with node_for("log", master) as own, own.new_sub(LOG_TOPIC, LOG_TYPE) as subscriber:
         if not as_json:
-            say(_("waiting for log records; press Ctrl+C to stop"))
+            print_status(_("waiting for log records; press Ctrl+C to stop"))
         wanted = (
             record
             for record in _records(own, subscriber)

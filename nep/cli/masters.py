@@ -12,7 +12,7 @@ import typer
 from nep.cli import interrupts
 from nep.cli.alert_printer import AlertLog, AlertPrinter
 from nep.cli.options import MasterOption
-from nep.cli.screen import console, say
+from nep.cli.screen import console, print_status
 from nep.errors import AddressInUseError, NepError
 from nep.i18n import _
 from nep.masters.master import Attachment, Master, is_running
@@ -84,7 +84,7 @@ def master(
             _show_address(running.address, terminal, joins_originals=gateway)
             problem = collect.loopback_problem()
             if problem:
-                say(
+                print_status(
                     _(
                         "but programs on this computer can't reach it: {problem}; run 'nep "
                         "doctor' for details"

@@ -11,7 +11,16 @@ import typer
 from nep.cli.complete import complete_node
 from nep.cli.network import BackendOption, graph_of
 from nep.cli.options import JsonOption, MasterOption
-from nep.cli.screen import UNKNOWN, TextColumn, duration, say, show_alerts, show_json, show_table, write
+from nep.cli.screen import (
+    UNKNOWN,
+    TextColumn,
+    duration,
+    print_status,
+    show_alerts,
+    show_json,
+    show_table,
+    write,
+)
 from nep.cli.topic_wait import meant
 from nep.cli.typer_words import TranslatedGroup
 from nep.cli.values import service_type_text
@@ -65,7 +74,7 @@ def list_nodes(
     elif nodes:
         show_table(_COLUMNS, [_row(graph, node) for node in nodes])
     else:
-        say(_("no nodes; start a program that creates one"))
+        print_status(_("no nodes; start a program that creates one"))
     show_alerts(graph.alerts)
 
 

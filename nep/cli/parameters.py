@@ -17,7 +17,7 @@ from nep.cli.complete import complete_node
 from nep.cli.json_input import parse_json, text_of
 from nep.cli.options import JsonOption, MasterOption, TimeoutOption
 from nep.cli.publish import read_file
-from nep.cli.screen import UNKNOWN, TextColumn, say, show_json, show_table, write
+from nep.cli.screen import UNKNOWN, TextColumn, print_status, show_json, show_table, write
 from nep.cli.typer_words import TranslatedGroup
 from nep.cli.values import json_of, presented
 from nep.errors import DecodeError, MasterUnreachable, NepError, WaitTimeoutError, did_you_mean
@@ -68,7 +68,7 @@ def list_parameters(node: _NodeArgument, master: MasterOption = None, as_json: J
     elif found:
         show_table(_COLUMNS, [_row(each) for each in found])
     else:
-        say(_("the node has no parameters"))
+        print_status(_("the node has no parameters"))
 
 
 @app.command("get")

@@ -22,7 +22,7 @@ from nep.cli.recording_files import (
     end_with_damage,
     span_ns,
 )
-from nep.cli.screen import console, say
+from nep.cli.screen import console, print_status
 from nep.errors import NepError
 from nep.i18n import _, listed, ngettext, number
 from nep.messages.message import Message
@@ -112,7 +112,7 @@ def play(
             with _Sender(node, recording, chosen, limits) as sender:
                 _play(recording, playback, sender)
                 template = ngettext("published {count} message", "published {count} messages", sender.count)
-                say(template.format(count=sender.count))
+                print_status(template.format(count=sender.count))
         end_with_damage(recording)
         if limits.was_named_blocked:
             raise typer.Exit(1)
@@ -158,7 +158,7 @@ class _MotionLimits:
             elif topic in self._named_topics:
                 raise typer.BadParameter(reason)
             else:
-                say(_("not published: {reason}").format(reason=reason))
+                print_status(_("not published: {reason}").format(reason=reason))
         return allowed_topics
 
     def allows(self, topic: str) -> bool:
@@ -176,7 +176,7 @@ class _MotionLimits:
             if reason:
                 blocked[name] = reason
                 if name not in before:
-                    say(_("not published: {reason}").format(reason=reason))
+                    print_status(_("not published: {reason}").format(reason=reason))
                     self.was_named_blocked |= recorded in self._named_topics
         return blocked
 
@@ -263,7 +263,7 @@ class _Sender:
 
     def poll_guard(self) -> None:
         if self.limits.guard is not None:
-            self.limits.guard.look()
+            self.limits.guard.poll()
 
     def __enter__(self) -> Self:
         return self

@@ -20,7 +20,7 @@ from nep.cli.complete import complete_topic
 from nep.cli.json_input import parse_json, text_of
 from nep.cli.network import BackendOption, node_for
 from nep.cli.options import MasterOption
-from nep.cli.screen import say, size
+from nep.cli.screen import print_status, size
 from nep.errors import EncodeError, NepError
 from nep.i18n import _, ngettext
 from nep.messages.codecs import CODECS, codec_for
@@ -142,15 +142,15 @@ def publish(
                 repeat(partial(publisher.publish, value), rate_hz or 1.0, count if rate_hz is not None else 1)
             template = _("published {count} on '{topic}' ({kind}) to {people}")
             people = _subscriber_text(publisher.subscribers)
-            say(template.format(count=publisher.count, topic=topic, kind=kind, people=people))
+            print_status(template.format(count=publisher.count, topic=topic, kind=kind, people=people))
             if latched:
-                say(_("keeping the message for later subscribers; press Ctrl+C to stop"))
+                print_status(_("keeping the message for later subscribers; press Ctrl+C to stop"))
                 _wait_for_ever()
 
 
 def _warn_of_type(topic: str, kind: str, known: TopicInfo | None) -> None:
     if known is not None and known.publishers and known.msg_type != kind:
-        say(
+        print_status(
             _("'{topic}' is published with the type '{msg_type}'; yours is '{kind}'").format(
                 topic=topic, msg_type=known.msg_type, kind=kind
             )
@@ -158,7 +158,9 @@ def _warn_of_type(topic: str, kind: str, known: TopicInfo | None) -> None:
     elif (
         codec_for(kind).name == "json" and (near := get_close_matches(kind, CODECS, n=1)) and near[0] != kind
     ):
-        say(_("the type '{kind}' is sent as JSON; did you mean '{near}'?").format(kind=kind, near=near[0]))
+        print_status(
+            _("the type '{kind}' is sent as JSON; did you mean '{near}'?").format(kind=kind, near=near[0])
+        )
 
 
 def encoded_of(text: str, msg_type: str, first_line: int = 1) -> Encoded:
@@ -286,7 +288,7 @@ def wait_for_subscribers(publisher: Publisher, count: int) -> None:
         "waiting for {count} subscribers; press Ctrl+C to stop",
         count,
     )
-    say(template.format(count=count))
+    print_status(template.format(count=count))
     never = threading.Event()
     while publisher.subscribers < count:
         never.wait(_WAIT_SLICE_S)

@@ -17,7 +17,7 @@ from nep.cli.complete import complete_topic
 from nep.cli.network import node_for
 from nep.cli.options import JsonOption, MasterOption
 from nep.cli.recording_files import TopicsToRecord, clock_text
-from nep.cli.screen import console, say, show_json, size
+from nep.cli.screen import console, print_status, show_json, size
 from nep.errors import RecordingError
 from nep.i18n import _, ngettext
 from nep.system.lazy_import import lazy_module
@@ -109,7 +109,7 @@ def record(
                 interrupts.call_first(ended.set)
                 if not as_json:
                     template = _("recording to '{path}'; press Ctrl+C to stop")
-                    say(template.format(path=path if parts is None else parts.paths[0]))
+                    print_status(template.format(path=path if parts is None else parts.paths[0]))
                 _wait(ended, file, duration_s, None if split else max_bytes)
         finally:
             status = file.close()
@@ -137,7 +137,7 @@ def _show_result(paths: Sequence[Path], status: writer.RecordingStatus, *, as_js
         template = ngettext(
             "in {count} file, the last is '{path}'", "in {count} files, the last is '{path}'", len(paths)
         )
-        say(template.format(count=len(paths), path=paths[-1]))
+        print_status(template.format(count=len(paths), path=paths[-1]))
 
 
 def _max_bytes(text: str | None, *, split: bool) -> int | None:
@@ -199,7 +199,7 @@ def _show_summary(path: Path, status: writer.RecordingStatus) -> None:
         "{count} messages of {topics} in {time}, {size}: '{path}'",
         status.message_count,
     )
-    say(
+    print_status(
         template.format(
             count=status.message_count,
             topics=topics.format(count=len(status.topics)),
@@ -216,4 +216,4 @@ def _show_summary(path: Path, status: writer.RecordingStatus) -> None:
                 "'{topic}' lacks {count} messages: {lost} lost, {unkept} write errors",
                 missing,
             )
-            say(template.format(count=missing, topic=topic, lost=each.lost or 0, unkept=each.unkept))
+            print_status(template.format(count=missing, topic=topic, lost=each.lost or 0, unkept=each.unkept))

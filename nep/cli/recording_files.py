@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from nep.cli.complete import complete_topic
-from nep.cli.screen import console, say
+from nep.cli.screen import console, print_status
 from nep.errors import NepError, did_you_mean, nearest
 from nep.i18n import _
 from nep.protocol.topic_glob import glob_matches, is_glob
@@ -126,7 +126,7 @@ def end_with_damage(recording: reader.Recording) -> None:
     """Report damage found in the file and exit with 1; do nothing for an intact file."""
     words = damage.damage_words(recording.damage, recording.start_ns)
     if words:
-        say(words)
+        print_status(words)
         raise typer.Exit(1)
 
 

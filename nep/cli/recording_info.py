@@ -11,7 +11,7 @@ import typer
 
 from nep.cli.options import JsonOption
 from nep.cli.recording_files import FileArgument, clock_text, end_with_damage, progress_bar
-from nep.cli.screen import UNKNOWN, TextColumn, rate, say, show_json, show_table, size, write
+from nep.cli.screen import UNKNOWN, TextColumn, print_status, rate, show_json, show_table, size, write
 from nep.i18n import _, lazy, listed, ngettext
 from nep.system.lazy_import import lazy_module
 from nep.text import escaped, quotable
@@ -68,13 +68,13 @@ def info(
             _show(recording, topic_figures)
             if not is_checked:
                 words = _("only the first gigabyte was checked for damage; --check reads all of it")
-                say(words)
+                print_status(words)
         if not recording.is_complete:
             template = _(
                 "the file is incomplete: it was truncated or not closed. Readable messages are "
                 "shown; to repair it: nep recording repair {file}"
             )
-            say(template.format(file=file))
+            print_status(template.format(file=file))
         end_with_damage(recording)
 
 

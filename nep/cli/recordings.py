@@ -20,7 +20,7 @@ from nep.cli.recording_files import (
     progress_bar,
     span_ns,
 )
-from nep.cli.screen import UNKNOWN, say, show_json, size
+from nep.cli.screen import UNKNOWN, print_status, show_json, size
 from nep.cli.typer_words import TranslatedGroup
 from nep.i18n import _, ngettext, number
 from nep.system.lazy_import import lazy_module
@@ -86,11 +86,13 @@ def repair(
         "recovered and verified {count} messages, {time}: '{path}'",
         report.recovered,
     )
-    say(template.format(count=report.recovered, time=clock_text(report.duration_s), path=report.path))
+    print_status(
+        template.format(count=report.recovered, time=clock_text(report.duration_s), path=report.path)
+    )
     if not report.is_whole:
         lost_count = UNKNOWN if report.discarded is None else str(report.discarded)
         words = _("lost: {messages} messages, {size}, the last {seconds} s")
-        say(
+        print_status(
             words.format(
                 messages=lost_count, size=size(report.discarded_bytes), seconds=number(report.lost_s, ".1f")
             )
@@ -159,18 +161,18 @@ def export(
     else:
         _show_exported(exported)
     if words:
-        say(words)
+        print_status(words)
         raise typer.Exit(1)
 
 
 def _show_exported(exported: Sequence[exports.Exported]) -> None:
     for each in exported:
         template = ngettext("{count} message: '{path}'", "{count} messages: '{path}'", each.count)
-        say(template.format(count=each.count, path=each.path))
+        print_status(template.format(count=each.count, path=each.path))
         if each.unreadable:
             words = ngettext(
                 "skipped {count} undecodable message",
                 "skipped {count} undecodable messages",
                 each.unreadable,
             )
-            say(words.format(count=each.unreadable))
+            print_status(words.format(count=each.unreadable))

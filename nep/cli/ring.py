@@ -19,7 +19,7 @@ from nep.cli.complete import complete_topic
 from nep.cli.network import node_for
 from nep.cli.options import JsonOption, MasterOption
 from nep.cli.recording_files import TopicsToRecord, clock_text
-from nep.cli.screen import console, say, show_json, size
+from nep.cli.screen import console, print_status, show_json, size
 from nep.errors import NepError, RecordingError
 from nep.i18n import _, ngettext
 from nep.protocol.graph_view import GraphView
@@ -78,7 +78,7 @@ class _Saver:
                 kept.message_count,
             )
             time = clock_text(kept.duration_s)
-            say(words.format(count=kept.message_count, time=time, path=kept.path))
+            print_status(words.format(count=kept.message_count, time=time, path=kept.path))
         return result
 
     def _free_path(self) -> Path:
@@ -146,7 +146,7 @@ def ring(
                     template = _(
                         "buffering the last {seconds:g} s; 'nep recording keep' saves them, Ctrl+C stops"
                     )
-                    say(template.format(seconds=seconds))
+                    print_status(template.format(seconds=seconds))
                 _run_commands(commands, keeper, kept)
             problem = kept.status.problem
         with suppress(OSError):  # another flight recorder uses the same folder
@@ -178,7 +178,7 @@ def _run_commands(commands: queue.SimpleQueue[str], keeper: _Saver, kept: rings.
                 try:
                     keeper.keep()
                 except NepError as error:
-                    say(str(error))
+                    print_status(str(error))
             if shown is not None:
                 status = kept.status
                 words = _("{time} buffered, {size}")
@@ -224,4 +224,4 @@ def keep(
     if as_json:
         show_json(result)
     else:
-        say(_("saved to '{path}'").format(path=result.get("path", "")))
+        print_status(_("saved to '{path}'").format(path=result.get("path", "")))

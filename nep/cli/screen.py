@@ -13,7 +13,7 @@ from typing import IO, TYPE_CHECKING, Literal, cast
 
 from nep.cli.values import json_of
 from nep.i18n import _
-from nep.system.streams import tell
+from nep.system.streams import print_error
 from nep.text import escaped
 
 if TYPE_CHECKING:
@@ -185,7 +185,7 @@ def show_alerts(alerts: Iterable[Alert], out: Terminal | None = None) -> None:
             console(stderr=True, out=out).print(text)
 
 
-def say(sentence: str, out: Terminal | None = None) -> None:
+def print_status(sentence: str, out: Terminal | None = None) -> None:
     """Print a status sentence to stderr or `out`."""
     with suppress(OSError):  # a closed stream is not an error
         console(stderr=True, out=out).print(escaped(sentence), style="dim", markup=False)
@@ -193,7 +193,7 @@ def say(sentence: str, out: Terminal | None = None) -> None:
 
 def say_error(sentence: str) -> None:
     """Print an error to stderr."""
-    tell(f"nep: {escaped(sentence, lines=True)}")  # plain text: unbuffered and readable for programs
+    print_error(f"nep: {escaped(sentence, lines=True)}")  # plain text: unbuffered and readable for programs
 
 
 def write(text: str) -> None:

@@ -13,7 +13,7 @@ from nep.cli.json_input import parse_json, text_of
 from nep.cli.network import BackendOption, graph_of, open_node
 from nep.cli.options import JsonOption, MasterOption, checked_time
 from nep.cli.publish import read_file
-from nep.cli.screen import UNKNOWN, TextColumn, say, show_alerts, show_json, show_table, size, write
+from nep.cli.screen import UNKNOWN, TextColumn, print_status, show_alerts, show_json, show_table, size, write
 from nep.cli.topic_wait import meant
 from nep.cli.typer_words import TranslatedGroup
 from nep.cli.values import ids_as_text, presented, service_type_text
@@ -68,7 +68,7 @@ def list_services(
     if services:
         show_table(_COLUMNS, [_row(graph, each) for each in services])
     else:
-        say(_("no services; start a program that has a server or a client"))
+        print_status(_("no services; start a program that has a server or a client"))
     show_alerts(each for each in graph.alerts if each.id.startswith("service:"))
 
 
@@ -139,7 +139,7 @@ def find(
         template = _(
             "no service has the type '{msg_type}'; {meant}'nep service type NAME' shows a service's type"
         )
-        say(template.format(msg_type=quotable(msg_type), meant=meant(msg_type, types)))
+        print_status(template.format(msg_type=quotable(msg_type), meant=meant(msg_type, types)))
 
 
 @app.command("call")

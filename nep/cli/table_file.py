@@ -8,7 +8,7 @@ from collections import Counter
 from collections.abc import Mapping, Sequence
 from typing import Protocol
 
-from nep.cli.screen import say
+from nep.cli.screen import print_status
 from nep.cli.values import json_of
 from nep.errors import DecodeError
 from nep.i18n import _, ngettext
@@ -62,7 +62,7 @@ class Fields:
         """Print counts of missing fields and undecodable messages to stderr."""
         for name in self.names:
             if self.missing[name]:
-                say(
+                print_status(
                     _("'{name}' was missing in {missing} of {messages} messages").format(
                         name=name, missing=self.missing[name], messages=self.messages
                     )
@@ -73,7 +73,7 @@ class Fields:
                 "skipped {count} undecodable messages",
                 self.unreadable,
             )
-            say(template.format(count=self.unreadable))
+            print_status(template.format(count=self.unreadable))
 
 
 class Table:

@@ -24,8 +24,8 @@ from nep.cli.screen import (
     bandwidth,
     console,
     duration,
+    print_status,
     rate,
-    say,
     show_json,
     show_table,
     size,
@@ -203,7 +203,7 @@ class _GraphPrinter:
 
     def show_json(self, graph: GraphView, problem: str) -> None:
         if problem:
-            say(problem)
+            print_status(problem)
             return
         plain = graph.to_plain()
         names = {topic.name for topic in topic_rows(graph, self.pattern)}
@@ -218,7 +218,7 @@ class _GraphPrinter:
 
     def show_plain(self, graph: GraphView, problem: str) -> None:
         if problem:
-            say(problem)
+            print_status(problem)
             return
         write(f"{self.head(graph)}\n")
         topics = topic_rows(graph, self.pattern, self.order)

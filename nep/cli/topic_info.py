@@ -14,8 +14,8 @@ from nep.cli.screen import (
     UNKNOWN,
     TextColumn,
     bandwidth,
+    print_status,
     rate,
-    say,
     show_alerts,
     show_json,
     show_table,
@@ -113,7 +113,7 @@ def find(
     else:
         types = sorted({each.msg_type for each in graph.topics.values()})
         template = _("no topic has the type '{msg_type}'; {meant}'nep topic list' shows all types")
-        say(template.format(msg_type=msg_type, meant=meant(msg_type, types)))
+        print_status(template.format(msg_type=msg_type, meant=meant(msg_type, types)))
 
 
 def _found(topic: str, graph: GraphView) -> TopicInfo:

@@ -6,7 +6,7 @@ import time
 from collections.abc import Collection, Sequence
 from contextlib import suppress
 
-from nep.cli.screen import say
+from nep.cli.screen import print_status
 from nep.errors import NepError
 from nep.i18n import _
 from nep.nodes.node import Node
@@ -47,7 +47,7 @@ class TopicPatterns:
                 self._reported.add(pattern)
                 if not any(matches(pattern, name) for name in published):
                     template = _("no topic matches '{pattern}' yet; waiting (Ctrl+C to stop)")
-                    say(template.format(pattern=pattern))
+                    print_status(template.format(pattern=pattern))
         found = [
             (name, published[name].msg_type)
             for name in sorted(published.keys() - self._known)

@@ -6,7 +6,7 @@ import time
 from collections.abc import Collection, Sequence
 from contextlib import suppress
 
-from nep.cli.screen import say
+from nep.cli.screen import print_status
 from nep.errors import NepError, nearest
 from nep.i18n import _
 from nep.nodes.node import Node
@@ -59,7 +59,7 @@ class TopicWait:
                     template = _("'{topic}' has no publisher any more; {meant}waiting (Ctrl+C to stop)")
                 else:
                     template = _("'{topic}' has no publisher yet; {meant}waiting (Ctrl+C to stop)")
-                say(template.format(topic=topic, meant=meant(topic, other_topics)))
+                print_status(template.format(topic=topic, meant=meant(topic, other_topics)))
         self._poll_at = time.monotonic() + _GRAPH_POLL_S
 
     def mark_received(self, topics: Collection[str]) -> None:

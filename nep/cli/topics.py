@@ -11,7 +11,16 @@ from nep.cli.hz_bw import bw, delay, hz
 from nep.cli.network import BackendOption, graph_of
 from nep.cli.options import JsonOption, MasterOption
 from nep.cli.publish import publish
-from nep.cli.screen import UNKNOWN, TextColumn, bandwidth, rate, say, show_alerts, show_json, show_table
+from nep.cli.screen import (
+    UNKNOWN,
+    TextColumn,
+    bandwidth,
+    print_status,
+    rate,
+    show_alerts,
+    show_json,
+    show_table,
+)
 from nep.cli.topic_info import find, info, show_type
 from nep.cli.typer_words import TranslatedGroup
 from nep.cli.values import ids_as_text
@@ -56,7 +65,7 @@ def list_topics(
     if topics:
         show_table(_COLUMNS, [_row(graph, topic) for topic in topics])
     else:
-        say(_("no topics; start a program that publishes or subscribes"))
+        print_status(_("no topics; start a program that publishes or subscribes"))
     show_alerts(graph.alerts)
 
 

@@ -17,7 +17,7 @@ import typer
 from nep.cli import interrupts
 from nep.cli.options import AllowMovingOption, JsonOption, MasterOption
 from nep.cli.ring import KEEP_SERVICE, SAVE_TIMEOUT_S, has_ring
-from nep.cli.screen import console, say, show_json, write
+from nep.cli.screen import console, print_status, show_json, write
 from nep.cli.values import cleaned
 from nep.errors import NepError, nearest
 from nep.i18n import _
@@ -79,7 +79,7 @@ def watch(
     if check:
         for rule in rules:
             write(escaped(rule_words(rule)) + "\n")
-        say(_("the file is valid"))
+        print_status(_("the file is valid"))
         return
     if not any(rule.is_on for rule in rules):
         raise NepError(_("all alarms of '{file}' are switched off").format(file=file))
@@ -196,7 +196,7 @@ class _AlarmRunner:
     def show_rules(self) -> None:
         rules = [rule for rule in self.alarms.rules if rule.is_on]
         for rule in rules:
-            say(rule_words(rule))
+            print_status(rule_words(rule))
         studios = dict.fromkeys(
             action_words(action)
             for rule in rules
@@ -205,8 +205,8 @@ class _AlarmRunner:
         )
         if studios:
             template = _("these actions need Studio and are skipped: {actions}")
-            say(template.format(actions=", ".join(studios)))
-        say(_("watching; press Ctrl+C to stop"))
+            print_status(template.format(actions=", ".join(studios)))
+        print_status(_("watching; press Ctrl+C to stop"))
 
     def run(self, count: int) -> None:
         alarm_count = 0
@@ -240,11 +240,11 @@ class _AlarmRunner:
             self._guard.see(self._view)
         except NepError as error:
             if not self._was_away:
-                say(_("{problem}; waiting").format(problem=error))
+                print_status(_("{problem}; waiting").format(problem=error))
             self._was_away, self._view = True, None
         else:
             if self._was_away:
-                say(_("connected to the master"))
+                print_status(_("connected to the master"))
             self._was_away = False
             self._report_unknown_once(self._view)
         self.alarms.evaluator.see(self._view)
@@ -264,7 +264,7 @@ class _AlarmRunner:
                 self._subscribers[topic] = (info.msg_type, subscriber)
 
     def _sink(self, topic: str) -> Callable[[Sequence[Message]], None]:
-        return lambda messages: self.alarms.evaluator.take(topic, messages)
+        return lambda messages: self.alarms.evaluator.evaluate(topic, messages)
 
     def _report_unknown_once(self, view: GraphView) -> None:
         if self._has_reported_unknown:
@@ -278,12 +278,14 @@ class _AlarmRunner:
                 continue
             near = nearest(condition.name, known)
             meant = "" if near is None else " " + _("did you mean '{near}'?").format(near=near)
-            say(_("'{name}' does not exist yet; waiting.{meant}").format(name=condition.name, meant=meant))
+            print_status(
+                _("'{name}' does not exist yet; waiting.{meant}").format(name=condition.name, meant=meant)
+            )
 
     # ---- actions
 
     def _refusal(self, _node: Node, topic: str, msg_type: str) -> str:
-        self._guard.look()  # alarms are rare, and a robot may just have connected
+        self._guard.poll()  # alarms are rare, and a robot may just have connected
         return self._guard.refusal(topic, msg_type)
 
     def _command(self, _event: AlarmEvent, action: AlarmAction, done: Done) -> None:

@@ -13,7 +13,7 @@ import typer
 
 from nep.cli import interrupts
 from nep.cli.options import AllowMovingOption, MasterOption
-from nep.cli.screen import console, say
+from nep.cli.screen import console, print_status
 from nep.errors import AddressInUseError, NepError
 from nep.i18n import _, ngettext
 from nep.masters.master import is_running
@@ -189,7 +189,7 @@ def _say_running(server: WebServer, terminal: Terminal, *, token_file: Path | No
     address = master_address(server.settings.master)
     if not is_running(address, _MASTER_TIMEOUT_S):
         words = _("no master at '{address}'; start one with 'nep master'")
-        say(words.format(address=address), terminal)
+        print_status(words.format(address=address), terminal)
     out.print(_("  Ctrl+C ends it"), style="dim")
 
 
@@ -206,4 +206,4 @@ def _say_ended(server: WebServer, terminal: Terminal) -> None:
         ", {turned_away} refused; {operations} operations, {rejected} rejected; {sent} messages sent, "
         "{dropped} dropped"
     ).format(**counts.as_map())
-    say(words, terminal)
+    print_status(words, terminal)

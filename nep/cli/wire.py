@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from nep.cli.options import JsonOption
-from nep.cli.screen import console, say, say_error, show_json, write
+from nep.cli.screen import console, print_status, say_error, show_json, write
 from nep.cli.typer_words import TranslatedGroup
 from nep.i18n import _, ngettext
 from nep.system.lazy_import import lazy_module
@@ -118,4 +118,4 @@ def _summarize(outcomes: list[conformance.Outcome], failed: int) -> None:
         parts.append(ngettext("{count} failed", "{count} failed", failed).format(count=failed))
     if skipped:
         parts.append(ngettext("{count} skipped", "{count} skipped", skipped).format(count=skipped))
-    say(", ".join(parts))
+    print_status(", ".join(parts))

@@ -34,7 +34,7 @@ _MAX_REQUEST_S = 4.0
 NO_CONSOLE: int = getattr(subprocess, "CREATE_NO_WINDOW", 0)
 """`creationflags` for subprocesses: Windows would open a window for every console program."""
 
-__all__ = ["NO_CONSOLE", "Owner", "is_running", "listen", "look", "start_process", "view"]
+__all__ = ["NO_CONSOLE", "Owner", "is_running", "listen", "start_process", "view", "view_or_none"]
 
 
 class Owner:
@@ -85,7 +85,7 @@ def view(address: str | None = None, timeout_s: float = 2.0) -> GraphView:
     return reply.view
 
 
-def look(address: str | None = None, timeout_s: float = 0.5) -> GraphView | None:
+def view_or_none(address: str | None = None, timeout_s: float = 0.5) -> GraphView | None:
     """Return a snapshot as `view` does, or None if no (compatible) master replies in time."""
     chosen = master_address(address)
     try:
@@ -110,7 +110,7 @@ def _request(request: Request, address: str, timeout_s: float) -> Reply:
     check_room(_DESCRIPTORS_NEEDED, "a question to the master")
     started = time.monotonic()
     name = MasterName(address, lambda _known: None)
-    name.look(started)
+    name.resolve(started)
     if not name.wait(timeout_s):
         raise MasterUnreachable(address, timeout_s, is_known=False)
     context: zmq.Context[zmq.Socket[bytes]] = zmq.Context()

@@ -43,7 +43,7 @@ class Inbox:
             dropped += self._keeps_all
         return dropped
 
-    def take(self) -> Message | None:
+    def pop(self) -> Message | None:
         """Remove and return the oldest message, or None."""
         if not self.messages:
             return None

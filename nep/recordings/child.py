@@ -106,7 +106,7 @@ class RecorderService:
             "record": self._record,
             "stop": self._stop,
             "note": self._note,
-            "say": self._say,
+            "say": self._write_entry,
             "ring": self._start_ring,
             "keep": self._keep,
             "end_ring": self._end_ring,
@@ -150,13 +150,13 @@ class RecorderService:
             self._report_errors("stop", "", lambda: self._stop({}))
             self._report_errors("end_ring", "", lambda: self._end_ring({}))
 
-    def tell(self, event: str, **content: object) -> None:
+    def report(self, event: str, **content: object) -> None:
         """Report an event."""
         with self._tell_lock:
             self._report({"event": event, **content})
 
     def _problem(self, op: str, sentence: str, path: str = "") -> None:
-        self.tell("problem", op=op, sentence=sentence, path=path)
+        self.report("problem", op=op, sentence=sentence, path=path)
 
     def _wake_on_failure(self, _reason: str) -> None:
         # Called by a writer thread, which can't join itself.
@@ -188,28 +188,28 @@ class RecorderService:
             raise
         self._recording = _OneRecording(writer, recorder, path, until, most_bytes)
         self._check_now.set()  # the limit may be reached before the next figures
-        self.tell("recording", path=path)
+        self.report("recording", path=path)
 
     def _stop(self, _order: Mapping[str, Any], limit: str = "") -> None:
         if self._recording is None:
             return
         ended, self._recording = self._recording, None
         ended.recorder.close()
-        self.tell("ended", path=ended.path, status=_plain(ended.writer.close()), limit=limit)
+        self.report("ended", path=ended.path, status=_plain(ended.writer.close()), limit=limit)
 
     def _note(self, order: Mapping[str, Any]) -> None:
         if self._recording is not None:
-            self._recording.writer.say("notes", {"text": _text(order, "text")})
+            self._recording.writer.write_entry("notes", {"text": _text(order, "text")})
 
-    def _say(self, order: Mapping[str, Any]) -> None:
+    def _write_entry(self, order: Mapping[str, Any]) -> None:
         # Discarded while nothing is recorded.
         role, value, to = _text(order, "role"), order["value"], _text(order, "to", "")
         if role not in _RUN_ROLES or not isinstance(value, dict) or to not in {"", "ring", "recording"}:
             raise ValueError(role)
         if self._recording is not None and to != "ring":
-            self._recording.writer.say(role, value)
+            self._recording.writer.write_entry(role, value)
         if self._ring is not None and to != "recording":
-            self._ring[0].say(role, value)
+            self._ring[0].write_entry(role, value)
 
     def _start_ring(self, order: Mapping[str, Any]) -> None:
         if self._ring is not None:
@@ -228,7 +228,7 @@ class RecorderService:
             ring.close()
             raise
         self._ring = (ring, recorder)
-        self.tell("ring")
+        self.report("ring")
 
     def _keep(self, order: Mapping[str, Any]) -> None:
         # Copies in a thread, so that commands are still served.
@@ -245,7 +245,7 @@ class RecorderService:
 
         def copy() -> None:
             kept = ring.keep(path, seconds, note)
-            self.tell(
+            self.report(
                 "kept", path=path, message_count=kept.message_count, duration_s=kept.duration_s, note=note
             )
 
@@ -261,7 +261,7 @@ class RecorderService:
             thread.join()
         recorder.close()
         ring.close()
-        self.tell("ring_ended", status=_plain(ring.status))
+        self.report("ring_ended", status=_plain(ring.status))
 
     # ---- once a second
 
@@ -274,7 +274,7 @@ class RecorderService:
             self._stop_finished()
             recording, ring = self._recording, self._ring
             if recording is not None or ring is not None:
-                self.tell(
+                self.report(
                     "figures",
                     recording=None if recording is None else _plain(recording.writer.status),
                     ring=None if ring is None else _plain(ring[0].status),
@@ -372,7 +372,7 @@ def main(arguments: list[str] | None = None) -> None:
     node = Node(f"nep-recorder-{os.getpid()}", options.transport, master=options.master, wait_s=None)
     service = RecorderService(node, tell)
     _stop_on_signals()
-    service.tell("ready")
+    service.report("ready")
     try:
         for line in _lines(sys.stdin.buffer):
             service.order(line)

@@ -37,7 +37,7 @@ class _Writer(Protocol):
     def post(self, messages: Sequence[Message]) -> None:
         """Record messages received now."""
 
-    def say(self, role: Role, value: object) -> None:
+    def write_entry(self, role: Role, value: object) -> None:
         """Write an entry of the recorder's own."""
 
 
@@ -162,7 +162,7 @@ class Recorder:
     def _handle_graph(self, graph: GraphView) -> None:
         alerts = [asdict(each) for each in graph.alerts]
         if alerts != self._last_alerts and (alerts or self._last_alerts is not None):
-            self._writer.say("alerts", {"alerts": alerts})
+            self._writer.write_entry("alerts", {"alerts": alerts})
         self._last_alerts = alerts
         for name, topic in graph.topics.items():
             # descriptions are recorded in any case, unless excluded explicitly

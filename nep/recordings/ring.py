@@ -167,7 +167,7 @@ class _Segments:
     def _newest_ns_locked(self) -> int:
         return max(each.writer.end_ns for each in self._all)
 
-    def take(self, seconds: float) -> list[tuple[_Segment, list[ChunkInfo]]]:
+    def select(self, seconds: float) -> list[tuple[_Segment, list[ChunkInfo]]]:
         # `release(` must follow.
         with self._lock:
             since = self._newest_ns_locked() - int(seconds * 1e9)
@@ -248,9 +248,9 @@ class FlightRecorder:
         """Record messages received now. Never blocks, never raises; usable as `sink` of `Node.new_sub`."""
         self._writer.post(messages)
 
-    def say(self, role: Role, value: object) -> None:
-        """Write an entry of the recorder's own. See `RecordingWriter.say`."""
-        self._writer.say(role, value)
+    def write_entry(self, role: Role, value: object) -> None:
+        """Write an entry of the recorder's own. See `RecordingWriter.write_entry`."""
+        self._writer.write_entry(role, value)
 
     @property
     def status(self) -> RingStatus:
@@ -279,7 +279,7 @@ class FlightRecorder:
         target = Path(path)
         if not self._writer.flush():
             raise RecordingError(str(target), self._writer.problem or _("the disk does not respond"))
-        segments = self._segments.take(seconds)
+        segments = self._segments.select(seconds)
         if not segments:
             raise RecordingError(str(target), _("no messages received yet"))
         try:

@@ -258,7 +258,7 @@ class RecordingWriter:
             self._queue.append((now, fits))
             self._lock.notify_all()
 
-    def say(self, role: Role, value: object) -> None:
+    def write_entry(self, role: Role, value: object) -> None:
         """Write an entry of the recorder's own as JSON, such as "alerts" or "notes". Never blocks."""
         text = orjson.dumps(value, option=orjson.OPT_NON_STR_KEYS)
         with self._lock:

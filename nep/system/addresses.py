@@ -264,7 +264,7 @@ class MasterName:
             self.known = f"{host}:{self._port}"
             self._resolved.set()
 
-    def look(self, now: float) -> None:
+    def resolve(self, now: float) -> None:
         """Start to resolve again, unless the host is numeric or the last attempt was recent.
 
         Call while disconnected.

@@ -14,8 +14,6 @@ import sys
 from contextlib import suppress
 from io import RawIOBase, TextIOWrapper
 
-__all__ = ["buffer_output", "close_streams", "output_problem", "prepare_streams", "tell", "words_given"]
-
 _REPLACEMENTS = {
     **dict.fromkeys("\u2010\u2011\u2013\u2014\u2212─━·", "-"),  # dashes, minus, lines
     **dict.fromkeys("\u2018\u2019", "'"), **dict.fromkeys("“”„", '"'), **dict.fromkeys("\u00a0\u202f", " "),
@@ -75,7 +73,7 @@ def _replace_unencodable(error: UnicodeError) -> tuple[str, int]:
     return "".join(_REPLACEMENTS.get(letter, "?") for letter in letters), error.end
 
 
-def tell(text: str) -> None:
+def print_error(text: str) -> None:
     """Write a line to stderr; ignore errors."""
     with suppress(OSError, ValueError):
         print(text, file=sys.stderr, flush=True)  # noqa: T201 - output of a command

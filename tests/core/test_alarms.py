@@ -159,7 +159,7 @@ def test_an_alarm_that_is_on_is_told_though_the_history_has_forgotten_it(tmp_pat
     session = at_rest(tmp_path)
     rule = AlarmRule("d", BELOW, (AlarmAction("banner"),))
     session.alarms.put(rule)
-    session.alarms.take("/distance", [message("/distance", {"range": 0.1})])
+    session.alarms.evaluate("/distance", [message("/distance", {"range": 0.1})])
     session.tick()
     session.alarms.history.records.clear()
     session.alarms.check()

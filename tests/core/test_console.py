@@ -52,7 +52,7 @@ def test_records_of_the_bus_are_decoded_when_somebody_reads_them() -> None:
     sent = record(
         level="warning", text="low", name="driver", node="Pepper", stamp_ns=9_000_000_000, file="a.py", line=3
     )
-    console.take([sent])
+    console.add_messages([sent])
     console.add("info", "studio", "last")
     assert console.revision == 3
     assert sent.reads == 0
@@ -66,8 +66,8 @@ def test_records_of_the_bus_are_decoded_when_somebody_reads_them() -> None:
 
 def test_what_the_window_was_too_slow_for_is_counted() -> None:
     console = Console()
-    console.take([record(text="newest")], dropped=744)
-    console.take([], dropped=1)
+    console.add_messages([record(text="newest")], dropped=744)
+    console.add_messages([], dropped=1)
     assert [line.text for line in console.records] == [
         "744 log records were dropped: too many at once",
         "newest",
@@ -80,13 +80,13 @@ def test_a_program_that_runs_here_is_not_heard_twice() -> None:
     console = Console()
     console.leave_out(None)
     console.leave_out(77)
-    console.take([record(text="mine", pid=77), record(text="theirs", pid=78), record(text="unsaid")])
+    console.add_messages([record(text="mine", pid=77), record(text="theirs", pid=78), record(text="unsaid")])
     assert [line.text for line in console.records] == ["theirs", "unsaid"]
 
 
 def test_whatever_comes_on_the_topic_is_one_line_or_an_alert_elsewhere() -> None:
     console = Console(lambda: 5.0)
-    console.take([
+    console.add_messages([
         Message(LOG_TOPIC, b"{oops", "json", LOG_TYPE),
         Message(LOG_TOPIC, b'"only words"', "json", LOG_TYPE),
         record(level="critical", text="x" * (TEXT_LIMIT + 1), node="a", name="a"),
@@ -99,6 +99,6 @@ def test_whatever_comes_on_the_topic_is_one_line_or_an_alert_elsewhere() -> None
 
 def test_a_ring_that_is_full_of_unread_records_keeps_the_newest() -> None:
     console = Console(capacity=3)
-    console.take([record(text=str(number)) for number in range(10)])
+    console.add_messages([record(text=str(number)) for number in range(10)])
     console.add("info", "studio", "end")
     assert [line.text for line in console.records] == ["8", "9", "end"]

@@ -123,6 +123,6 @@ def test_alerts_of_the_connection_lead_to_the_doctor(session: Session) -> None:
 
 
 def test_the_doctor_ends_with_the_session(session: Session) -> None:
-    session.doctor.look()
+    session.doctor.start()
     session.close()
     assert not any(thread.name == "studio-doctor" for thread in threading.enumerate())

@@ -170,7 +170,7 @@ def tcp_stream(data: bytes) -> None:
 @TARGETS.add(WireError, seeds=lambda: [struct.pack("<Q", 7), b""])
 def shared_references(data: bytes) -> None:
     sources = SharedSources(1, lambda _shares: None)
-    assert sources.take(7, data) is None
+    assert sources.read(7, data) is None
 
 
 # ---- nodes and master

@@ -15,7 +15,7 @@ def test_a_flood_of_one_publisher_displaces_its_own_messages_only() -> None:
     held.put(message(1))
     for seq in range(1000):
         held.put(message(2, seq))
-    assert [(each.publisher, each.seq) for each in held.take()] == [(1, 1), (2, 998), (2, 999)]
+    assert [(each.publisher, each.seq) for each in held.pop_all()] == [(1, 1), (2, 998), (2, 999)]
     assert not held
 
 
@@ -23,6 +23,6 @@ def test_a_flood_of_publishers_displaces_no_earlier_one() -> None:
     held = HeldMessages(publishers=8)
     for publisher in range(1000):
         held.put(message(publisher))
-    assert [each.publisher for each in held.take()] == list(range(8))
+    assert [each.publisher for each in held.pop_all()] == list(range(8))
     held.put(message(1000))
     assert held.holds(1000)

@@ -191,5 +191,5 @@ def test_the_end_of_a_stop_is_said_and_no_figure(qtbot, theme: Theme, said: list
 
 def test_a_toast_is_said(qtbot, window: MainWindow, said: list[str]) -> None:
     window.show()
-    window.toast.say("Copied robots.Pepper.pose.y")
+    window.toast.show_toast("Copied robots.Pepper.pose.y")
     assert said == ["Copied robots.Pepper.pose.y"]

@@ -124,7 +124,7 @@ def test_an_engine_that_breaks_off_leaves_silence(qtbot, caplog) -> None:
         raise RuntimeError("no sound server")
 
     speaker = QtSpeaker(broken)
-    speaker.say("Hello", "en", 0.5)
+    speaker.speak("Hello", "en", 0.5)
     qtbot.waitUntil(lambda: not speaker.busy)
     assert speaker.problem == "This computer plays no sound."
     speaker.close()
@@ -133,7 +133,7 @@ def test_an_engine_that_breaks_off_leaves_silence(qtbot, caplog) -> None:
 
 def test_without_the_libraries_of_sound_it_is_silent_and_says_why(qtbot) -> None:
     speaker = QtSpeaker(QtEngine)
-    speaker.say("Hello", "en", 0.5)
+    speaker.speak("Hello", "en", 0.5)
     qtbot.waitUntil(lambda: not speaker.busy)
     assert speaker.problem == "This computer has no voice for English."
     speaker.play(((440.0, 0.1),), 0.5)
@@ -150,7 +150,7 @@ def test_a_voice_that_ends_the_process_that_tries_it_is_not_made_here(qtbot, mon
     assert outlives_trial([sys.executable, "-c", ""])
     monkeypatch.setattr("app.ui.speaker.has_voice_engine", lambda: True)
     monkeypatch.setattr("app.ui.speaker.module_command", lambda module: crash)
-    assert QtEngine().say("Hello", "en", 0.5, lambda: None) == no_voice("en")
+    assert QtEngine().speak("Hello", "en", 0.5, lambda: None) == no_voice("en")
 
 
 def test_a_voice_that_hangs_ends_with_the_process_that_tries_it(monkeypatch) -> None:

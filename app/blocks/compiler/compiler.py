@@ -135,7 +135,7 @@ class _Compiler:
             function for script in self._workspace.scripts if (function := self._script(script)) is not None
         ]
         self._problems.check_starts(len(functions))
-        self._loose_ends.tell(self._problems, self._workspace)
+        self._loose_ends.report(self._problems, self._workspace)
         self._problems.check_unknown()
         self._problems.check_names()
         for found in ConflictFinder(self._workspace, self._catalogue, self._shaping.called).conflicts():
@@ -266,7 +266,7 @@ class _Compiler:
             return []
         self._uses.remember(placed, block)
         self._loose_ends.remember(placed, block)
-        self._problems.look(placed, block)
+        self._problems.check(placed, block)
         if block.publishes:
             self._note_motion(placed, block)
         bodies = {

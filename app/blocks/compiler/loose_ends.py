@@ -44,7 +44,7 @@ class LooseEnds:
         else:
             self._set.add(id)
 
-    def tell(self, notes: ProblemCollector, workspace: Workspace) -> None:
+    def report(self, notes: ProblemCollector, workspace: Workspace) -> None:
         """Report names without a counterpart."""
         for id, (placed, block) in self._read.items():
             is_list = id in self._as_list

@@ -290,7 +290,7 @@ class ProblemCollector:
             return sentence
         return None
 
-    def look(self, placed: Placed, block: Block) -> None:
+    def check(self, placed: Placed, block: Block) -> None:
         """Report hints about a block that will run."""
         if block.type == "control_wait_until" and not _is_literal(placed, "CONDITION"):
             self._add(

@@ -331,7 +331,7 @@ class Network:
                 first = first_to_announce(view, robot.topics.description)
                 if robot.dialect != "rize" and first is not None:
                     self._owners.setdefault(robot.name, first.node_id)
-            for message in self._unknown.take():
+            for message in self._unknown.pop_all():
                 if self._senders.node_of(message) is not None:
                     self._judge_locked(message)
         self._poke()
@@ -368,10 +368,10 @@ class Network:
     def _messages(self, messages: Sequence[Message]) -> None:
         for message in messages:
             with self._errors:
-                self._take(message)
+                self._receive(message)
         self._poke()
 
-    def _take(self, message: Message) -> None:
+    def _receive(self, message: Message) -> None:
         if not self._is_from_robot(message):
             return
         self._newest[message.topic] = message

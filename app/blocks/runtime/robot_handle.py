@@ -52,7 +52,7 @@ class StatusText:
         self._told: dict[str | None, str] = {}
         self._warned: dict[str | None, str] = {}
 
-    def tell(self, sentence: str) -> None:
+    def set_text(self, sentence: str) -> None:
         """Set what a robot does for the calling script's block; "" when it is done."""
         _set_or_remove(self._told, self._block(), sentence)
 
@@ -276,11 +276,11 @@ class RobotHandle:
         if wrong:
             raise BehaviourError(_("{name} can't do this: {wrong}.").format(name=self._name, wrong=wrong[0]))
         words = sentence(robot, action, input)
-        self._runtime.saying.tell(words)
+        self._runtime.saying.set_text(words)
         try:
             call = self._do(robot, action, action.complete(input), words)
         finally:
-            self._runtime.saying.tell("")
+            self._runtime.saying.set_text("")
         if call.state == "failed":
             why = call.error or _("“{action}” failed").format(action=action.title)
             raise BehaviourError(
@@ -329,7 +329,7 @@ class RobotHandle:
         until = time.monotonic() + limit + MARGIN_S
         waits = bool(call.waits_for) and call.state == "accepted"
         if waits:
-            self._runtime.saying.tell(_waiting_text(robot, call))
+            self._runtime.saying.set_text(_waiting_text(robot, call))
 
         def ready() -> bool:
             return call.done or (can_hold and scheduler.holds())
@@ -338,7 +338,7 @@ class RobotHandle:
             if waits:  # the time limit starts with the action
                 until = time.monotonic() + limit + MARGIN_S
                 waits = not call.began
-                self._runtime.saying.tell(_waiting_text(robot, call) if waits else words)
+                self._runtime.saying.set_text(_waiting_text(robot, call) if waits else words)
             said = self._silence_error(robot, call)
             if said is None and time.monotonic() >= until:
                 said = _("{name} did not finish “{title}” within {limit:g} s.").format(

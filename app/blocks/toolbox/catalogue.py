@@ -41,7 +41,7 @@ def categories() -> tuple[Category, ...]:
 
 @lru_cache(maxsize=1)
 def _translated(_language: str) -> tuple[Category, ...]:
-    return tuple(category.translated(_say) for category in english_categories())
+    return tuple(category.translated(_translate) for category in english_categories())
 
 
 @lru_cache(maxsize=1)
@@ -56,5 +56,5 @@ def has_words(english: str) -> bool:
     return any(letter.isalpha() for letter in _HOLE.sub("", english))
 
 
-def _say(context: str | None, english: str) -> str:
+def _translate(context: str | None, english: str) -> str:
     return translate(context, english) if has_words(english) else english

@@ -35,7 +35,7 @@ class BackgroundWorker(Generic[T]):
                 start_deep(self._thread)
             self._changed.notify_all()
 
-    def take(self, owner: str) -> T | None:
+    def pop_result(self, owner: str) -> T | None:
         """Return the result of the owner's last job once; None while there is none.
 
         Raises the job's exception.

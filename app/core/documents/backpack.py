@@ -80,7 +80,7 @@ class Backpack:
         trouble, self._problem = self._problem, ""
         return trouble
 
-    def look(self) -> None:
+    def reload_if_changed(self) -> None:
         """Read the file if another instance has changed it."""
         if _stamp(self.path) == self._stamp:
             return

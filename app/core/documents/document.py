@@ -248,7 +248,7 @@ class Document:
         None while it is, or is being written.
         """
         if self.journal_writer is not None:
-            self._apply_journal_result(partial(self.journal_writer.take, self._journal.name))
+            self._apply_journal_result(partial(self.journal_writer.pop_result, self._journal.name))
         return self._journal_error
 
     @property
@@ -321,7 +321,7 @@ class Document:
             return self._compiled[1]
         if self.compiler is None:
             return self.program()
-        done = self.compiler.take(self.key)
+        done = self.compiler.pop_result(self.key)
         if done is not None:
             self._compiled, self._compile_s = (done.key, done.program), done.seconds
         if self._compiling_key != key:

@@ -48,7 +48,7 @@ class LayoutThread:
                 self._thread.start()
             self._changed.notify()
 
-    def take(self) -> tuple[NodeGraph, GraphLayout] | None:
+    def pop_result(self) -> tuple[NodeGraph, GraphLayout] | None:
         """Return the newest finished graph with its layout once; None when there is none."""
         with self._changed:
             layout, self._made = self._made, None

@@ -66,7 +66,7 @@ class MessageHistory:
             self.size_bytes -= self._kept.popleft().size_bytes
             self.first += 1
 
-    def take(self, batch: Batch, _now_ns: int) -> None:
+    def process(self, batch: Batch, _now_ns: int) -> None:
         """Append the messages of a tick (see `SeriesTaker`)."""
         self.missed += batch.dropped
         for message in batch.messages:

@@ -38,7 +38,7 @@ class NewestOnly(Generic[Asked, Done]):
                 self._thread.start()
             self._wake.notify()
 
-    def take(self) -> Done | None:
+    def pop_result(self) -> Done | None:
         """Return the last result once."""
         with self._wake:
             done, self._done = self._done, []

@@ -121,7 +121,7 @@ class _Steps:
     def __init__(self, most: int) -> None:
         self._left = most
 
-    def take(self, steps: int = 1) -> None:
+    def add(self, steps: int = 1) -> None:
         self._left -= steps
         if self._left < 0:
             raise _LimitReached
@@ -161,25 +161,25 @@ class _CountedObject(Mapping[str, object]):
         self.raw, self._count = raw, count
 
     def __getitem__(self, key: str) -> object:
-        self._count.take()
+        self._count.add()
         return _counted(self.raw[key], self._count)
 
     def __iter__(self) -> Iterator[str]:
         for key in self.raw:
-            self._count.take()
+            self._count.add()
             yield str(key)
 
     def items(self) -> Iterator[tuple[str, object]]:  # type: ignore[override]
         # Avoids looking up each key again, and supports numeric keys of msgpack.
         for key, value in self.raw.items():
-            self._count.take()
+            self._count.add()
             yield str(key), _counted(value, self._count)
 
     def __len__(self) -> int:
         return len(self.raw)
 
     def __eq__(self, other: object) -> bool:
-        self._count.take()
+        self._count.add()
         if not isinstance(other, _CountedObject) or len(self) != len(other):
             return False
         return self.raw is other.raw or all(
@@ -203,21 +203,21 @@ class _CountedList(Sequence[object]):
 
     def __getitem__(self, row: int | slice) -> object:
         if isinstance(row, slice):
-            self._count.take(len(range(*row.indices(len(self.raw)))))
+            self._count.add(len(range(*row.indices(len(self.raw)))))
             return [_counted(value, self._count) for value in self.raw[row]]
-        self._count.take()
+        self._count.add()
         return _counted(self.raw[row], self._count)
 
     def __iter__(self) -> Iterator[object]:
         for value in self.raw:
-            self._count.take()
+            self._count.add()
             yield _counted(value, self._count)
 
     def __len__(self) -> int:
         return len(self.raw)
 
     def __eq__(self, other: object) -> bool:
-        self._count.take()
+        self._count.add()
         if not isinstance(other, _CountedList) or len(self) != len(other):
             return False
         return self.raw is other.raw or all(map(_same, self, other))

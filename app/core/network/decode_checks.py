@@ -28,7 +28,7 @@ SOME, SOME_BYTES = 256, 64_000
 
 @dataclass(slots=True)
 class Checked:
-    """Result for one topic since the last `Checks.take`.
+    """Result for one topic since the last `Checks.pop_results`.
 
     ``bad`` of the ``checked`` messages can't be decoded; ``unchecked`` exceeded the budget. ``sentence``
     describes the newest error; ``last_good`` is whether the newest message can be decoded.
@@ -57,7 +57,7 @@ class Checks:
         self._advance_s = ADVANCE_S
         self._refilled = clock()
 
-    def look(self, topic: str, messages: Sequence[Message]) -> None:
+    def check(self, topic: str, messages: Sequence[Message]) -> None:
         """Check messages of one topic, oldest first. Images and bytes are not decoded."""
         if not messages or messages[-1].codec not in READABLE:
             return
@@ -73,7 +73,7 @@ class Checks:
                 found.sentence = found.sentence or old.sentence
             self._found[topic] = found
 
-    def take(self) -> dict[str, Checked]:
+    def pop_results(self) -> dict[str, Checked]:
         """Return and clear the results by topic."""
         with self._lock:
             found, self._found = self._found, {}

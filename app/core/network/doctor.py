@@ -72,9 +72,9 @@ class Doctor:
     def miss(self, topic: str) -> None:
         """Set the topic that the user misses ("" for no specific topic) and run the checks."""
         self._missed = topic
-        self.look()
+        self.start()
 
-    def look(self) -> None:
+    def start(self) -> None:
         """Start the checks; a run in progress continues with the topic that is missed now."""
         if self.looking:
             return
@@ -104,13 +104,13 @@ class Doctor:
         self._so_far = None
         self.revision += 1
 
-    def _tell(self, found: tuple[doctor.Finding, ...], looked_at: int, things: int) -> None:
+    def _report(self, found: tuple[doctor.Finding, ...], looked_at: int, things: int) -> None:
         self._so_far, self.looked_at, self.things = found, looked_at, things
         self.revision += 1
 
     def _find(self, missed: str) -> tuple[doctor.Finding, ...]:
         try:
-            return tuple(self._look(missed, self._tell))
+            return tuple(self._look(missed, self._report))
         except Exception as error:  # noqa: BLE001  reported as a finding
             words = _("The doctor could not finish: {kind}: {error}.").format(
                 kind=type(error).__name__, error=error
@@ -126,4 +126,4 @@ def doctor_of(address: str, folder: Path) -> Doctor:
     A topic of another network is not checked: the doctor knows only Studio's own network.
     """
     folders = [(_("Settings and unsaved work"), folder)]
-    return Doctor(lambda key, tell: doctor.look(address, "" if split_key(key)[0] else key, folders, tell))
+    return Doctor(lambda key, tell: doctor.diagnose(address, "" if split_key(key)[0] else key, folders, tell))

@@ -17,7 +17,7 @@ import nep
 from app.core.faults import error_words, log_errors
 from nep.errors import NepError
 from nep.i18n import _
-from nep.masters.process import look
+from nep.masters.process import view_or_none
 from nep.messages.message import Message
 from nep.nodes.node import Node
 from nep.nodes.subscriber import Subscriber
@@ -196,12 +196,12 @@ class LiveSource:
 
         Raises: NepError: no master answers.
         """
-        view = look(self.address, timeout_s=0.5)
+        view = view_or_none(self.address, timeout_s=0.5)
         if view is None:
             raise NepError(_("no master responds at {address}").format(address=self.address))
         return nep.node(_free_name(view), master=self.address)
 
-    def look(self, node: Node) -> GraphView:
+    def query_graph(self, node: Node) -> GraphView:
         """Return the current graph. Raises `NepError`."""
         return node.graph(timeout_s=1.0)
 
@@ -254,7 +254,7 @@ class LiveSource:
             return 0.0
         asked = time.monotonic()
         try:
-            view = self.look(self._node)
+            view = self.query_graph(self._node)
         except NepError as error:
             self._report_lost(str(error))
             return 0.0

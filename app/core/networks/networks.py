@@ -93,7 +93,7 @@ class OtherNetwork:
         """True if the network is shown."""
         return self.source is not None
 
-    def take(self, event: object, now: float) -> None:
+    def apply(self, event: object, now: float) -> None:
         """Apply an event of its source."""
         match event:
             case GraphSeen():
@@ -254,7 +254,7 @@ class Networks:
         network = self._networks[told.kind]
         if network.is_chosen and told.number == network.number:
             before = network.state
-            network.take(told.event, now)
+            network.apply(told.event, now)
             if network.state != before:
                 self._changes += 1
                 self._update_alert(network)

@@ -69,12 +69,12 @@ class ParameterSetter:
         owner = f"{node_id} {name}"
         self._submit("", lambda node: self._worker.ask(owner, partial(_set, node, node_id, name, value)))
 
-    def take(self, node_id: str, name: str) -> bool:
+    def has_been_set(self, node_id: str, name: str) -> bool:
         """Return whether the node has set it since the last call.
 
         Raises `NepError` with the reason if it failed.
         """
-        return self._worker.take(f"{node_id} {name}") is True
+        return self._worker.pop_result(f"{node_id} {name}") is True
 
     def close(self) -> None:
         """Wait for a call in flight, at most 2 s."""
@@ -182,7 +182,7 @@ class NodeParameters:
 
     def _poll_result(self, node: NodeEntry) -> None:
         try:
-            done = self._setter.take(node.id, self.setting)
+            done = self._setter.has_been_set(node.id, self.setting)
         except NepError as error:
             self.refusal, self.setting = str(error), ""
             self.revision += 1

@@ -45,7 +45,7 @@ class OtherSource(LiveSource):
         with _converted_errors():
             return nep.node(NODE_NAME, self._kind.name, master=self.address, wait_s=POLL_S)
 
-    def look(self, node: Node) -> GraphView:
+    def query_graph(self, node: Node) -> GraphView:
         """Return the graph with the codecs by which topics are read.
 
         The revision increases with every change of nodes or topics: back ends that collect a new graph each

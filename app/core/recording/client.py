@@ -266,7 +266,7 @@ class RecorderClient:
         if self.state.phase == "recording":
             self._send(op="note", text=text)
 
-    def say(self, role: str, value: Mapping[str, object], to: str = "") -> None:
+    def write_entry(self, role: str, value: Mapping[str, object], to: str = "") -> None:
         """Add an event to the recording and the flight recorder, if they are on.
 
         ``to`` restricts it to "recording" or "ring".

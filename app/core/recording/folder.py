@@ -60,11 +60,11 @@ class RecordingFacts:
 
 
 @dataclass(frozen=True, slots=True)
-class FolderLook:
+class FolderScan:
     """Contents of the folder, newest first.
 
     ``problem`` is why it can't be read. ``left_out`` counts older files beyond the limit. ``is_whole``: all
-    files have been read; otherwise call `RecordingFolder.look` again.
+    files have been read; otherwise call `RecordingFolder.start_scan` again.
     """
 
     files: Sequence[RecordingFacts] = ()
@@ -94,24 +94,24 @@ class RecordingFolder:
     def __init__(self, folder: Path, opener: RecordingOpener | None = None) -> None:
         self.folder = folder
         self._opener: RecordingOpener = LocalOpener() if opener is None else opener
-        self._worker: BackgroundWorker[FolderLook] = BackgroundWorker("recordings-folder")
+        self._worker: BackgroundWorker[FolderScan] = BackgroundWorker("recordings-folder")
         self._known: dict[Path, tuple[tuple[int, int], RecordingFacts]] = {}
         """Used by the worker thread only."""
 
-    def look(self, being_written: Path | None = None) -> None:
+    def start_scan(self, being_written: Path | None = None) -> None:
         """Start a scan in another thread; `take` returns the result. ``being_written`` is not opened."""
-        self._worker.ask(_OWNER, lambda: self._look(being_written))
+        self._worker.ask(_OWNER, lambda: self._scan(being_written))
 
-    def take(self) -> FolderLook | None:
+    def pop_result(self) -> FolderScan | None:
         """Return a new scan result once; None while there is none."""
-        return self._worker.take(_OWNER)
+        return self._worker.pop_result(_OWNER)
 
     def close(self) -> None:
         """Stop scanning."""
         self._opener.close()
         self._worker.close()
 
-    def _look(self, being_written: Path | None) -> FolderLook:
+    def _scan(self, being_written: Path | None) -> FolderScan:
         try:
             with os.scandir(self.folder) as entries:
                 there = [
@@ -120,7 +120,7 @@ class RecordingFolder:
                     if each.name.lower().endswith(SUFFIX) and each.is_file()
                 ]
         except OSError as error:
-            return FolderLook(problem=(error.strerror or str(error)).lower())
+            return FolderScan(problem=(error.strerror or str(error)).lower())
         there.sort(key=lambda each: (-each[1].st_mtime_ns, each[0].name))
         listed, left_out = there[:MAX_FILES], max(0, len(there) - MAX_FILES)
         self._known = {path: self._known[path] for path, _about in listed if path in self._known}
@@ -138,7 +138,7 @@ class RecordingFolder:
                 self._known[path] = (mark, plain)
             files.append(plain)
         is_whole = all(each.is_read or each.path == being_written for each in files)
-        return FolderLook(tuple(files), "", left_out, is_whole)
+        return FolderScan(tuple(files), "", left_out, is_whole)
 
 
 def read_facts(plain: RecordingFacts, opener: RecordingOpener) -> RecordingFacts:

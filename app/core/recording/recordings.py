@@ -78,7 +78,7 @@ class SessionRecordings:
         self._reads_apart = reads_apart
         self._settings, self._alerts, self._clock, self._now = settings, alerts, clock, now
         self.client = RecorderClient(address, alerts, post_event, start=start, clock=clock)
-        self.events = RecordedEvents(self.client.say)
+        self.events = RecordedEvents(self.client.write_entry)
         self.choice = read_choice(settings.get(CHOICE_KEY, {}))
         self.wish = read_wish(settings.get(RING_KEY, {}))
         self.on_made: Callable[[Path, str], object] = _ignore_made

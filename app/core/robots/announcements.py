@@ -291,7 +291,7 @@ class RizeNames:
     def __init__(self) -> None:
         self._told: dict[str, None] = {}
 
-    def tell(self, name: str) -> None:
+    def add(self, name: str) -> None:
         """Add a name from a ready message on ``rize_event``."""
         self._told.setdefault(name)
         if len(self._told) > MAX_ROBOTS:

@@ -314,12 +314,12 @@ class Fleet:
         for message in events.messages if events is not None else ():
             name = rize.ready(mapping_of(message))
             if name is not None:
-                self._rize_names.tell(name)
+                self._rize_names.add(name)
         for link in self._links.values():
             self._messages.read(link, batches)
             began_s = link.stop_began_s
             link.stopping = began_s is not None and self._clock() - began_s >= STOPPING_SHOWN_AFTER_S
-        self._tries.look(self._links.values())
+        self._tries.check_timeouts(self._links.values())
         self.gate.follow()
         for link in self._links.values():
             self._judge_motion(link)

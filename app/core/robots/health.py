@@ -52,7 +52,7 @@ class Health:
         self._gone_since: dict[str, float] = {}
         self._robots: set[str] = set()
 
-    def look(self, found: Mapping[str, Checked]) -> None:
+    def update(self, found: Mapping[str, Checked]) -> None:
         """Alert topics with undecodable messages, with their exact count.
 
         `check` resolves the alert when only good messages arrived for a second, so a topic with both has one

@@ -16,7 +16,7 @@ class ReportedCount:
     value: int = 0
     grew_s: float | None = None
 
-    def take(self, reported: object, now_s: float) -> None:
+    def update(self, reported: object, now_s: float) -> None:
         """Update from a reported value; anything but an integer from 0 to `MAX_COUNT` is ignored.
 
         A smaller value means that the driver was restarted.

@@ -55,7 +55,7 @@ class RobotMessages:
         held, self._held = self._held, {}
         for name, messages in held.items():
             link = links.get(name)
-            for message in messages.take() if link is not None else ():
+            for message in messages.pop_all() if link is not None else ():
                 if link is not None and self._own.is_from(link, message):
                     self._answer(link, message)
 
@@ -93,8 +93,8 @@ class RobotMessages:
     def _take_heartbeat(self, link: RobotLink, answer: Payload) -> None:
         # Drivers omit counts that are zero.
         now_s = self._clock()
-        link.rejected.take(answer.get("rejected", 0), now_s)
-        link.errors.take(answer.get("errors", 0), now_s)
+        link.rejected.update(answer.get("rejected", 0), now_s)
+        link.errors.update(answer.get("errors", 0), now_s)
         if "not_ended" not in answer:
             return
         before, link.goes_on = link.goes_on, ""

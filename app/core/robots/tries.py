@@ -93,7 +93,7 @@ class Tries:
         if state == "running" and made.begun_s is None:
             made.begun_s = self._clock()
 
-    def look(self, links: Iterable[RobotLink]) -> None:
+    def check_timeouts(self, links: Iterable[RobotLink]) -> None:
         """End invocations of robots that stopped replying, and those beyond their time limit."""
         now = self._clock()
         for link in links:

@@ -44,7 +44,7 @@ class Speaker(Protocol):
         "" when they are, or before the first attempt.
         """
 
-    def say(self, words: str, language: str, volume: float) -> None:
+    def speak(self, words: str, language: str, volume: float) -> None:
         """Speak a text; ``language`` is a code such as ``en``, ``volume`` from 0 to 1."""
 
     def play(self, notes: Notes, volume: float) -> None:
@@ -161,10 +161,10 @@ class RobotVoices:
         for name, link in there.items():
             if name not in self._watches and link.robot.topics.state is not None:
                 self._watches[name] = self._watch(link.robot.topics.state)
-            self._take(name, link.drawing, is_heard=not stopped)
+            self._process(name, link.drawing, is_heard=not stopped)
         self._speak_next(self.speaker)
 
-    def _take(self, name: str, drawing: Mapping[str, object] | None, *, is_heard: bool) -> None:
+    def _process(self, name: str, drawing: Mapping[str, object] | None, *, is_heard: bool) -> None:
         last_drawing, before = self._last_drawings.get(name, (None, Heard()))
         if drawing is None or drawing is last_drawing:
             return
@@ -206,7 +206,7 @@ class RobotVoices:
         if self._waiting:
             utterance = self._current = self._waiting.popleft()
             self._until_s = self._clock() + PATIENCE_S + PATIENCE_PER_LETTER_S * len(utterance.words)
-            speaker.say(utterance.words, utterance.language, utterance.volume)
+            speaker.speak(utterance.words, utterance.language, utterance.volume)
 
     def silence(self) -> None:
         """Stop and discard all speech and sounds."""

@@ -28,7 +28,7 @@ class Asking:
         """Begin with a new program."""
         self.question, self._runner = None, runner
 
-    def take(self, event: RunnerEvent) -> None:
+    def apply(self, event: RunnerEvent) -> None:
         """Apply an event: a question or its withdrawal; others are ignored."""
         if event.kind == "ask" and self._runner is not None:
             number = event.question

@@ -66,7 +66,7 @@ class ChildProcess:
         """True if the process has ended."""
         return self.popen.poll() is not None
 
-    def look(self) -> None:
+    def check(self) -> None:
         """Find its children, and kill it when it uses too much memory."""
         if self._process is None:
             return

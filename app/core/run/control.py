@@ -335,7 +335,7 @@ class Runs:
         if self._runner is None or event.run != self._runner.run:
             return
         run = self._begun(event)
-        self.asking.take(event)
+        self.asking.apply(event)
         match event.kind:
             case "running" if run.state in {"running", "paused"}:
                 if event.says and event.says != run.says:
@@ -487,7 +487,7 @@ class Runs:
 
     def _on_print(self, event: RunnerEvent) -> None:
         # Shown in the Console, or as the value of a tried block.
-        words = self._trial.take(event.text)
+        words = self._trial.parse_line(event.text)
         if words is None:
             self._console.add("info", self._run.name, event.text)
         else:

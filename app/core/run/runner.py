@@ -279,7 +279,7 @@ class Runner:
 
     def _watch(self, child: ChildProcess, reader: threading.Thread, errors: threading.Thread) -> None:
         while not child.ended and not self._output_over.wait(MEMORY_CHECK_INTERVAL_S):
-            child.look()
+            child.check()
         self._commands.put(None)  # closes its input, which ends a child that still waits for commands
         hung = not child.wait(END_TIMEOUT_S)
         if hung:

@@ -20,7 +20,7 @@ class StopNews:
 
     def tell_fleet(self, report: StopReport, mark: int) -> None:
         """Apply the result of a Stop that began at ``mark`` (`MovedRobots.mark`), then its sentences."""
-        self._fleet.moved.take(report, mark)
+        self._fleet.moved.apply_report(report, mark)
         clock = clock_words(time.localtime())
         words = {name: (stop_words(each, clock), each.status) for name, each in report.by_name.items()}
         self._fleet.stopped(words, report)

@@ -44,7 +44,7 @@ class Trial:
         self._unit = self._request.unit(program, robots)
         return self._request.words(program)
 
-    def take(self, line: str) -> str | None:
+    def parse_line(self, line: str) -> str | None:
         """Return a printed line formatted as the tried value; None if the trial has no value."""
         wanted = self._request
         if wanted is None or wanted.stack is None or not wanted.gives_value:

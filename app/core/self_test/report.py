@@ -93,7 +93,7 @@ class Report:
             newest = self._steps[-1] if self._steps else None
             return newest if newest is not None and newest.ms is None else None
 
-    def tell(self, **facts: object) -> None:
+    def add_computer(self, **facts: object) -> None:
         """Add facts about this computer."""
         with self._lock:
             self._facts.update(facts)

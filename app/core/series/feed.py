@@ -15,7 +15,7 @@ BETWEEN_TICKS = 8192
 class SeriesTaker(Protocol):
     """Receiver of a topic's messages."""
 
-    def take(self, batch: Batch, now_ns: int) -> None:
+    def process(self, batch: Batch, now_ns: int) -> None:
         """Process a batch; ``now_ns`` is this computer's time, for messages without a time stamp."""
 
     def rewind(self) -> None:
@@ -93,4 +93,4 @@ class SeriesFeed:
         now_ns = self._clock_ns()
         for topic, batch in batches.items():
             for taker in self._takers.get(topic, ()):
-                taker.take(batch, now_ns)
+                taker.process(batch, now_ns)

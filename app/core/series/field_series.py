@@ -47,7 +47,7 @@ class FieldSeries:
         """True if its newest value is text or boolean."""
         return kind_of_value(self.last) == "state"
 
-    def take(self, times_s: Sequence[float], payloads: Sequence[object], gaps: Sequence[bool]) -> None:
+    def add_values(self, times_s: Sequence[float], payloads: Sequence[object], gaps: Sequence[bool]) -> None:
         """Add the field's values in messages at these times; ``gaps`` marks missing messages before each."""
         find = self.path.value_in
         times: list[float] = []
@@ -122,9 +122,9 @@ class TopicSeries:
         """Add a field, read from now on and in the newest message."""
         self.fields.append(field)
         if self.payload is not MISSING and self._last_s is not None:
-            field.take([self._last_s], [self.payload], [False])
+            field.add_values([self._last_s], [self.payload], [False])
 
-    def take(self, batch: Batch, now_ns: int) -> None:
+    def process(self, batch: Batch, now_ns: int) -> None:
         """Add received messages."""
         # publishers, because dropped messages also appear as jumps of their sequence numbers
         seen: set[int | None] = set()
@@ -155,7 +155,7 @@ class TopicSeries:
         self.received += len(batch.messages)
         self.lost += lost + max(batch.dropped, first_jumps)
         for field in self.fields:
-            field.take(times, payloads, gaps)
+            field.add_values(times, payloads, gaps)
 
     def rewind(self) -> None:
         """Clear: the source moved to another time."""

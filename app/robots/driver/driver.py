@@ -141,8 +141,8 @@ class Driver:
         topic, stop_words = self.robot.topics.command, ("stop", stop)
         native = CommandReceiver(topic, tasks, desk, stop_words, self._rejected)
         rize = CommandReceiver(RIZE_COMMANDS, tasks, dialect, stop_words, self._rejected, queues_stops=True)
-        self._subscribers.append(self._node.new_sub(topic, "robot/command", sink=native.take))
-        self._subscribers.append(self._node.new_sub(RIZE_COMMANDS, "json", sink=rize.take))
+        self._subscribers.append(self._node.new_sub(topic, "robot/command", sink=native.process))
+        self._subscribers.append(self._node.new_sub(RIZE_COMMANDS, "json", sink=rize.process))
 
     def close(self) -> None:
         """Stop the robot, reply to open commands, end its threads and close its topics. Idempotent."""

@@ -146,7 +146,7 @@ class CommandReceiver:
         self._queue = MessageQueue(topic, tasks.call_soon, rejected, MAX_COMMAND_BYTES)
         self._needles = sorted({json.dumps(word)[1:-1].encode() for word in stop_words if word})
 
-    def take(self, messages: Sequence[Message]) -> None:
+    def process(self, messages: Sequence[Message]) -> None:
         """Process messages. Runs in the network's thread; never raises."""
         stops = [at for at, message in enumerate(messages) if self._is_stop(message)]
         older_epoch = self._tasks.epoch

@@ -113,7 +113,7 @@ class Body:
         self._base, self._turning = motion, turning
         return motion
 
-    def say(self, text: str, speed_percent: float = 100.0) -> Speech:
+    def speak(self, text: str, speed_percent: float = 100.0) -> Speech:
         """Start to speak; the current speech ends."""
         self.hush()
         self._speech = Speech.of(text, speed_percent)

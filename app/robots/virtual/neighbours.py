@@ -51,7 +51,7 @@ class Neighbours:
             for other, _at, began in self._seen.values()
         )
 
-    def tell(self, me: Other, publish: Callable[[Mapping[str, object]], None]) -> None:
+    def publish_position(self, me: Other, publish: Callable[[Mapping[str, object]], None]) -> None:
         """Publish this robot's position: at once if it changed, else at intervals."""
         now = self._clock.now()
         if me != self._told or now - self._told_s >= CALM_S:

@@ -110,7 +110,7 @@ class SharedRoom:
 
     # -- call without the lock -------------------------------------------------------------------------
 
-    def tell(self) -> None:
+    def publish_changes(self) -> None:
         """Publish changes; call after every step."""
         with self._lock:
             body = self._body
@@ -123,4 +123,4 @@ class SharedRoom:
             told, self._is_new = self._map.message() if self._is_new else None, False
         if told is not None:
             self._tell_room(told)
-        self._neighbours.tell(me, self._tell_robots)
+        self._neighbours.publish_position(me, self._tell_robots)

@@ -109,10 +109,10 @@ class Simulation:
                 happenings = list(self.body.happenings)
                 self.body.happenings.clear()
                 self.changed.notify_all()
-            self.tell(happenings, step)
-            self._shared.tell()
+            self.publish_step(happenings, step)
+            self._shared.publish_changes()
 
-    def tell(self, happenings: list[BodyEvent], step: int) -> None:
+    def publish_step(self, happenings: list[BodyEvent], step: int) -> None:
         """Publish events, the drawing, and the sensors due at this step."""
         for happening in happenings:
             self._link.happen(happening.event, **happening.data)
@@ -140,9 +140,9 @@ class Simulation:
             is_turn = count % _DETECTION_PERIOD_IMAGES == 0
             # subscribers get boxes that belong to the same image
             if is_watched or is_turn:
-                self.look(publish=is_watched)
+                self.capture(publish=is_watched)
 
-    def look(self, *, publish: bool) -> None:
+    def capture(self, *, publish: bool) -> None:
         """Take one image, detect objects, and publish both."""
         with self.changed:
             room, lens = self.body.room, lens_of(self.body)

@@ -50,7 +50,7 @@ class BlocklyBridge(QObject):
         super().__init__(parent)
         self._begin = begin
 
-    def tell(self, command: str, payload: object) -> None:
+    def send_command(self, command: str, payload: object) -> None:
         """Send a command to the page, which doesn't reply."""
         self.told.emit(command, deep_json.dumps(payload, ascii=True))
 

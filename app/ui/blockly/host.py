@@ -143,13 +143,13 @@ class BlocklyHost(QWidget):
             self.set_reduced_motion(bool(tokens["reducedMotion"]))
         if self._web is not None:
             self._apply_theme(self._web)
-        self._tell("theme", self._theme)
+        self._send_command("theme", self._theme)
 
     def set_reduced_motion(self, reduced: bool) -> None:
         """Set a steady glow instead of an animated one."""
         if reduced != self._reduced_motion:
             self._reduced_motion = reduced
-            self._tell("motion", {"reduced": reduced})
+            self._send_command("motion", {"reduced": reduced})
 
     # -- for the view -----------------------------------------------------------------------------
 
@@ -161,10 +161,10 @@ class BlocklyHost(QWidget):
         # Overridden: the page and its state are lost.
         ...
 
-    def _tell(self, command: str, payload: object) -> None:
+    def _send_command(self, command: str, payload: object) -> None:
         # Without a page nothing is sent; `_page_came` sends everything to a later one.
         if self._up:
-            self._bridge.tell(command, payload)
+            self._bridge.send_command(command, payload)
 
     def _ask_for(self, field: str) -> None:
         # Holds keys that are pressed before the field has the focus.
@@ -173,7 +173,7 @@ class BlocklyHost(QWidget):
         self._asked_for = field
         self._watch_keys()
         self._keys.hold()
-        self._tell(field, None)
+        self._send_command(field, None)
 
     # -- page -------------------------------------------------------------------------------------
 
@@ -188,7 +188,7 @@ class BlocklyHost(QWidget):
         if self._keys.keeps(event):
             return True
         if event.type() == QEvent.Type.FocusIn and keyboard_leads():
-            self._tell("keyboard", None)
+            self._send_command("keyboard", None)
         overrides = event.type() == QEvent.Type.ShortcutOverride and self._on_block
         if overrides and _is_help(cast("QKeyEvent", event)):
             event.accept()  # on a block, F1 is the block's help: the window's F1 doesn't get it
@@ -198,7 +198,7 @@ class BlocklyHost(QWidget):
             # A shortcut of the window was handled before a key press arrives here.
             if key.key() in _FUNCTION_KEYS and key.modifiers() == Qt.KeyboardModifier.NoModifier:
                 if self._on_block and _is_help(key):
-                    self._tell("help", None)
+                    self._send_command("help", None)
                 else:
                     self.key_pressed.emit(QKeySequence(key.key()).toString())
                 return True
@@ -275,7 +275,7 @@ class BlocklyHost(QWidget):
         self._watch_keys()
         self._page_came()
         if self._asked_for:
-            self._tell(self._asked_for, None)
+            self._send_command(self._asked_for, None)
         self.ready.emit()
         if self._had_died:
             self._had_died = False

@@ -107,7 +107,7 @@ class BlocklyView(BlocklyHost):
         gone = self._tabs.show(key, WorkspaceJson.of(workspace))
         self._send_tab()
         if gone is not None:
-            self._tell("close", gone)
+            self._send_command("close", gone)
 
     def close_tab(self, key: str) -> None:
         """Close a behaviour and discard its undo. If it was shown, an empty one replaces it."""
@@ -115,7 +115,7 @@ class BlocklyView(BlocklyHost):
         if self._tabs.close(key):
             if was_shown:
                 self._send_tab()
-            self._tell("close", key)
+            self._send_command("close", key)
 
     def load(self, workspace: Mapping[str, object]) -> None:
         """Load another program into the shown tab.
@@ -129,7 +129,7 @@ class BlocklyView(BlocklyHost):
     def change(self, workspace: Mapping[str, object]) -> None:
         """Change the shown tab's program as one edit that can be undone; `changed` is not emitted."""
         self._tabs.shown.program = WorkspaceJson.of(workspace)
-        self._tell("change", workspace)
+        self._send_command("change", workspace)
 
     def flush(self, done: Callable[[WorkspaceJson], None]) -> None:
         """Request the newest program of the shown tab.
@@ -142,7 +142,7 @@ class BlocklyView(BlocklyHost):
             return
         self._tokens += 1
         self._waiting[self._tokens] = done
-        self._bridge.tell("flush", self._tokens)
+        self._bridge.send_command("flush", self._tokens)
 
     def picture(self, kind: str, white: bool, done: Callable[[bytes], None]) -> None:
         """Create a "png" or "svg" of all blocks of the shown tab, with a white or transparent background.
@@ -154,7 +154,7 @@ class BlocklyView(BlocklyHost):
             return
         self._tokens += 1
         self._pictures[self._tokens] = done
-        self._bridge.tell("picture", {"token": self._tokens, "kind": kind, "white": white})
+        self._bridge.send_command("picture", {"token": self._tokens, "kind": kind, "white": white})
 
     def pdf(self, title: str, date: str, layout: QPageLayout, done: Callable[[bytes], None]) -> None:
         """Create a PDF of all blocks of the shown tab, with the title on each page.
@@ -168,7 +168,7 @@ class BlocklyView(BlocklyHost):
         token = self._tokens
 
         def made(data: QByteArray) -> None:
-            self._tell("printed", None)
+            self._send_command("printed", None)
             waiting = self._pictures.pop(token, None)
             if waiting is not None:
                 waiting(bytes(data.data()))
@@ -186,12 +186,12 @@ class BlocklyView(BlocklyHost):
         pixels = {"width": paper.width(), "height": paper.height(), "edge": edge}
         self._pictures[token] = laid
         settings: Json = {name: inches * _PIXELS_PER_INCH for name, inches in pixels.items()}
-        self._bridge.tell("pages", {"token": token, "title": title, "date": date, **settings})
+        self._bridge.send_command("pages", {"token": token, "title": title, "date": date, **settings})
 
     def set_toolbox_pinned(self, pinned: bool | None) -> None:
         """Set whether the flyout stays open, or closes after each use; None: depending on the space."""
         self._pinned = pinned
-        self._tell("pin", pinned)
+        self._send_command("pin", pinned)
 
     def set_definitions(self, definitions: Mapping[str, object]) -> None:
         """Set the result of `app.blocks.editor_definitions`. Equal definitions cost nothing.
@@ -201,7 +201,7 @@ class BlocklyView(BlocklyHost):
         if definitions == self._definitions:
             return
         self._definitions = dict(definitions)
-        self._tell("definitions", self._definitions)
+        self._send_command("definitions", self._definitions)
 
     # -- state of the shown tab's blocks ----------------------------------------------------------
 
@@ -223,7 +223,7 @@ class BlocklyView(BlocklyHost):
 
     def show_value(self, id: str, words: str) -> None:
         """Show a value at a block, also in the open toolbox, until the next click."""
-        self._tell("value", [id, words])
+        self._send_command("value", [id, words])
 
     def set_absent(self, ids: Sequence[str]) -> None:
         """Show these blocks grey and dashed: their robot is not connected."""
@@ -237,17 +237,17 @@ class BlocklyView(BlocklyHost):
         live: Json = {"values": dict(values), "old": sorted(old)}
         if live != self._live:
             self._live = live
-            self._tell("live", self._live)
+            self._send_command("live", self._live)
 
     def set_variable_values(self, values: Mapping[str, Mapping[str, object]]) -> None:
         """Set the values of the variables that the page shows: by id, as `VariableValue.to_json`."""
         if values != self._values:
             self._values = dict(values)
-            self._tell("values", self._values)
+            self._send_command("values", self._values)
 
     def edit_variable(self, edit: Mapping[str, object]) -> None:
         """Edit a variable: ``{"do": "new" | "rename" | "delete" | "watch" | "show", …}``."""
-        self._tell("variable", dict(edit))
+        self._send_command("variable", dict(edit))
 
     def set_alarms(self, alarms: Mapping[str, tuple[str, str]]) -> None:
         """Set problems of robots in the toolbox: name -> status of its dot, sentence.
@@ -257,19 +257,19 @@ class BlocklyView(BlocklyHost):
         states: Json = {name: {"status": status, "words": words} for name, (status, words) in alarms.items()}
         if states != self._alarms:
             self._alarms = states
-            self._tell("alarms", states)
+            self._send_command("alarms", states)
 
     def set_backpack(self, items: Sequence[Mapping[str, object]]) -> None:
         """Set the content of the backpack, newest first: ``{"id", "at", "block"}`` of each."""
         self._backpack = [dict(item) for item in items]
-        self._tell("backpack", self._backpack)
+        self._send_command("backpack", self._backpack)
 
     def set_first_step(self, first: str, robot: bool) -> None:
         """Set the hint of an empty canvas to drag the block ``first`` there; ``robot``: one is connected."""
         state: Json = {"first": first, "robot": robot}
         if state != self._first_step:
             self._first_step = state
-            self._tell("begin", state)
+            self._send_command("begin", state)
 
     def point_at(self, block: str, name: str = "", then: str = "") -> None:
         """Highlight the category of a block type, then the block; "" ends that.
@@ -279,29 +279,29 @@ class BlocklyView(BlocklyHost):
         """
         wanted: Json | None = {"block": block, "name": name, "then": then} if block else None
         self._pointed = None if self._up else wanted
-        self._tell("point", wanted)
+        self._send_command("point", wanted)
 
     # -- commands ---------------------------------------------------------------------------------
 
     def undo(self) -> None:
         """Undo the last edit."""
-        self._tell("undo", None)
+        self._send_command("undo", None)
 
     def undo_deletion(self) -> None:
         """Restore the last deleted blocks, whatever was done since."""
-        self._tell("undelete", None)
+        self._send_command("undelete", None)
 
     def bring_blocks(self) -> None:
         """Move the last dragged blocks from their tab into the shown one."""
-        self._tell("bring", None)
+        self._send_command("bring", None)
 
     def give_blocks_back(self) -> None:
         """Undo the last `bring_blocks` in both tabs."""
-        self._tell("giveBack", None)
+        self._send_command("giveBack", None)
 
     def redo(self) -> None:
         """Redo."""
-        self._tell("redo", None)
+        self._send_command("redo", None)
 
     def edit(self, what: str) -> None:
         """Apply "copy", "cut", "paste" or "duplicate" to the selected block, and focus the page.
@@ -310,7 +310,7 @@ class BlocklyView(BlocklyHost):
         """
         if self.web is not None and not self._has_focus():
             self.setFocus()
-            self._tell("edit", what)
+            self._send_command("edit", what)
 
     def edit_from_menu(self, what: str) -> None:
         """Apply "cut", "copy", "paste" or "selectAll" in the page's focused field, else to blocks."""
@@ -323,7 +323,7 @@ class BlocklyView(BlocklyHost):
                 page.triggerAction(page.WebAction[PAGE_EDITS[what]])
             else:
                 self.setFocus()
-                self._tell("edit", what)
+                self._send_command("edit", what)
 
         page.runJavaScript(TYPES, act)
 
@@ -333,15 +333,15 @@ class BlocklyView(BlocklyHost):
 
     def zoom_in(self) -> None:
         """Zoom in by one step."""
-        self._tell("zoom", 1)
+        self._send_command("zoom", 1)
 
     def zoom_out(self) -> None:
         """Zoom out by one step."""
-        self._tell("zoom", -1)
+        self._send_command("zoom", -1)
 
     def zoom_to_fit(self) -> None:
         """Show the whole program."""
-        self._tell("fit", None)
+        self._send_command("fit", None)
 
     def open_find(self) -> None:
         """Open the bar for finding blocks in the shown program."""
@@ -353,11 +353,11 @@ class BlocklyView(BlocklyHost):
 
     def show_help(self) -> None:
         """Show the help of the focused block, if any."""
-        self._tell("help", None)
+        self._send_command("help", None)
 
     def show_block(self, id: str) -> None:
         """Scroll to a block and select it."""
-        self._tell("show", id)
+        self._send_command("show", id)
 
     # -- page -------------------------------------------------------------------------------------
 
@@ -372,15 +372,15 @@ class BlocklyView(BlocklyHost):
         return view.mapToGlobal(QPoint(round(x * zoom), round(y * zoom)))
 
     def _page_came(self) -> None:
-        self._tell("definitions", self._definitions)
-        self._tell("alarms", self._alarms)
-        self._tell("begin", self._first_step)
-        self._tell("backpack", self._backpack)
+        self._send_command("definitions", self._definitions)
+        self._send_command("alarms", self._alarms)
+        self._send_command("begin", self._first_step)
+        self._send_command("backpack", self._backpack)
         self._tabs.page_gone()
         self._send_tab()
         pointed, self._pointed = self._pointed, None
         if pointed is not None:
-            self._tell("point", pointed)
+            self._send_command("point", pointed)
 
     def _page_went(self) -> None:
         pictures, self._pictures = self._pictures, {}
@@ -402,17 +402,17 @@ class BlocklyView(BlocklyHost):
         if not tab.in_page:
             here |= {"generation": tab.generation, "workspace": tab.program.blocks}
             tab.in_page = True
-        self._bridge.tell("tab", here)
+        self._bridge.send_command("tab", here)
         for name, value in tab.states.items():
-            self._bridge.tell(name, value)
-        self._bridge.tell("live", self._live)
-        self._bridge.tell("values", self._values)
+            self._bridge.send_command(name, value)
+        self._bridge.send_command("live", self._live)
+        self._bridge.send_command("values", self._values)
 
     def _show(self, name: str, value: object) -> None:
         states = self._tabs.shown.states
         if states.get(name) != value:
             states[name] = value
-            self._tell(name, value)
+            self._send_command(name, value)
 
     def _edited(self, key: str, generation: int, workspace: str) -> None:
         tab = self._tabs.edited(key, generation)

@@ -53,7 +53,9 @@ class AlertsPanel(PanelWidget):
         for row in known.values():
             self.pages.drop(row)
         for place, (row, alert) in enumerate(zip(self.rows, active, strict=True)):
-            row.say(alert.severity, alert.title, alert.detail, note=_since(alert), button=alert.button or "")
+            row.set_texts(
+                alert.severity, alert.title, alert.detail, note=_since(alert), button=alert.button or ""
+            )
             self.pages.put(place, row)
         self.pages.show_rows(bool(active))
         self.chip.set(str(len(active)) if active else "", active[0].severity if active else "ok")

@@ -55,12 +55,12 @@ class CameraPanel(OneRobotPanel):
         start = EmptyAction(_("Use the virtual robot"), lambda: context.run("robots.virtual"), "bot")
         self.empty = EmptyState(self.theme, "camera", title, text, [start])
         self._no_robot = NoRobot(self.empty, title, text, [start])
-        self._no_robot.tell(self.session.coming)
+        self._no_robot.set_starting(self.session.coming)
         self.pages = self.show_one_of(self.empty, self.view)
 
     def refresh_robot(self, link: RobotLink | None) -> None:
         if link is None:
-            self._no_robot.tell(self.session.coming)
+            self._no_robot.set_starting(self.session.coming)
         if self._stream is None or link is None:
             return
         silent_s = self._stream.silent_s
@@ -72,7 +72,7 @@ class CameraPanel(OneRobotPanel):
             and all(map(is_, seen, self._seen))
         ):
             return  # polled 60 times a second, mostly without a new picture
-        self.view.take(self._stream, boxes_on(link, self._topic))
+        self.view.show_image(self._stream, boxes_on(link, self._topic))
         silent = silent_s is not None and silent_s > SILENT_AFTER_S
         sentence = self._rates.of(self._stream)
         self.rate.setText("" if silent else sentence)
@@ -106,7 +106,7 @@ class CameraPanel(OneRobotPanel):
         self._rates.clear()
         self.set_title(_("Camera"), self._topic)
         said = _("The next image from {robot} appears here.").format(robot=link.name)
-        self.empty.say(_("No images yet"), said)
+        self.empty.set_texts(_("No images yet"), said)
         self.empty.set_actions([])
         self.pages.setCurrentWidget(self.empty)
 

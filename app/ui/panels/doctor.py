@@ -61,7 +61,7 @@ class DoctorPanel(PanelWidget):
         self.chip = Chip(self.theme)
         self.chips = [self.chip]
         self.again = IconButton(self.theme, "refresh-cw", _("Check again"), size=26)
-        self.again.clicked.connect(self.session.doctor.look)
+        self.again.clicked.connect(self.session.doctor.start)
         self.header = [self.again]
         self._copy = QAction(_("Copy the report"), self)
         self._copy.triggered.connect(self.copy_report)
@@ -119,9 +119,9 @@ class DoctorPanel(PanelWidget):
         if self.session.master.kind != self._master:
             # the master changed while the panel is open: earlier findings are outdated
             self._master = self.session.master.kind
-            doctor.look()
+            doctor.start()
         elif doctor.told_of != doctor.missed and not doctor.looking:
-            doctor.look()
+            doctor.start()
         self._offer_topics()
         own = list(self._hindrances())
         told = tuple((each.sentence, each.button) for each in own)
@@ -260,7 +260,7 @@ class DoctorPanel(PanelWidget):
 
     def _row(self, finding: Finding, step: NextStep | None) -> AlertRow:
         row = AlertRow(self.theme, framed=finding.severity in BAD_SEVERITIES)
-        row.say(
+        row.set_texts(
             STATUS[finding.severity],
             finding.sentence,
             finding.mend,
@@ -306,7 +306,7 @@ class DoctorPanel(PanelWidget):
             return
         step.run()
         if finding.id.startswith("studio:"):
-            self.session.doctor.look()
+            self.session.doctor.start()
             self.context.toast(_("Done. Checking again"))
 
     def _use(self, topic: str) -> None:

@@ -90,7 +90,7 @@ class HealthPanel(OneRobotPanel):
         ]
         self.empty = EmptyState(self.theme, "bot", title, text, steps)
         self._no_robot = NoRobot(self.empty, title, text, steps)
-        self._no_robot.tell(self.session.coming)
+        self._no_robot.set_starting(self.session.coming)
         self.step = Button(self.theme, _("Restart it"), "rotate-ccw", size="small")
         self.step.clicked.connect(self._do_next_step)
         inside = QWidget()
@@ -122,7 +122,7 @@ class HealthPanel(OneRobotPanel):
     def refresh_robot(self, link: RobotLink | None) -> None:
         if link is None:
             self.chip.set("")
-            self._no_robot.tell(self.session.coming)
+            self._no_robot.set_starting(self.session.coming)
             return
         facts = facts_of(link, self.session.live.topics, time.monotonic(), _whole_age)
         if facts != self._facts:

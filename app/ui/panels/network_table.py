@@ -39,7 +39,7 @@ class NetworkTable(TablePanel[Row]):
 
     def show_networks(self) -> None:
         """Report unreachable networks, and show the network column if there are several networks."""
-        self.networks.say([lost_words(each) for each in self.session.networks.chosen])
+        self.networks.set_sentences([lost_words(each) for each in self.session.networks.chosen])
         if self._networks_seen != len(self.session.networks.chosen):
             self._networks_seen = len(self.session.networks.chosen)
             self.table.fit_columns()
@@ -70,7 +70,7 @@ class NetworkLine(QWidget):
         column.addLayout(row)
         self.hide()
 
-    def say(self, sentences: Sequence[str]) -> None:
+    def set_sentences(self, sentences: Sequence[str]) -> None:
         """Show each sentence on a line of its own; hidden if all are empty."""
         said = "\n".join(filter(None, sentences))
         self.words.setText(said)

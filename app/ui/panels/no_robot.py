@@ -16,14 +16,16 @@ class NoRobot:
         self._empty, self._title, self._text, self._actions = empty, title, text, tuple(actions)
         self._coming: tuple[str, ...] = ()
 
-    def tell(self, coming: tuple[str, ...]) -> None:
+    def set_starting(self, coming: tuple[str, ...]) -> None:
         """Report the robots being started; call on every refresh without a robot."""
         if coming == self._coming:
             return
         self._coming = coming
         if coming:
-            self._empty.say(connected_words((), coming), _("A virtual robot takes a few seconds to start."))
+            self._empty.set_texts(
+                connected_words((), coming), _("A virtual robot takes a few seconds to start.")
+            )
             self._empty.set_actions(())
         else:
-            self._empty.say(self._title, self._text)
+            self._empty.set_texts(self._title, self._text)
             self._empty.set_actions(self._actions)

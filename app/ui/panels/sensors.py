@@ -97,7 +97,7 @@ class SensorsPanel(OneRobotPanel):
         title, text = _("No robot connected"), _("Connect a robot to see its sensors.")
         self.empty = EmptyState(self.theme, "eye", title, text)
         self._no_robot = NoRobot(self.empty, title, text)
-        self._no_robot.tell(self.session.coming)
+        self._no_robot.set_starting(self.session.coming)
         self.pages = QStackedWidget()
         self.pages.addWidget(self.empty)
         self.pages.addWidget(self._scroll)
@@ -116,7 +116,7 @@ class SensorsPanel(OneRobotPanel):
             for row in self.rows:
                 row.show_value(link.values.get(row.sensor.name) if there else None, now)
         else:
-            self._no_robot.tell(self.session.coming)
+            self._no_robot.set_starting(self.session.coming)
 
     def show_robot(self, link: RobotLink) -> None:
         for row in self.rows:
@@ -130,7 +130,7 @@ class SensorsPanel(OneRobotPanel):
         self.pages.setCurrentIndex(1 if self.rows else 0)
         if not self.rows:
             title = _("{robot} has no sensors").format(robot=link.name)
-            self.empty.say(title, _("The robot's description has no sensors."))
+            self.empty.set_texts(title, _("The robot's description has no sensors."))
 
     def _fit_rows(self) -> None:
         # Shows whole rows only; scrolling moves by rows.

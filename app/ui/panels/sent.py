@@ -117,11 +117,11 @@ class SentPanel(PanelWidget):
         self.table.tell_visible_changed()
         self.pages.setCurrentIndex(1 if rows else 0)
         if words and log.records:
-            self.empty.say(_("No matches"), _("Clear the filter to see all sent messages."), "search")
+            self.empty.set_texts(_("No matches"), _("Clear the filter to see all sent messages."), "search")
             self.empty.set_actions([EmptyAction(_("Clear the filter"), self.filter.clear, "x")])
         else:
             said = _("Messages you publish, calls, replays and clicks in images are listed here.")
-            self.empty.say(_("Nothing sent yet"), said, "send")
+            self.empty.set_texts(_("Nothing sent yet"), said, "send")
             publish = EmptyAction(_("Publish a message"), lambda: self.context.run("publish.new"), "send")
             self.empty.set_actions([publish])
         self.foot.setText(_("Messages and calls you send by hand are listed here"))

@@ -114,17 +114,17 @@ class TablePanel(PanelWidget, Generic[Row]):
             return
         if filtered:
             words = self._words
-            self.empty.say(_(words.nothing_fits), _(words.clear_the_filter), "search")
+            self.empty.set_texts(_(words.nothing_fits), _(words.clear_the_filter), "search")
             clear = EmptyAction(_("Clear the filter"), self.filter.clear, "x")
             wanted = self.missed_topic()
             self.empty.set_actions([clear, self.why(wanted)] if wanted else [clear])
         elif self.session.replay is not None and self._words.not_recorded:
             self.doctor.hide()
-            self.empty.say(_(self._words.not_recorded), "", "film")
+            self.empty.set_texts(_(self._words.not_recorded), "", "film")
             self.empty.set_actions([])
         elif self.session.master.kind == "none":
             said = _("A master lets programs find each other.")
-            self.empty.say(_("No master is running"), said, "radio-tower")
+            self.empty.set_texts(_("No master is running"), said, "radio-tower")
             start = self.session.launcher.ensure_master
             self.empty.set_actions([EmptyAction(_("Start a master here"), start, "play", primary=True)])
         else:

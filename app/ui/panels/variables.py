@@ -204,7 +204,7 @@ class VariablesPanel(TablePanel[VariableRow]):
             self.say_empty()
 
     def say_empty(self) -> None:
-        self.empty.say(
+        self.empty.set_texts(
             _("No variables yet"),
             _("A variable stores a number, a text or a list under a name. You see its value here."),
             "variable",

@@ -145,7 +145,7 @@ class PictureView(QWidget):
         self._silent = False
         self.update()
 
-    def take(
+    def show_image(
         self,
         stream: ImageStream,
         boxes: tuple[DetectionBox, ...] = (),

@@ -109,7 +109,7 @@ class MainWindow(QMainWindow):
         files = asks if asks is not None else self._file_dialogs()
         asked = self.asked.take_keyboard
         self.context = PanelContext(
-            session, theme, self.open_topic, self.say, self._run, files, asked, self.plot,
+            session, theme, self.open_topic, self.show_toast, self._run, files, asked, self.plot,
             partial(self.open_topic, beside=True), self._why,
             lambda: self.bench.shown_panels() if self.bench is not None else (),
         )  # fmt: skip
@@ -179,14 +179,14 @@ class MainWindow(QMainWindow):
         self.banner.on_dismiss = self.session.alerts.dismiss
         self.banner.on_more = partial(run, OPEN_ALERTS)
         self.pages.currentChanged.connect(self._page_changed)
-        self.bench_made.connect(shortcuts.tell)
+        self.bench_made.connect(shortcuts.update_tooltips)
         shortcuts.changed.connect(self._show_keys)
         self._show_keys()
 
     def _show_keys(self) -> None:
         shortcuts = self.commands.shortcuts
         self.bar.search.show_key(shortcuts.first("palette.open"))
-        shortcuts.tell()
+        shortcuts.update_tooltips()
 
     def _page_changed(self) -> None:
         self.commands.view.show_keys()
@@ -213,9 +213,9 @@ class MainWindow(QMainWindow):
         return self.bar.menus
 
     @property
-    def say(self) -> ShowToast:
+    def show_toast(self) -> ShowToast:
         """Function that shows a toast."""
-        return self.toast.say
+        return self.toast.show_toast
 
     @property
     def examples(self) -> Sequence[Example]:
@@ -560,7 +560,7 @@ class MainWindow(QMainWindow):
             return True
         self.show_layout("behaviour")
         self.session.documents.show(unkept[0])
-        self.toast.say(_("Studio can't close: unsaved work would be lost"))
+        self.toast.show_toast(_("Studio can't close: unsaved work would be lost"))
         return False
 
     def _keep(self) -> None:

@@ -89,7 +89,7 @@ class Log(logging.Handler):
             level = "error" if filtered.levelno >= logging.ERROR else "warn"
             self._records.append((level, filtered.name.partition(".")[0], filtered.getMessage()))
 
-    def take(self, add: Callable[[str, str, str], object]) -> None:
+    def drain(self, add: Callable[[str, str, str], object]) -> None:
         """Pass stored records to ``add`` (level, origin, text), oldest first."""
         while self._records:
             add(*self._records.popleft())

@@ -82,7 +82,7 @@ class PaintedButton(QAbstractButton):
         # `radius` is the theme's name of the corner radius.
         super().__init__(parent)
         self._theme = theme
-        self.say(text)
+        self.set_text(text)
         self.setCheckable(checkable)
         self.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
         self.setSizePolicy(QSizePolicy.Policy.Fixed, QSizePolicy.Policy.Fixed)
@@ -102,7 +102,7 @@ class PaintedButton(QAbstractButton):
             self._aimed = aimed
             self.update()
 
-    def say(self, text: str, name: str = "") -> None:
+    def set_text(self, text: str, name: str = "") -> None:
         """Set the text, and the accessible name, which is ``name`` or the text."""
         self.setText(text)
         self.setAccessibleName(name or text)
@@ -179,7 +179,7 @@ class Button(PaintedButton):
         same = text == self.text() and (name or text) == self.accessibleName()
         if same and icon in {None, self.icon_name}:
             return
-        self.say(text, name)
+        self.set_text(text, name)
         self.icon_name = icon if icon is not None else self.icon_name
         self.updateGeometry()
         self.update()
@@ -227,7 +227,7 @@ class Button(PaintedButton):
         return self.text()
 
     def paint_button(self, painter: QPainter, rect: QRectF) -> None:
-        fill, border, ink = self._look()
+        fill, border, ink = self._colours()
         paint.box(painter, rect, self._theme.radius(self.measure.radius), fill, border)
         self.paint_content(painter, ink)
 
@@ -251,7 +251,7 @@ class Button(PaintedButton):
         area = QRectF(QPointF(left + icon + gap, frame.top()), end)
         paint.words(painter, area, word, font, ink)
 
-    def _look(self) -> tuple[QColor | None, QColor | None, QColor]:
+    def _colours(self) -> tuple[QColor | None, QColor | None, QColor]:
         # Fill, border and text colour.
         theme = self._theme
         rest, hover, pressed, border, ink = _COLOURS[self.kind]
@@ -291,11 +291,11 @@ class ToggleButton(Button):
         super().__init__(theme, text, icon, size="small")
         self.setCheckable(True)
 
-    def _look(self) -> tuple[QColor | None, QColor | None, QColor]:
+    def _colours(self) -> tuple[QColor | None, QColor | None, QColor]:
         colour = self._theme.colour
         if self.isChecked() and self.isEnabled():
             return colour("selected"), colour("accent"), colour("selectedText")
-        return super()._look()
+        return super()._colours()
 
 
 class IconButton(PaintedButton):
@@ -368,7 +368,7 @@ class LinkButton(PaintedButton):
     def set_word(self, text: str, icon: str | None) -> None:
         """Set the text, and an arrow or none."""
         self._icon = icon
-        self.say(text)
+        self.set_text(text)
         self.updateGeometry()
         self.update()
 
@@ -457,7 +457,7 @@ class StopButton(PaintedButton):
         """Show "Stop", "Stopping" (with the ring) or "Stop again"; outlined only while nothing can move."""
         if (word, ring, filled) == (self.text(), self._ring, self.filled):
             return
-        self.say(word)
+        self.set_text(word)
         self._ring = ring
         self.filled = filled
         self.update()

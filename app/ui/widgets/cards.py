@@ -132,7 +132,7 @@ class AlertRow(AlertBox):
         self.button = Button(theme, "", size="small")
         self.button_row.addWidget(self.button)
 
-    def say(
+    def set_texts(
         self, status: str, title: str, detail: str, *, command: str = "", note: str = "", button: str = ""
     ) -> None:
         """Show these texts, without empty ones; the button stays, so that a click in progress is not lost."""

@@ -90,7 +90,7 @@ class EmptyState(QWidget):
         whole.addWidget(area)
         self.set_actions(actions)
 
-    def say(self, title: str, text: str, icon: str | None = None) -> None:
+    def set_texts(self, title: str, text: str, icon: str | None = None) -> None:
         """Set other texts."""
         self._title.setText(title)
         self._text.setText(text)

@@ -107,7 +107,7 @@ class MemoryServer:
         reply = fitting(reply)
         self.tally.add(reply)
         with self.hub.lock:
-            is_waited_for = call.client.take(call)
+            is_waited_for = call.client.remove_locked(call)
             call.client.answered += is_waited_for
             call.client.late += not is_waited_for
         if is_waited_for:
@@ -142,7 +142,7 @@ class MemoryServer:
                 call
                 for client in self.hub.clients.get(self.spec.service, ())
                 for call in client.calls
-                if call.server is self and client.take(call)
+                if call.server is self and client.remove_locked(call)
             ]
             for call in left:
                 call.client.failed += 1
@@ -217,7 +217,7 @@ class MemoryClient:
         for call in calls:
             self.forget(call)
 
-    def take(self, call: _Call) -> bool:
+    def remove_locked(self, call: _Call) -> bool:
         """Remove a call; return False if it was no longer in flight. Call with the hub's lock held."""
         if self._calls.pop(call.number, None) is None:
             return False
@@ -229,7 +229,7 @@ class MemoryClient:
         with self.hub.lock:
             known = self._calls.get(call.number)
             if known is not None:
-                self.take(known)
+                self.remove_locked(known)
 
     def served_by(self, server: MemoryServer) -> None:
         """Send waiting calls to a new server. Call with the hub's lock held."""
@@ -240,7 +240,7 @@ class MemoryClient:
     def expire(self, now: float) -> float:
         """Fail expired calls; return the next deadline."""
         with self.hub.lock:
-            late = [each for each in self.calls if each.deadline <= now and self.take(each)]
+            late = [each for each in self.calls if each.deadline <= now and self.remove_locked(each)]
             self.failed += len(late)
             due = min((each.deadline for each in self._calls.values()), default=math.inf)
         for call in late:

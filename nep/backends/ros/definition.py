@@ -57,14 +57,14 @@ class _Reader:
     def left(self) -> int:
         return len(self.data) - self.at
 
-    def take(self, count: int) -> memoryview:
+    def read(self, count: int) -> memoryview:
         if count > self.left:
             raise struct.error
         self.at += count
         return self.data[self.at - count : self.at]
 
     def length(self) -> int:
-        return int(_LENGTH.unpack(self.take(4))[0])
+        return int(_LENGTH.unpack(self.read(4))[0])
 
 
 @dataclass(frozen=True)
@@ -227,7 +227,7 @@ def _basic(name: str) -> FieldKind | None:
     if name in _TIMES:
         return _time(name)
     if name == "bool":
-        return FieldKind(name, _write_bool, lambda reader, _path: reader.take(1)[0] != 0, 1)
+        return FieldKind(name, _write_bool, lambda reader, _path: reader.read(1)[0] != 0, 1)
     if name == "string":
         return FieldKind(name, _write_string, _read_string, 4)
     return None
@@ -253,7 +253,7 @@ def _integer(name: str) -> FieldKind:
         out += packing.pack(number)
 
     return FieldKind(
-        name, write, lambda reader, _path: packing.unpack(reader.take(packing.size))[0], packing.size
+        name, write, lambda reader, _path: packing.unpack(reader.read(packing.size))[0], packing.size
     )
 
 
@@ -272,7 +272,7 @@ def _float(name: str) -> FieldKind:
             ) from None
 
     return FieldKind(
-        name, write, lambda reader, _path: packing.unpack(reader.take(packing.size))[0], packing.size
+        name, write, lambda reader, _path: packing.unpack(reader.read(packing.size))[0], packing.size
     )
 
 
@@ -288,7 +288,7 @@ def _time(name: str) -> FieldKind:
             ) from None
 
     def read(reader: _Reader, _path: str) -> object:
-        secs, nsecs = packing.unpack(reader.take(8))
+        secs, nsecs = packing.unpack(reader.read(8))
         return {"secs": secs, "nsecs": nsecs}
 
     return FieldKind(name, write, read, 8)
@@ -329,7 +329,7 @@ def _write_string(value: object, path: str, out: bytearray) -> None:
 
 
 def _read_string(reader: _Reader, _path: str) -> object:
-    return str(reader.take(reader.length()), "utf-8", "replace")
+    return str(reader.read(reader.length()), "utf-8", "replace")
 
 
 def _array(kind: FieldKind, length: int | None) -> FieldKind:
@@ -381,7 +381,7 @@ def _bytes_of(value: object, path: str, name: str) -> bytes | bytearray | memory
 
 
 def _reads_bytes(reader: _Reader, _path: str, count: int) -> object:
-    return bytes(reader.take(count))
+    return bytes(reader.read(count))
 
 
 def _writes_list(name: str, kind: FieldKind, length: int | None) -> Callable[[object, str, bytearray], None]:
@@ -415,7 +415,7 @@ def _reads_list(kind: FieldKind) -> Callable[[_Reader, str, int], object]:
                 path, _("has {count} elements, more than the data can hold").format(count=count)
             )
         if format_char:
-            return list(struct.unpack(f"<{count}{format_char}", reader.take(count * size)))
+            return list(struct.unpack(f"<{count}{format_char}", reader.read(count * size)))
         return [kind.read(reader, path) for _number in range(count)]
 
     return read

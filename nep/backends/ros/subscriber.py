@@ -205,7 +205,7 @@ class RospySubscriber(WakingSubscriber):
     def poll(self) -> Message | None:
         """Return the next message, or None. Raises `RosShutdownError` after rospy was shut down."""
         with self._owner.changed:
-            message = None if self.is_closed else self.inbox.take()
+            message = None if self.is_closed else self.inbox.pop()
         if message is None and self.process.is_over and not self.is_closed:
             raise RosShutdownError
         return message

@@ -248,7 +248,7 @@ class Ros2Subscriber(WakingSubscriber):
     def poll(self) -> Message | None:
         """Return the next message, or None."""
         with self._transport.changed:
-            return None if self.is_closed else self.inbox.take()
+            return None if self.is_closed else self.inbox.pop()
 
     def receive(self, timeout_s: float) -> Message | None:
         """Return the next message; wait up to `timeout_s` seconds."""

@@ -51,7 +51,7 @@ class EarlyMessages(Generic[T]):
         count = len(self._queued.get(header.publisher, ()))
         return count < self._max_messages and self._bytes < HISTORY_BYTES
 
-    def take(self, publisher: int) -> list[T]:
+    def pop(self, publisher: int) -> list[T]:
         """Remove and return a publisher's queued messages that weren't received since, in order."""
         self._until.pop(publisher, None)
         queued = self._queued.pop(publisher, [])

@@ -90,7 +90,7 @@ class ZenohSubscriber(WakingSubscriber):
     def poll(self) -> Message | None:
         """Return the next message, or None."""
         with self._inboxes.changed:
-            return None if self.is_closed else self._inbox.take()
+            return None if self.is_closed else self._inbox.pop()
 
     def receive(self, timeout_s: float) -> Message | None:
         """Return the next message; wait up to `timeout_s` seconds."""
@@ -194,7 +194,7 @@ class ZenohSubscriber(WakingSubscriber):
             self.notify_waiting()
 
     def _release_early(self, publisher: int) -> None:
-        for topic_parser, rest in self._early.take(publisher):
+        for topic_parser, rest in self._early.pop(publisher):
             self._append(topic_parser.parser.parse(topic_parser.topic, rest))
 
     def end_greeting(self, publishers: Iterable[int]) -> None:

@@ -172,7 +172,7 @@ class MasterSession:
         self._name = MasterName(address, self._set_address, look_up)
         if self._name.known:
             self._set_address(self._name.known)
-        self._name.look(time.monotonic())
+        self._name.resolve(time.monotonic())
         self._moved_to = self.hosts
         self._connected_from = self._own_host
         self._load = CpuLoad()
@@ -262,7 +262,7 @@ class MasterSession:
             known = self._publishers.pop(publisher, None)
             self._confirmed.discard(publisher)
         if known is not None:
-            self._calls.tell(RemovePublisher(self._node.id, publisher, last_seq))
+            self._calls.notify(RemovePublisher(self._node.id, publisher, last_seq))
 
     def remove_subscriber(self, subscriber: int) -> None:
         """Unregister a subscriber; doesn't wait."""
@@ -270,11 +270,11 @@ class MasterSession:
             known = self._subscribers.pop(subscriber, None)
             self._confirmed.discard(subscriber)
         if known is not None:
-            self._calls.tell(RemoveSubscriber(self._node.id, subscriber))
+            self._calls.notify(RemoveSubscriber(self._node.id, subscriber))
 
     def report_missing(self, publisher: int, subscribers: Iterable[int]) -> None:
         """Report subscribers that didn't complete the handshake."""
-        self._calls.tell(ReportMissing(self._node.id, publisher, tuple(subscribers)))
+        self._calls.notify(ReportMissing(self._node.id, publisher, tuple(subscribers)))
 
     def query_graph(self, timeout_s: float) -> GraphView:
         """Return the graph. Raises as `RpcClient.ask` does."""
@@ -337,7 +337,7 @@ class MasterSession:
         if is_connected:
             self._reconnect_at = now + self._reconnect_s
         else:
-            self._name.look(now)
+            self._name.resolve(now)
             self._connect_when_due(now)
         is_due = now >= self._renewal_timer.due_at
         if is_due or now >= self._address_check_at:
@@ -375,7 +375,7 @@ class MasterSession:
                 if moved != record and moved.endpoints:
                     self._publishers[id] = (moved, publisher)
                     if id in self._confirmed:
-                        self._calls.tell(AddPublisher(self._node, moved))
+                        self._calls.notify(AddPublisher(self._node, moved))
 
     def _reconnect_from(self, host: str) -> None:
         # Connections from the old address would stay silent for many seconds.
@@ -443,7 +443,7 @@ class MasterSession:
                 self._load.ratio(),
                 offset or (),
             )
-            self._calls.tell(request, then=partial(self._add_clock_sample, self._clock.now()))
+            self._calls.notify(request, then=partial(self._add_clock_sample, self._clock.now()))
 
     def _add_clock_sample(self, sent: Moment, answer: Reply) -> None:
         # Compares this computer's clock with the master's by the times of a renewal and its reply.
@@ -500,7 +500,7 @@ class MasterSession:
             subscribers = tuple(record for record, _ in self._subscribers.values())
             request = Join(self._node, self._epoch, publishers, subscribers)
             items = {record.id for record in publishers} | {record.id for record in subscribers}
-            self._calls.tell(request, then=lambda reply: self._handle_joined(reply, items))
+            self._calls.notify(request, then=lambda reply: self._handle_joined(reply, items))
 
     def _handle_joined(self, reply: Reply, items: set[int]) -> None:
         if not isinstance(reply, Found):

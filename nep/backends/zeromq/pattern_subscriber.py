@@ -70,13 +70,13 @@ class PatternSubscriber(WakingSubscriber):
     def poll(self) -> Message | None:
         """Return the next message, or None."""
         with self._changed:
-            return None if self.is_closed else self._inbox.take()
+            return None if self.is_closed else self._inbox.pop()
 
     def receive(self, timeout_s: float) -> Message | None:
         """Return the next message; wait up to `timeout_s` seconds."""
         with self._changed:
             self._changed.wait_for(lambda: self.is_closed or len(self._inbox), timeout_s)
-            return None if self.is_closed else self._inbox.take()
+            return None if self.is_closed else self._inbox.pop()
 
     @property
     def has_input(self) -> bool:

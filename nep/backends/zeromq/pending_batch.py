@@ -134,7 +134,7 @@ class PendingBatch:
 
         return publish
 
-    def take(self) -> list[tuple[bytes, int]]:
+    def pop_batch(self) -> list[tuple[bytes, int]]:
         """Remove and return up to `BATCH_MAX` pending messages, oldest first.
 
         Must not be called without any.

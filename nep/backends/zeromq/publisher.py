@@ -367,7 +367,7 @@ class NativePublisher(GreetedPublisher):
 
     def _send_batches_locked(self, batch: PendingBatch) -> None:
         while batch.pending:
-            taken = batch.take()
+            taken = batch.pop_batch()
             self._last_stamp_ns = stamp_ns = taken[-1][1]
             count, payloads, stamps_ns = len(taken), *zip(*taken, strict=True)
             size = sum(map(len, payloads))

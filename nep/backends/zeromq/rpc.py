@@ -161,7 +161,7 @@ class RpcClient:
             raise RequestRefusedError(_("the master's message is not a reply"))
         return reply
 
-    def tell(self, request: Request, then: Then | None = None) -> None:
+    def notify(self, request: Request, then: Then | None = None) -> None:
         """Send a request without waiting; dropped if no master is connected.
 
         `then` is called with the reply in the I/O thread.

@@ -175,7 +175,7 @@ class CarefulParser:
                 raise WireError(
                     _("its payload is in shared memory that no publisher offered"), code="shared-memory"
                 )
-            shared = self._shared.take(header.publisher, payload, may_copy=codec.name == "bytes")
+            shared = self._shared.read(header.publisher, payload, may_copy=codec.name == "bytes")
             if shared is None:
                 self._sources.count_dropped(1)
                 return None
@@ -516,7 +516,7 @@ class SubSocket:
             or len(first) != self._body + size
         ):
             return None
-        data = self._shared.take(publisher, first[self._body :], may_copy=source.kind.codec == "bytes")
+        data = self._shared.read(publisher, first[self._body :], may_copy=source.kind.codec == "bytes")
         if data is None:
             return None
         self.sources.received += 1

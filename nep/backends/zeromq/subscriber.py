@@ -422,7 +422,7 @@ class SocketSubscriber(Generic[R]):
         elif self._may_exceed_bound and self._inbox.messages:
             self._inbox.move(self.ready, AHEAD_MOST, _AHEAD_BYTES)
             return self.ready.popleft()
-        return self._inbox.take()
+        return self._inbox.pop()
 
     def _bounded_locked(self, message: Message | None) -> Message | None:
         # Returns the oldest of `message` and those behind it for which there is room; counts the others as

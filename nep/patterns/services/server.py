@@ -115,14 +115,14 @@ class Server:
 
     def run_one(self) -> bool:
         """Serve the oldest waiting call; return True if there was one. Called by the spinning thread."""
-        call = self._transport.calls.take()
+        call = self._transport.calls.pop()
         if call is not None:
             self._execute(call)
         return call is not None
 
     def _run_thread(self) -> None:
         while not self._transport.calls.is_closed:
-            call = self._transport.calls.take(SLICE_S)
+            call = self._transport.calls.pop(SLICE_S)
             if call is None:
                 continue
             try:
@@ -212,7 +212,7 @@ class Server:
         deadline = None if timeout_s is None else time.monotonic() + timeout_s
         while not self._transport.calls.is_closed:
             left = SLICE_S if deadline is None else min(SLICE_S, deadline - time.monotonic())
-            call = self._transport.calls.take(max(0.0, left))
+            call = self._transport.calls.pop(max(0.0, left))
             if call is None:
                 if left <= 0.0:
                     return None

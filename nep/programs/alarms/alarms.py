@@ -38,7 +38,7 @@ class _Retry:
 class Alarms:
     """Alarm rules with their history and running actions.
 
-    Not thread-safe, except for `evaluator.take` and the completion callbacks of actions.
+    Not thread-safe, except for `evaluator.evaluate` and the completion callbacks of actions.
     """
 
     def __init__(

@@ -177,7 +177,7 @@ class AlarmEvaluator:
 
     # ---- inputs
 
-    def take(self, topic: str, messages: Sequence[Message]) -> None:
+    def evaluate(self, topic: str, messages: Sequence[Message]) -> None:
         """Process messages of a topic, oldest first. Does nothing for topics without a rule."""
         subscription = self._subscribed.get(topic)
         if subscription is None or not messages:

@@ -202,7 +202,7 @@ class Blackboard:
             self._check_open()
             self._watches = (*self._watches, watch)
         try:
-            watch.attach(node.new_sub(topic, msg_type, configuration, sink=watch.take))
+            watch.attach(node.new_sub(topic, msg_type, configuration, sink=watch.store_messages))
         except BaseException:
             with self._updated:
                 self._watches = tuple(other for other in self._watches if other is not watch)

@@ -150,17 +150,17 @@ class BlackboardWatch:
         if is_closed:
             subscriber.close()
 
-    def take(self, messages: Sequence[Message]) -> None:
+    def store_messages(self, messages: Sequence[Message]) -> None:
         """Store messages. Runs in the node's sink thread."""
         for message in messages:
             if self._is_closed:
                 return
             try:
-                self._take(message)
+                self._store_message(message)
             except Exception as error:  # noqa: BLE001 - a bad message must not affect the others
                 self._reject(message, error)
 
-    def _take(self, message: Message) -> None:
+    def _store_message(self, message: Message) -> None:
         subscriber = self._subscriber
         # The first messages may arrive before `attach` is called.
         payload = message.payload if subscriber is None else subscriber.decoded(message)

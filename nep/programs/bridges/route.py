@@ -339,7 +339,7 @@ class Route:
             publisher = self._publishers.get(self._key(message))
             if publisher is None:
                 return message
-            self._backlog.take()
+            self._backlog.pop()
             self._send(publisher, message)
         return None
 
@@ -408,7 +408,7 @@ class Route:
             subscriber_count = publisher.subscribers
             if subscriber_count != self._subscriber_counts.get(publisher):  # a robot may have connected
                 self._subscriber_counts[publisher] = subscriber_count
-                self.end.guard.look()
+                self.end.guard.poll()
             refusal = self.refusal
             if refusal:
                 self._fail(refusal)

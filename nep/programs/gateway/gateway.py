@@ -144,7 +144,7 @@ class Gateway:
         for socket in ready:
             if socket in self._request_sockets:
                 self._request_server.answer(socket, self._request_sockets[socket])
-        for message in self._inbox.take():
+        for message in self._inbox.pop_all():
             data = self._outside.data_of(message)
             if data is not None:
                 self._relay.deliver(message.topic, message.codec, data)

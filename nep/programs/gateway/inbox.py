@@ -54,7 +54,7 @@ class NativeInbox:
         with contextlib.suppress(OSError):  # full: the reader is already woken; closed: there is none
             self._writer.send(b"\x00")
 
-    def take(self) -> list[Message]:
+    def pop_all(self) -> list[Message]:
         """Remove and return all messages, oldest first."""
         with contextlib.suppress(BlockingIOError):
             self._reader.recv(4096)

@@ -95,7 +95,7 @@ class MotionGuard:
                 self._view = view if self._subscribe(view) else None  # retried with the next graph
             self._rebuild(view)
 
-    def look(self) -> None:
+    def poll(self) -> None:
         """Query the graph and process it; do nothing while the master doesn't reply."""
         try:
             view = self._node.graph(_GRAPH_TIMEOUT_S)
@@ -107,7 +107,7 @@ class MotionGuard:
         """Wait up to `timeout_s` until all descriptions were read; return whether they were."""
         until = time.monotonic() + timeout_s
         while True:
-            self.look()
+            self.poll()
             if self.is_settled or time.monotonic() >= until:
                 return self.is_settled
             threading.Event().wait(_POLL_S)

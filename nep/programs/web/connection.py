@@ -152,7 +152,7 @@ class PageConnection:
         """Send queued messages, as fast as the page reads them."""
         try:
             while True:
-                await self._send(await self._queue.take())
+                await self._send(await self._queue.pop())
         except ws_exceptions.ConnectionClosed:
             return
         except Exception:

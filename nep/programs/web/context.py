@@ -180,7 +180,7 @@ class PageContext:
                 del self._refused_at[next(iter(self._refused_at))]
         self._on_robot_refused(robot, reason)
 
-    def tell(self, level: Level, sentence: str, id_: OperationId = None) -> None:
+    def send_status(self, level: Level, sentence: str, id_: OperationId = None) -> None:
         """Send a status, unless the page wants none of this level."""
         if LEVELS.index(level) < LEVELS.index(self.level):
             return

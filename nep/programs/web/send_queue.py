@@ -131,7 +131,7 @@ class Feed:
         """When the next message may be taken, by the clock of `take`."""
         return self._next_at
 
-    def take(self, now: float) -> Message:
+    def pop(self, now: float) -> Message:
         """Return the oldest message."""
         message = self._messages.popleft()
         self.size_bytes -= message.size_bytes
@@ -203,7 +203,7 @@ class SendQueue:
         if feed in self._active:
             self._active.remove(feed)
 
-    async def take(self) -> Frame | Queued:
+    async def pop(self) -> Frame | Queued:
         """Return what is to be sent next, as soon as there is something."""
         while True:
             if self._frames:
@@ -226,7 +226,7 @@ class SendQueue:
             if feed.next_at > now:
                 self._active.append(feed)
                 continue
-            message = feed.take(now)
+            message = feed.pop(now)
             if len(feed):
                 self._active.append(feed)
             return Queued(feed, message)

@@ -367,7 +367,7 @@ class WebServer:
         with ThreadPoolExecutor(1, "nep-web-robots") as thread:
             while stop is not None and not stop.is_set():
                 if self._pages:
-                    await loop.run_in_executor(thread, guard.look)
+                    await loop.run_in_executor(thread, guard.poll)
                 with suppress(asyncio.TimeoutError):
                     await asyncio.wait_for(stop.wait(), _REFRESH_S)
 

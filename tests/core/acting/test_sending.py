@@ -51,7 +51,7 @@ def order(
 
 
 def kinds(bench: Bench) -> list[str]:
-    return [each.kind for each in bench.outbox.take()]
+    return [each.kind for each in bench.outbox.pop_results()]
 
 
 def test_it_is_sent_once_and_says_how_many_hear_it(bench) -> None:

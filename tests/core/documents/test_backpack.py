@@ -33,7 +33,7 @@ def test_what_was_put_in_is_there_at_the_next_start_the_newest_first(tmp_path: P
     first.put([WAIT])
     first.put([SAY, deep(600)])
     again = Backpack(tmp_path)
-    again.look()
+    again.reload_if_changed()
     assert types(again) == ["robot_pepper_do_say", "control_wait", "control_wait"]
     assert again.items[0].block == SAY
     assert [item.id for item in again.items] == [item.id for item in first.items]
@@ -43,10 +43,10 @@ def test_two_studios_do_not_lose_each_others(tmp_path: Path) -> None:
     one, other = Backpack(tmp_path), Backpack(tmp_path)
     one.put([WAIT])
     other.put([SAY])  # has not looked since
-    one.look()
+    one.reload_if_changed()
     assert types(one) == types(other) == ["robot_pepper_do_say", "control_wait"]
     before = one.revision
-    one.look()
+    one.reload_if_changed()
     assert one.revision == before
     (gone,) = one.remove([item.id for item in one.items if item.block["type"] == "control_wait"])
     other.put([deep(1)])
@@ -73,7 +73,7 @@ def test_a_file_that_is_no_backpack_is_kept_aside_and_said_once(tmp_path: Path, 
     (tmp_path / "backpack.json").write_bytes(content)
     (tmp_path / "backpack.damaged.json").write_text("an earlier one")
     backpack = Backpack(tmp_path)
-    backpack.look()
+    backpack.reload_if_changed()
     kept = tmp_path / "backpack.damaged-2.json"
     assert kept.read_bytes() == content
     assert (tmp_path / "backpack.damaged.json").read_text() == "an earlier one"
@@ -93,7 +93,7 @@ def test_what_is_not_understood_in_it_is_counted_and_stays(tmp_path: Path) -> No
     good = {"id": "a", "at": 5, "block": WAIT}
     (tmp_path / "backpack.json").write_text(json.dumps({"backpack": 1, "items": [*strange, good]}))
     backpack = Backpack(tmp_path)
-    backpack.look()
+    backpack.reload_if_changed()
     assert types(backpack) == ["control_wait"]
     assert "4 items" in backpack.take_trouble()
     backpack.put([SAY])
@@ -113,7 +113,7 @@ def test_it_has_bounds_that_lose_nothing(tmp_path: Path, monkeypatch: pytest.Mon
         backpack.put([{"type": "x" * 3000}])
     assert types(backpack) == ["control_wait"] * 2
     again = Backpack(tmp_path)
-    again.look()
+    again.reload_if_changed()
     assert types(again) == ["control_wait"] * 2
     monkeypatch.setattr(module, "MAX_STACKS", 1)
     backpack.remove([backpack.items[0].id])  # less than it holds is always possible
@@ -123,7 +123,7 @@ def test_it_has_bounds_that_lose_nothing(tmp_path: Path, monkeypatch: pytest.Mon
 def test_one_that_cannot_be_read_or_written_is_left_as_it_is(tmp_path: Path) -> None:
     (tmp_path / "backpack.json").mkdir()
     backpack = Backpack(tmp_path)
-    backpack.look()
+    backpack.reload_if_changed()
     assert "can't read " in backpack.take_trouble()
     with pytest.raises(BackpackError, match="can't read "):
         backpack.put([WAIT])

@@ -171,14 +171,14 @@ def test_the_thread_arranges_the_newest_graph_only() -> None:
         for count in (8, 9):
             thread.ask(replace(LAB, nodes_there=count), None, LayoutSizes())
         assert thread.is_busy
-        assert thread.take() is None
+        assert thread.pop_result() is None
         go_on.set()
         eventually(lambda: not thread.is_busy)
-        made = thread.take()
+        made = thread.pop_result()
         assert made is not None
         assert made[0].nodes_there == 9
         assert asked == [7, 9]
-        assert thread.take() is None
+        assert thread.pop_result() is None
     finally:
         thread.close()
 
@@ -193,7 +193,7 @@ def test_the_thread_goes_on_after_an_error_and_ends_at_once(caplog: pytest.LogCa
     thread.ask(NodeGraph(), None, LayoutSizes())
     eventually(lambda: not thread.is_busy)
     thread.ask(LAB, None, LayoutSizes())
-    eventually(lambda: thread.take() is not None)
+    eventually(lambda: thread.pop_result() is not None)
     thread.close()
     thread.ask(LAB, None, LayoutSizes())
     assert not thread.is_busy

@@ -52,7 +52,7 @@ def test_the_thread_places_in_rows_what_no_process_could_place(monkeypatch: pyte
     thread = LayoutThread()
     thread.ask(LARGE, None, LayoutSizes())
     eventually(lambda: not thread.is_busy)
-    made = thread.take()
+    made = thread.pop_result()
     thread.close()
     assert made is not None
     assert made[1].is_plain

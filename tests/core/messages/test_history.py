@@ -63,7 +63,7 @@ def test_how_long_it_took_is_what_it_was_when_it_came() -> None:
 
 def test_what_came_too_fast_is_counted_and_another_time_begins_anew() -> None:
     history = MessageHistory()
-    history.take(Batch([message(1), message(2)], dropped=7), 0)
+    history.process(Batch([message(1), message(2)], dropped=7), 0)
     assert (numbers(history), history.missed) == ([1, 2], 7)
     history.rewind()
     assert (len(history), history.size_bytes, history.first, history.missed, history.at(0)) == (

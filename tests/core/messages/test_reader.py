@@ -30,7 +30,7 @@ def reader() -> Iterator[Reader]:
 def taken(reader: Reader) -> Reading:
     pause = threading.Event()
     for _ in range(int(WAIT_S * 100)):
-        found = reader.take()
+        found = reader.pop_result()
         if found is not None:
             return found
         pause.wait(0.01)

@@ -33,15 +33,15 @@ class Clock:
 
 def test_every_message_is_tried_and_the_newest_bad_one_is_told() -> None:
     checks = Checks(Clock())
-    checks.look("/a", messages(BAD, GOOD, BAD))
-    checks.look("/a", messages(GOOD))
-    checks.look("/b", messages(GOOD))
-    found = checks.take()
+    checks.check("/a", messages(BAD, GOOD, BAD))
+    checks.check("/a", messages(GOOD))
+    checks.check("/b", messages(GOOD))
+    found = checks.pop_results()
     assert (found["/a"].checked, found["/a"].bad, found["/a"].unchecked) == (4, 2, 0)
     assert "json" in found["/a"].sentence
     assert found["/a"].last_good
     assert (found["/b"].checked, found["/b"].bad, found["/b"].sentence) == (1, 0, "")
-    assert checks.take() == {}
+    assert checks.pop_results() == {}
 
 
 def test_a_hundred_thousand_bad_messages_in_a_burst_are_counted_exactly() -> None:
@@ -52,8 +52,8 @@ def test_a_hundred_thousand_bad_messages_in_a_burst_are_counted_exactly() -> Non
     each_s = (time.thread_time() - began) / len(some)
     checks = Checks()  # the real clocks: the promise is about real work
     for _ in range(10):
-        checks.look("/a", messages(*[BAD] * 10_000))
-    found = checks.take()["/a"]
+        checks.check("/a", messages(*[BAD] * 10_000))
+    found = checks.pop_results()["/a"]
     assert found.bad + found.unchecked == 100_000
     assert not found.last_good
     # A machine that is slow may not get through all of them; then it has worked for all of the advance.
@@ -63,24 +63,24 @@ def test_a_hundred_thousand_bad_messages_in_a_burst_are_counted_exactly() -> Non
 def test_a_topic_that_is_well_leaves_the_reserve_to_those_that_are_not() -> None:
     clock = Clock(step_s=0.01)
     checks = Checks(clock, clock)
-    checks.look("/a", messages(*[GOOD] * 500))
-    well = checks.take()["/a"]
+    checks.check("/a", messages(*[GOOD] * 500))
+    well = checks.pop_results()["/a"]
     assert 0 < well.checked < 60
     assert well.checked + well.unchecked == 500
-    checks.look("/b", messages(*[BAD] * 500))
-    bad = checks.take()["/b"]
+    checks.check("/b", messages(*[BAD] * 500))
+    bad = checks.pop_results()["/b"]
     assert bad.bad == bad.checked > 40
-    checks.look("/b", messages(*[BAD] * 500))
-    assert checks.take()["/b"].checked < 10  # the advance is spent, the newest is always tried
+    checks.check("/b", messages(*[BAD] * 500))
+    assert checks.pop_results()["/b"].checked < 10  # the advance is spent, the newest is always tried
     clock.now += 10.0
-    checks.look("/b", messages(*[BAD] * 500))
-    assert checks.take()["/b"].checked > 40
+    checks.check("/b", messages(*[BAD] * 500))
+    assert checks.pop_results()["/b"].checked > 40
 
 
 def test_one_bad_message_makes_the_rest_of_its_batch_worth_the_reserve() -> None:
     checks = Checks(work=Clock(step_s=0.01))
-    checks.look("/a", messages(BAD, *[GOOD] * 200))
-    found = checks.take()["/a"]
+    checks.check("/a", messages(BAD, *[GOOD] * 200))
+    found = checks.pop_results()["/a"]
     assert found.bad == 1
     assert found.checked > module.RESERVE_S / 0.01
 
@@ -98,8 +98,8 @@ class Reads(Clock):
 def test_the_clock_of_work_is_not_read_for_every_message() -> None:
     clock = Reads(step_s=1e-6)
     checks = Checks(Clock(), clock)
-    checks.look("/a", messages(*[GOOD] * 5000, BAD, *[GOOD] * 5000))
-    found = checks.take()["/a"]
+    checks.check("/a", messages(*[GOOD] * 5000, BAD, *[GOOD] * 5000))
+    found = checks.pop_results()["/a"]
     assert (found.checked, found.bad, found.unchecked) == (10_001, 1, 0)
     assert clock.count < 100
 
@@ -107,8 +107,8 @@ def test_the_clock_of_work_is_not_read_for_every_message() -> None:
 def test_it_is_read_after_each_large_message_whatever_came_before() -> None:
     clock = Reads(step_s=1e-6)
     checks = Checks(Clock(), clock)
-    checks.look("/a", messages(*[GOOD] * 1000, *[b" " * 64_000 + GOOD] * 200))
-    assert checks.take()["/a"].checked == 1200
+    checks.check("/a", messages(*[GOOD] * 1000, *[b" " * 64_000 + GOOD] * 200))
+    assert checks.pop_results()["/a"].checked == 1200
     assert clock.count > 190
 
 
@@ -116,23 +116,23 @@ def test_a_clock_that_jumps_back_takes_nothing_away() -> None:
     clock = Clock()
     checks = Checks(clock, clock)
     clock.now -= 50.0
-    checks.look("/a", messages(BAD, BAD))
-    assert checks.take()["/a"].bad == 2
+    checks.check("/a", messages(BAD, BAD))
+    assert checks.pop_results()["/a"].bad == 2
 
 
 @pytest.mark.parametrize("codec", ["bytes", "image"])
 def test_what_is_not_to_be_read_is_not_tried(codec: str) -> None:
     checks = Checks()
-    checks.look("/a", messages(BAD, codec=codec))
-    checks.look("/b", [])
-    assert checks.take() == {}
+    checks.check("/a", messages(BAD, codec=codec))
+    checks.check("/b", [])
+    assert checks.pop_results() == {}
 
 
 def test_a_large_message_is_left_to_who_shows_it() -> None:
     large = messages(b"[" * (module.LARGE_BYTES + 1))
     checks = Checks()
-    checks.look("/a", large)
-    assert checks.take()["/a"].bad == 0
+    checks.check("/a", large)
+    assert checks.pop_results()["/a"].bad == 0
 
 
 def test_nothing_is_counted_twice_or_not_at_all_between_threads() -> None:
@@ -143,7 +143,7 @@ def test_nothing_is_counted_twice_or_not_at_all_between_threads() -> None:
     def looks(topic: str) -> Callable[[], None]:
         def run() -> None:
             for _ in range(300):
-                checks.look(topic, messages(BAD, GOOD))
+                checks.check(topic, messages(BAD, GOOD))
 
         return run
 
@@ -153,7 +153,7 @@ def test_nothing_is_counted_twice_or_not_at_all_between_threads() -> None:
     while not done.is_set():
         if not any(thread.is_alive() for thread in threads):
             done.set()
-        counted += sum(found.checked + found.unchecked for found in checks.take().values())
+        counted += sum(found.checked + found.unchecked for found in checks.pop_results().values())
     for thread in threads:
         thread.join()
     assert counted == 2 * 300 * 2
@@ -162,10 +162,10 @@ def test_nothing_is_counted_twice_or_not_at_all_between_threads() -> None:
 def test_a_topic_that_was_well_for_long_is_no_suspect_any_more() -> None:
     clock = Clock()
     checks = Checks(clock, Clock(step_s=0.01))
-    checks.look("/a", messages(BAD))
+    checks.check("/a", messages(BAD))
     clock.now += module.SUSPECT_S - 1
-    checks.look("/a", messages(*[GOOD] * 500))
-    suspect = checks.take()["/a"].checked
+    checks.check("/a", messages(*[GOOD] * 500))
+    suspect = checks.pop_results()["/a"].checked
     clock.now += module.SUSPECT_S + 20
-    checks.look("/a", messages(*[GOOD] * 500))
-    assert checks.take()["/a"].checked < suspect - module.RESERVE_S / 0.01 / 2
+    checks.check("/a", messages(*[GOOD] * 500))
+    assert checks.pop_results()["/a"].checked < suspect - module.RESERVE_S / 0.01 / 2

@@ -22,8 +22,8 @@ def test_it_looks_beside_the_window_and_keeps_what_it_found() -> None:
 
     doctor = Doctor(look, lambda: 7.0)
     assert (doctor.looking, doctor.looked_s, doctor.findings) == (False, None, ())
-    doctor.look()
-    doctor.look()  # it looks already
+    doctor.start()
+    doctor.start()  # it looks already
     assert doctor.looking
     go_on.set()
     doctor.close()
@@ -43,7 +43,7 @@ def test_what_is_found_so_far_is_told_while_it_looks() -> None:
 
     doctor = Doctor(look)
     assert doctor.so_far is None
-    doctor.look()
+    doctor.start()
     assert went.wait(30)
     assert (doctor.so_far, doctor.looked_at, doctor.things) == ((FINE,), 1, 3)
     assert (doctor.looked_s, doctor.findings) == (None, ())
@@ -88,7 +88,7 @@ def test_a_doctor_that_breaks_off_says_so() -> None:
         raise ValueError("no such luck")
 
     doctor = Doctor(look)
-    doctor.look()
+    doctor.start()
     doctor.close()
     assert doctor.findings[0].severity == "error"
     assert "ValueError: no such luck" in doctor.findings[0].sentence
@@ -99,7 +99,7 @@ def test_studios_own_folder_is_looked_at(tmp_path) -> None:
         probe.bind(("127.0.0.1", 0))
         address = f"127.0.0.1:{probe.getsockname()[1]}"
     doctor = doctor_of(address, tmp_path)
-    doctor.look()
+    doctor.start()
     doctor.close()
     found = {finding.id: finding for finding in doctor.findings}
     assert found["master:none"].severity == "error"

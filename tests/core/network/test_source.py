@@ -9,7 +9,6 @@ import pytest
 import nep
 from app.core.network.source import GraphSeen, LiveSource, MasterFound, MasterLost
 from nep.masters.master import Master
-from nep.masters.process import look
 from nep.nodes.log_handler import LOG_TOPIC, LOG_TYPE
 from tests.e2e.waiting import until
 
@@ -36,7 +35,7 @@ def begin(address: str, events: list[object], made: list[LiveSource]) -> LiveSou
 
 
 def names(address: str) -> list[str]:
-    view = look(address)
+    view = view_or_none(address)
     return sorted(node.name for node in view.nodes.values()) if view is not None else []
 
 

@@ -270,7 +270,7 @@ def test_a_graph_that_is_gathered_anew_is_another_one_only_when_somebody_came_or
     views = [graph("/a"), graph("/a", rate_hz=5.0), graph("/b"), graph("/b"), GraphView(1, 1), graph("/b")]
     source = OtherSource(KINDS[0], "", [], lambda _event: None)
     teller = Teller(*views)
-    revisions = [source.look(teller).revision for _view in views]  # type: ignore[arg-type]
+    revisions = [source.query_graph(teller).revision for _view in views]  # type: ignore[arg-type]
     assert revisions == [1, 1, 2, 2, 3, 4]
 
 
@@ -281,7 +281,7 @@ def test_what_a_library_raises_is_a_sentence() -> None:
 
     source = OtherSource(KINDS[2], "", [], lambda _event: None)
     with pytest.raises(NepError, match=r"OSError: .*it broke"):
-        source.look(Breaks())  # type: ignore[arg-type]
+        source.query_graph(Breaks())  # type: ignore[arg-type]
 
 
 def test_a_missing_package_is_one_sentence(session: Session, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -8,22 +8,22 @@ from pathlib import Path
 import pytest
 
 from app.core.recording import folder as folder_module
-from app.core.recording.folder import FolderLook, RecordingFolder, new_path, usual_folder
+from app.core.recording.folder import FolderScan, RecordingFolder, new_path, usual_folder
 from nep.recordings.repair import repair
 from tests.nep.programs import eventually
 from tests.nep.recordings.messages import json_message, record
 
 
-def look(folder: RecordingFolder, being_written: Path | None = None) -> FolderLook:
-    found: list[FolderLook] = []
+def look(folder: RecordingFolder, being_written: Path | None = None) -> FolderScan:
+    found: list[FolderScan] = []
 
     def is_found() -> bool:
-        made = folder.take()
+        made = folder.pop_result()
         if made is not None:
             found.append(made)
         return made is not None
 
-    folder.look(being_written)
+    folder.start_scan(being_written)
     eventually(is_found)
     return found[0]
 
@@ -36,7 +36,7 @@ def folder(tmp_path):
 
 
 def test_each_file_with_what_is_in_it(folder, tmp_path, monkeypatch):
-    assert look(folder) == FolderLook()
+    assert look(folder) == FolderScan()
     record(tmp_path / "a.mcap", [[json_message(seq, topic="/odom") for seq in range(5)]])
     (tmp_path / "cut.MCAP").write_bytes((tmp_path / "a.mcap").read_bytes()[:-100])
     repair(tmp_path / "cut.MCAP", tmp_path / "mended.mcap")

@@ -74,14 +74,14 @@ class Replayed:
     def do(self, change) -> Handed:
         self.source.order("test", change)
         self.source.turn()
-        return self.source.take()
+        return self.source.pop_results()
 
     def pass_time(self, seconds: float, step_s: float = 0.004) -> Handed:
         end = self.clock.now + seconds
         while self.clock.now < end:
             self.source.turn()
             self.clock.now += step_s
-        return self.source.take()
+        return self.source.pop_results()
 
 
 @pytest.fixture

@@ -28,7 +28,7 @@ def found(tmp_path):
             for number in range(10):
                 for after, role, value in said:
                     if after == number:
-                        writer.say(role, value)
+                        writer.write_entry(role, value)
                         assert writer.flush()
                 writer.post([json_message(number)])
                 assert writer.flush()

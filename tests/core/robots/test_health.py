@@ -31,7 +31,7 @@ class Case:
 
     def look(self, bad: int, good: int = 0, *, unchecked: int = 0, last_good: bool = False) -> None:
         checked = Checked(bad + good, bad, unchecked, "no json" if bad else "", last_good)
-        self.health.look({"/a": checked})
+        self.health.update({"/a": checked})
 
     def alert(self) -> ActiveAlert | None:
         return next(iter(self.alerts.active), None)
@@ -173,7 +173,7 @@ def test_driver_that_rejects_messages_or_catches_exceptions_is_an_alert_until_it
     case.health.check()
     assert case.alert() is None
     for value in (1, 12):
-        count.take(value, case.now)
+        count.update(value, case.now)
         case.health.check()
     alert = case.alert()
     assert alert is not None
@@ -181,10 +181,10 @@ def test_driver_that_rejects_messages_or_catches_exceptions_is_an_alert_until_it
     assert "Rover" in alert.title
     assert "12" in alert.title
     case.now += GROWING_S
-    count.take(12, case.now)
+    count.update(12, case.now)
     case.health.check()
     assert case.alert() is None
-    count.take(13, case.now)
+    count.update(13, case.now)
     case.health.check()
     assert case.alert() is not None
     link.connected = False

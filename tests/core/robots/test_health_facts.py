@@ -104,7 +104,7 @@ def test_what_the_driver_rejected_or_caught_is_a_warning_while_it_grows(
 ) -> None:
     assert title not in {fact.title for fact in case.facts()}
     count: ReportedCount = getattr(case.link, kind)
-    count.take(12, NOW - 1)
+    count.update(12, NOW - 1)
     status, words = case.says(title)
     assert status == "warn"
     assert "12" in words

@@ -26,19 +26,19 @@ def lab(tmp_path: Path) -> Iterator[SimulatedLab]:
 )
 def test_anything_but_a_count_is_ignored(hostile: object) -> None:
     count = ReportedCount()
-    count.take(hostile, 1.0)
+    count.update(hostile, 1.0)
     assert (count.value, count.is_growing(1.0)) == (0, False)
-    count.take(7, 2.0)
-    count.take(hostile, 3.0)
+    count.update(7, 2.0)
+    count.update(hostile, 3.0)
     assert (count.value, count.grew_s) == (7, 2.0)
 
 
 def test_count_of_a_restarted_driver_begins_anew() -> None:
     count = ReportedCount()
-    count.take(7, 1.0)
-    count.take(0, 2.0)
+    count.update(7, 1.0)
+    count.update(0, 2.0)
     assert (count.value, count.is_growing(2.0)) == (0, False)
-    count.take(1, 3.0)
+    count.update(1, 3.0)
     assert count.is_growing(3.0)
     assert not count.is_growing(3.0 + GROWING_S)
 

@@ -206,5 +206,5 @@ def test_running_program_tells_the_fleet_which_robots_it_uses(tmp_path: Path) ->
 def test_names_that_robots_of_rize_tell_are_bounded() -> None:
     names = RizeNames()
     for number in range(1000):
-        names.tell(f"Robot{number}")
+        names.add(f"Robot{number}")
     assert len(names._told) <= MAX_AWAY

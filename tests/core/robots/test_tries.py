@@ -46,7 +46,7 @@ class Bench:
         self.now += seconds
         if alive:
             self.tries.answer(self.link, {"op": "alive", "id": "", "state": "running"})
-        self.tries.look([self.link])
+        self.tries.check_timeouts([self.link])
 
 
 @pytest.fixture

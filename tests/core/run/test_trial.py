@@ -28,28 +28,28 @@ def test_a_value_is_the_line_with_its_unit() -> None:
     trial, words = began(BATTERY)
     assert words == "battery"
     assert trial.value is None
-    assert trial.take("84") == "84 %"
+    assert trial.parse_line("84") == "84 %"
     assert trial.value is not None
     assert (trial.value.block, trial.value.words) == ("bat", "84 %")
 
 
 def test_an_empty_line_is_a_value_that_is_not_known() -> None:
     trial, _words = began(BATTERY)
-    assert trial.take("") == "not known yet"
+    assert trial.parse_line("") == "not known yet"
 
 
 def test_the_next_run_forgets_the_value() -> None:
     trial, _words = began(BATTERY)
-    trial.take("84")
+    trial.parse_line("84")
     trial.begin(Wanted(Document()))
     assert trial.value is None
-    assert trial.take("printed") is None
+    assert trial.parse_line("printed") is None
 
 
 def test_what_a_stack_or_a_behaviour_prints_is_no_value() -> None:
     for stack, words in ((Stack("hi"), "say"), (None, "")):
         trial, said = began(stack)
         assert said == words
-        assert trial.take("printed") is None
+        assert trial.parse_line("printed") is None
         assert trial.value is None
-    assert Trial().take("early") is None
+    assert Trial().parse_line("early") is None

@@ -131,7 +131,7 @@ def test_what_is_no_journal_is_nobodys_work(tmp_path: Path, content: str) -> Non
 def test_a_backpack_of_a_newer_studio_is_left_as_it_is(tmp_path: Path) -> None:
     before = write(tmp_path / "backpack.json", {"backpack": 2, "things": [{"id": "x"}]})
     backpack = Backpack(tmp_path)
-    backpack.look()
+    backpack.reload_if_changed()
     assert backpack.items == ()
     assert backpack.take_trouble() == (
         "the backpack in “backpack.json” belongs to a newer NEP Studio and is unchanged; "
@@ -140,7 +140,7 @@ def test_a_backpack_of_a_newer_studio_is_left_as_it_is(tmp_path: Path) -> None:
     backpack.put([{"type": "control_wait"}])
     assert (tmp_path / "backpack.json").read_bytes() == before
     again = Backpack(tmp_path)
-    again.look()
+    again.reload_if_changed()
     assert [item.block["type"] for item in again.items] == ["control_wait"]
     assert again.take_trouble() == ""
 
@@ -149,7 +149,7 @@ def test_a_backpack_of_ones_own_that_is_newer_still_is_set_aside(tmp_path: Path)
     for name in ("backpack.json", "backpack.format-1.json"):
         write(tmp_path / name, {"backpack": 2})
     backpack = Backpack(tmp_path)
-    backpack.look()
+    backpack.reload_if_changed()
     assert "damaged" in backpack.take_trouble()
     assert json.loads((tmp_path / "backpack.json").read_text()) == {"backpack": 2}
     assert json.loads((tmp_path / "backpack.format-1.damaged.json").read_text()) == {"backpack": 2}

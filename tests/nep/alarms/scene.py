@@ -37,7 +37,7 @@ class Scene:
     def send(self, topic: str, *payloads: object) -> list[tuple[str, object]]:
         """A batch of messages arrives."""
         made = [each if isinstance(each, Message) else message(topic, each) for each in payloads]
-        self.alarms.evaluator.take(topic, made)
+        self.alarms.evaluator.evaluate(topic, made)
         return self.happened()
 
     def graph(

@@ -274,7 +274,7 @@ def test_messages_and_ticks_in_two_threads_lose_nothing() -> None:
 
     def arrive() -> None:
         for batch in batches:
-            scene.alarms.evaluator.take("/n", batch)
+            scene.alarms.evaluator.evaluate("/n", batch)
 
     thread = threading.Thread(target=arrive)
     thread.start()

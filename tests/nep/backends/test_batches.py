@@ -264,13 +264,13 @@ def test_when_the_node_s_thread_comes_again() -> None:
     waiting(batch, 10_000, 12_000)
     assert batch.next_check_s(20_000) == pytest.approx((MAX_DELAY_NS - 10_000) / 1e9)
     assert batch.next_check_s(10_000 + MAX_DELAY_NS) == 0.0
-    assert batch.take() == [(b"x", 10_000), (b"x", 12_000)]
+    assert batch.pop_batch() == [(b"x", 10_000), (b"x", 12_000)]
     assert (batch.burst_check_s, batch.is_flush_scheduled) == (0.0, False)
     batch.is_flush_scheduled = batch.has_sent_full = True  # it sends batch after batch itself
     waiting(batch, 200_000)
     assert batch.next_check_s(200_001) > MAX_DELAY_NS / 1e9
     assert batch.next_check_s(10**9) == 0.0
-    batch.take()
+    batch.pop_batch()
     assert batch.burst_check_s == 0.0  # nothing went since
 
 

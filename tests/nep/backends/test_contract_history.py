@@ -259,8 +259,8 @@ def test_early_messages_wait_for_the_history_and_are_bounded() -> None:
         assert early.keep(Header(1, 1, seq, 0, 5), b"%d" % seq, 2)
     assert not early.keep(Header(1, 1, 10, 0, 5), b"10", 2), "there is room for three"
     assert sources.count_message(5, 7, is_alone=True)
-    assert early.take(5) == [b"8", b"9"], "those that the history had are left out"
-    assert early.take(5) == []
+    assert early.pop(5) == [b"8", b"9"], "those that the history had are left out"
+    assert early.pop(5) == []
     sources.get(5).has_echoed = True
     assert not early.keep(Header(1, 1, 11, 0, 5), b"11", 2), "it has replied"
     sources.get(5).has_echoed = False

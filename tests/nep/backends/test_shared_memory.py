@@ -534,11 +534,11 @@ def test_payloads_that_were_overwritten_are_lost_and_the_next_is_found() -> None
         loan.buffer[:] = bytes([value]) * 1000
         numbers.append(writer.send(loan))
     assert numbers == [1, 2, 3, 4]
-    found = reader.take(3)
+    found = reader.read(3)
     assert found is not None
     assert bytes(found) == b"\2" * 1000
-    assert reader.take(1) is None
-    found = reader.take(4)
+    assert reader.read(1) is None
+    found = reader.read(4)
     assert found is not None
     assert bytes(found) == b"\3" * 1000
-    assert reader.take(5) is None
+    assert reader.read(5) is None

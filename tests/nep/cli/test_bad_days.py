@@ -159,7 +159,7 @@ def test_the_sentence_for_any_port_names_the_computer():
 def test_alerts_are_told_when_they_come_change_and_go():
     changes = AlertChanges()
     first, other = Alert("a", "one"), Alert("a", "two")
-    assert changes.take(GraphView(1, 1, alerts=(first,))) == ([first], [])
-    assert changes.take(GraphView(1, 2, alerts=(first,))) == ([], [])
-    assert changes.take(GraphView(1, 3, alerts=(other,))) == ([other], [])
-    assert changes.take(GraphView(1, 4)) == ([], [other])
+    assert changes.update(GraphView(1, 1, alerts=(first,))) == ([first], [])
+    assert changes.update(GraphView(1, 2, alerts=(first,))) == ([], [])
+    assert changes.update(GraphView(1, 3, alerts=(other,))) == ([other], [])
+    assert changes.update(GraphView(1, 4)) == ([], [other])

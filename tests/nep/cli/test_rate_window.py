@@ -13,7 +13,7 @@ import nep
 from nep.cli.hz_bw import _DelayReport, age, bw, gap, hz
 from nep.cli.publish import repeat
 from nep.cli.rate_window import MAX_MESSAGES, AgeWindow, Delay, RateWindow, ReplayFilter
-from nep.cli.screen import say
+from nep.cli.screen import print_status
 from nep.errors import BadTopicError, WaitTimeoutError
 from nep.messages.clocks import NOT_COMPARED, OWN_CLOCK
 from nep.messages.message import arrived as new_arrived
@@ -133,7 +133,7 @@ def test_what_comes_later_is_measured(master, capsys, monkeypatch):
         talking = threading.Thread(target=publish_late, args=(node,))
 
         def said(sentence):
-            say(sentence)
+            print_status(sentence)
             talking.start()
 
         monkeypatch.setattr("nep.cli.topic_wait.say", said)

@@ -13,7 +13,7 @@ from pathlib import Path
 import pytest
 
 import nep
-from nep.cli.screen import say, say_error, show_alerts
+from nep.cli.screen import print_status, say_error, show_alerts
 from nep.protocol.graph_view import Alert
 from nep.system.streams import words_given
 
@@ -206,7 +206,7 @@ def test_sentences_beside_the_results_never_end_a_command(monkeypatch):
             raise BrokenPipeError(errno.EPIPE, "gone")
 
     monkeypatch.setattr("sys.stderr", Gone())
-    say("one")
+    print_status("one")
     say_error("two")
     show_alerts([Alert("a", "three", "four")])
 

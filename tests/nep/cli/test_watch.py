@@ -162,7 +162,7 @@ def test_a_master_that_is_away_is_waited_for(type_in, file, monkeypatch) -> None
     waits, ended = threading.Event(), threading.Event()
 
     def say(sentence: str) -> None:
-        screen.say(sentence)
+        screen.print_status(sentence)
         if sentence.endswith("; waiting"):
             waits.set()
 

@@ -20,9 +20,9 @@ def path(tmp_path):
         for seq in range(10):
             writer.post([json_message(seq)])
             if seq == 4:
-                writer.say("notes", {"text": "it fell"})
-                writer.say("notes", {"text": 7})
-                writer.say("notes", ["other"])
+                writer.write_entry("notes", {"text": "it fell"})
+                writer.write_entry("notes", {"text": 7})
+                writer.write_entry("notes", ["other"])
     return path
 
 

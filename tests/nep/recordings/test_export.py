@@ -263,9 +263,9 @@ def test_a_part_as_a_recording_has_the_same_bytes_and_times_and_what_was_said(tm
             writer.post([picture(seq) if seq % 4 == 0 else json_message(seq, f"/{'ab'[seq % 2]}")])
             assert writer.flush()
             if seq % 5 == 0:
-                writer.say("runs", run)
+                writer.write_entry("runs", run)
             if seq in {2, 21}:
-                writer.say("notes", {"text": f"note {seq}"})
+                writer.write_entry("notes", {"text": f"note {seq}"})
     with Recording(path) as whole:
         times = [each.log_ns for each in whole.read()]
         part = Part(times[10], times[30], ["/a", "/camera"])

@@ -45,8 +45,8 @@ def test_robot_that_appears_later_is_protected_under_whatever_topic_it_names(
         assert "--allow-moving Rover" in guard.refusal("robot_action")
         assert guard.refusal("/weather") == ""
         describe(robot, "Rover", "/others")
-        eventually(lambda: (guard.look(), guard.refusal("/others"))[1])
-    guard.look()
+        eventually(lambda: (guard.poll(), guard.refusal("/others"))[1])
+    guard.poll()
     assert guard.refusal("/orders")  # it may only have lost its connection
     guard.close()
 
@@ -93,11 +93,11 @@ def test_hostile_descriptions_end_nothing_and_protect_no_less(network: str, node
         strange = x.new_pub("/Rover/description", "robot/description", latched=True)
         for payload in HOSTILE:
             strange.publish(payload)
-            guard.look()
+            guard.poll()
             assert "Rover" in guard.refusal("/orders")
             guard.refusal("/a/b").encode()
         for data in (b"[" * 100_000, b" " * 1_000_001, b'{"title":"\\ud800"}', b"\xff"):
             strange.publish_bytes(data)
-            guard.look()
+            guard.poll()
             assert "Rover" in guard.refusal("/orders")
         guard.close()

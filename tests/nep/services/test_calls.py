@@ -317,7 +317,7 @@ def test_a_server_that_closes_refuses_what_waits(make: Make) -> None:
     client = make("client").new_client("/closes", timeout_s=LONG_S)
     eventually(lambda: client.is_connected)
     future = client.call_async({})
-    assert node._services.queues[0].take(LONG_S) is not None  # it is carried out when the server ends
+    assert node._services.queues[0].pop(LONG_S) is not None  # it is carried out when the server ends
     waiting = client.call_async({})
     eventually(lambda: len(node._services.queues[0]._calls) == 1)
     server.close()

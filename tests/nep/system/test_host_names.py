@@ -49,7 +49,7 @@ class Book:
 def test_numbers_are_never_asked_for(address: str, known: str) -> None:
     book = Book()
     name = MasterName(address, lambda _known: None, book.look_up)
-    name.look(1.0)
+    name.resolve(1.0)
     assert name.known == known
     assert name.wait(0.0)
     assert book.asked == []
@@ -61,7 +61,7 @@ def test_a_name_is_asked_for_again_only_after_a_while(caplog: pytest.LogCaptureF
     name = MasterName("robot:7780", told.append, book.look_up)
 
     def look(now: float) -> None:
-        name.look(now)
+        name.resolve(now)
         assert name._thread is not None
         name._thread.join(5.0)
 

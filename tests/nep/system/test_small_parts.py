@@ -44,7 +44,7 @@ def test_an_inbox_keeps_the_newest_within_both_bounds(sizes: list[int], most: in
     assert [each.seq for each in kept] == list(range(dropped, len(sizes)))
     assert len(kept) <= most
     assert sum(each.size_bytes for each in kept) <= max_bytes or len(kept) == 1
-    assert inbox.take() is None
+    assert inbox.pop() is None
 
 
 def test_an_inbox_of_the_latest_drops_nothing() -> None:

@@ -25,7 +25,7 @@ def feed(**wishes: object) -> Feed:
 
 
 def numbers(source: Feed) -> list[int | None]:
-    return [source.take(0.0).seq for _left in range(len(source))]
+    return [source.pop(0.0).seq for _left in range(len(source))]
 
 
 def test_slow_page_loses_the_oldest_messages() -> None:
@@ -50,7 +50,7 @@ def test_throttled_subscription_keeps_the_newest_message() -> None:
     for number in range(10):
         slow.add(message(number))
     assert (slow.dropped_count, slow.throttled_count) == (0, 9)
-    assert slow.take(100.0).seq == 9
+    assert slow.pop(100.0).seq == 9
     assert slow.next_at == 100.5
 
 
@@ -61,7 +61,7 @@ def test_subscriptions_of_a_page_are_combined() -> None:
     for number in range(10):
         both.add(message(number))
     assert len(both) == 5
-    assert both.take(1.0) is not None
+    assert both.pop(1.0) is not None
     assert both.next_at == pytest.approx(1.1)
     assert both.unsubscribe("t")
     assert not both.unsubscribe("t")
@@ -94,7 +94,7 @@ def test_topics_are_sent_round_robin_after_other_operations() -> None:
             waiting.add(busy, message(number))
         waiting.add(quiet, message(9))
         waiting.put([Frame(b"status", is_text=True)])
-        taken = [await waiting.take() for _left in range(5)]
+        taken = [await waiting.pop() for _left in range(5)]
         return [each.message.seq if isinstance(each, Queued) else each.data for each in taken]
 
     assert asyncio.run(drain()) == [b"status", 0, 9, 1, 2]
@@ -117,10 +117,10 @@ def test_throttled_message_is_sent_after_its_interval() -> None:
         loop = asyncio.get_running_loop()
         waiting, slow = SendQueue(loop.time), feed(throttle_s=0.05)
         waiting.add(slow, message(1))
-        await waiting.take()
+        await waiting.pop()
         began = loop.time()
         waiting.add(slow, message(2))
-        await waiting.take()
+        await waiting.pop()
         return loop.time() - began
 
     assert asyncio.run(wait()) >= 0.03

@@ -90,7 +90,7 @@ def test_the_head_keeps_its_speed_and_its_limits():
 
 def test_words_take_as_long_as_their_letters():
     body = Body()
-    speech = body.say("x" * 50)
+    speech = body.speak("x" * 50)
     assert body.speech == "x" * 50
     seconds = run(body, lambda: speech.done)
     assert seconds == pytest.approx(3.0, abs=2 * STEP)
@@ -148,7 +148,7 @@ def test_a_short_tap_lasts_as_long_as_a_program_needs_to_see_it_and_a_hand_that_
 
 def test_how_much_of_a_speech_is_spoken_is_told():
     body = Body()
-    speech = body.say("x" * 100)
+    speech = body.speak("x" * 100)
     body.step(speech.seconds / 2)
     assert drawable(body)["spoken"] == pytest.approx(0.5, abs=0.02)
     run(body, lambda: speech.done)
@@ -188,7 +188,7 @@ def test_reset_puts_everything_back():
 def test_the_drawing_has_what_studio_draws():
     body = Body()
     body.touch("head", down=True)
-    body.say("Hi")
+    body.speak("Hi")
     drawn = drawable(body)
     assert {k: drawn[k] for k in ("x", "speech", "touched", "moving")} == {
         "x": -0.5, "speech": "Hi", "touched": ["head"], "moving": False,

@@ -115,7 +115,7 @@ def test_who_tells_nothing_any_more_is_gone() -> None:
     time = FakeClock()
     seen = Neighbours("Pepper", time, began_ns=5)
     told: list[dict[str, object]] = []
-    Neighbours("Turtle", time, began_ns=1).tell(OTHER, lambda message: told.append(dict(message)))
+    Neighbours("Turtle", time, began_ns=1).publish_position(OTHER, lambda message: told.append(dict(message)))
     seen.hear(told[0])
     assert seen.others() == (OTHER,)
     for damaged in ({}, {**told[0], "x": "far"}, {**told[0], "radius": 50}, {**told[0], "robot": "Pepper"}):
@@ -128,8 +128,8 @@ def test_who_tells_nothing_any_more_is_gone() -> None:
 def test_the_one_that_came_later_makes_way() -> None:
     time = FakeClock()
     first, second = Neighbours("A", time, began_ns=1), Neighbours("B", time, began_ns=2)
-    first.tell(Other("A", 0, 0, 0, 0.27, 1.2), second.hear)
-    second.tell(Other("B", 0, 0.1, 0, 0.27, 1.2), first.hear)
+    first.publish_position(Other("A", 0, 0, 0, 0.27, 1.2), second.hear)
+    second.publish_position(Other("B", 0, 0.1, 0, 0.27, 1.2), first.hear)
     assert (first.makes_way(0, 0, 0.27), second.makes_way(0, 0.1, 0.27)) == (False, True)
 
 

@@ -8,7 +8,7 @@ from app.ui.blockly.bridge import BlocklyBridge
 def test_tells_the_page_in_json(qtbot):
     bridge = BlocklyBridge(dict)
     with qtbot.waitSignal(bridge.told) as told:
-        bridge.tell("errors", {"a": "“no”"})
+        bridge.send_command("errors", {"a": "“no”"})
     name, payload = told.args
     assert name == "errors"
     assert json.loads(payload) == {"a": "“no”"}

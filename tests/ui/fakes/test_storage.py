@@ -163,7 +163,7 @@ def look(is_real: bool) -> Callable[[list[Finding]], Doctor]:
             made = session.Doctor()
             made.found = findings  # type: ignore[assignment]
         assert (made.looking, made.looked_s, tuple(made.findings), made.revision) == (False, None, (), 0)
-        made.look()
+        made.start()
         made.close()
         return made
 
@@ -177,7 +177,7 @@ def test_a_doctor_keeps_what_it_found(look: Callable[[object], Doctor]) -> None:
     assert doctor.looked_s is not None
     seen = doctor.revision
     assert seen > 0
-    doctor.look()
+    doctor.start()
     doctor.close()
     assert doctor.revision > seen
 

@@ -13,16 +13,16 @@ def test_words_come_late_and_go_with_the_page(qtbot) -> None:
     place.resize(600, 400)
     now = [10.0]
     wait = BlocksWait(place, lambda: now[0])
-    wait.tell(ready=False)
+    wait.report(ready=False)
     now[0] += WAIT_UNTIL_S - 0.01
-    wait.tell(ready=False)
+    wait.report(ready=False)
     assert wait.words.isHidden()
     now[0] += 0.02
-    wait.tell(ready=False)
+    wait.report(ready=False)
     assert not wait.words.isHidden()
     assert wait.words.text() == "Loading blocks."
     assert wait.words.geometry() == place.rect()
-    wait.tell(ready=True)
+    wait.report(ready=True)
     assert wait.words.isHidden()
-    wait.tell(ready=False)  # its process died: the patience begins anew
+    wait.report(ready=False)  # its process died: the patience begins anew
     assert wait.words.isHidden()

@@ -70,7 +70,7 @@ def test_what_leaves_the_ring_leaves_the_list(qtbot, qapp) -> None:
     panel.refresh()
     assert lines(panel) == ["info x 5", "info x 4", "info x 3"]
     assert (reset.count(), removed.count()) == (0, 1)
-    session.console.take(
+    session.console.add_messages(
         [Message(LOG_TOPIC, b'{"text": "%d"}' % number, "json", LOG_TYPE) for number in range(9)]
     )
     panel.refresh()  # everything that was shown has left the ring

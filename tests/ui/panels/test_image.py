@@ -157,13 +157,13 @@ def test_an_age_is_told_once_a_second_and_paints_its_words_alone(qtbot, monkeypa
     qtbot.addWidget(view)
     view.resize(400, 300)
     stream, first = stream_of(picture(320, 240)), picture(320, 240)
-    view.take(stream)
+    view.show_image(stream)
     asked: list[tuple[int, ...]] = []
     monkeypatch.setattr(view, "update", lambda *where: asked.append(where))
 
     def takes(age_s: float) -> None:
         stream.picture = replace(first, bgra=view.picture.bgra, stamp_ns=time.time_ns() - round(1e9 * age_s))
-        view.take(stream)
+        view.show_image(stream)
 
     for n in range(30):
         clock.now += 0.03

@@ -44,7 +44,7 @@ def place(qtbot) -> QWidget:
 
 def test_a_toast_goes_to_the_corner_and_follows_the_window(place: QWidget, theme: Theme) -> None:
     toast = Toast(theme, place)
-    toast.say("Copied robots.Pepper.pose.y")
+    toast.show_toast("Copied robots.Pepper.pose.y")
     assert toast.isVisible()
     assert not toast.button.isVisible()
     right = place.width() - toast.geometry().right()
@@ -55,7 +55,7 @@ def test_a_toast_goes_to_the_corner_and_follows_the_window(place: QWidget, theme
 def test_a_toast_undoes_what_it_says(place: QWidget, theme: Theme) -> None:
     done: list[str] = []
     toast = Toast(theme, place)
-    toast.say("Deleted 4 blocks", "Undo", lambda: done.append("undone"))
+    toast.show_toast("Deleted 4 blocks", "Undo", lambda: done.append("undone"))
     QTest.mouseClick(toast.button, Qt.MouseButton.LeftButton)
     assert done == ["undone"]
     assert not toast.isVisible()
@@ -63,7 +63,7 @@ def test_a_toast_undoes_what_it_says(place: QWidget, theme: Theme) -> None:
 
 def test_a_toast_stays_while_it_has_the_focus(qtbot, place: QWidget, theme: Theme) -> None:
     toast = Toast(theme, place)
-    toast.say("Deleted 4 blocks", "Undo", lambda: None)
+    toast.show_toast("Deleted 4 blocks", "Undo", lambda: None)
     toast.button.setFocus()
     qtbot.waitUntil(toast.button.hasFocus)
     toast._time_is_up()

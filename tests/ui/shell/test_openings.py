@@ -220,7 +220,7 @@ def test_toasts_and_banners(window: MainWindow) -> None:
     opened(window, "topics")
 
     def say() -> None:
-        window.toast.say("Done", "Undo", lambda: None)
+        window.toast.show_toast("Done", "Undo", lambda: None)
         window.session.alerts.put(
             "x", "error", "This is wrong.", "Mend it.", button="Stop", action="run.stop"
         )

@@ -114,10 +114,10 @@ class Answered:
 
 def test_only_the_question_that_is_asked_is_answered_and_once() -> None:
     asking, runner = Asking(), Answered(4)
-    asking.take(RunnerEvent("ask", 4, text="Nobody runs yet", question=9))
+    asking.apply(RunnerEvent("ask", 4, text="Nobody runs yet", question=9))
     assert asking.question is None
     asking.begin(cast("Runner", runner))
-    asking.take(RunnerEvent("ask", 4, text="Name?", question=1))
+    asking.apply(RunnerEvent("ask", 4, text="Name?", question=1))
     shown = asking.question
     assert shown is not None
     asking.take(RunnerEvent("ask", 4, text="Age?", question=2))

@@ -58,10 +58,10 @@ def path(tmp_path_factory) -> Path:
     with RecordingWriter(path, clock=TestClock(), limits=limits(figures_s=1e6)) as writer:
         for number in range(COUNT):
             if number == 5:
-                writer.say("notes", {"text": "it fell"})
+                writer.write_entry("notes", {"text": "it fell"})
             writer.post([json_message(number)])
         for role, value in said:
-            writer.say(role, value)
+            writer.write_entry(role, value)
     return path
 
 

@@ -273,7 +273,7 @@ def test_looking_for_a_new_version_only_opens_the_page(
     opened.works = works
     said: list[str] = []
     monkey = ReportCommands(window, session, window.commands.files, answers)
-    window.toast.say = lambda words, *_more: said.append(words)  # type: ignore[method-assign]
+    window.toast.show_toast = lambda words, *_more: said.append(words)  # type: ignore[method-assign]
     monkey.look_for_new_version("https://example.org/releases")
     assert opened.urls == ["https://example.org/releases"]
     assert f"This is NEP Studio {__version__}." in said[0]

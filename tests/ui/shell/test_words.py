@@ -150,7 +150,7 @@ def everything(qtbot, window: MainWindow, look: Look) -> None:
         commands.run(f"layout.{layout}")
         window.tick()
         window._show_facts()
-        window.toast.say(_("Nothing is running"), _("Undo"), lambda: None)
+        window.toast.show_toast(_("Nothing is running"), _("Undo"), lambda: None)
         for view in views():
             bar.show_view(view)
             look(f"{layout}, {view.state}", window)
@@ -234,7 +234,7 @@ def test_what_is_said_while_a_command_is_sought_or_gets_a_key(qtbot, whole: Main
     whole.commands.run("help.shortcuts")
     (sheet,) = whole.findChildren(ShortcutSheet)
     told = []
-    for act in (sheet.record, sheet._take_away, sheet._reset, lambda: sheet._tell(sheet.said.text())):
+    for act in (sheet.record, sheet._take_away, sheet._reset, lambda: sheet._set_status(sheet.said.text())):
         act()
         told.append(sheet.said.text())
     sheet.open_for("file.new")

@@ -68,8 +68,8 @@ def test_the_log_is_kept_until_the_console_takes_it() -> None:
     finally:
         logger.removeHandler(log)
     lines: list[tuple[str, str, str]] = []
-    log.take(lambda *line: lines.append(line))
-    log.take(lambda *line: lines.append(line))
+    log.drain(lambda *line: lines.append(line))
+    log.drain(lambda *line: lines.append(line))
     assert lines == [("warn", "qt", "a warning"), ("error", "qt", "an error")]
 
 
@@ -139,6 +139,6 @@ def test_what_the_console_has_in_its_own_words_is_in_the_log_file_only(tmp_path:
             logger.removeHandler(handler)
             handler.close()
     told: list[str] = []
-    log.take(lambda _level, _origin, words: told.append(words))
+    log.drain(lambda _level, _origin, words: told.append(words))
     assert told == []
     assert "the panel 'a' stopped" in (tmp_path / "studio.log").read_text("utf-8")

@@ -185,7 +185,7 @@ def test_the_window_cuts_no_words(
     for layout, bar in (("behaviour", window.run_bar), ("developer", window.tool_bar)):
         commands.run(f"layout.{layout}")
         window.tick()
-        window.toast.say("Deleted the layout “Two cameras and a plot”", "Undo", lambda: None)
+        window.toast.show_toast("Deleted the layout “Two cameras and a plot”", "Undo", lambda: None)
         for view in VIEWS:
             bar.show_view(view)
             look(f"{layout}, {view.state}")

@@ -68,9 +68,9 @@ class Densities:
         self._wanted = wanted
         self._worker.ask("density", lambda: _Made(density=density_of(self._recording, *wanted)))
 
-    def take(self) -> bool:
+    def collect_results(self) -> bool:
         """Take finished results; return whether there are any. `problem` is the reason of a failure."""
-        density, losses, spans = (self._take(owner) for owner in ("density", "losses", "spans"))
+        density, losses, spans = (self._pop(owner) for owner in ("density", "losses", "spans"))
         if density is not None:
             self.newest = density.density
         if losses is not None:
@@ -79,9 +79,9 @@ class Densities:
             self.spans = spans.spans or RecordedSpans()
         return density is not None or losses is not None or spans is not None
 
-    def _take(self, owner: str) -> _Made | None:
+    def _pop(self, owner: str) -> _Made | None:
         try:
-            return self._worker.take(owner)
+            return self._worker.pop_result(owner)
         except NepError as error:
             self.problem = error.reason if isinstance(error, RecordingError) else str(error)
             return None

@@ -286,13 +286,13 @@ class Replay:
         if self.opened is None and self.source.opened is not None and self.player is not None:
             self._opened(self.source.opened, now)
         self._alert_problems()
-        handed = self.source.take()
+        handed = self.source.pop_results()
         if handed.jump is not None:
             self._take_jump(handed.jump, now)
         self._take_history(handed, now)
         for topic, batch in handed.drained.batches.items():
             if topic in LOGS:
-                self.console.take(batch.messages, batch.dropped)
+                self.console.add_messages(batch.messages, batch.dropped)
             self._add(topic, batch, now)
         self.series.add(handed.drained.batches)
         if handed.figures:
@@ -362,7 +362,7 @@ class Replay:
 
     def _take_history(self, handed: Handed, now: float) -> None:
         log_messages = [message for topic in LOGS for message in handed.history.get(topic, ())]
-        self.console.take(sorted(log_messages, key=lambda message: message.stamp_ns or 0))
+        self.console.add_messages(sorted(log_messages, key=lambda message: message.stamp_ns or 0))
         for topic, messages in handed.history.items():
             batch = Batch(list(messages))
             self._add(topic, Batch(batch.messages[-2:]), now)

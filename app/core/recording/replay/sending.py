@@ -321,7 +321,7 @@ class ReplaySending:
     def _log(self, route: ReplayRoute, words: str, sent: int = 0, *, is_bad: bool = False) -> None:
         if route.name != route.recorded:
             words = _("{topic} of the recording, {what}").format(topic=route.recorded, what=words)
-        self._acting.tell("warn" if is_bad else "info", route.target, words, sent)
+        self._acting.log("warn" if is_bad else "info", route.target, words, sent)
 
     def tick(self) -> None:
         """Apply changes: end topics that are no longer allowed, or that move a new robot."""
@@ -345,7 +345,7 @@ class ReplaySending:
         if self._worker is None or self._moving is not None or self._opened is None:
             return
         try:
-            taken = self._worker.take("topics")
+            taken = self._worker.pop_result("topics")
         except NepError:  # unreadable: every topic may move a robot
             taken = (MovingTopics(unidentified=self._opened.recording.topics), frozenset())
         if taken is not None:

@@ -181,7 +181,7 @@ class ReplaySource:
             self._sent, self._forward = frozenset(topics), to
         self.order("choose", self._choose)
 
-    def take(self) -> Handed:
+    def pop_results(self) -> Handed:
         """Return and clear the results since the last call."""
         with self._changed:
             handed, self._results = self._results, Handed()

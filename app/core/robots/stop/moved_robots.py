@@ -214,7 +214,7 @@ class MovedRobots:
             ),
         )
 
-    def take(self, report: StopReport, mark: int) -> None:
+    def apply_report(self, report: StopReport, mark: int) -> None:
         """Apply the report of a Stop that began at ``mark``: proven and unproven robots."""
         self.note((name for name in report.silent if name not in self), "stop")
         for name in report.still:

@@ -114,7 +114,7 @@ class StopRequest:
             node
             for node, held in self.foreign.items()
             if any(
-                (told := answer_in(each)) is not None and told.get("id") == self.id for each in held.take()
+                (told := answer_in(each)) is not None and told.get("id") == self.id for each in held.pop_all()
             )
         ]
 

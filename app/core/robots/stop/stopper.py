@@ -475,7 +475,7 @@ class RobotStopper:
         # Processes held replies whose publishers are known now; returns late ones with their callbacks, which
         # the caller invokes after releasing the lock. Replies that are still unknown are discarded: their
         # publisher has not registered, or the master is missing, and then nothing can be proven.
-        held = asked.unknown.take()
+        held = asked.unknown.pop_all()
         known = [(node, message) for message in held if (node := self._senders.node_of(message)) is not None]
         return [late for node, message in known for late in self._apply_reply_locked(asked, node, message)]
 

@@ -336,7 +336,7 @@ class SessionActing:
             if not self.may_go_on(target):
                 self.outbox.end(each.order.id)
                 self.ready(target, _ignore)
-        for result in self.outbox.take():
+        for result in self.outbox.pop_results():
             self._apply_result(result)
         for record in self.calls.tick():
             self.revision += 1
@@ -374,7 +374,7 @@ class SessionActing:
             again=partial(self.call, record.service, record.request, record.timeout_s),
         )  # fmt: skip
 
-    def tell(self, level: str, target: Target, words: str, sent: int = 0) -> None:
+    def log(self, level: str, target: Target, words: str, sent: int = 0) -> None:
         """Log what a recording sends; ``sent`` messages have been sent."""
         self.revision += 1
         self._log_to_console(level, f"{target.name}: {words}")
@@ -393,7 +393,7 @@ class SessionActing:
         """Save changes. Called once a second."""
         self._write()
         try:
-            if self._worker.take(FILE):
+            if self._worker.pop_result(FILE):
                 self._session.alerts.resolve("messages:kept")
         except OSError as error:
             self._written = -1  # retried at the next check

@@ -120,7 +120,7 @@ class Outbox:
         self._thread: threading.Thread | None = None
         self._is_closed = False
 
-    def take(self) -> list[SendResult]:
+    def pop_results(self) -> list[SendResult]:
         """Return and clear the results."""
         taken = []
         while self._results:

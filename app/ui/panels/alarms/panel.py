@@ -305,13 +305,13 @@ class AlarmsPanel(PanelWidget):
             row.slots[part.key],
             typed_now(rule, part),
             example_of(part, rule),
-            lambda text: self._take(row, part, text),
+            lambda text: self._apply(row, part, text),
             rejection=rejection_of(part, rule),
         )
         self.field.ended.connect(self._field_ended)
         self.field.offer(self._existing(part, row))
 
-    def _take(self, row: AlarmRow, part: PhrasePart, text: str) -> bool:
+    def _apply(self, row: AlarmRow, part: PhrasePart, text: str) -> bool:
         rule = self._rule(row.rule_id)
         if rule is None:
             return True

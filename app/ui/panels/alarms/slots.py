@@ -30,16 +30,16 @@ class AlarmSlot(PaintedButton):
     def __init__(self, theme: Theme, part: PhrasePart, name: str) -> None:
         super().__init__(theme)
         self.part, self._name = part, name
-        self._say(part)
+        self._update_text(part)
 
     def show_part(self, part: PhrasePart) -> None:
         """Show a part of the sentence."""
         if part != self.part:
             self.part = part
-            self._say(part)
+            self._update_text(part)
 
-    def _say(self, part: PhrasePart) -> None:
-        self.say(part.text, f"{self._name}: {part.text}" if part.text else self._name)
+    def _update_text(self, part: PhrasePart) -> None:
+        self.set_text(part.text, f"{self._name}: {part.text}" if part.text else self._name)
         self.updateGeometry()
         self.update()
 

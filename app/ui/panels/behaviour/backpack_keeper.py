@@ -37,17 +37,17 @@ class BackpackKeeper:
         self._shown = -1
         self._ticks = 0
         editor.backpack_asked.connect(self._asked)
-        self.look()
+        self.reload_if_changed()
 
     def tick(self) -> None:
         """Poll for changes by another Studio; call on every refresh."""
         self._ticks += 1
         if self._ticks % POLL_TICKS == 0:
-            self.look()
+            self.reload_if_changed()
 
-    def look(self) -> None:
+    def reload_if_changed(self) -> None:
         """Reload the backpack if its file changed and show it."""
-        self._backpack.look()
+        self._backpack.reload_if_changed()
         self._show()
 
     def _show(self) -> None:
@@ -66,7 +66,7 @@ class BackpackKeeper:
         if not isinstance(asked, Mapping):
             return
         if asked.get("do") == "look":
-            self.look()
+            self.reload_if_changed()
         elif asked.get("do") == "put":
             blocks, count = asked.get("blocks"), asked.get("count")
             if isinstance(blocks, list) and isinstance(count, int):

@@ -196,7 +196,7 @@ class BehaviourPanel(PanelWidget):
             self._show_live()
         if self._backpack is not None:
             self._backpack.tick()
-        self.waiting.tell(ready=editor.is_ready)
+        self.waiting.report(ready=editor.is_ready)
         robot = bool(self.session.fleet.connected or self.session.coming)
         editor.set_first_step(pgettext("block", "when started"), robot)
 
@@ -475,7 +475,7 @@ class BlocksWait:
         self.words.setParent(place)
         self.words.hide()
 
-    def tell(self, *, ready: bool) -> None:
+    def report(self, *, ready: bool) -> None:
         """Report the page's readiness; call on every refresh."""
         now = self._clock()
         if ready:

@@ -70,7 +70,7 @@ class BehaviourTab(PaintedButton):
         self.setChecked(current)
         self.setFocusPolicy(Qt.FocusPolicy.StrongFocus if current else Qt.FocusPolicy.ClickFocus)
         states = [word for word, so in ((_("not saved"), facts.dirty), (_("running"), facts.runs)) if so]
-        self.say(facts.name, ", ".join([facts.name, *states]))
+        self.set_text(facts.name, ", ".join([facts.name, *states]))
         said = _("The active behaviour") if current else _("Another open behaviour")
         self.setAccessibleDescription(said)
         self.setToolTip(plain.tip(facts.tip or self.accessibleName()))
@@ -224,7 +224,7 @@ class NameField(QLineEdit):
 
     def keyPressEvent(self, event: QKeyEvent) -> None:
         if event.key() in {Qt.Key.Key_Return, Qt.Key.Key_Enter}:
-            self._take()
+            self._commit()
         elif event.key() == Qt.Key.Key_Escape:
             self._end()
         elif event.key() in {Qt.Key.Key_Tab, Qt.Key.Key_F2}:
@@ -240,9 +240,9 @@ class NameField(QLineEdit):
         if self._why_not(self.text()):
             self._end()
         else:
-            self._take()
+            self._commit()
 
-    def _take(self) -> None:
+    def _commit(self) -> None:
         problem = self._why_not(self.text())
         if problem:
             self._mark(problem)

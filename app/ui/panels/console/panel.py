@@ -163,14 +163,14 @@ class ConsolePanel(PanelWidget):
     def _say_nothing(self) -> None:
         chosen = self.level in {"warn", "error"} or self.node or self.words.text()
         if not chosen:
-            self.empty.say(_("No events yet"), _("Log messages of programs and robots appear here."))
+            self.empty.set_texts(_("No events yet"), _("Log messages of programs and robots appear here."))
             self.empty.set_actions([self.why()])
         elif self.node or self.words.text():
-            self.empty.say(_("No matching lines"), _("Show all lines, or wait for a matching one."))
+            self.empty.set_texts(_("No matching lines"), _("Show all lines, or wait for a matching one."))
             self.empty.set_actions([EmptyAction(_("Show all lines"), self.show_all, "x")])
         else:
             said = _("Choose “{everything}” to see all lines.").format(everything=_(LEVEL_WORDS["all"]))
-            self.empty.say(_("No problems reported"), said)
+            self.empty.set_texts(_("No problems reported"), said)
             self.empty.set_actions([])
 
     def hindrances(self) -> list[Hindrance]:

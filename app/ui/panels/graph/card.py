@@ -187,9 +187,9 @@ class GraphCard(QWidget):
         if before is None or _shape(before) != _shape(content):
             self._rebuild(content)
         for box, figure in zip(self._figures, content.figures, strict=True):
-            box.say(figure)
+            box.set_figure(figure)
         for made, table in zip(self._tables, content.tables, strict=True):
-            made.say(table)
+            made.set_table(table)
         self.show()
 
     def _rebuild(self, content: CardContent) -> None:
@@ -243,7 +243,7 @@ class _FigureBox(QWidget):
         column.addLayout(row)
         column.addWidget(self._note)
 
-    def say(self, figure: CardFigure) -> None:
+    def set_figure(self, figure: CardFigure) -> None:
         self._title.setText(figure.title)
         if self._value.text() != figure.value:
             self._value.setText(figure.value)
@@ -291,7 +291,7 @@ class _Table(QWidget):
                 grid.addWidget(shown[-1], number_, place, Qt.AlignmentFlag.AlignRight)
             self.rows.append(_TableRow(button, shown))
 
-    def say(self, table: CardTable) -> None:
+    def set_table(self, table: CardTable) -> None:
         for row, (_key, _name, figures) in zip(self.rows, table.rows, strict=True):
             for shown, words in zip(row.figures, figures, strict=True):
                 if shown.text() != words:  # type: ignore[attr-defined]

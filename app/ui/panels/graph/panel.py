@@ -242,7 +242,7 @@ class GraphPanel(PanelWidget):
     def _take_layout(self) -> None:
         # A large scene is shown one tick after it was built, to keep ticks short.
         scene, self._coming = self._coming, None
-        made = self._thread.take()
+        made = self._thread.pop_result()
         if made is not None:
             graph, self._layout = made
             scene = GraphScene(self.theme, graph, self._layout, self._sizes_asked, self._host)
@@ -272,14 +272,14 @@ class GraphPanel(PanelWidget):
 
     def _say_empty(self) -> None:
         if self.session.master.kind == "none":
-            self.empty.say(
+            self.empty.set_texts(
                 _("No master is running"), _("A master lets programs find each other."), "radio-tower"
             )
             start = self.session.launcher.ensure_master
             self.empty.set_actions([EmptyAction(_("Start a master here"), start, "play", primary=True)])
             return
         said = _("Programs appear here as soon as they join the master.")
-        self.empty.say(_("No nodes yet"), said, "workflow")
+        self.empty.set_texts(_("No nodes yet"), said, "workflow")
         doctor = EmptyAction(
             _("Open the connection doctor"), lambda: self.context.why(self, ""), "stethoscope", primary=True
         )

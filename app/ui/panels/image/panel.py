@@ -179,12 +179,12 @@ class ImagePanel(PanelWidget):
         self._look_at_robot()
         link = self.session.fleet.link(self._watched_robot) if self._watched_robot else None
         boxes = boxes_on(link, self._topic) if link is not None else ()
-        self.view.take(self._stream, boxes, self.overlays.on)
+        self.view.show_image(self._stream, boxes, self.overlays.on)
         self.look_bar.refresh()
         if self._stream.picture is not None:
             self._page(there=True)
         elif self._stream.error:
-            self.empty.say(_("Can't be shown as an image"), f"{self._stream.error}.", "circle-x")
+            self.empty.set_texts(_("Can't be shown as an image"), f"{self._stream.error}.", "circle-x")
             look = EmptyAction(_("Open the message"), self._inspect, "list-tree")
             self.empty.set_actions([look, self.why(self._topic)])
         # the playhead is before the topic's first image
@@ -205,11 +205,11 @@ class ImagePanel(PanelWidget):
     def _say_nothing(self) -> None:
         if self._topic:
             words = _("The next image on {topic} appears here.").format(topic=topic_words(self._topic))
-            self.empty.say(_("No images yet"), words, "image")
+            self.empty.set_texts(_("No images yet"), words, "image")
             self.empty.set_actions([self.why(self._topic)])
         else:
             words = _("Images appear here as soon as a camera publishes them.")
-            self.empty.say(_("No images yet"), words, "image")
+            self.empty.set_texts(_("No images yet"), words, "image")
             robot = EmptyAction(_("Use the virtual robot"), lambda: self.context.run("robots.virtual"), "bot")
             self.empty.set_actions([robot, self.why()])
         self._page(there=False)

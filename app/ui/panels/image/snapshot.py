@@ -41,7 +41,7 @@ class SnapshotJob(QObject):
         self._made: queue.SimpleQueue[Made] = queue.SimpleQueue()
         self._timer = QTimer(self)
         self._timer.setInterval(POLL_MS)
-        self._timer.timeout.connect(self._tell)
+        self._timer.timeout.connect(self._report)
 
     @property
     def busy(self) -> bool:
@@ -84,7 +84,7 @@ class SnapshotJob(QObject):
             made = f"{type(error).__name__}: {error}"
         self._made.put(made)
 
-    def _tell(self) -> None:
+    def _report(self) -> None:
         try:
             made = self._made.get_nowait()
         except queue.Empty:

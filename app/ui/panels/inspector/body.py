@@ -48,7 +48,7 @@ class CompareStrip(QWidget):
         row.addWidget(self.only)
         self.hide()
 
-    def say(self, compared_with: str, counts: Counts, whole: bool) -> None:
+    def set_summary(self, compared_with: str, counts: Counts, whole: bool) -> None:
         """Show the summary, such as ``Previous message: 3 changed, 1 added``."""
         said = _("{compared_with}: {changes}")
         self.words.setText(said.format(compared_with=compared_with, changes=changes_words(counts, whole)))
@@ -144,7 +144,7 @@ class InspectorBody(QWidget):
         words = words.format(topic=topic)
         if words != self._waiting:
             self._waiting = words
-            self.empty.say(_("No message yet"), words)
+            self.empty.set_texts(_("No message yet"), words)
             self.empty.set_actions([why])
 
     def say_unread(self, topic: str, reason: str, why: EmptyAction) -> None:
@@ -152,7 +152,7 @@ class InspectorBody(QWidget):
         words = _("{topic}: {reason}.").format(topic=topic, reason=reason)
         if words != self._waiting:
             self._waiting = words
-            self.empty.say(_("Can't be decoded here"), words)
+            self.empty.set_texts(_("Can't be decoded here"), words)
             self.empty.set_actions([why])
 
     def say_nothing(self, topic: str, choose: Callable[[], object], why: EmptyAction) -> None:
@@ -161,12 +161,12 @@ class InspectorBody(QWidget):
         if topic:
             self.say_waiting(topic, published=True, why=why)
         else:
-            self.empty.say(_("Nothing selected"), _("Click a topic to see its newest message."))
+            self.empty.set_texts(_("Nothing selected"), _("Click a topic to see its newest message."))
             self.empty.set_actions([EmptyAction(_("Choose a topic"), choose, "list")])
 
     def say_large(self, size_bytes: int, words: str, read: Callable[[], object] | None = None) -> None:
         """Show that the message is large; `read` decodes it on request."""
-        self.large.say(_("Message of {size}").format(size=size_words(size_bytes)), words)
+        self.large.set_texts(_("Message of {size}").format(size=size_words(size_bytes)), words)
         if read is None:
             self.large.set_actions([])
         elif self.page != LARGE:

@@ -98,7 +98,7 @@ class FindBar(QWidget):
         self._more = False
         self._place = -1
         self.field = FindField(theme)
-        self.field.textChanged.connect(self.look)
+        self.field.textChanged.connect(self.search)
         self.field.step_wanted.connect(self.step)
         self.before = IconButton(theme, "chevron-up", _("Previous"), "Shift+Return", size=22)
         self.after = IconButton(theme, "chevron-down", _("Next"), "Return", size=22)
@@ -118,7 +118,7 @@ class FindBar(QWidget):
         """Matches so far: paths, or offsets in a large text."""
         return self._matches or []
 
-    def look(self, words: str) -> None:
+    def search(self, words: str) -> None:
         """Search for words and go to the first match; text that begins with ``$`` is a query."""
         self._place = -1
         self._matches = []
@@ -132,7 +132,7 @@ class FindBar(QWidget):
         if is_query:
             return
         self._search(words)
-        self._say(wrong=bool(words) and not self.matches)
+        self._update_count(wrong=bool(words) and not self.matches)
         if self.matches:
             self.step(1)
 
@@ -159,7 +159,7 @@ class FindBar(QWidget):
             found = self.matches[self._place]
             place = isinstance(found, int) and self._index is not None
             self.found.emit(self._index.path_to(found) if place else found)  # type: ignore[union-attr, arg-type]
-        self._say(wrong=not self.matches)
+        self._update_count(wrong=not self.matches)
 
     def _search(self, words: str) -> None:
         if not words:
@@ -174,7 +174,7 @@ class FindBar(QWidget):
         self._more = len(found) > MAX_MATCHES
         self._matches = found[:MAX_MATCHES]
 
-    def _say(self, *, wrong: bool) -> None:
+    def _update_count(self, *, wrong: bool) -> None:
         total = f"{len(self.matches)}{'+' if self._more else ''}"
         words = _("{place} of {total}") if self.matches else pgettext("found", "none")
         words = words.format(place=self._place + 1, total=total)

@@ -77,7 +77,7 @@ class HistoryStrip(QWidget):
         self._topic = ""
         self.kept.rewind()
         self.at = None
-        self.say(at_once=True)
+        self.refresh(at_once=True)
 
     def shown(self) -> Message | None:
         """Return the selected message; None for the newest, or if it has been evicted."""
@@ -98,7 +98,7 @@ class HistoryStrip(QWidget):
         """Select a message by number; None follows the newest."""
         if number != self.at:
             self.at = number
-            self.say(at_once=True)
+            self.refresh(at_once=True)
             self.moved.emit()
 
     def follow(self) -> None:
@@ -106,7 +106,7 @@ class HistoryStrip(QWidget):
         if self.at is not None and self.at >= self.kept.end:
             self.at = None
 
-    def say(self, *, at_once: bool = False, beside: bool = False) -> None:
+    def refresh(self, *, at_once: bool = False, beside: bool = False) -> None:
         """Update the strip; call on every refresh. `beside` is True if other parts are repainted anyway."""
         self._ticks += 1
         self.follow()

@@ -138,9 +138,9 @@ class ObjectsView(QWidget):
         if columns != self._columns or self.table is None:
             self._make_table(columns, rows)
         self._put(rows, now)
-        self._say(len(rows), total, path)
+        self._set_status(len(rows), total, path)
 
-    def _say(self, shown: int, total: int, path: str) -> None:
+    def _set_status(self, shown: int, total: int, path: str) -> None:
         if shown < total and shown >= MOST_ROWS:
             words = _("the first {shown} of {count} rows").format(shown=grouped(shown), count=grouped(total))
         else:

@@ -148,18 +148,18 @@ class InspectorPanel(PanelWidget):
         if topic is not None and newest is not None and newest is not self._shown and not self.holds:
             taken = self._pace.may(self.clock())
             if taken:
-                self._take(newest)
+                self._add_message(newest)
         elif recorded and newest is None and self._shown is not None and not self.holds:
             self._show_none_yet()
         if self.body.page == NOTHING:
             self._say_waiting(topic)
-        done = self.reader.take()
+        done = self.reader.pop_result()
         if done is not None and not self._raw_wanted:
             self._show_read(done)
-        answer = self.query.take(self.clock())
+        answer = self.query.pop_answer(self.clock())
         if answer is not None and self._value is not None:
             self._show_found(answer)
-        self.history.say(beside=taken)
+        self.history.refresh(beside=taken)
         self._show_fading(taken=taken)
 
     def _show_fading(self, *, taken: bool) -> None:
@@ -191,7 +191,7 @@ class InspectorPanel(PanelWidget):
             published = topic is not None and topic.publishers > 0
             self.body.say_waiting(topic_words(self._topic), published, self.why(self._topic))
 
-    def _take(self, message: Message) -> None:
+    def _add_message(self, message: Message) -> None:
         large = message.size_bytes > LARGE_BYTES and message.codec != "image"
         if self._raw_wanted:
             self._show_raw(message, "")
@@ -257,7 +257,7 @@ class InspectorPanel(PanelWidget):
         if self.comparing:
             base = self._pinned if self.pin.isChecked() else self._before
             compared_with = self._pinned_words if self.pin.isChecked() else _(BEFORE)
-            self.strip.say(compared_with, *count_changes(self._value, base))
+            self.strip.set_summary(compared_with, *count_changes(self._value, base))
         self.strip.setVisible(self.comparing and self.body.page == TREE)
         only = self.comparing and base is not OFF and self.strip.only.isChecked()
         self.model.set_value(self._value, self.clock(), base, changes_only=only)
@@ -348,7 +348,7 @@ class InspectorPanel(PanelWidget):
         self.reader.forget()
         message = self.history.shown()
         if message is not None:
-            self._take(message)
+            self._add_message(message)
         elif self.history.at is None:
             self.freeze.setChecked(False)
             self._refresh_now()
@@ -373,7 +373,7 @@ class InspectorPanel(PanelWidget):
         if self._reading is not None and self._reading.message is shown and not self._raw_wanted:
             self._show_read(self._reading)
         elif self.session.topic(self._topic) is not None:
-            self._take(shown)
+            self._add_message(shown)
 
     def _chosen(self, index: QModelIndex) -> None:
         self.foot.show_path(self.model.node(index).path if index.isValid() else "")

@@ -71,19 +71,19 @@ class QueryStrip(QWidget):
                 self._query = JsonQuery(text)
             except QueryError as error:
                 sentence = error.sentence
-        self._say(sentence, wrong=bool(sentence))
+        self._set_status(sentence, wrong=bool(sentence))
         return not sentence
 
     def ask(self, value: object) -> None:
         """Queue a message for evaluation; `take` returns the answer."""
         self._value, self._due = value, True
 
-    def take(self, now: float) -> QueryAnswer | None:
+    def pop_answer(self, now: float) -> QueryAnswer | None:
         """Return a new answer once, or None; call on every refresh with monotonic time."""
-        done = self._worker.take()
+        done = self._worker.pop_result()
         if done is not None:
             self._not_before = now + (LOAD_DIVISOR - 1) * done.took_s
-            self._say(found_words(done.answer), wrong=False)
+            self._set_status(found_words(done.answer), wrong=False)
         if self._due and self._query is not None and not self._worker.busy and now >= self._not_before:
             self._due = False
             self._worker.ask(_Asked(self._query, self._value))
@@ -93,7 +93,7 @@ class QueryStrip(QWidget):
         """Discard pending work because another topic is shown."""
         self._worker.forget()
         self._value, self._due = None, False
-        self._say("", wrong=False)
+        self._set_status("", wrong=False)
 
     def show_on(self, *, tree: bool) -> None:
         """Show the strip if the tree is visible and there is text."""
@@ -104,7 +104,7 @@ class QueryStrip(QWidget):
         """Stop the background thread."""
         self._worker.close()
 
-    def _say(self, words: str, *, wrong: bool) -> None:
+    def _set_status(self, words: str, *, wrong: bool) -> None:
         self.words.setText(words)
         set_role(self.words, "warn" if wrong else "textSecondary")
         self.show_on(tree=self._on_tree)

@@ -199,7 +199,7 @@ class TreeModel(QAbstractItemModel):
             if now is not None and not is_container(value) and differs(before, value):
                 node.changed_s = self.changed_at_s = now
             if marked:
-                self._tell(node, node)
+                self._emit_changed(node, node)
             return
         parts = self._parts(node, max(len(loaded), PAGE_SIZE) if loaded or is_container(value) else 0)
         wanted = [each[0] for each in parts]
@@ -214,9 +214,9 @@ class TreeModel(QAbstractItemModel):
             self._update(child, newer, now)
         rows = [child.row for child in loaded if child.changed_s == now and now is not None]
         if rows:
-            self._tell(loaded[rows[0]], loaded[rows[-1]])
+            self._emit_changed(loaded[rows[0]], loaded[rows[-1]])
 
-    def _tell(self, first: TreeNode, last: TreeNode) -> None:
+    def _emit_changed(self, first: TreeNode, last: TreeNode) -> None:
         if first is not self._root:
             roles = [Qt.ItemDataRole.DisplayRole]
             self.dataChanged.emit(self.index_of(first), self.index_of(last), roles)

@@ -124,7 +124,7 @@ class NodesPanel(NetworkTable[NodeRow]):
 
     def say_empty(self) -> None:
         said = _("Programs appear here as soon as they join the master.")
-        self.empty.say(_("No nodes yet"), said, "network")
+        self.empty.set_texts(_("No nodes yet"), said, "network")
         self.empty.set_actions([])
 
     def _chosen(self, _now: QModelIndex, _before: QModelIndex) -> None:

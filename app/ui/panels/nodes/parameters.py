@@ -171,7 +171,7 @@ class ParametersPart(QWidget):
         for widget in (self.name, self.editors, self.button):
             paint.show_when(widget, shown)
         if parameter is None or node is None:
-            self._say(_("Choose a parameter to change its value."))
+            self._set_status(_("Choose a parameter to change its value."))
             return
         self.name.setText(parameter.name)
         self.name.setToolTip(plain.tip(_tip(parameter)))
@@ -208,16 +208,16 @@ class ParametersPart(QWidget):
         refusal = self.parameters.refusal
         self.field.mark(wrong=bool(refusal))
         if refusal:
-            self._say(_sentence(refusal), "error")
+            self._set_status(_sentence(refusal), "error")
         elif waits:
-            self._say(_("Waiting for the node's answer"))
+            self._set_status(_("Waiting for the node's answer"))
         elif why_not:
-            self._say(_sentence(why_not))
+            self._set_status(_sentence(why_not))
         else:
             words = (shortened(parameter.description, 300), allowed_words(parameter))
-            self._say("; ".join(filter(None, words)))
+            self._set_status("; ".join(filter(None, words)))
 
-    def _say(self, words: str, role: str = "textTertiary") -> None:
+    def _set_status(self, words: str, role: str = "textTertiary") -> None:
         set_role(self.sentence, role)
         if words != self.sentence.text():
             self.sentence.setText(words)

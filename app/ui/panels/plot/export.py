@@ -61,7 +61,7 @@ class CsvWriter:
                 raise OSError(errno.ECANCELED, os.strerror(errno.ECANCELED))
             yield lines.encode()
 
-    def take(self) -> str | None:
+    def pop_result(self) -> str | None:
         """Return None while writing, "" on success, else the reason of the failure."""
         return self._done
 
@@ -184,11 +184,11 @@ class PlotExport:
             try:
                 write_atomically(path, picture.png() if kind == PNG else picture.svg())
             except OSError as error:
-                self._tell(path, error.strerror or type(error).__name__)
+                self._report(path, error.strerror or type(error).__name__)
             else:
-                self._tell(path, "")
+                self._report(path, "")
             return
-        if self._writer is not None and self._writer.take() is None:
+        if self._writer is not None and self._writer.pop_result() is None:
             self._context.toast(_("The previous export is still running"))
             return
         curves = [each.curve for each in self._curves() if not each.hidden]
@@ -197,11 +197,11 @@ class PlotExport:
 
     def follow(self) -> None:
         """Report a finished export; call on every tick."""
-        if self._writer is not None and (failed := self._writer.take()) is not None:
-            self._tell(self._writer.path, failed)
+        if self._writer is not None and (failed := self._writer.pop_result()) is not None:
+            self._report(self._writer.path, failed)
             self._writer = None
 
-    def _tell(self, path: Path, reason: str) -> None:
+    def _report(self, path: Path, reason: str) -> None:
         if reason:
             said = _("can't write {file}: {reason}").format(file=path.name, reason=reason)
         else:

@@ -143,7 +143,7 @@ class AddCurve(SearchField):
         if self._matches is None or self._matches.parentWidget() is not window:
             self._drop_matches()
             self._matches = _Matches(self._theme, window)
-            self._matches.list.pressed_row.connect(lambda: self._take(right=False))
+            self._matches.list.pressed_row.connect(lambda: self._commit(right=False))
         return self._matches
 
     def _drop_matches(self) -> None:
@@ -204,7 +204,7 @@ class AddCurve(SearchField):
         for line in list(shown.lines.lines):
             found = None if isinstance(line, Heading) else self._known.get(line.entry.words)
             if found is not None and not isinstance(line, Heading):
-                shown.tell(line.entry.id, _note(found))
+                shown.update_entry(line.entry.id, _note(found))
 
     def _read(self) -> None:
         self._known = dict(self.offers.fields())
@@ -305,7 +305,7 @@ class AddCurve(SearchField):
     def keyPressEvent(self, event: QKeyEvent) -> None:
         key = event.key()
         if key in {Qt.Key.Key_Return, Qt.Key.Key_Enter}:
-            self._take(right=bool(event.modifiers() & Qt.KeyboardModifier.ShiftModifier))
+            self._commit(right=bool(event.modifiers() & Qt.KeyboardModifier.ShiftModifier))
         elif key == Qt.Key.Key_Escape:
             self.clear()
             self.shut()
@@ -319,7 +319,7 @@ class AddCurve(SearchField):
         else:
             super().keyPressEvent(event)
 
-    def _take(self, *, right: bool) -> None:
+    def _commit(self, *, right: bool) -> None:
         # A complete expression takes precedence over the selected match.
         typed = self.text().strip()
         entry = self._matches.list.entry if self._matches is not None and self._matches.isVisible() else None

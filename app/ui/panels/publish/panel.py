@@ -274,7 +274,7 @@ class PublishPanel(PanelWidget):
         """Send the selected message once."""
         message = self.message
         if message is not None:
-            self._tell(self.acting.send(message))
+            self._set_reason(self.acting.send(message))
 
     def repeat(self) -> None:
         """Start or stop repeated sending of the selected message."""
@@ -285,9 +285,9 @@ class PublishPanel(PanelWidget):
             self.acting.end(message.id)
             self.refresh()
         else:
-            self._tell(self.acting.send(message, rate_hz=message.rate_hz))
+            self._set_reason(self.acting.send(message, rate_hz=message.rate_hz))
 
-    def _tell(self, why_not: str) -> None:
+    def _set_reason(self, why_not: str) -> None:
         if why_not:
             self.context.toast(why_not)
         self.refresh()

@@ -18,7 +18,7 @@ from app.core.recording.choice import file_stem
 from app.core.recording.choice import free_path as free
 from app.core.recording.exporting import RecordingExport
 from app.core.recording.film_strip import FilmStripLook, film_strip
-from app.core.recording.folder import FolderLook, RecordingFacts, RecordingFolder, picture_in
+from app.core.recording.folder import FolderScan, RecordingFacts, RecordingFolder, picture_in
 from app.core.recording.opener import RecordingOpener
 from app.core.recording.recordings import FOLDER_KEY
 from app.ui.other_programs import open_outside
@@ -56,7 +56,7 @@ class RecordingsPanel(TablePanel[RecordingFacts]):
         self._recordings = context.session.recordings
         self._folder = RecordingFolder(self._recordings.folder, self._recordings.new_opener())
         self._opener = self._recordings.new_opener()
-        self._look = FolderLook(is_whole=False)
+        self._look = FolderScan(is_whole=False)
         self._has_looked = False
         self._pictures: OrderedDict[tuple[Path, float, int], QImage | None] = OrderedDict()
         self._asked: dict[str, tuple[Path, float, int]] = {}
@@ -115,8 +115,8 @@ class RecordingsPanel(TablePanel[RecordingFacts]):
         seen = recordings.client.revision
         is_new = seen != self._recorder_seen
         if self._ticks % SCAN_TICKS == FIRST_SCAN_TICK:
-            self._folder.look(recordings.client.state.path if recordings.is_recording else None)
-        found = self._folder.take()
+            self._folder.start_scan(recordings.client.state.path if recordings.is_recording else None)
+        found = self._folder.pop_result()
         if found is not None:
             self._look, self._has_looked = found, True
         if found is not None or is_new:
@@ -184,16 +184,16 @@ class RecordingsPanel(TablePanel[RecordingFacts]):
         is_own = bool(self.session.settings.get(FOLDER_KEY, ""))
         if not self._has_looked:
             said = _("Recordings in this folder appear here in a moment.")
-            self.empty.say(_("Reading the folder"), said, "folder-open")
+            self.empty.set_texts(_("Reading the folder"), said, "folder-open")
             self.empty.set_actions([])
         elif self._look.problem and is_own:
             said = _("{folder}: {reason}.").format(folder=folder, reason=self._look.problem)
-            self.empty.say(_("The recordings folder doesn't exist"), said, "folder-open")
+            self.empty.set_texts(_("The recordings folder doesn't exist"), said, "folder-open")
             choose = EmptyAction(_("Choose a folder"), lambda: self.context.run("recording.folder"), "folder")
             self.empty.set_actions([choose])
         else:
             said = _("Start recording, or save the last seconds when something happened.")
-            self.empty.say(_("No recordings yet"), said, "film")
+            self.empty.set_texts(_("No recordings yet"), said, "film")
             record = EmptyAction(
                 _("Record"), lambda: self.context.run("recording.toggle"), "circle-dot", primary=True
             )
@@ -228,7 +228,7 @@ class RecordingsPanel(TablePanel[RecordingFacts]):
     def _take_pictures(self) -> bool:
         is_any = False
         for owner, mark in list(self._asked.items()):
-            made = self._artist.take(owner)
+            made = self._artist.pop_result(owner)
             if made is not None:
                 is_any = True
                 del self._asked[owner]
@@ -253,7 +253,7 @@ class RecordingsPanel(TablePanel[RecordingFacts]):
 
     def _follow_strip(self) -> None:
         # Shows a loaded film strip; a loop on the timeline becomes the selected part.
-        made = self._strips.take("strip")
+        made = self._strips.pop_result("strip")
         if made is not None:
             look, images = made
             if look is not None and self._strip_of is not None and look.path == self._strip_of[0]:

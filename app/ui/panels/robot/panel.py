@@ -89,7 +89,7 @@ class RobotPanel(OneRobotPanel):
         start = EmptyAction(_("Use the virtual robot"), lambda: self.context.run("robots.virtual"), "bot")
         self.empty = EmptyState(self.theme, "bot", title, text, [start])
         self._no_robot = NoRobot(self.empty, title, text, [start])
-        self._no_robot.tell(self.session.coming)
+        self._no_robot.set_starting(self.session.coming)
         self.pages = self.show_one_of(self.empty, self.stage)
 
     def _room_tools(self, size: int) -> tuple[IconButton, IconButton]:
@@ -138,7 +138,7 @@ class RobotPanel(OneRobotPanel):
 
     def refresh_robot(self, link: RobotLink | None) -> None:
         if link is None:
-            self._no_robot.tell(self.session.coming)
+            self._no_robot.set_starting(self.session.coming)
             return
         self._show_sound()
         if self._large is not None:
@@ -182,10 +182,10 @@ class RobotPanel(OneRobotPanel):
         self.pages.setCurrentWidget(self.empty)
         if link.virtual:
             title = _("{robot} is starting").format(robot=link.name)
-            self.empty.say(title, _("The robot is drawn as soon as it reports its position."))
+            self.empty.set_texts(title, _("The robot is drawn as soon as it reports its position."))
             self.empty.set_actions([])
         else:
-            self.empty.say(link.name, _where_to_look(link))
+            self.empty.set_texts(link.name, _where_to_look(link))
             show = EmptyAction(_("Show actions"), lambda: self.context.run("panel:robots"), "bot")
             self.empty.set_actions([show])
 

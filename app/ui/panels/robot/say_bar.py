@@ -43,7 +43,7 @@ class SayField(SearchField):
     def sizeHint(self) -> QSize:
         return QSize(120, super().sizeHint().height())
 
-    def say(self, words: str) -> None:
+    def submit(self, words: str) -> None:
         """Emit `said` with these words and clear the field."""
         if words.strip():
             self._last = words.strip()
@@ -53,7 +53,7 @@ class SayField(SearchField):
     def keyPressEvent(self, event: QKeyEvent) -> None:
         key = event.key() if is_plain(event) else None
         if key in {Qt.Key.Key_Return, Qt.Key.Key_Enter}:
-            self.say(self.text())
+            self.submit(self.text())
         elif key == Qt.Key.Key_Up and not self.text():
             self.setText(self._last)
         elif key == Qt.Key.Key_Down:
@@ -121,7 +121,7 @@ class SayBar(QWidget):
         menu = Menu(self._theme, self)
         for word in self.choices():
             menu.addAction(plain.entry(word)).triggered.connect(
-                lambda _on=False, word=word: self.field.say(word)
+                lambda _on=False, word=word: self.field.submit(word)
             )
         if menu.isEmpty():
             menu.addAction(_("No program is waiting for words")).setEnabled(False)

@@ -170,16 +170,16 @@ class ActionForm(QWidget):
         for parameter in self.action.parameters:
             self._judge(parameter, [each.sentence for each in problems if each.parameter == parameter.name])
         rows = {parameter.name for parameter in self.action.parameters}
-        self._say(self.problem, [each.sentence for each in problems if each.parameter not in rows])
+        self._set_errors(self.problem, [each.sentence for each in problems if each.parameter not in rows])
 
     def _judge(self, parameter: Parameter, said: Sequence[str]) -> None:
         control = self.controls[parameter.name]
-        self._say(self._sentences[parameter.name], () if control.sentence else said)
+        self._set_errors(self._sentences[parameter.name], () if control.sentence else said)
         self._mark(control.widget, wrong=bool(said or control.sentence))
         if said and parameter.advanced:
             self.more.setChecked(True)
 
-    def _say(self, place: QLabel, sentences: Sequence[str]) -> None:
+    def _set_errors(self, place: QLabel, sentences: Sequence[str]) -> None:
         place.setText(" ".join(f"{sentence_case(one)}." for one in sentences))
         place.setVisible(bool(sentences))
 

@@ -126,7 +126,7 @@ class RobotsPanel(OneRobotPanel):
         )
         self.empty = EmptyState(theme, "bot", title, text, [start])
         self._no_robot = NoRobot(self.empty, title, text, [start])
-        self._no_robot.tell(self.session.coming)
+        self._no_robot.set_starting(self.session.coming)
         self.list = RobotList(theme, self.context.run)
         self.list.chosen.connect(self.choose)
         self.list.forgotten.connect(self.forget)
@@ -187,7 +187,7 @@ class RobotsPanel(OneRobotPanel):
         if link is not None:
             self._show_link(link)
         else:
-            self._no_robot.tell(self.session.coming)
+            self._no_robot.set_starting(self.session.coming)
 
     def _new(self, what: str, *now: object) -> bool:
         # True if the value differs from the one shown last.

@@ -239,14 +239,14 @@ class ServicesPanel(PanelWidget):
 
     def _say_empty(self) -> None:
         if self.session.master.kind == "none":
-            self.empty.say(
+            self.empty.set_texts(
                 _("No master is running"), _("A master lets programs find each other."), "radio-tower"
             )
             start = self.session.launcher.ensure_master
             self.empty.set_actions([EmptyAction(_("Start a master here"), start, "play", primary=True)])
         else:
             said = _("Services appear here as soon as a program offers one.")
-            self.empty.say(_("No services available"), said, "spline")
+            self.empty.set_texts(_("No services available"), said, "spline")
             self.empty.set_actions([self.why()])
 
     @property

@@ -73,7 +73,7 @@ class TimelinePanel(PanelWidget):
         self.strip.change_wanted.connect(self.choose_sent)
         self.chooser.left.connect(self._leave_chooser)
         self.chooser.refused.connect(self.context.toast)
-        self._say()
+        self._update_text()
 
     # -- display ------------------------------------------------------------------------------------------
 
@@ -82,7 +82,7 @@ class TimelinePanel(PanelWidget):
         player = replay.player if replay is not None else None
         if replay is None or player is None or replay.opened is None:
             self._shown = None
-            self._say()
+            self._update_text()
             return
         if replay is not self._shown:
             self._shown, self._state = replay, ()
@@ -91,7 +91,7 @@ class TimelinePanel(PanelWidget):
             self.canvas.show_replay(replay)
             self.pages.setCurrentIndex(1)
             self.ruler.setVisible(True)
-        is_new = replay.densities is not None and replay.densities.take()
+        is_new = replay.densities is not None and replay.densities.collect_results()
         state = (replay.chosen, tuple(replay.bookmarks))
         if is_new or state != self._state:
             self._state = state
@@ -103,7 +103,7 @@ class TimelinePanel(PanelWidget):
             self.chooser.refresh()
         self.canvas.move_to(player.position_ns, player.loop if player.is_looping else None)
 
-    def _say(self) -> None:
+    def _update_text(self) -> None:
         # Progress of opening, the error, or how to open a recording.
         replay = self.session.replay
         status = replay.status if replay is not None else None
@@ -124,7 +124,7 @@ class TimelinePanel(PanelWidget):
             return
         self._state = words
         title, sentence, offers = words
-        self.empty.say(str(title), str(sentence), "film")
+        self.empty.set_texts(str(title), str(sentence), "film")
         action = EmptyAction(
             _("Open a recording"), lambda: self.context.run("replay.open"), "folder-open", primary=True
         )

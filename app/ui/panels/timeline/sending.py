@@ -172,7 +172,7 @@ class SendChooser(QWidget):
     def _toggle(self, topic: str) -> None:
         sending = self._sending
         if sending is not None:
-            self._say(sending.choose(topic, None if topic in sending.routes else ""))
+            self._set_problem(sending.choose(topic, None if topic in sending.routes else ""))
             self._show_name()
 
     def _show_name(self) -> None:
@@ -187,9 +187,9 @@ class SendChooser(QWidget):
     def _type(self, text: str) -> None:
         topic = self.table.chosen_key()
         if topic and self._sending is not None:
-            self._say(self._sending.choose(topic, text))
+            self._set_problem(self._sending.choose(topic, text))
 
-    def _say(self, problem: str) -> None:
+    def _set_problem(self, problem: str) -> None:
         self.problem.setText(problem)
         self._seen = None
         self.refresh()

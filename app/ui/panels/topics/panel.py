@@ -180,10 +180,12 @@ class TopicsPanel(NetworkTable[TreeRow]):
     def say_empty(self) -> None:
         if self.session.master.kind == "searching":
             said = _("At {address}.").format(address=self.session.master.address)
-            self.empty.say(_("Searching for a master"), said, "radio-tower")
+            self.empty.set_texts(_("Searching for a master"), said, "radio-tower")
             self.empty.set_actions([])
         else:
-            self.empty.say(_("No topics yet"), _("Topics appear as soon as a program publishes."), "list")
+            self.empty.set_texts(
+                _("No topics yet"), _("Topics appear as soon as a program publishes."), "list"
+            )
             self.empty.set_actions(
                 [EmptyAction(_("Use the virtual robot"), self._use_virtual, "bot", primary=True)]
             )

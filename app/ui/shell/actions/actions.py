@@ -71,7 +71,7 @@ class Actions:
         return name in self._actions
 
     def bind(self, button: QAbstractButton, name: str) -> None:
-        """Make a button trigger a command; its tooltip shows the command's keys (`Shortcuts.tell`)."""
+        """Make a button trigger a command; its tooltip shows the command's keys (see `Shortcuts`)."""
         name_command(button, name)
         button.clicked.connect(self[name].trigger)
 

@@ -237,7 +237,7 @@ class Shortcuts(QObject):
             self._complain(str(error))
         self.changed.emit()
 
-    def tell(self) -> None:
+    def update_tooltips(self) -> None:
         """Update the keys in the tooltips of all buttons with the property ``command``."""
         for widget in QApplication.allWidgets():
             command = widget.property("command")

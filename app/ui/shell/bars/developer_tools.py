@@ -68,11 +68,11 @@ class RecordButton(Button):
         bare = self.icon_side() + 2 * self.measure.padding
         return QSize(bare if self._is_bare else round(self._theme.scaled(RECORD_PX)), high)
 
-    def _look(self) -> tuple[QColor | None, QColor | None, QColor]:
+    def _colours(self) -> tuple[QColor | None, QColor | None, QColor]:
         colour = self._theme.colour
         if self._is_on and self.isEnabled():
             return colour("pressed"), colour("borderStrong"), colour("error")
-        return super()._look()
+        return super()._colours()
 
 
 LIVE_ICON, RECORDING_ICON = "radio-tower", "history"
@@ -112,11 +112,11 @@ class SourceSwitch(MenuButton):
         menu.addActions([self._actions["replay.open"], self._actions["replay.live"]])
         drop_below(menu, self)
 
-    def _look(self) -> tuple[QColor | None, QColor | None, QColor]:
+    def _colours(self) -> tuple[QColor | None, QColor | None, QColor]:
         if self._is_recording and self.isEnabled():
             colour = self._theme.colour
             return colour("accentTint"), colour("accent"), colour("accentText")
-        return super()._look()
+        return super()._colours()
 
 
 class DeveloperTools(QObject):

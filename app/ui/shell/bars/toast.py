@@ -50,7 +50,7 @@ class Toast(FloatingCard):
         """Sentence shown last."""
         return self._words.text()
 
-    def say(
+    def show_toast(
         self,
         words: str,
         button: str = "",

@@ -26,7 +26,7 @@ class ActingCommands:
     def publish(self, key: str = "") -> bool:
         """Open a new message for a topic, or without one for ""."""
         if split_key(key)[0]:
-            self._shell.say(_("Only topics of Studio's own network can be published to"))
+            self._shell.show_toast(_("Only topics of Studio's own network can be published to"))
             return False
         return self._begin("publish", key)
 

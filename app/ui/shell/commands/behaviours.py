@@ -161,7 +161,7 @@ class BehaviourCommands:
         was_active = runs.active
         begin()
         if was_active and running is not None and running is not shown and not runs.concerns(running):
-            self._shell.say(
+            self._shell.show_toast(
                 _("Stopped “{stopped}” to run “{name}”").format(
                     stopped=session.documents.title(running), name=session.documents.title(shown)
                 )
@@ -276,7 +276,7 @@ class BehaviourCommands:
                 return
             folder = document.path.parent
             if not open_outside(QUrl.fromLocalFile(str(folder))):
-                self._shell.say(_("The file is in {folder}").format(folder=folder))
+                self._shell.show_toast(_("The file is in {folder}").format(folder=folder))
 
         return self._with(key, show)
 
@@ -351,7 +351,7 @@ class BehaviourCommands:
         words = _("Recent files cleared")
         if not self._set_recent([]):
             words = _("Can't save this change: the recent files will return at the next start")
-        self._shell.say(words, _("Undo"), lambda: self._set_recent(before))
+        self._shell.show_toast(words, _("Undo"), lambda: self._set_recent(before))
 
     def _set_recent(self, files: list[RecentFile]) -> bool:
         kept = True

@@ -35,7 +35,7 @@ class Commands:
         keys = Shortcuts(session.settings, shell.complain, COMMANDS)
         self.session = session
         self.files = DocumentController(
-            session, asks, shell.say, partial(bring_into_view, shell), shell.editor
+            session, asks, shell.show_toast, partial(bring_into_view, shell), shell.editor
         )
         self.behaviours = BehaviourCommands(shell, session, self.files, asks)
         session.alarms.run_behaviour = self.behaviours.run_named

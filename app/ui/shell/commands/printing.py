@@ -50,7 +50,7 @@ class Printing:
     def ask(self) -> None:
         """Open the print dialog, or without printers the dialog to save a PDF."""
         if not self._printers():
-            self._shell.say(_("No printer is set up on this computer. Save the pages as PDF instead."))
+            self._shell.show_toast(_("No printer is set up on this computer. Save the pages as PDF instead."))
             self.ask_pdf()
             return
         from PySide6.QtPrintSupport import QPrintDialog, QPrinter  # noqa: PLC0415 - needed for printing only
@@ -73,9 +73,11 @@ class Printing:
             if not data:
                 self._say_nothing_there()
             elif paint_pdf(data, printer):
-                self._shell.say(_("Sent to the printer {name}").format(name=printer.printerName()))
+                self._shell.show_toast(_("Sent to the printer {name}").format(name=printer.printerName()))
             else:
-                self._shell.say(_("The printer {name} does not respond").format(name=printer.printerName()))
+                self._shell.show_toast(
+                    _("The printer {name} does not respond").format(name=printer.printerName())
+                )
 
         self._make(printer.pageLayout(), paint)
 
@@ -99,9 +101,11 @@ class Printing:
             try:
                 write_atomically(whole, data)
             except OSError as error:
-                self._shell.say(_("Can't save the PDF: {why}").format(why=error.strerror or str(error)))
+                self._shell.show_toast(
+                    _("Can't save the PDF: {why}").format(why=error.strerror or str(error))
+                )
             else:
-                self._shell.say(_("Saved {name}").format(name=whole.name))
+                self._shell.show_toast(_("Saved {name}").format(name=whole.name))
 
         self._make(usual_paper(), write)
 
@@ -113,7 +117,7 @@ class Printing:
             editor.pdf(self._session.document.name, date, layout, done)
 
     def _say_nothing_there(self) -> None:
-        self._shell.say(_("This page has no blocks"))
+        self._shell.show_toast(_("This page has no blocks"))
 
 
 def known_printers() -> list[str]:

@@ -72,9 +72,11 @@ class ProgramPictures:
             try:
                 write_atomically(whole, data)
             except OSError as error:
-                self._shell.say(_("Can't save the image: {why}").format(why=error.strerror or str(error)))
+                self._shell.show_toast(
+                    _("Can't save the image: {why}").format(why=error.strerror or str(error))
+                )
             else:
-                self._shell.say(_("Saved {name}").format(name=whole.name))
+                self._shell.show_toast(_("Saved {name}").format(name=whole.name))
 
         self._make(kind, white, write)
 
@@ -87,7 +89,7 @@ class ProgramPictures:
                 self._say_nothing_there()
                 return
             QGuiApplication.clipboard().setImage(image)
-            self._shell.say(_("Copied the image"))
+            self._shell.show_toast(_("Copied the image"))
 
         self._make("png", True, put)
 
@@ -97,4 +99,4 @@ class ProgramPictures:
             editor.picture(kind, white, done)
 
     def _say_nothing_there(self) -> None:
-        self._shell.say(_("This page has no blocks"))
+        self._shell.show_toast(_("This page has no blocks"))

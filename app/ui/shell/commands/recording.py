@@ -54,22 +54,22 @@ class RecordCommands:
     def _begin(self, choice: RecordingChoice | None = None) -> bool:
         why_not = self._recordings.record(choice=choice)
         if why_not and choice is None:
-            self._shell.say(why_not, _("Choose topics to record"), self.open_sheet)
+            self._shell.show_toast(why_not, _("Choose topics to record"), self.open_sheet)
         elif why_not:
-            self._shell.say(why_not)
+            self._shell.show_toast(why_not)
         elif self._session.master.kind != "connected":
-            self._shell.say(_("Recording starts as soon as a master appears"))
+            self._shell.show_toast(_("Recording starts as soon as a master appears"))
         return not why_not
 
     def record_topic(self, key: str) -> bool:
         """Record only this topic, without changing the saved settings."""
         network, topic = split_key(key)
         if network:
-            self._shell.say(_("Only topics of Studio's own network can be recorded"))
+            self._shell.show_toast(_("Only topics of Studio's own network can be recorded"))
             return False
         if not self._begin(RecordingChoice("chosen", (topic,))):
             return False
-        self._shell.say(
+        self._shell.show_toast(
             _("Recording {topic}").format(topic=topic), _("Stop recording"), self._recordings.stop
         )
         return True
@@ -79,7 +79,7 @@ class RecordCommands:
         if self._sheet is None:
             shell = self._shell
             self._sheet = record_sheet.RecordSheet(
-                shell.theme, shell.surface, self._session, self.keep, shell.say
+                shell.theme, shell.surface, self._session, self.keep, shell.show_toast
             )
         self._sheet.open()
 
@@ -87,7 +87,7 @@ class RecordCommands:
         """Save the flight recorder's last seconds as a recording."""
         recordings = self._recordings
         if not recordings.wish.is_on:
-            self._shell.say(
+            self._shell.show_toast(
                 _("The flight recorder is off: there are no last seconds to save"),
                 _("Turn it on"),
                 self._switch_on,
@@ -95,13 +95,13 @@ class RecordCommands:
             return
         why_not = recordings.keep()
         if why_not:
-            self._shell.say(why_not)
+            self._shell.show_toast(why_not)
 
     def _switch_on(self) -> None:
         recordings = self._recordings
         recordings.set_wish(replace(recordings.wish, is_on=True))
         words = _("The flight recorder now keeps the last {count} s")
-        self._shell.say(words.format(count=recordings.wish.seconds))
+        self._shell.show_toast(words.format(count=recordings.wish.seconds))
 
     def show(self, path: Path | None = None) -> None:
         """Show the recordings panel and select a recording."""
@@ -120,7 +120,7 @@ class RecordCommands:
             self.show(path)
         else:
             words = _("{file} is in another folder. Choose that folder for recordings first")
-            self._shell.say(words.format(file=path.name), _("Choose a folder"), self.choose_folder)
+            self._shell.show_toast(words.format(file=path.name), _("Choose a folder"), self.choose_folder)
 
     def choose_folder(self) -> None:
         """Ask for the folder of recordings."""
@@ -128,7 +128,7 @@ class RecordCommands:
 
         def take(folder: Path) -> None:
             recordings.set_folder(folder)
-            self._shell.say(_("Recordings are saved in {folder}").format(folder=folder))
+            self._shell.show_toast(_("Recordings are saved in {folder}").format(folder=folder))
 
         place = recordings.folder
         self._asks.choose_folder(str(place if place.is_dir() else Path.home()), take)
@@ -145,4 +145,4 @@ class RecordCommands:
             words = words.format(
                 file=path.stem, length=length_words(state.duration_s), size=size_words(state.size_bytes)
             )
-        self._shell.say(words, _("Show"), lambda: self.show(path))
+        self._shell.show_toast(words, _("Show"), lambda: self.show(path))

@@ -39,7 +39,7 @@ class ReplayCommands:
     def open(self, path: Path) -> None:
         """Open a recording with its timeline; errors become alerts."""
         if not path.is_file():
-            self._shell.say(_("{file} no longer exists").format(file=path.name))
+            self._shell.show_toast(_("{file} no longer exists").format(file=path.name))
             return
         self._shell.show_layout("developer")
         self._session.open_recording(path)
@@ -77,4 +77,4 @@ class ReplayCommands:
             self._session.alerts.put("recording:bookmark", "error", _("Can't save the bookmark."), sentence)
             return
         if made is not None:
-            self._shell.say(_("Added a bookmark"), _("Undo"), lambda: replay.remove_bookmark(made))
+            self._shell.show_toast(_("Added a bookmark"), _("Undo"), lambda: replay.remove_bookmark(made))

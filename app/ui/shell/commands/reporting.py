@@ -55,14 +55,14 @@ class ReportCommands:
         self._session.alerts.resolve(ALERT)
         doctor = self._session.doctor
         if doctor.looked_s is None or self._clock() - doctor.looked_s > DOCTOR_MAX_AGE_S:
-            doctor.look()
+            doctor.start()
         self._files.with_newest(self._open)
 
     def _open(self) -> None:
         shell, session = self._shell, self._session
         if self._sheet is None:
             self._sheet = report_sheet.ReportSheet(
-                shell.theme, shell.surface, self._asks, shell.say, self._clock
+                shell.theme, shell.surface, self._asks, shell.show_toast, self._clock
             )
         parts = problem_report.ReportParts(
             qt_facts(shell.surface), session.settings.all(), lambda: session.doctor.report(DOCTOR_TIMEOUT_S)
@@ -93,7 +93,7 @@ class ReportCommands:
             if opened
             else _("This is NEP Studio {version}. You'll find newer versions at {page}")
         )
-        self._shell.say(words.format(version=__version__, page=page))
+        self._shell.show_toast(words.format(version=__version__, page=page))
 
 
 def qt_facts(window: QWidget) -> tuple[tuple[str, str], ...]:

@@ -74,7 +74,7 @@ class RobotCommands:
         self._session.launcher.start_virtual_robot("Turtle", "diffdrive")
         if self._shell.bench is None:
             self._shell.show_layout("behaviour")
-        self._shell.say(_("Starting the virtual Turtle"), until=lambda: not self._is_coming("Turtle"))
+        self._shell.show_toast(_("Starting the virtual Turtle"), until=lambda: not self._is_coming("Turtle"))
 
     def _is_coming(self, name: str) -> bool:
         return name in self._session.coming
@@ -109,7 +109,7 @@ class RobotCommands:
             return False
         launcher = self._session.launcher
         launcher.restart_virtual_robot(missing, model)
-        self._shell.say(
+        self._shell.show_toast(
             _("Starting the virtual {robot}").format(robot=missing),
             _("Undo"),
             lambda: launcher.stop_virtual_robot(missing),
@@ -133,7 +133,7 @@ class RobotCommands:
             if document.use_robot(swap.missing, robot):
                 words = _("{robot} does what {other} was asked to do")
                 words = words.format(robot=swap.other, other=swap.missing)
-                self._shell.say(words, _("Undo"), self._undo)
+                self._shell.show_toast(words, _("Undo"), self._undo)
 
         self._files.with_newest(change)
         return True
@@ -146,7 +146,7 @@ class RobotCommands:
         except SettingsError as error:
             self._shell.complain(str(error))
             words = _("Studio will ask again before a real robot moves, until you close it")
-        self._shell.say(words)
+        self._shell.show_toast(words)
 
     def ask_about_others(self) -> None:
         """Open the sheet for access from other computers."""
@@ -172,7 +172,7 @@ class RobotCommands:
                 self._shell.surface,
                 self._session.web_pages,
                 self._robot_names,
-                self._shell.say,
+                self._shell.show_toast,
             )
         self._web_pages.open()
 

@@ -49,7 +49,7 @@ class Shell(Protocol):
         """Current workbench, or None on the start page."""
 
     @property
-    def say(self) -> ShowToast:
+    def show_toast(self) -> ShowToast:
         """Function that shows a toast."""
 
     def complain(self, sentence: str) -> None:

@@ -89,7 +89,7 @@ class VariableCommands:
                     "Deleted “{name}” and {count} blocks that used it",
                     count,
                 ).format(name=name, count=count)
-            self._shell.say(said, _("Undo"), lambda: self._edit({"do": "undo"}))
+            self._shell.show_toast(said, _("Undo"), lambda: self._edit({"do": "undo"}))
 
         self._with_newest(delete)
 
@@ -120,7 +120,7 @@ class VariableCommands:
 
         def take(words: str) -> None:
             if not runs.put_variable(id, value_of(words)):
-                self._shell.say(_("The behaviour ended: “{name}” was not changed").format(name=name))
+                self._shell.show_toast(_("The behaviour ended: “{name}” was not changed").format(name=name))
 
         is_number = now is not None and now.kind == "number"
         self._ask().ask(

@@ -243,7 +243,7 @@ class ViewCommands:
     def _restart(self) -> None:
         why_not = self._shell.restart()
         if why_not:
-            self._shell.say(why_not)
+            self._shell.show_toast(why_not)
 
     def _voice_words(self) -> str:
         # Includes the result of real speech: an engine can be installed without a voice.
@@ -301,7 +301,7 @@ class ViewCommands:
                 if kept
                 else _("Can't save “{name}”: it is kept only until Studio closes")
             )
-            shell.say(words.format(name=name))
+            shell.show_toast(words.format(name=name))
 
         self._ask_name().ask(_("Save layout as"), _("Keep"), arrangements.refusal, keep)
 
@@ -329,7 +329,7 @@ class ViewCommands:
                 if kept
                 else _("Can't save this change: “{name}” will return at the next start")
             )
-            shell.say(words.format(name=name), _("Undo"), undo)
+            shell.show_toast(words.format(name=name), _("Undo"), undo)
 
     def export_layout(self) -> None:
         """Export the current layout to a file."""
@@ -344,9 +344,9 @@ class ViewCommands:
                 write_atomically(path, layout_bytes(name, base, bench.save()))
             except OSError as error:
                 reason = (error.strerror or str(error)).lower()
-                shell.say(_("can't write {file}: {reason}").format(file=path.name, reason=reason))
+                shell.show_toast(_("can't write {file}: {reason}").format(file=path.name, reason=reason))
             else:
-                shell.say(_("Saved the layout to {file}").format(file=path.name))
+                shell.show_toast(_("Saved the layout to {file}").format(file=path.name))
 
         kind = FileKind(LAYOUTS[0], LAYOUTS[1].lstrip("*"))
         suggestion = Path.home() / f"{file_stem(name)}{kind.ending}"
@@ -364,11 +364,13 @@ class ViewCommands:
         except (OSError, LayoutFileError) as error:
             reason = (error.strerror or str(error)) if isinstance(error, OSError) else str(error)
             reason = f"{reason[:1].lower()}{reason[1:]}"
-            shell.say(_("Can't open {file}: {reason}").format(file=path.name, reason=reason))
+            shell.show_toast(_("Can't open {file}: {reason}").format(file=path.name, reason=reason))
             return
         layouts, before = shell.saved_layouts, shell.saved_layouts.own(found.base)
         if not layouts.fits(shell.show_layout(found.base), found.base, found.saved):
-            shell.say(_("Can't open {file}: {reason}").format(file=path.name, reason=_("it is damaged")))
+            shell.show_toast(
+                _("Can't open {file}: {reason}").format(file=path.name, reason=_("it is damaged"))
+            )
             return
         name, _is_kept = layouts.take_in(found.name, found.base, found.saved)
         self.show_own_layout(name)
@@ -385,7 +387,7 @@ class ViewCommands:
             words = _("{opened}. Missing panels were left out: {panels}").format(
                 opened=words, panels=left_out
             )
-        shell.say(words, _("Undo"), undo)
+        shell.show_toast(words, _("Undo"), undo)
 
     def freeze(self) -> None:
         """Freeze all panels, or unfreeze them if all are frozen."""
@@ -460,14 +462,14 @@ class ViewCommands:
             folder.mkdir(0o700, parents=True, exist_ok=True)
         except OSError as error:
             reason = (error.strerror or str(error)).lower()
-            self._shell.say(_("Can't create {folder}: {reason}").format(folder=folder, reason=reason))
+            self._shell.show_toast(_("Can't create {folder}: {reason}").format(folder=folder, reason=reason))
             return
         if not open_outside(QUrl.fromLocalFile(str(folder))):
-            self._shell.say(_("The log files are in {folder}").format(folder=folder))
+            self._shell.show_toast(_("The log files are in {folder}").format(folder=folder))
 
     def about(self) -> None:
         """Show the About dialog."""
-        AboutSheet(self._shell.theme, self._shell.surface, self._shell.say).open()
+        AboutSheet(self._shell.theme, self._shell.surface, self._shell.show_toast).open()
 
 
 def _wish(action: QAction) -> Preference:

@@ -139,7 +139,7 @@ class Palette(Overlay):
         column.addWidget(self.foot)
         self.field.installEventFilter(self)
         self.field.textChanged.connect(self._search)
-        self.rows.moved.connect(self._say)
+        self.rows.moved.connect(self._update_status)
         self.rows.pressed_row.connect(self.do_it)
         theme.changed.connect(self._restyle)
 
@@ -207,7 +207,7 @@ class Palette(Overlay):
         )
         return lines
 
-    def _say(self) -> None:
+    def _update_status(self) -> None:
         # The focus stays in the field, so the selected row is announced to screen readers.
         entry = self.rows.entry
         if entry is not None and self.isVisible():

@@ -349,7 +349,7 @@ class FileSheet(Overlay):
             found = entries_of(folder, self.question.endings)
         except OSError as error:
             reason = (error.strerror or str(error)).lower()
-            self._say(
+            self._set_status(
                 _("Can't open “{folder}”: {reason}.").format(folder=folder.name, reason=reason), "error"
             )
             return
@@ -423,7 +423,7 @@ class FileSheet(Overlay):
                 reason = (error.strerror or str(error)).lower()
                 wrong = _("Can't create “{name}”: {reason}.").format(name=name, reason=reason)
         if wrong:
-            self._say(wrong, "error")
+            self._set_status(wrong, "error")
             return
         self._show_folder_field(False)
         self.go_to(self.folder / name)
@@ -460,19 +460,23 @@ class FileSheet(Overlay):
         self.done.setEnabled((target is not None and writable) or into)
         wrong = self._wrong() if self.saves else ""
         if wrong:
-            self._say(wrong, "error")
+            self._set_status(wrong, "error")
         elif not writable:
-            self._say(_("You don't have permission to save in this folder. Choose another one."), "error")
+            self._set_status(
+                _("You don't have permission to save in this folder. Choose another one."), "error"
+            )
         elif taken and target is not None:
             name = target.name.removesuffix(SUFFIX)
-            self._say(_("“{name}” already exists. Replace it, or keep both.").format(name=name), "text")
+            self._set_status(
+                _("“{name}” already exists. Replace it, or keep both.").format(name=name), "text"
+            )
         elif wants_folder and target is not None:
             name = target.name or str(target)
-            self._say(_("Images will be saved in “{folder}”.").format(folder=name), "text")
+            self._set_status(_("Images will be saved in “{folder}”.").format(folder=name), "text")
         elif not self.list.topLevelItemCount():
-            self._say(_(self.question.empty), "textSecondary")
+            self._set_status(_(self.question.empty), "textSecondary")
         else:
-            self._say("", "textSecondary")
+            self._set_status("", "textSecondary")
 
     def _wrong(self) -> str:
         name = self.name.text().strip()
@@ -485,7 +489,7 @@ class FileSheet(Overlay):
             else _("The folder “{folder}” doesn't exist.").format(folder=whole.parent)
         )
 
-    def _say(self, words: str, role: str) -> None:
+    def _set_status(self, words: str, role: str) -> None:
         if self.said.text() == words:
             return
         self.said.setText(words)

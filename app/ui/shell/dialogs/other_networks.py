@@ -88,7 +88,7 @@ class OtherNetworksSheet(Overlay):
     def shut(self) -> None:
         """Apply typed addresses and close."""
         for row in self.rows:
-            row.take()
+            row.apply()
         super().shut()
 
     def show_states(self) -> None:
@@ -109,7 +109,7 @@ class NetworkRow(QWidget):
         self.switch = Switch(theme, kind.words)
         self.switch.setMinimumWidth(round(theme.scaled(SWITCH_WIDTH)))
         place = _(kind.place)
-        self.address = AddressField(theme, f"{kind.words}: {place}", kind.example, self.take)
+        self.address = AddressField(theme, f"{kind.words}: {place}", kind.example, self.apply)
         said = label(place, "small", role="textTertiary")
         self.state = label("", "small", role="textSecondary", wrap=True)
         self._wrong = ""
@@ -125,7 +125,7 @@ class NetworkRow(QWidget):
         self._lines.addLayout(above)
         self._lines.addWidget(self.state)
         self.switch.clicked.connect(self._switched)
-        self.address.editingFinished.connect(self.take)
+        self.address.editingFinished.connect(self.apply)
 
     def height_for(self, width: int) -> int:
         """Return the height in px for a width."""
@@ -157,7 +157,7 @@ class NetworkRow(QWidget):
         else:
             self._do(lambda: self._networks.leave(self._network.kind.name))
 
-    def take(self) -> None:
+    def apply(self) -> None:
         """Apply a changed address if the network is on."""
         network = self._network
         if network.is_chosen and self.address.text().strip() != network.address:

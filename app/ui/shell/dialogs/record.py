@@ -74,7 +74,7 @@ class RecordMeter(QWidget):
         column.addWidget(self.value)
         column.addWidget(self.note)
 
-    def say(self, value: str, note: str = "", role: str = "textSecondary") -> None:
+    def set_value(self, value: str, note: str = "", role: str = "textSecondary") -> None:
         """Set figure and note."""
         self.value.setText(value)
         self.note.setText(note)
@@ -417,7 +417,7 @@ class RecordSheet(Overlay):
         if not recordings.is_recording:
             self._written = self._speed = None
             for meter in (self.length, self.size_so_far, self.unkept, self.disk):
-                meter.say("")
+                meter.set_value("")
             self._show_end(None)
             return
         elapsed = recordings.elapsed_s
@@ -428,11 +428,11 @@ class RecordSheet(Overlay):
             self._written = (elapsed, state.size_bytes)
         speed = self._speed
         begins = state.phase == "starting"
-        self.length.say(length_words(elapsed), _("starting") if begins else _("recording"), "error")
+        self.length.set_value(length_words(elapsed), _("starting") if begins else _("recording"), "error")
         written = _("{speed} written").format(speed=bandwidth_words(speed)) if speed is not None else ""
-        self.size_so_far.say(size_words(state.size_bytes), written)
+        self.size_so_far.set_value(size_words(state.size_bytes), written)
         count = ngettext("{count} message", "{count} messages", state.unkept)
-        self.unkept.say(
+        self.unkept.set_value(
             count.format(count=grouped(state.unkept)) if state.unkept else _("none"),
             _("the disk is too slow") if state.unkept else _("all data written"),
             "warn" if state.unkept else "ok",
@@ -440,11 +440,11 @@ class RecordSheet(Overlay):
         self._show_end(recordings.recorded.end(elapsed, state.size_bytes, speed))
         free = state.free_bytes
         if free is None:
-            self.disk.say("")
+            self.disk.set_value("")
             return
         left_s = free / speed if speed else LONG_S
         full = _("full in {time}").format(time=age_words(left_s)) if left_s < LONG_S else ""
-        self.disk.say(size_words(free), full, "warn" if free < LOW_DISK_BYTES else "textSecondary")
+        self.disk.set_value(size_words(free), full, "warn" if free < LOW_DISK_BYTES else "textSecondary")
 
     def _show_end(self, end: tuple[float, float] | None) -> None:
         # Only for a recording with limits whose rate is known.
@@ -452,7 +452,7 @@ class RecordSheet(Overlay):
             each.setVisible(end is not None)
         if end is not None:
             at_s, size_bytes = end
-            self.at_end.say(size_words(size_bytes), _("at {time}").format(time=length_words(at_s)))
+            self.at_end.set_value(size_words(size_bytes), _("at {time}").format(time=length_words(at_s)))
 
     def _ends_problem(self, sentence: str) -> None:
         # Error of a limit, otherwise their meaning.

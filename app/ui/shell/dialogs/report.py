@@ -88,7 +88,7 @@ class ReportSheet(Overlay):
         self.write = Button(theme, _("Write report"), "file-archive", kind="primary", size="form")
         self._looking = QTimer(self)
         self._looking.setInterval(LOOK_MS)
-        self._looking.timeout.connect(self._look)
+        self._looking.timeout.connect(self._check)
         self.write.clicked.connect(self._ask_where)
         self.show_file.clicked.connect(self._show_file)
         self._lay_out()
@@ -163,7 +163,7 @@ class ReportSheet(Overlay):
         for widget in (self.work, self.names):
             paint.show_when(widget, bool(names))
         if self._writer is None:
-            self._tell("")
+            self._set_status("")
         self.open()
 
     def first(self) -> QWidget:
@@ -181,7 +181,7 @@ class ReportSheet(Overlay):
         high = inside + self._head.sizeHint().height() + foot + 14 + 2 * 10 + 16 + 4
         return QSize(wide, min(room.height(), high))
 
-    def _tell(self, words: str, role: str = "textSecondary", path: Path | None = None) -> None:
+    def _set_status(self, words: str, role: str = "textSecondary", path: Path | None = None) -> None:
         # With a path the button to show the file appears.
         self.written = path
         set_role(self.state, role)
@@ -208,21 +208,21 @@ class ReportSheet(Overlay):
         # A copy, because settings may change while the thread reads them.
         still = replace(parts, settings=dict(parts.settings))
         self._writer = ReportWriter(path, lambda: make_report(still, happened, work))
-        self._tell(_("Writing the report."))
+        self._set_status(_("Writing the report."))
         self._looking.start()
 
-    def _look(self) -> None:
+    def _check(self) -> None:
         writer = self._writer
         if writer is None or not writer.is_done:
             return
         self._looking.stop()
         self._writer = None
         if writer.problem:
-            self._tell(f"{writer.problem[:1].upper()}{writer.problem[1:]}.", "error")
+            self._set_status(f"{writer.problem[:1].upper()}{writer.problem[1:]}.", "error")
             said = self.state.text()
         else:
             said = _("The report is in {file}").format(file=without_home(str(writer.path)))
-            self._tell(said, path=writer.path)
+            self._set_status(said, path=writer.path)
             self.happened.set_text("")
         if self.isVisible():
             (self.show_file if not writer.problem else self.write).setFocus(Qt.FocusReason.OtherFocusReason)

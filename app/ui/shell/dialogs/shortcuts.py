@@ -148,24 +148,24 @@ class ShortcutSheet(Overlay):
         if entry is None:
             return
         if entry.kind != "command":
-            self._tell(_("The shortcut of “{command}” was not changed.").format(command=entry.words))
+            self._set_status(_("The shortcut of “{command}” was not changed.").format(command=entry.words))
             return
         self._waiting, self._offer = entry.name, None
         self.rows.look.waiting = entry.id
         paint.show_when(self.swap, False)
         self.field.setFocus(Qt.FocusReason.OtherFocusReason)
         words = _("Press the new shortcut for “{command}”. Esc cancels.")
-        self._tell(words.format(command=entry.words))
+        self._set_status(words.format(command=entry.words))
         self.rows.viewport().update()
 
     def _stop_waiting(self, said: str = "") -> None:
         self._waiting = self.rows.look.waiting = ""
         self._offer = None
         paint.show_when(self.swap, False)
-        self._tell(said or _(HINT))
+        self._set_status(said or _(HINT))
         self.rows.viewport().update()
 
-    def _tell(self, said: str) -> None:
+    def _set_status(self, said: str) -> None:
         self.said.setText(said)
         if said != _(HINT) and self.isVisible():
             paint.announce(self.said, said)
@@ -186,7 +186,7 @@ class ShortcutSheet(Overlay):
         key = pressed.key()
         if self._waiting:
             if key not in ONLY_MODIFIERS:
-                self._take(pressed)
+                self._assign(pressed)
             return True
         if key in {Qt.Key.Key_Return, Qt.Key.Key_Enter}:
             self.record()
@@ -197,14 +197,14 @@ class ShortcutSheet(Overlay):
         plain = not pressed.modifiers() & ~Qt.KeyboardModifier.KeypadModifier
         return plain and self.rows.handle(key)
 
-    def _take(self, pressed: QKeyEvent) -> None:
+    def _assign(self, pressed: QKeyEvent) -> None:
         name, key = self._waiting, key_of(pressed.keyCombination())
         if pressed.key() == Qt.Key.Key_Escape:
             self._stop_waiting()
             return
         refusal = self._shortcuts.refusal(name, pressed.keyCombination())
         if refusal:
-            self._tell(refusal)
+            self._set_status(refusal)
             return
         words = self._shortcuts.commands[name].words
         holder = self._shortcuts.holder(key)
@@ -237,7 +237,7 @@ class ShortcutSheet(Overlay):
         if entry is None or entry.kind != "command" or not self._shortcuts.of(entry.name):
             return
         if entry.name == STOP and len(self._shortcuts.of(STOP)) == 1:
-            self._tell(_("F12 always remains a shortcut of Stop."))
+            self._set_status(_("F12 always remains a shortcut of Stop."))
             return
         said = _("“{command}” no longer has a shortcut.").format(command=entry.words)
         self._stop_waiting(_("Stop now has only F12.") if entry.name == STOP else said)

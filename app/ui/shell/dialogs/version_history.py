@@ -136,10 +136,10 @@ class VersionHistorySheet(Overlay):
 
     def _say_nothing(self, name: str, path: Path | None) -> None:
         if path is None:
-            self.empty.say(_("{name} is not saved to a file yet").format(name=name), _(SAVE_FIRST))
+            self.empty.set_texts(_("{name} is not saved to a file yet").format(name=name), _(SAVE_FIRST))
             self.empty.set_actions([EmptyAction(_("Save"), self._save_it, "save", primary=True)])
         else:
-            self.empty.say(_("No earlier versions yet"), _(WHEN_CREATED))
+            self.empty.set_texts(_("No earlier versions yet"), _(WHEN_CREATED))
             self.empty.set_actions([EmptyAction(_("Close"), self.shut)])
 
     def _line(self, version: Version, now: dt.datetime) -> Match:
@@ -170,7 +170,7 @@ class VersionHistorySheet(Overlay):
             note = difference_words(difference(read_file(version.copy, version.name).workspace, self._now))
         except DocumentError as error:
             reason = error.reason
-        self.rows.tell(id, note, reason)
+        self.rows.update_entry(id, note, reason)
 
     @property
     def read(self) -> bool:

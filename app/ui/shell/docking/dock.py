@@ -95,7 +95,7 @@ class DockBody(QWidget):
         if self._failure is None:
             self._failure = EmptyState(self._theme, "circle-x", _("This panel stopped"), sentence)
             self._stack.addWidget(self._failure)
-        self._failure.say(_("This panel stopped"), sentence)
+        self._failure.set_texts(_("This panel stopped"), sentence)
         self._failure.set_actions([EmptyAction(_("Try again"), again, "rotate-ccw")])
         self._stack.setCurrentWidget(self._failure)
 

@@ -73,7 +73,7 @@ class BigCard(Card):
         body.addLayout(row)
         column.addLayout(body, 1)
 
-    def say(self, title: str, text: str) -> None:
+    def set_texts(self, title: str, text: str) -> None:
         """Set heading and text."""
         self.title.setText(title)
         self.text.setText(text)
@@ -86,7 +86,7 @@ class ExampleCard(PaintedButton):
         super().__init__(theme, radius="card")
         self._text, self._rows = text, rows
         self.path = path
-        self.say(name, _("Open the example {name}. {description}").format(name=name, description=text))
+        self.set_text(name, _("Open the example {name}. {description}").format(name=name, description=text))
         self.setToolTip(plain.tip(text))  # a narrow card elides the text
         self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Fixed)
 
@@ -124,7 +124,7 @@ class RecentRow(PaintedButton):
         self.path = recent.path
         then = dt.datetime.fromtimestamp(recent.opened_s, tz=now.tzinfo)
         self._when = day_words(then, now)
-        self.say(recent.name, _("Open {name}, {day}").format(name=recent.name, day=self._when))
+        self.set_text(recent.name, _("Open {name}, {day}").format(name=recent.name, day=self._when))
         self.setToolTip(plain.tip(str(recent.path)))
         self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Fixed)
 

@@ -57,7 +57,7 @@ class OpenRow(PaintedButton):
         super().__init__(theme, radius="panel")
         self.work = work
         self._state = state_words(work)
-        self.say(work.name, _("Continue with {name}, {state}").format(name=work.name, state=self._state))
+        self.set_text(work.name, _("Continue with {name}, {state}").format(name=work.name, state=self._state))
         self.setToolTip(plain.tip(work.path or self._state))
         self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Fixed)
 

@@ -273,7 +273,7 @@ class StartPage(QWidget):
         self._learn.set_kind("primary" if offers else "plain")
         self._use.set_kind("plain" if offers else "primary")
         title, text = OFFER if offers else LEARN
-        self.learn_card.say(_(title), _(text))
+        self.learn_card.set_texts(_(title), _(text))
         self.learn_card.border = "accent" if offers else "border"
         paint.show_when(self._not_now, offers)
         cards = self._order_of_cards()

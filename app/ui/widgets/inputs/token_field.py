@@ -29,7 +29,7 @@ class Token(PaintedButton):
         super().__init__(theme)
         self.entry, self.is_left_out = entry, is_left_out
         words = _("Remove “not {pattern}”") if is_left_out else _("Remove “{pattern}”")
-        self.say(entry, words.format(pattern=entry))
+        self.set_text(entry, words.format(pattern=entry))
 
     def sizeHint(self) -> QSize:
         theme = self._theme

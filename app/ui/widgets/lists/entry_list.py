@@ -46,7 +46,7 @@ class EntryModel(QAbstractListModel):
         self.lines = lines
         self.endResetModel()
 
-    def tell(self, id: str, note: str, reason: str) -> None:
+    def update_entry(self, id: str, note: str, reason: str) -> None:
         """Update note and reason of an entry in place."""
         for row, line in enumerate(self.lines):
             if isinstance(line, Match) and line.entry.id == id:
@@ -210,9 +210,9 @@ class EntryList(QListView):
         if not chosen:
             self.scrollToTop()
 
-    def tell(self, id: str, note: str, reason: str = "") -> None:
+    def update_entry(self, id: str, note: str, reason: str = "") -> None:
         """Update note and reason of an entry."""
-        self.lines.tell(id, note, reason)
+        self.lines.update_entry(id, note, reason)
 
     @property
     def entry(self) -> Entry | None:

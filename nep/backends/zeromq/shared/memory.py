@@ -368,7 +368,7 @@ class SharedReader:
             raise LookupError from error
         _readers[id(self)] = self
 
-    def take(self, number: int, *, may_copy: bool = False) -> bytes | memoryview | None:
+    def read(self, number: int, *, may_copy: bool = False) -> bytes | memoryview | None:
         """Return the payload with this number, read-only, or None if it was overwritten.
 
         With `may_copy` small payloads are copied out of their slot.

@@ -108,7 +108,7 @@ class SharedSources:
                 return
         self._answer(Shares(self._subscriber, publisher, generation))
 
-    def take(
+    def read(
         self, publisher: int, part: bytes | memoryview, *, may_copy: bool = False
     ) -> bytes | memoryview | None:
         """Return the payload that a message's part refers to, or None if it was overwritten.
@@ -122,7 +122,7 @@ class SharedSources:
             raise WireError(
                 _("it does not refer to a payload in shared memory"), len(part), code="shared-memory"
             )
-        return None if reader is None else reader.take(_NUMBER.unpack(part)[0], may_copy=may_copy)
+        return None if reader is None else reader.read(_NUMBER.unpack(part)[0], may_copy=may_copy)
 
     def leave(self, publisher: int) -> None:
         """Close a publisher's memory; payloads in use stay valid."""

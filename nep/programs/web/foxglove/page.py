@@ -88,7 +88,7 @@ class FoxglovePage(PageConnection):
             send_status=self._send_status,
         )
         self._context = context
-        self._channels = Channels(context, channels, self._tell)
+        self._channels = Channels(context, channels, self._send_fields)
         self._topics = PageTopics(context)
         self._services = PageServices(context, self._respond)
         self._advertised: dict[int, op.Advertise] = {}
@@ -103,7 +103,7 @@ class FoxglovePage(PageConnection):
 
     async def run(self) -> None:
         """Serve the client until it goes; then close its node."""
-        self._tell(
+        self._send_fields(
             {
                 "op": "serverInfo",
                 "name": "NEP",
@@ -129,11 +129,11 @@ class FoxglovePage(PageConnection):
             self._services.cancel()
             await self._close_node()
 
-    def _tell(self, fields: Mapping[str, object]) -> None:
+    def _send_fields(self, fields: Mapping[str, object]) -> None:
         self._queue.put([wire.control_frame(fields)])
 
     def _send_status(self, level: op.Level, sentence: str) -> None:
-        self._tell({"op": "status", "level": _STATUS_LEVELS[level], "message": sentence})
+        self._send_fields({"op": "status", "level": _STATUS_LEVELS[level], "message": sentence})
 
     def _warn(self, sentence: str) -> None:
         self._send_status("warning", sentence)
@@ -163,7 +163,7 @@ class FoxglovePage(PageConnection):
                     }
                 )
                 for message in self._updates.update(view):
-                    self._tell(message)
+                    self._send_fields(message)
             except NepError as error:  # the master is away: nothing is known to have changed
                 _logger.debug("the page '%s' keeps its channels: %s", self.name, error)
             except Exception:
@@ -281,7 +281,7 @@ class FoxglovePage(PageConnection):
         if is_success:
             self._queue.put([wire.response_frame(service_id, call_id, json_bytes(values))])
             return
-        self._tell(
+        self._send_fields(
             {
                 "op": "serviceCallFailure",
                 "serviceId": service_id,

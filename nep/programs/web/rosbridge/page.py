@@ -104,7 +104,7 @@ class Page(PageConnection):
             raise op.OperationError(f"'{topic}': {error}", level="warning") from error
 
     def _warn(self, sentence: str) -> None:
-        self._context.tell("warning", sentence)
+        self._context.send_status("warning", sentence)
 
     # ---- operations
 
@@ -167,7 +167,7 @@ class Page(PageConnection):
         if is_logged(self._rejected):
             _logger.warning("page '%s': %s (%d so far)", self.name, error, self._rejected)
         shown = error if isinstance(error, op.OperationError) else op.OperationError(str(error))
-        self._context.tell(shown.level, str(shown), shown.id)
+        self._context.send_status(shown.level, str(shown), shown.id)
 
 
 async def authenticate(connection: ServerConnection, check: AuthCheck) -> bool:

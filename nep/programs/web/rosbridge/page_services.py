@@ -116,7 +116,7 @@ class PageServices:
             self._context.node.new_server, operation.service, callback, threads=1
         )
         said = _("serving '{service}'").format(service=operation.service)
-        self._context.tell("info", said, operation.id)
+        self._context.send_status("info", said, operation.id)
 
     def _ask_page(self, service: str, request: object) -> Future[object]:
         """In a thread of the server's: ask the page, and return the future of its answer."""

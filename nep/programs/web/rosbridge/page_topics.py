@@ -80,7 +80,9 @@ class PageTopics:
             raise _another_type(operation.topic, operation.ros_type, known.publisher.msg_type, operation.id)
         if len(known.ids) < MAX_SUBSCRIPTION_IDS:
             known.ids.add(operation.id)
-        self._context.tell("info", _("advertised '{topic}'").format(topic=operation.topic), operation.id)
+        self._context.send_status(
+            "info", _("advertised '{topic}'").format(topic=operation.topic), operation.id
+        )
 
     async def _open_publication(self, operation: Advertise) -> _Publication:
         if len(self._publications) >= MAX_TOPICS:
@@ -153,7 +155,9 @@ class PageTopics:
         if operation.id is None or not known.ids:
             del self._publications[operation.topic]
             await self._context.in_thread(known.publisher.close)
-        self._context.tell("info", _("unadvertised '{topic}'").format(topic=operation.topic), operation.id)
+        self._context.send_status(
+            "info", _("unadvertised '{topic}'").format(topic=operation.topic), operation.id
+        )
 
     # ---- subscribing
 
@@ -177,7 +181,9 @@ class PageTopics:
                 )
             known.feed.subscribe(operation, as_pixels=as_pixels)
             self._context.queue.activate(known.feed)
-        self._context.tell("info", _("subscribed to '{topic}'").format(topic=operation.topic), operation.id)
+        self._context.send_status(
+            "info", _("subscribed to '{topic}'").format(topic=operation.topic), operation.id
+        )
 
     async def _open_subscription(self, operation: Subscribe, *, as_pixels: bool) -> None:
         if len(self._subscriptions) >= MAX_TOPICS:
@@ -207,7 +213,7 @@ class PageTopics:
         if not known.feed.subscription_count:
             del self._subscriptions[operation.topic]
             await self._close_subscription(known)
-        self._context.tell(
+        self._context.send_status(
             "info", _("unsubscribed from '{topic}'").format(topic=operation.topic), operation.id
         )
 

@@ -108,7 +108,7 @@ class PageTreeModel(QAbstractItemModel):
             row = self._by_id.get(each.page.id)
             if row is not None and row.listed != each:
                 row.listed = each
-                self._tell(self.createIndex(row.place, 0, 0), self.createIndex(row.place, 0, 0))
+                self._emit_changed(self.createIndex(row.place, 0, 0), self.createIndex(row.place, 0, 0))
                 self._show_topics(row, each.page.topics)
         if new:
             self._append_pages(new)
@@ -160,9 +160,9 @@ class PageTreeModel(QAbstractItemModel):
     def _tell_topics(self, row: PageRow, first: int, last: int) -> None:
         if first <= last:
             id_ = row.id + 1
-            self._tell(self.createIndex(first, 0, id_), self.createIndex(last, 0, id_))
+            self._emit_changed(self.createIndex(first, 0, id_), self.createIndex(last, 0, id_))
 
-    def _tell(self, first: QModelIndex, last: QModelIndex) -> None:
+    def _emit_changed(self, first: QModelIndex, last: QModelIndex) -> None:
         self.dataChanged.emit(first, last, [Qt.ItemDataRole.DisplayRole])
 
 

@@ -263,7 +263,7 @@ class WebPagesSheet(Overlay):
         web, is_foxglove = self._web, self._tab == "foxglove"
         words = _("Let Foxglove and Lichtblick connect") if is_foxglove else _("Let web pages connect")
         if words != self.switch.text():
-            self.switch.say(words)
+            self.switch.set_text(words)
             self.switch.updateGeometry()
         self.switch.setChecked(self._tab in web.protocols)
         for protocol in ("rosbridge", "foxglove"):

@@ -153,13 +153,13 @@ class RobotChoice(QWidget):
         for name in wanted:
             if name not in self.boxes:
                 box = self.boxes[name] = CheckBox(self._theme, name)
-                box.clicked.connect(self._take)
+                box.clicked.connect(self._apply)
                 self._flow.addWidget(box)
                 box.show()
             self.boxes[name].setChecked(name in self._web.robots)
         self.none.setVisible(not wanted)
 
-    def _take(self) -> None:
+    def _apply(self) -> None:
         self._web.set_robots([name for name, box in self.boxes.items() if box.isChecked()])
         self.show_state()
         self.changed.emit()

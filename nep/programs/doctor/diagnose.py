@@ -12,13 +12,13 @@ from nep.programs.doctor.finding import Finding
 from nep.programs.doctor.listen import collect_topic
 from nep.programs.doctor.topics import topic_findings
 
-__all__ = ["Tell", "look"]
+__all__ = ["Tell", "diagnose"]
 
 Tell = Callable[[tuple[Finding, ...], int, int], object]
 """Progress callback: findings so far (worst first), number of checks done, number of all checks."""
 
 
-def look(
+def diagnose(
     address: str | None = None,
     topic: str = "",
     folders: Sequence[tuple[str, Path]] = (),
