@@ -45,7 +45,7 @@ EARNED = {
     "nep.programs.blackboard.ages": "pure, and tested alone",
     "nep.programs.web.kept_out": "state with a lock of its own",
     "nep.cli.doctor": "one of a list: the commands of nep",
-    "nep.programs.doctor.look": "joins collecting and judging, which know nothing of each other",
+    "nep.programs.doctor.diagnose": "joins collecting and judging, which know nothing of each other",
     "app.ui.panels.inspector.pace": "pure, and tested alone",
     "app.ui.panels.plot.pace": "pure, and tested alone",
     "app.ui.panels.plot.advice": "a line of its own: the plot panel is as long as may be",

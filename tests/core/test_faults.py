@@ -214,11 +214,11 @@ def test_an_event_that_raises_takes_no_other_with_it(
         "launcher.check",
         "documents.set_topics",
         "runs.on_runner",
-        "_checks.take",
-        "_health.look",
+        "_checks.pop_results",
+        "_health.update",
         "_health.check",
         "source.missed",
-        "console.take",
+        "console.add_messages",
     ],
 )
 def test_whatever_raises_in_a_tick_a_stop_and_messages_arrive(

@@ -39,7 +39,7 @@ class Window:
             self.session,  # type: ignore[arg-type]
             self.theme,
             self.opened.append,
-            self.say,
+            self.show_toast,
             self.commands.append,
             self.answers,
             plot=lambda topic, path: self.plotted.append((topic, path)),
@@ -48,7 +48,7 @@ class Window:
             panels=lambda: self.panels,
         )
 
-    def say(self, words: str, button: str = "", run: Callable[[], object] | None = None) -> None:
+    def show_toast(self, words: str, button: str = "", run: Callable[[], object] | None = None) -> None:
         """A toast."""
         self.toasts.append(words)
         self.toast_buttons.append((button, run))

@@ -31,7 +31,7 @@ class FakeEngine:
         assert self.may_begin.wait(20)
         return self
 
-    def say(self, words: str, language: str, volume: float, ended: Callable[[], None]) -> str:
+    def speak(self, words: str, language: str, volume: float, ended: Callable[[], None]) -> str:
         self.threads.add(threading.current_thread().name)
         if language != "en":
             return no_voice(language)

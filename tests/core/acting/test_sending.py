@@ -59,7 +59,7 @@ def test_it_is_sent_once_and_says_how_many_hear_it(bench) -> None:
     bench.arm("/cmd_vel")
     bench.outbox.send(order())
     assert heard.listen(timeout_s=5.0) == (True, {"x": 1})
-    (result,) = bench.outbox.take()
+    (result,) = bench.outbox.pop_results()
     assert (result.kind, result.heard) == ("sent", 1)
 
 
@@ -68,7 +68,7 @@ def test_what_is_not_armed_is_not_sent(bench) -> None:
     bench.outbox.send(order())
     bench.arm("/other")
     bench.outbox.send(order())
-    assert [(each.kind, each.sentence) for each in bench.outbox.take()] == [
+    assert [(each.kind, each.sentence) for each in bench.outbox.pop_results()] == [
         ("failed", "not sent: no longer armed")
     ] * 2
     assert heard.receive(0.0) is None
@@ -86,7 +86,7 @@ def test_what_waited_for_a_master_is_not_sent_when_it_is_late_or_no_longer_armed
     first(bench.node)
     bench.now += MAX_AGE_S + 1
     second(bench.node)
-    said = [each.sentence for each in bench.outbox.take()]
+    said = [each.sentence for each in bench.outbox.pop_results()]
     assert said == ["not sent: no longer armed", "not sent: there was no master"]
     assert heard.receive(0.0) is None
 
@@ -98,7 +98,7 @@ def test_what_cannot_be_sent_says_why(bench, topic, msg_type, payload) -> None:
     bench.arm(topic)
     bench.outbox.send(order(topic, msg_type, payload))
     bench.outbox.begin(order(topic, msg_type, payload), 10)
-    results = bench.outbox.take()
+    results = bench.outbox.pop_results()
     assert [each.kind for each in results] == ["failed", "failed"]
     assert all(each.sentence for each in results)
     assert bench.outbox.all_repeated == ()
@@ -112,7 +112,7 @@ def test_again_and_again_until_it_is_ended_and_not_once_more(bench) -> None:
         assert heard.listen(timeout_s=20.0) == (True, {"x": 1})
     bench.outbox.end("a")
     assert not bench.outbox.is_going("a")
-    began, ended = bench.outbox.take()
+    began, ended = bench.outbox.pop_results()
     assert (began.kind, ended.kind) == ("began", "ended")
     more = 0
     while heard.receive(0.0) is not None:
@@ -146,7 +146,7 @@ def test_one_that_raises_ends_and_the_others_go_on(bench) -> None:
     while heard.receive(0.0) is not None:
         pass
     assert heard.listen(timeout_s=20.0)[0]
-    failed = next(each for each in bench.outbox.take() if each.kind == "failed")
+    failed = next(each for each in bench.outbox.pop_results() if each.kind == "failed")
     assert (failed.sentence, failed.count) == ("Fill in “yaw” first.", 1)
 
 

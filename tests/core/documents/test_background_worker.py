@@ -21,9 +21,9 @@ def beside() -> Iterator[BackgroundWorker[str]]:
 def test_what_was_asked_is_taken_once(beside) -> None:
     found: list[str | None] = []
     beside.ask("a", lambda: threading.current_thread().name)
-    until(lambda: bool(found.append(beside.take("a")) or found[-1]))
+    until(lambda: bool(found.append(beside.pop_result("a")) or found[-1]))
     assert found[-1] == "test beside"
-    assert beside.take("a") is None
+    assert beside.pop_result("a") is None
 
 
 def test_only_the_newest_waits(beside) -> None:
@@ -39,8 +39,8 @@ def test_only_the_newest_waits(beside) -> None:
         beside.ask("b", lambda number=number: did.append(number) or str(number))
     go.set()
     until(lambda: did == [4])
-    until(lambda: beside.take("b") == "4")
-    assert beside.take("a") == "slow"
+    until(lambda: beside.pop_result("b") == "4")
+    assert beside.pop_result("a") == "slow"
 
 
 def test_a_failure_is_raised_where_it_was_asked_and_the_next_work_is_done(beside) -> None:
@@ -50,17 +50,17 @@ def test_a_failure_is_raised_where_it_was_asked_and_the_next_work_is_done(beside
     beside.ask("a", fail)
     until(lambda: bool(beside._failed))
     with pytest.raises(ValueError, match="no such luck"):
-        beside.take("a")
+        beside.pop_result("a")
     beside.ask("a", lambda: "well")
-    until(lambda: beside.take("a") == "well")
+    until(lambda: beside.pop_result("a") == "well")
 
 
 def test_closing_ends_the_thread_and_drops_what_waits(beside) -> None:
     beside.ask("a", lambda: "x")
-    until(lambda: beside.take("a") == "x")
+    until(lambda: beside.pop_result("a") == "x")
     beside.close()
     beside.ask("a", lambda: "y")
-    assert beside.take("a") is None
+    assert beside.pop_result("a") is None
     assert not any(thread.name == "test beside" for thread in threading.enumerate())
 
 
@@ -83,7 +83,7 @@ def test_finishing_waits_for_what_is_asked_and_what_is_done_just_now(beside, mon
     go.set()
     assert beside.finish("a")
     assert did == ["first", "second"]
-    assert beside.take("a") == "second"
+    assert beside.pop_result("a") == "second"
 
 
 def test_a_failure_is_outdated_by_the_next_success(beside) -> None:
@@ -94,4 +94,4 @@ def test_a_failure_is_outdated_by_the_next_success(beside) -> None:
     assert beside.finish("a")
     beside.ask("a", lambda: "well")
     assert beside.finish("a")
-    assert beside.take("a") == "well"
+    assert beside.pop_result("a") == "well"

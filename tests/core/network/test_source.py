@@ -9,6 +9,7 @@ import pytest
 import nep
 from app.core.network.source import GraphSeen, LiveSource, MasterFound, MasterLost
 from nep.masters.master import Master
+from nep.masters.process import view_or_none
 from nep.nodes.log_handler import LOG_TOPIC, LOG_TYPE
 from tests.e2e.waiting import until
 

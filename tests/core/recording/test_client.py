@@ -107,16 +107,16 @@ def test_a_recording_begins_tells_its_figures_and_ends(made):
 
 def test_what_happens_is_told_while_something_is_recorded_and_else_to_nobody(made):
     client = made.client
-    client.say("runs", {"id": "1"})
+    client.write_entry("runs", {"id": "1"})
     assert not made.lines
     client.record(Path("a.mcap"))
-    client.say("runs", {"id": "2"})
+    client.write_entry("runs", {"id": "2"})
     made.say("ended", path="a.mcap", status=status())
-    client.say("runs", {"id": "3"})
+    client.write_entry("runs", {"id": "3"})
     client.follow_ring(RingChoice(Path("ring")))
-    client.say("runs", {"id": "3"}, "recording")
+    client.write_entry("runs", {"id": "3"}, "recording")
     made.lines[0].is_full = True  # it is told again in a second: nothing is wrong
-    client.say("alarms", {"id": "4"})
+    client.write_entry("alarms", {"id": "4"})
     said = [(each["role"], each["value"]) for each in made.lines[0].orders if each["op"] == "say"]
     assert said == [("runs", {"id": "2"}), ("alarms", {"id": "4"})]
     assert not made.told()

@@ -79,7 +79,7 @@ class Taker:
     def __init__(self) -> None:
         self.seqs: list[int | None] = []
 
-    def take(self, batch: Batch, now_ns: int) -> None:
+    def process(self, batch: Batch, now_ns: int) -> None:
         self.seqs += [message.seq for message in batch.messages]
 
     def rewind(self) -> None:
@@ -148,7 +148,7 @@ def test_losses_and_density_are_read_in_a_thread(shown, whole):
     densities.want(whole[0][0], whole[-1][0] + 1, COUNT)
     end = time.monotonic() + 60
     while densities.newest is None or not densities.losses:
-        densities.take()
+        densities.collect_results()
         assert time.monotonic() < end
     assert sum(densities.newest.counts["/a"]) == 54
     assert sum(mark.count for mark in densities.losses["/a"]) == LOST

@@ -102,7 +102,7 @@ def test_all_of_a_topic_is_sent_from_its_first_message_on_and_panels_get_what_th
     sender.pass_time(2.0)
     assert sender.taken() == some(whole, "/a", "/camera")
     assert max(sender.late) < MAX_DELAY_S
-    assert set(sender.source.take().drained.batches) == {"/b"}
+    assert set(sender.source.pop_results().drained.batches) == {"/b"}
     sender.do(lambda playback: playback.seek(whole[0][0]))
     sender.do(Playback.play)
     sender.pass_time(2.0)
@@ -160,10 +160,10 @@ def test_a_panel_that_looks_at_what_is_sent_has_its_newest_message(played, whole
     sender.do(Playback.play)
     sender.pass_time(0.2)
     sender.do(Playback.pause)
-    sender.source.take()
+    sender.source.pop_results()
     sender.source.watch("/a")
     sender.source.turn()
-    shown = sender.source.take().drained.batches["/a"].messages
+    shown = sender.source.pop_results().drained.batches["/a"].messages
     assert [kept(each) for each in shown] == [sender.taken()[-1]]
 
 

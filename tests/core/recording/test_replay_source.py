@@ -109,7 +109,7 @@ def newest(whole, topic: str, at_ns: int) -> tuple[object, ...] | None:
 
 def test_what_is_played_is_what_came_byte_for_byte(replay, whole):
     played = replay("/a", "/b", "/camera", "/rare")
-    first = played.source.take()
+    first = played.source.pop_results()
     handed = played.do(Playback.play)
     assert first.jump is not None
     handed = played.pass_time(2.0)
@@ -167,12 +167,12 @@ def test_only_the_last_of_many_seeks_is_done(replay, whole):
 
 def test_a_topic_that_is_looked_at_later_has_its_newest_message_and_all_that_follow(replay, whole):
     played = replay("/a")
-    played.source.take()
+    played.source.pop_results()
     played.do(Playback.play)
     played.pass_time(0.4)
     played.source.watch("/b")
     played.source.turn()
-    came = of(played.source.take(), "/b")
+    came = of(played.source.pop_results(), "/b")
     at_ns = played.source.status.player.position_ns
     came = [each for each in came if each.seq <= (at_ns - whole[0][0]) // STEP_NS]
     assert kept(came[0]) == newest(whole, "/b", whole[0][0] + came[0].seq * STEP_NS)
@@ -186,7 +186,7 @@ def test_who_looks_no_more_gets_nothing_more(replay):
     played.do(Playback.play)
     played.source.unwatch("/b")
     played.source.turn()
-    played.source.take()
+    played.source.pop_results()
     handed = played.pass_time(0.5)
     assert of(handed, "/a")
     assert not of(handed, "/b")
@@ -230,7 +230,7 @@ def test_a_window_that_is_slow_misses_messages_and_they_are_counted_but_the_play
             writer.post([json_message(seq, "/a")])
         assert writer.flush()
     played = replay("/a", path=path)
-    played.source.take()
+    played.source.pop_results()
     played.do(Playback.play)
     handed = played.pass_time(5.0)
     batch = handed.drained.batches["/a"]
@@ -247,13 +247,13 @@ def test_small_messages_do_not_keep_the_piece_of_the_file_that_they_came_from(re
 
 def test_who_plots_gets_what_was_before_the_playhead(replay, whole):
     played = replay()
-    played.source.take()
+    played.source.pop_results()
     at_ns = whole[50][0]
     played.do(lambda playback: playback.seek(at_ns))
     played.source.set_deep("/a", 8192)
     played.source.watch("/a")
     played.source.turn()
-    handed = played.source.take()
+    handed = played.source.pop_results()
     before = [message.seq for log_ns, message in whole if message.topic == "/a" and log_ns <= at_ns]
     assert [each.seq for each in handed.history["/a"]] == before
     assert not of(handed, "/a")

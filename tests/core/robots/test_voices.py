@@ -22,7 +22,7 @@ class FakeSpeaker:
         self.busy = False
         self.problem = ""
 
-    def say(self, words: str, language: str, volume: float) -> None:
+    def speak(self, words: str, language: str, volume: float) -> None:
         self.did.append((words, language, volume))
         self.busy = True
 

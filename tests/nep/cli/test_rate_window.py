@@ -136,7 +136,7 @@ def test_what_comes_later_is_measured(master, capsys, monkeypatch):
             print_status(sentence)
             talking.start()
 
-        monkeypatch.setattr("nep.cli.topic_wait.say", said)
+        monkeypatch.setattr("nep.cli.topic_wait.print_status", said)
         hz(["/odom"], 60.0, 2, master.address)
         ended.set()
         talking.join()

@@ -166,7 +166,7 @@ def test_a_master_that_is_away_is_waited_for(type_in, file, monkeypatch) -> None
         if sentence.endswith("; waiting"):
             waits.set()
 
-    monkeypatch.setattr("nep.cli.watch.say", say)
+    monkeypatch.setattr("nep.cli.watch.print_status", say)
 
     def come_later() -> None:
         if waits.wait(30):

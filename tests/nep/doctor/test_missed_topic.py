@@ -13,7 +13,7 @@ import typer
 
 import nep
 from nep.cli.doctor import doctor
-from nep.programs.doctor import TopicFacts, collect_topic, look, meant_topic, topic_findings
+from nep.programs.doctor import TopicFacts, collect_topic, diagnose, meant_topic, topic_findings
 from nep.programs.doctor.facts import PublisherFact
 from nep.programs.doctor.listen import reach_of
 from nep.protocol.graph_view import Alert
@@ -187,7 +187,7 @@ def test_real_topics(master):
         assert one.endpoint.startswith("tcp://127.0.0.1:")
         (silent,) = [each for each in topic_findings(facts) if each.severity == "error"]
         assert silent.id in {"topic:silent:arm", "topic:blocked"}  # by how new the master's figures are
-        near = look(master.address, "/arm/posse")
+        near = diagnose(master.address, "/arm/posse")
         assert (near[0].id, near[0].instead) == ("topic:near", "/arm/pose")
         assert "master" in {each.id for each in near}
 
@@ -207,7 +207,7 @@ def test_without_a_master_there_is_nothing_to_tell_of_a_topic():
         probe.bind(("127.0.0.1", 0))
         address = f"127.0.0.1:{probe.getsockname()[1]}"
     assert collect_topic("/camera", address) is None
-    told = {each.id for each in look(address, "/camera")}
+    told = {each.id for each in diagnose(address, "/camera")}
     assert "master:none" in told
     assert not any(id.startswith("topic") for id in told)
 

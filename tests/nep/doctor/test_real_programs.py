@@ -11,7 +11,7 @@ import pytest
 
 import nep
 from nep.masters.master import Master
-from nep.programs.doctor import collect_topic, look, start_obstacle, topic_findings
+from nep.programs.doctor import collect_topic, diagnose, start_obstacle, topic_findings
 from nep.programs.doctor.diagnosis import PARTS
 from nep.programs.doctor.listen import reach_of
 from tests.nep.programs import running
@@ -90,11 +90,11 @@ def test_a_place_that_answers_nobody_is_a_timeout() -> None:
 
 
 def test_a_master_that_serves_this_computer_only_does_not_hang(master: Master, own: str) -> None:
-    found = {each.id: each for each in look(f"{own}:{port_of(master.address)}", "/arm/pose")}
+    found = {each.id: each for each in diagnose(f"{own}:{port_of(master.address)}", "/arm/pose")}
     assert "master:hung" not in found
     assert found["master:closed"].severity == "error"
     assert f"127.0.0.1:{port_of(master.address)}" in found["master:closed"].sentence
-    assert "master" in {each.id for each in look(master.address)}
+    assert "master" in {each.id for each in diagnose(master.address)}
 
 
 def test_at_an_address_of_the_network_no_master_is_started(master: Master, own: str) -> None:
@@ -113,7 +113,7 @@ def test_at_an_address_of_the_network_no_master_is_started(master: Master, own: 
 
 def test_it_tells_what_is_found_so_far_and_comes_to_the_same_end(master: Master) -> None:
     told = []
-    found = look(master.address, "/arm/pose", tell=lambda *each: told.append(each))
+    found = diagnose(master.address, "/arm/pose", tell=lambda *each: told.append(each))
     done = [done for _found, done, _count in told]
     assert done == sorted(done)
     assert {count for _found, _done, count in told} == {done[-1]} == {len(PARTS) + 1}
@@ -122,5 +122,5 @@ def test_it_tells_what_is_found_so_far_and_comes_to_the_same_end(master: Master)
     assert {each.id for each in found} == ids[-1] >= {"topic:nobody"}
     assert "topic:nobody" not in ids[-2]
     assert {each.id for each in told[0][0]} == {"versions"}
-    alone = [each.id for each in look(master.address)]
+    alone = [each.id for each in diagnose(master.address)]
     assert {each for each in alone if not each.startswith("files:")} <= ids[-1]

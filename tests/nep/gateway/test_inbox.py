@@ -27,20 +27,20 @@ def test_what_is_posted_is_taken_in_order_and_wakes_the_reader(inbox):
     poster.start()
     assert select.select([inbox], [], [], 5)[0]
     poster.join()
-    assert inbox.take() == [first, second]
+    assert inbox.pop_all() == [first, second]
     assert not select.select([inbox], [], [], 0)[0]
-    assert inbox.take() == []
+    assert inbox.pop_all() == []
 
 
 def test_it_is_bounded_in_messages_and_in_bytes_and_counts_what_it_refuses(inbox):
     for _ in range(5):
         inbox.post(message())
-    assert (len(inbox.take()), inbox.dropped) == (3, 2)
+    assert (len(inbox.pop_all()), inbox.dropped) == (3, 2)
     inbox.post(message(b"x" * 90))
     inbox.post(message(b"x" * 20))
-    assert (len(inbox.take()), inbox.dropped) == (1, 3)
+    assert (len(inbox.pop_all()), inbox.dropped) == (1, 3)
     inbox.post(message(b"x" * 90))
-    assert len(inbox.take()) == 1
+    assert len(inbox.pop_all()) == 1
 
 
 def test_a_wake_after_the_end_harms_nobody(inbox):

@@ -38,7 +38,7 @@ class Heard:
     def post(self, messages: Sequence[nep.Message]) -> None:
         self.messages.extend(messages)
 
-    def say(self, role: str, value: object) -> None:
+    def write_entry(self, role: str, value: object) -> None:
         self.said.append((role, value))
 
     def of(self, topic: str) -> list[object]:

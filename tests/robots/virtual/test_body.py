@@ -95,7 +95,7 @@ def test_words_take_as_long_as_their_letters():
     seconds = run(body, lambda: speech.done)
     assert seconds == pytest.approx(3.0, abs=2 * STEP)
     assert body.speech is None
-    first, second = body.say("one two"), body.say("three")
+    first, second = body.speak("one two"), body.speak("three")
     assert first.done
     assert body.speech == "three"
     assert second.word == "three"

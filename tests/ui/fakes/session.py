@@ -70,7 +70,7 @@ class Doctor(doctor_module.Doctor):
         self.looked = 0
         self.found: tuple[Finding, ...] = ()
 
-    def look(self) -> None:
+    def start(self) -> None:
         self.looked += 1
         self._run()
 

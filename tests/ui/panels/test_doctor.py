@@ -61,7 +61,7 @@ def test_while_it_looks_rows_come_as_they_are_found(qtbot, window) -> None:
         doctor.looked += 1
         doctor.looking = True
         for done, found in enumerate(((FINE,), (FULL, FINE))):
-            doctor._tell(found, done + 1, 4)
+            doctor._report(found, done + 1, 4)
             panel.refresh()
             told.append(([each.id for each in panel.shown], panel.looked.text(), panel.chip.accessibleName()))
         doctor._run()
@@ -72,7 +72,7 @@ def test_while_it_looks_rows_come_as_they_are_found(qtbot, window) -> None:
     for widget in panel.header_widgets():
         qtbot.addWidget(widget)
     panel.resize(640, 480), panel.show()
-    doctor.look = look
+    doctor.start = look
     panel._master = "none"
     look()
     assert told == [(["master"], "Checking: 1 of 4", ""), (["disk", "master"], "Checking: 2 of 4", "1")]
@@ -362,7 +362,7 @@ def test_a_plot_of_nothing_leads_here(qtbot, window) -> None:
 
 def test_before_the_first_answer_it_says_that_it_looks(qtbot, qapp) -> None:
     window = Window(Session())
-    window.session.doctor.look = lambda: None
+    window.session.doctor.start = lambda: None
     panel = window.make(PANEL)
     qtbot.addWidget(panel)
     for widget in panel.header_widgets():

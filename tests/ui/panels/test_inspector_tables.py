@@ -206,7 +206,7 @@ def shown_stamp(panel: InspectorPanel) -> object:
 def test_a_person_goes_back_through_what_came_and_compares_with_any_of_it(panel, window) -> None:
     for number in range(5):
         send(window, panel, seen(number, stamp=number))
-    panel.history.say(at_once=True)
+    panel.history.refresh(at_once=True)
     assert panel.history.isVisible()
     assert panel.history.words.text() == "the newest of 5"
     press(panel.history.back)
