@@ -73,7 +73,7 @@ def test_nothing_begins_before_the_first_word(speaker, engine) -> None:
 
 
 def test_a_voice_is_busy_until_its_engine_has_said_it(qtbot, speaker, engine) -> None:
-    speaker.say("Hello", "en", 0.5)
+    speaker.speak("Hello", "en", 0.5)
     assert speaker.busy
     qtbot.waitUntil(lambda: engine.end is not None)
     assert engine.did == [("Hello", 0.5)]
@@ -86,36 +86,36 @@ def test_a_voice_is_busy_until_its_engine_has_said_it(qtbot, speaker, engine) ->
 
 def test_an_engine_that_takes_long_holds_nobody_up_and_a_stop_overtakes_it(qtbot, speaker, engine) -> None:
     engine.may_begin.clear()
-    speaker.say("Hello", "en", 0.5)
+    speaker.speak("Hello", "en", 0.5)
     speaker.play(((440.0, 0.1),), 0.5)
     assert engine.begins.wait(20)  # the window goes on while it begins
     assert speaker.busy
     speaker.stop()
     assert not speaker.busy
-    speaker.say("Again", "en", 0.5)
+    speaker.speak("Again", "en", 0.5)
     engine.may_begin.set()
     qtbot.waitUntil(lambda: engine.end is not None)
     assert [each for each in engine.did if isinstance(each, tuple)] == [("Again", 0.5)]
 
 
 def test_the_end_of_what_was_stopped_does_not_end_the_next(qtbot, speaker, engine) -> None:
-    speaker.say("Hello", "en", 0.5)
+    speaker.speak("Hello", "en", 0.5)
     qtbot.waitUntil(lambda: engine.end is not None)
     first, engine.end = engine.end, None
     speaker.stop_voice()
-    speaker.say("Again", "en", 0.5)
+    speaker.speak("Again", "en", 0.5)
     qtbot.waitUntil(lambda: engine.end is not None)
     first()
-    speaker.say("More", "fr", 0.5)
+    speaker.speak("More", "fr", 0.5)
     qtbot.waitUntil(lambda: speaker.problem != "")
     assert [each for each in engine.did if isinstance(each, tuple)] == [("Hello", 0.5), ("Again", 0.5)]
 
 
 def test_a_language_without_a_voice_ends_at_once_and_says_why(qtbot, speaker) -> None:
-    speaker.say("Bonjour", "fr", 0.5)
+    speaker.speak("Bonjour", "fr", 0.5)
     qtbot.waitUntil(lambda: not speaker.busy)
     assert speaker.problem == "This computer has no voice for French."
-    speaker.say("Hello", "en", 0.5)
+    speaker.speak("Hello", "en", 0.5)
     qtbot.waitUntil(lambda: speaker.problem == "")
 
 

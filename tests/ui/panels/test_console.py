@@ -117,7 +117,7 @@ def test_with_nothing_it_says_what_will_appear(qtbot, qapp) -> None:
 
 def logged(window, level="info", text="hello", node="Pepper", name="app.robots.driver.tasks", **more) -> None:
     given = {"level": level, "text": text, "node": node, "name": name, "stamp_ns": 10**18, **more}
-    window.session.console.take([Message(LOG_TOPIC, json.dumps(given).encode(), "json", LOG_TYPE)])
+    window.session.console.add_messages([Message(LOG_TOPIC, json.dumps(given).encode(), "json", LOG_TYPE)])
 
 
 def test_records_of_programs_stand_among_the_lines(panel, window) -> None:
@@ -155,7 +155,7 @@ def test_nothing_is_decoded_while_nobody_looks(window) -> None:
         def payload(self) -> object:
             raise AssertionError("nobody asked for it")
 
-    window.session.console.take([Unread(LOG_TOPIC, b"{}", "json", LOG_TYPE)])
+    window.session.console.add_messages([Unread(LOG_TOPIC, b"{}", "json", LOG_TYPE)])
     window.session.tick()
 
 

@@ -65,7 +65,7 @@ def stream_of(shown: Picture, silent_s: float = 0.01) -> ImageStream:
 
 
 def test_a_picture_keeps_its_aspect_on_black(view) -> None:
-    view.take(stream_of(picture(320, 240)))  # type: ignore[arg-type]
+    view.show_image(stream_of(picture(320, 240)))  # type: ignore[arg-type]
     assert view.area() == QRectF(0, 50, 400, 300)
     image = view.grab().toImage()
     assert image.pixelColor(200, 20).name() == "#000000"
@@ -76,7 +76,7 @@ def test_a_picture_keeps_its_aspect_on_black(view) -> None:
 
 
 def test_it_says_how_many_are_shown_and_their_size(view) -> None:
-    view.take(stream_of(picture(320, 240)))  # type: ignore[arg-type]
+    view.show_image(stream_of(picture(320, 240)))  # type: ignore[arg-type]
     assert view.words.startswith("60 fps (30 shown)  320\u00d7240  ")
     assert view.words.endswith(" ms")  # its age
     assert rate_sentence(None, None) == ""
@@ -98,29 +98,29 @@ def test_a_rate_that_jumps_is_said_once_a_second() -> None:
 
 def test_the_boxes_of_a_frozen_picture_are_frozen_too(view) -> None:
     stream, boxes = stream_of(picture()), boxes_of(FACES)
-    view.take(stream, boxes)  # type: ignore[arg-type]
+    view.show_image(stream, boxes)  # type: ignore[arg-type]
     stream.hold(True)
-    view.take(stream, ())  # type: ignore[arg-type]
+    view.show_image(stream, ())  # type: ignore[arg-type]
     assert view.boxes == boxes
     stream.hold(False)
-    view.take(stream, ())  # type: ignore[arg-type]
+    view.show_image(stream, ())  # type: ignore[arg-type]
     assert view.boxes == ()
 
 
 def test_each_picture_is_told_as_shown_once(view) -> None:
     stream = stream_of(picture())
-    view.take(stream)  # type: ignore[arg-type]
-    view.take(stream)  # type: ignore[arg-type]
+    view.show_image(stream)  # type: ignore[arg-type]
+    view.show_image(stream)  # type: ignore[arg-type]
     assert len(stream.painted) == 1
     stream.picture = picture()
-    view.take(stream)  # type: ignore[arg-type]
+    view.show_image(stream)  # type: ignore[arg-type]
     assert len(stream.painted) == 2
 
 
 def test_a_silent_stream_is_grey_and_says_how_old_its_picture_is(view) -> None:
-    view.take(stream_of(picture()))  # type: ignore[arg-type]
+    view.show_image(stream_of(picture()))  # type: ignore[arg-type]
     before = view.grab().toImage().pixelColor(20, 80)
-    view.take(stream_of(view._picture, silent_s=4.2))  # type: ignore[arg-type]
+    view.show_image(stream_of(view._picture, silent_s=4.2))  # type: ignore[arg-type]
     assert view.words == "Last image 4 s ago"
     assert view.grab().toImage().pixelColor(20, 80) != before
 
@@ -136,17 +136,17 @@ def camera_view(qtbot, qapp) -> PictureView:
 
 def test_a_camera_that_sees_the_same_is_not_painted_again(qtbot, camera_view, monkeypatch) -> None:
     stream = stream_of(picture(320, 240))
-    camera_view.take(stream)
+    camera_view.show_image(stream)
     qtbot.waitExposed(camera_view)
     asked: list[str] = []
     monkeypatch.setattr(camera_view, "update", lambda: asked.append("update"))
     first = stream.picture
     assert first is not None
     stream.picture = replace(first, seq=2)
-    camera_view.take(stream)
+    camera_view.show_image(stream)
     assert (asked, camera_view.picture) == ([], stream.picture)
     stream.picture = replace(first, seq=3, bgra=first.bgra.copy())
-    camera_view.take(stream)
+    camera_view.show_image(stream)
     assert asked
 
 
@@ -178,7 +178,7 @@ def test_an_age_is_told_once_a_second_and_paints_its_words_alone(qtbot, monkeypa
 
 
 def test_beside_the_cameras_picture_there_is_no_black(camera_view) -> None:
-    camera_view.take(stream_of(picture(320, 240)))  # type: ignore[arg-type]
+    camera_view.show_image(stream_of(picture(320, 240)))  # type: ignore[arg-type]
     assert camera_view.area().left() > 60
     image = camera_view.grab().toImage()
     assert all(image.pixelColor(x, 80).lightness() > 60 for x in (2, 30, 370, 397))
@@ -186,7 +186,7 @@ def test_beside_the_cameras_picture_there_is_no_black(camera_view) -> None:
 
 def test_the_cameras_last_picture_has_no_colours_and_says_so_in_its_middle(camera_view) -> None:
     shown = picture(320, 240)
-    camera_view.take(stream_of(shown, silent_s=4.2))  # type: ignore[arg-type]
+    camera_view.show_image(stream_of(shown, silent_s=4.2))  # type: ignore[arg-type]
     assert camera_view.words.startswith("Last image 4 s ago")
     image = camera_view.grab().toImage()
     found = [image.pixelColor(x, y) for x in range(0, 400, 3) for y in range(0, 160, 3)]
@@ -194,7 +194,7 @@ def test_the_cameras_last_picture_has_no_colours_and_says_so_in_its_middle(camer
         for one in found)  # fmt: skip
     assert any(one.lightness() > 240 for one in found)  # the words
     assert all(image.pixelColor(x, 150).lightness() < 200 for x in range(8, 200, 4))  # no label below
-    camera_view.take(stream_of(shown))  # type: ignore[arg-type]
+    camera_view.show_image(stream_of(shown))  # type: ignore[arg-type]
     assert any(one.saturation() > 100 for one in (camera_view.grab().toImage().pixelColor(x, 100)
         for x in range(100, 300)))  # fmt: skip
 
@@ -203,7 +203,7 @@ def test_boxes_are_drawn_where_they_are_with_their_words(view) -> None:
     boxes = boxes_of(FACES)
     assert (boxes[0].words, boxes[0].confidence) == ("face", 0.97)
     assert boxes[0].place == QRectF(0.5, 0.25, 0.25, 0.25)
-    view.take(stream_of(picture()), boxes)  # type: ignore[arg-type]
+    view.show_image(stream_of(picture()), boxes)  # type: ignore[arg-type]
     image = view.grab().toImage()
     assert image.pixelColor(250, 125).name() == "#ffc53d"  # its upper edge
     assert image.pixelColor(203, 110).name() == "#ffc53d"  # the tag above
@@ -217,7 +217,7 @@ def test_what_is_no_detection_makes_no_box(broken: object) -> None:
 
 
 def test_the_value_under_the_mouse_is_said(qtbot, view) -> None:
-    view.take(stream_of(picture()))  # type: ignore[arg-type]
+    view.show_image(stream_of(picture()))  # type: ignore[arg-type]
     QTest.mouseMove(view, QPoint(20, 60))
     qtbot.waitUntil(lambda: "(16, 8)  196 198 190  #C4C6BE" in view.words)
     QTest.mouseMove(view, QPoint(20, 20))
@@ -310,7 +310,7 @@ def under(view: ZoomablePicture, at: QPoint) -> str:
 
 
 def test_the_wheel_zooms_where_the_mouse_is(view) -> None:
-    view.take(stream_of(picture()))  # type: ignore[arg-type]
+    view.show_image(stream_of(picture()))  # type: ignore[arg-type]
     at = QPoint(313, 237)  # the ball
     before = under(view, at)
     assert before.endswith("210 62 58  #D23E3A")
@@ -325,7 +325,7 @@ def test_from_twice_its_size_on_pixels_have_edges(view) -> None:
     corner = bytes([255] * 3 + [0] * 45)
     layout = {"shape": [4, 4, 3], "encoding": "bgr8"}
     message = Message("/c", corner, "image", "image", stamp_ns=time.time_ns(), extension=layout)
-    view.take(stream_of(replace(picture(4, 4), message=message)))  # type: ignore[arg-type]
+    view.show_image(stream_of(replace(picture(4, 4), message=message)))  # type: ignore[arg-type]
     image = view.grab().toImage()
     assert {image.pixelColor(x, 20).name() for x in range(0, 200, 3)} == {"#ffffff", "#000000"}
     view.place.set_zoom(1.9)
@@ -338,7 +338,7 @@ def test_from_twice_its_size_on_pixels_have_edges(view) -> None:
 @pytest.mark.parametrize("turned", [0, 90, 180, 270])
 @pytest.mark.parametrize("flipped", [False, True])
 def test_values_and_boxes_follow_turning_and_flipping(view, turned: int, flipped: bool) -> None:
-    view.take(stream_of(picture()), boxes_of(FACES))  # type: ignore[arg-type]
+    view.show_image(stream_of(picture()), boxes_of(FACES))  # type: ignore[arg-type]
     if flipped:
         view.place.flip(across=True)
     view.place.turn(turned)
@@ -351,7 +351,7 @@ def test_values_and_boxes_follow_turning_and_flipping(view, turned: int, flipped
 
 
 def test_dragging_and_the_arrow_keys_move_a_zoomed_picture(qtbot, view) -> None:
-    view.take(stream_of(picture()))  # type: ignore[arg-type]
+    view.show_image(stream_of(picture()))  # type: ignore[arg-type]
     view.place.set_zoom(5.0)
     before = under(view, QPoint(100, 100))
     QTest.mousePress(view, Qt.MouseButton.LeftButton, pos=QPoint(100, 100))
@@ -364,7 +364,7 @@ def test_dragging_and_the_arrow_keys_move_a_zoomed_picture(qtbot, view) -> None:
 
 
 def test_a_double_click_goes_between_the_whole_and_one_for_one(view) -> None:
-    view.take(stream_of(picture()))  # type: ignore[arg-type]
+    view.show_image(stream_of(picture()))  # type: ignore[arg-type]
     QTest.mouseDClick(view, Qt.MouseButton.LeftButton, pos=QPoint(200, 200))
     assert view.scale() == pytest.approx(1.0)
     QTest.mouseDClick(view, Qt.MouseButton.LeftButton, pos=QPoint(200, 200))
@@ -373,17 +373,17 @@ def test_a_double_click_goes_between_the_whole_and_one_for_one(view) -> None:
 
 def test_as_many_pixels_are_wanted_as_are_shown_and_all_of_them_under_the_mouse(view) -> None:
     stream = stream_of(picture(640, 320))
-    view.take(stream)  # type: ignore[arg-type]
+    view.show_image(stream)  # type: ignore[arg-type]
     assert stream.wish == (400, 200)
     view.place.turn(90)
-    view.take(stream)  # type: ignore[arg-type]
+    view.show_image(stream)  # type: ignore[arg-type]
     assert stream.wish == (400, 200)
     view.place.set_zoom(3.0)
-    view.take(stream)  # type: ignore[arg-type]
+    view.show_image(stream)  # type: ignore[arg-type]
     assert stream.wish == (1920, 960)
     view.place.set_zoom(None)
     view.mouse = QPointF(200, 200)
-    view.take(stream)  # type: ignore[arg-type]
+    view.show_image(stream)  # type: ignore[arg-type]
     assert stream.wish is None
 
 

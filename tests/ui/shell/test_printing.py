@@ -52,7 +52,7 @@ class Case:
         self.editor, self.window = Editor(data), QWidget()
         qtbot.addWidget(self.window)
         surface = SimpleNamespace(window=lambda: self.window)
-        shell = SimpleNamespace(editor=lambda: self.editor, say=self.said.append, surface=surface)
+        shell = SimpleNamespace(editor=lambda: self.editor, show_toast=self.said.append, surface=surface)
         session = SimpleNamespace(document=SimpleNamespace(name="Tea", path=None))
         self.answers = Answers()
         self.printing = Printing(

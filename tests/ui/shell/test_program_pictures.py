@@ -30,7 +30,7 @@ class Editor:
 
 
 def made(editor: Editor, said: list[str], answers: Answers | None = None) -> ProgramPictures:
-    shell = SimpleNamespace(editor=lambda: editor, say=said.append)
+    shell = SimpleNamespace(editor=lambda: editor, show_toast=said.append)
     session = SimpleNamespace(document=SimpleNamespace(name="Tea", path=None))
     return ProgramPictures(cast("Shell", shell), cast("Session", session), answers or Answers())
 

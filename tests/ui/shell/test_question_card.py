@@ -120,7 +120,7 @@ def test_only_the_question_that_is_asked_is_answered_and_once() -> None:
     asking.apply(RunnerEvent("ask", 4, text="Name?", question=1))
     shown = asking.question
     assert shown is not None
-    asking.take(RunnerEvent("ask", 4, text="Age?", question=2))
+    asking.apply(RunnerEvent("ask", 4, text="Age?", question=2))
     asking.answer(shown, "late")
     assert runner.got == []
     newest = asking.question
@@ -128,9 +128,9 @@ def test_only_the_question_that_is_asked_is_answered_and_once() -> None:
     asking.answer(newest, "7")
     asking.answer(newest, "8")
     assert (runner.got, asking.question) == ([(2, "7")], None)
-    asking.take(RunnerEvent("ask", 4, question=0))
+    asking.apply(RunnerEvent("ask", 4, question=0))
     assert asking.question is None
-    asking.take(RunnerEvent("ask", 4, text="Name?", question=3))
+    asking.apply(RunnerEvent("ask", 4, text="Name?", question=3))
     asking.clear()
     assert asking.question is None
 

@@ -51,8 +51,8 @@ def opened(monkeypatch: pytest.MonkeyPatch) -> Opened:
 
 @pytest.fixture
 def session(session: Session, monkeypatch: pytest.MonkeyPatch) -> Session:
-    """Its doctor has looked already, and found nothing."""
-    monkeypatch.setattr(session.doctor, "look", lambda: None)
+    """Session whose doctor has run and found nothing."""
+    monkeypatch.setattr(session.doctor, "start", lambda: None)
     return session
 
 

@@ -110,7 +110,7 @@ thread.start()
 thread.join()
 qWarning("of Qt")
 told = []
-log.take(lambda *line: told.append(line))
+log.drain(lambda *line: told.append(line))
 with open(sys.argv[1], "w") as file:
     json.dump(told, file)
 raise ValueError("at the end")
