@@ -134,12 +134,12 @@ def test_a_command_that_is_typed_here_leaves_the_environment_to_others(type_in):
 def test_a_name_that_no_computer_has_is_the_right_sentence(type_in):
     done = type_in("--master", "nosuchhost.invalid:7781", "topic", "list")
     assert done.returncode == 1
-    assert done.stderr.startswith("nep: no computer is called 'nosuchhost.invalid' here; ")
+    assert done.stderr.startswith("nep: unknown computer 'nosuchhost.invalid'; ")
     doctor = type_in("doctor", "--master", "nosuchhost.invalid:7781")
-    assert "No computer is called" in doctor.stdout
-    assert "Start one" not in doctor.stdout
+    assert "Can't find a computer named “nosuchhost.invalid”" in doctor.stdout
+    assert "Start a master" not in doctor.stdout
     assert type_in("--master", "not an address", "topic", "list").stderr.startswith(
-        "nep: 'not an address:7780' is no"
+        "nep: 'not an address:7780' is not an address of a master"
     )
 
 
@@ -178,7 +178,7 @@ def test_without_a_master_each_command_says_how_to_start_one(address, type_in):
         assert done.returncode == 1
         assert (
             done.stderr
-            == f"nep: no master answers at '{address}' (waited 2 s); start one with 'nep master'\n"
+            == f"nep: no master replied at '{address}' (waited 2 s); start one with 'nep master'\n"
         )
         assert not done.stdout
 
@@ -244,7 +244,7 @@ def test_echo_writes_one_json_object_a_line(running_master):
 def test_echo_ends_when_nothing_comes_for_so_long(running_master, type_in):
     done = type_in("topic", "echo", "t", "--timeout", "0.2")
     assert done.returncode == 1
-    assert "did not come within 0.2 s" in done.stderr
+    assert "timed out after 0.2 s while waiting for a message on 't'" in done.stderr
 
 
 def test_ctrl_c_ends_everything_at_once_with_130_and_no_traceback(running_master, start):
@@ -326,7 +326,7 @@ def test_a_master_that_listens_says_what_others_type_and_warns(address, start):
     master.interrupt()
     refused = run("master", "--port", port, "--no-gateway", "--listen", "203.0.113.77")
     assert refused.returncode == 1
-    assert "no address of this computer" in refused.stderr
+    assert "'203.0.113.77' is not an address of this computer" in refused.stderr
 
 
 def test_the_command_starts_without_loading_rich():
@@ -353,10 +353,10 @@ def test_a_command_line_imports_its_own_command_alone():
         (("topic", "echo", "t", "--timeout", "nan"), "nan is not a valid duration"),
         (("topic", "hz", "t", "--timeout", "-1"), "-1 is not a valid duration"),
         (("topic", "pub", "t", "1", "--type", "a\x01"), "it is 'a\\x01'; use at most 200 characters"),
-        (("topic", "pub", "t", "1", "--type", "a" * 300), "(300 characters)'; use 200"),
+        (("topic", "pub", "t", "1", "--type", "a" * 300), "(300 characters)'; use at most 200 characters"),
     ],
 )
 def test_what_cannot_be_is_told_before_a_master_is_looked_for(words, sentence, type_in):
     done = type_in(*words)
     assert done.returncode == 2
-    assert sentence in done.stderr
+    assert sentence in " ".join(done.stderr.replace("│", " ").split())

@@ -97,7 +97,7 @@ def test_a_master_logs_its_alerts_and_when_they_are_resolved():
             first = records.listen(timeout_s=30.0)[1]
             assert first["node"] == "master"
             assert first["level"] == "warning"
-            assert "2 programs call themselves" in first["text"]
+            assert "2 programs are named “twin”" in first["text"]
             assert pubs
         resolved = records.listen(timeout_s=30.0)[1]
         assert (resolved["level"], resolved["text"][:9]) == ("info", "resolved:")

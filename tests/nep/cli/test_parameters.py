@@ -52,7 +52,7 @@ def test_list_get_and_set(node: nep.Node, run: TypeIn) -> None:
 def test_what_is_refused_is_a_sentence(node: nep.Node, run: TypeIn) -> None:
     refused = run("set", "robot", "speed", "9")
     assert (refused.returncode, refused.stdout) == (1, "")
-    assert "the parameter 'speed' cannot be 9; the most is 2" in refused.stderr
+    assert "the parameter 'speed' cannot be 9; the maximum is 2" in refused.stderr
     assert "unknown parameter 'spead'; did you mean 'speed'?" in run("get", "robot", "spead").stderr
     assert "no node is named 'robt'; did you mean 'robot'?" in run("list", "robt").stderr
     node.parameters.declare("word", "x")

@@ -114,7 +114,7 @@ def test_bw_reports_sizes_to_people(published, capsys):
 
 
 def test_a_topic_that_is_not_there_is_waited_for_with_the_nearest_name(published, capsys):
-    with pytest.raises(WaitTimeoutError, match="timed out after 0\\.5 s while waiting for '/odm'"):
+    with pytest.raises(WaitTimeoutError, match="timed out after 0\\.5 s while waiting for .*'/odm'"):
         hz(["/odm"], 10.0, 0, published, timeout_s=0.5)
     assert "'/odm' has no publisher yet; did you mean '/odom'? waiting" in capsys.readouterr().err
     with pytest.raises(BadTopicError):

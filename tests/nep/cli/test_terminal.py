@@ -54,11 +54,11 @@ def test_who_writes_never_waits_and_what_was_left_out_is_told(stuck: Stuck) -> N
         terminal.flush()
     terminal.close(0.0)  # nor does closing
     stuck.may_go_on.set()
-    eventually(lambda: "left out" in stuck.getvalue())
+    eventually(lambda: "dropped" in stuck.getvalue())
     lines = stuck.getvalue().splitlines()
     assert lines[:3] == ["first", "line 0", "line 1"]
     kept = len(lines) - 2
-    assert lines[-1] == f"… {1000 - kept} lines left out: nobody read this for a while"
+    assert lines[-1] == f"… {1000 - kept} lines dropped because the output was not read"
     assert terminal.write("too late") == 8
     terminal.close()
 

@@ -130,7 +130,9 @@ def test_alarm_moves_no_robot_that_was_not_allowed(master, type_in, file) -> Non
         told = describe(robot, "/orders")
         refused = type_in(*words)
         assert refused.returncode == 2
-        assert "'/orders' moves Rover; add --allow-moving Rover" in " ".join(refused.stderr.split())
+        said = " ".join(refused.stderr.replace("│", " ").split())
+        assert "'/orders' moves Rover; make sure that nobody is in the way" in said
+        assert "add --allow-moving Rover" in said
         assert told == []
         assert type_in(*words, "--allow-moving", "Rover").returncode == 0
         eventually(lambda: told == [{"op": "invoke"}])
@@ -151,7 +153,8 @@ def test_alarm_does_not_move_a_robot_that_came_later(master, type_in, file) -> N
         thread.start()
         done = type_in("watch", name, "-n", "1", "--master", master.address)
         thread.join()
-    assert "not sent: '/orders' moves Rover; add --allow-moving Rover" in done.stdout
+    assert "not sent: '/orders' moves Rover; make sure that nobody is in the way" in done.stdout
+    assert "add --allow-moving Rover" in done.stdout
     assert told == [[]]
 
 

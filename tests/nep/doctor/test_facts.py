@@ -185,7 +185,8 @@ def test_people_see_a_sentence_and_the_next_step(foreign):
     assert done.returncode == 2
     assert "Traceback" not in done.stderr
     lines = done.stdout.splitlines()
-    assert lines[0].startswith("✗ Port")
+    assert lines[0].startswith("✗ “")
+    assert lines[0].endswith(f" uses port {foreign} but is not a master.")
     assert lines[2].strip() == f"nep master --port {foreign + 1}"
 
 
@@ -193,8 +194,8 @@ def test_what_hinders_a_master_is_one_finding(foreign, master):
     one = start_obstacle(f"127.0.0.1:{foreign}")
     assert one is not None
     assert one.id == "master:foreign"
-    assert one.as_error.startswith(f"port {foreign} is held by ")
-    assert "; end that program" in one.as_error
+    assert f"(process {os.getpid()}) uses port {foreign} " in one.as_error
+    assert "; close that program" in one.as_error
     assert not one.as_error.endswith(".")
     with socket.socket() as probe:
         probe.bind(("127.0.0.1", 0))

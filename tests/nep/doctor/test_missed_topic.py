@@ -83,7 +83,7 @@ def test_what_ends_alike_is_meant_only_when_there_is_one():
 def test_who_is_not_there_at_all():
     nobody = found(topic="/speech", publishers=(), is_shared=False, address="127.0.0.1:7780")
     assert nobody["topic:nobody"].mend.endswith(
-        "what is published now: /once, /robot/camera and /robot/depth."
+        "Topics published now: /once, /robot/camera and /robot/depth."
     )
     assert nobody["topic:closed"].severity == "info"
     many = {f"/t{number}": None for number in range(40)} | {"/nep/log": None}
@@ -140,10 +140,10 @@ def test_versions_that_do_not_fit():
 
 def test_what_comes_and_can_or_cannot_be_read():
     assert [each.severity for each in found(received=1, **publisher(last_s=NOW)).values()] == ["ok"]
-    bad = found(received=1, unreadable="it is no JSON", **publisher(last_s=NOW))["topic:unreadable"]
-    assert bad.sentence == "Messages on /robot/camera arrive but can't be read: it is no JSON."
+    bad = found(received=1, unreadable="it is not valid JSON", **publisher(last_s=NOW))["topic:unreadable"]
+    assert bad.sentence == "Messages on /robot/camera arrive but can't be read: it is not valid JSON."
     blocked = found(**publisher(last_s=NOW))["topic:blocked"]
-    assert blocked.sentence.startswith("/robot/camera is sent by camera_driver (lab), but nothing came here")
+    assert blocked.sentence.startswith("camera_driver (lab) sends /robot/camera, but no messages were received")
 
 
 def test_what_the_master_noticed_of_the_topic_is_an_error_here():

@@ -107,7 +107,7 @@ def test_at_an_address_of_the_network_no_master_is_started(master: Master, own: 
     nobody = start_obstacle(f"{own}:{free}")
     assert nobody is not None
     assert (nobody.id, nobody.command) == ("master:network", "")
-    assert f"one begins at 127.0.0.1:{free}" in nobody.sentence
+    assert f"start at 127.0.0.1:{free}" in nobody.sentence
     assert f"Use 127.0.0.1:{free}" in nobody.mend
 
 

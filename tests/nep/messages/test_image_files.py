@@ -83,9 +83,9 @@ def test_no_bomb_takes_memory_in_the_library_or_in_studio() -> None:
         ("png of many pixels", "48000 × 48000 pixels are too many; the limit is 120 million"),  # noqa: RUF001
         ("png of 16 bits", "9500 × 12000 pixels need 1824 MB; the limit is 750 MB"),  # noqa: RUF001
         ("jpeg of many passes", "4000 × 4000 pixels in 90 passes take too long to decode"),  # noqa: RUF001
-        ("png of a chunk of gigabytes", "a broken PNG: it is truncated"),
-        ("png with two heads", "a broken PNG: it has two header chunks"),
-        ("jpeg of 12 bits", "a JPEG of 12 bits for a colour is not read"),
+        ("png of a chunk of gigabytes", "the PNG image is damaged: it is truncated"),
+        ("png with two heads", "the PNG image is damaged: it has two header chunks"),
+        ("jpeg of 12 bits", "a JPEG image with 12 bits per colour is not supported"),
         ("nothing", "the image is empty"),
         ("a word", "it is neither a JPEG nor a PNG image"),
     ],

@@ -83,12 +83,12 @@ def test_colour_is_mixed() -> None:
 @pytest.mark.parametrize(
     ("image", "frame", "sentence"),
     [
-        (ImageFormat("jpeg"), DEPTH, "a JPEG has 'uint8' and one or three channels"),
-        (ImageFormat("jpeg"), np.zeros((4, 4, 4), np.uint8), "a JPEG has 'uint8' and one or three channels"),
-        (ImageFormat("png"), DEPTH.astype(np.float32), "a PNG has 'uint8' or 'uint16'"),
-        (ImageFormat("png"), np.zeros((4, 4, 2), np.uint8), "a PNG has 'uint8' or 'uint16'"),
+        (ImageFormat("jpeg"), DEPTH, "a JPEG image needs 'uint8' and one or three channels"),
+        (ImageFormat("jpeg"), np.zeros((4, 4, 4), np.uint8), "a JPEG image needs 'uint8' and one or three channels"),
+        (ImageFormat("png"), DEPTH.astype(np.float32), "a PNG image needs 'uint8' or 'uint16'"),
+        (ImageFormat("png"), np.zeros((4, 4, 2), np.uint8), "a PNG image needs 'uint8' or 'uint16'"),
         (ImageFormat("raw"), "picture", "publish a 'uint8' array"),
-        (ImageFormat("raw"), b"no file", "picture"),
+        (ImageFormat("raw"), b"no file", "neither a JPEG nor a PNG image"),
     ],
 )
 def test_what_has_no_such_form_is_refused(image: ImageFormat, frame: Any, sentence: str) -> None:
@@ -134,7 +134,7 @@ def test_what_cannot_be_sent_so_is_refused_and_named(
     pub = node.new_pub("camera", "image", image=nep.ImageFormat("jpeg"))
     pub.publish(DEPTH)
     assert pub.refused == 1
-    assert "a JPEG has 'uint8' and one or three channels" in caplog.text
+    assert "a JPEG image needs 'uint8' and one or three channels" in caplog.text
 
 
 @pytest.mark.parametrize(

@@ -348,7 +348,7 @@ def _good() -> dict[str, Any]:
 
 def test_what_a_class_refuses_does_not_fit() -> None:
     assert refused(Shares, {"shares": [{"of_one": 0}, {"of_one": 2}]}) == (
-        "shares[1] is refused by 'Share': it is not from 0 to 1"
+        "shares[1] was rejected by 'Share': it is not from 0 to 1"
     )
 
 
@@ -360,8 +360,8 @@ def test_what_a_class_refuses_does_not_fit() -> None:
          "header.stamp.sec"),
         (Pose(position=Vector3()), "position is a 'Vector3'; give a 'Point'", "position"),
         (Pose(position={"x": 1}), "position is a 'dict'; give a 'Point'", "position"),
-        (Part(1 << 64), "number is beyond 64 bits; give a 'int'", "number"),
-        (Part(-(1 << 63) - 1), "number is beyond 64 bits; give a 'int'", "number"),
+        (Part(1 << 64), "number does not fit into 64 bits; give a 'int'", "number"),
+        (Part(-(1 << 63) - 1), "number does not fit into 64 bits; give a 'int'", "number"),
         (Part(word="\ud800"), "word contains an unpaired surrogate; give valid Unicode text", "word"),
         (Vector3(10**400), "x is too large; give a 'float'", "x"),
         (Vector3(y=True), "y is a 'bool'; give a 'float'", "y"),
@@ -378,7 +378,7 @@ def test_what_cannot_be_sent_is_told_with_its_place(payload: object, reason: str
 def test_a_dict_is_checked_too() -> None:
     encode = typed_codec(message_type(Strict), JSON).encode
     assert json.loads(bytes(encode({"b": "x", "a": 3}).data)) == {"b": "x", "a": 3}
-    assert unsent({"b": "x", "aa": 1}, Strict) == ("aa is no field of 'Strict'; did you mean 'a'?", "aa")
+    assert unsent({"b": "x", "aa": 1}, Strict) == ("aa is not a field of 'Strict'; did you mean 'a'?", "aa")
     assert unsent({"a": 1}, Strict) == ("b is missing; give a 'str'", "b")
     assert unsent({"b": 1}, Strict) == ("b is a 'int'; give a 'str'", "b")
     assert unsent([], Strict) == ("publish a 'Strict'", "")

@@ -140,23 +140,23 @@ class Plain:
 @pytest.mark.parametrize(
     ("declared", "sentence"),
     [
-        (Bytes, "Bytes.inner is a 'bytes', which typed messages cannot carry; docs/types.md lists"),
-        (Keys, "Keys.inner is a 'dict[int, str]', which typed messages cannot carry"),
+        (Bytes, "Bytes.inner is a 'bytes', which typed messages don't support; see docs/types.md"),
+        (Keys, "Keys.inner is a 'dict[int, str]', which typed messages don't support"),
         (Sets, "Sets.inner is a 'set[int]', which"),
         (BytesEnum, "BytesEnum.inner is a "),
         (EnumWord, "EnumWord.inner is a "),
         (Unhashable, "Unhashable.inner is a "),
         (TwoMaps, "TwoMaps.inner is a 'tests.nep.messages.test_typed_declarations.Part |"),
         (TwoTexts, "TwoTexts.inner is a "),
-        (TwoLists, "TwoLists.inner is a 'list[int] | tuple[str, int]', of which two are the same in JSON"),
-        (Unknown, "the types in 'Unknown' cannot be read: name 'NowhereToBeFound' is not defined"),
+        (TwoLists, "TwoLists.inner is a 'list[int] | tuple[str, int]', two types that look the same in JSON"),
+        (Unknown, "the type hints of 'Unknown' can't be resolved: name 'NowhereToBeFound' is not defined"),
         (Private, "Private._inner is not sent; give it a default"),
         (
             Image,
             "the message type of 'Image' is 'image', a built-in type without fields; set MSG_TYPE to another name",
         ),
-        (Needs, "Needs.other is needed" if sys.version_info >= (3, 11) else "the types in 'Needs' cannot"),
-        (OwnConstructor, "OwnConstructor.another is needed to make one, and is no field that is sent"),
+        (Needs, "Needs.other is required" if sys.version_info >= (3, 11) else "the type hints of 'Needs' can't"),
+        (OwnConstructor, "OwnConstructor.another is required by the constructor but is not a field that is sent"),
         (Empty, "MSG_TYPE is empty"),
         (Numbered, "MSG_TYPE is a 'int'; give a 'str'"),
         (Plain, "msg_type is the class 'Plain', which is neither a dataclass nor a TypedDict"),
@@ -181,7 +181,7 @@ def test_types_of_too_many_levels_are_refused() -> None:
     usual = sys.getrecursionlimit()
     sys.setrecursionlimit(1000)  # some library may have raised it
     try:
-        with pytest.raises(ValueError, match="the types in 'Deep' have too many levels; put a dataclass"):
+        with pytest.raises(ValueError, match="the types in 'Deep' are nested too deeply; use a dataclass"):
             message_type(TypedDict("Deep", {"inner": hint}))
     finally:
         sys.setrecursionlimit(usual)
