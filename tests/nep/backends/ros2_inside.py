@@ -348,7 +348,7 @@ def test_a_program_for_which_there_is_no_room_is_told() -> None:
         say(error)
     """
     with nep_program(code) as other:
-        assert other.line().endswith("whether 100 programs are in the domain already")
+        assert other.line().endswith("whether the domain already has 100 programs")
 
 
 def test_who_is_off_meets_nobody(make: Make, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -387,8 +387,8 @@ def test_another_type_on_the_topic_is_an_alert_and_nothing_is_heard(make: Make) 
     code += "pub.publish({'data': 1.0})\nsys.stdin.read()"
     with nep_program(code) as other:
         assert other.line() == "ready"
-        said = "it wants “std_msgs/msg/Int64”, and gets “std_msgs/msg/Float64”"
-        said = f"“a” hears nothing of “/other” on “t”: {said}"
+        said = "it requests “std_msgs/msg/Int64”, but the publisher offers “std_msgs/msg/Float64”"
+        said = f"“a” does not receive “t” from “/other”: {said}"
         eventually(lambda: [each.sentence for each in node.graph().alerts] == [said])
         assert sub.listen() == (False, {})
     eventually(lambda: node.graph().alerts == ())
@@ -411,9 +411,9 @@ def test_words_that_are_none(make: Make) -> None:
     node = make("a")
     with pytest.raises(ValueError, match="qos is 'quick'; use '', 'reliable', 'best_effort' or 'sensor'"):
         node.new_pub("t", qos="quick")
-    with pytest.raises(nep.NepError, match=r"no type of message 'std_msgs/msg/Strng' is known; did you mean"):
+    with pytest.raises(nep.NepError, match="'std_msgs/msg/Strng'; did you mean 'std_msgs/msg/String'"):
         node.new_sub("t", "std_msgs/Strng")
-    with pytest.raises(nep.NepError, match="no direct connections"):
+    with pytest.raises(nep.NepError, match=r"'ros2' .*direct connections"):
         node.new_pub("t", "json", node.direct())
     for topic in ("ü", "a b"[:1] + "-b", "1a", "a//b", "a/", "a__b"):
         with pytest.raises(nep.BadTopicError, match="ROS 2 allows"):
@@ -430,7 +430,7 @@ def test_a_node_is_in_the_domain_that_it_is_given_and_in_no_other(make: Make) ->
         assert sub.listen(timeout_s=60.0) == (True, 1)
         assert pub.subscribers == 1
         assert {each.name for each in there.graph().nodes.values()} == {"there", "too"}
-        with pytest.raises(nep.NepError, match="'there' is in the domain 201 of ROS 2; make another node"):
+        with pytest.raises(nep.NepError, match=r"'there' .* 201 .*master='202'"):
             there.new_sub("t", "json", there.hybrid("202"))
     assert hears.listen() == (False, {})
     assert {each.name for each in here.graph().nodes.values()} == {"here"}

@@ -100,9 +100,9 @@ def test_what_does_not_fit_is_told_with_its_place(make: Make) -> None:
         "/add", lambda asked: {"sum": "three"}, msg_type="example_interfaces/AddTwoInts", threads=1
     )
     add = make("client").new_client("/add", msg_type="example_interfaces/AddTwoInts", timeout_s=LONG_S)
-    with pytest.raises(nep.EncodeError, match="'a' is not from -9223372036854775808 to"):
+    with pytest.raises(nep.EncodeError, match=r"'a' .* -9223372036854775808 to"):
         add.call({"a": 2**63})
-    with pytest.raises(nep.EncodeError, match="'c' is no field of"):
+    with pytest.raises(nep.EncodeError, match=r"'c' .*fields: 'a', 'b'"):
         add.call({"c": 1})
     with pytest.raises(nep.ServiceError, match="'sum' is a 'str'; give a whole number"):
         add.call({"a": 1})
@@ -121,13 +121,13 @@ def test_programs_of_nep_tell_each_other_of_failures(make: Make) -> None:
 
 def test_types_that_are_not_known_are_told(make: Make, tmp_path, monkeypatch) -> None:
     node = make("node")
-    with pytest.raises(nep.NepError, match="no type of service 'std_srvs/srv/SetBol' is known; did you mean"):
+    with pytest.raises(nep.NepError, match="'std_srvs/srv/SetBol'; did you mean 'std_srvs/srv/SetBool'"):
         node.new_server("/x", msg_type="std_srvs/SetBol")
-    with pytest.raises(nep.NepError, match="cannot have the type 'image'; use one such as"):
+    with pytest.raises(nep.NepError, match=r"'image'.*'std_srvs/srv/SetBool'"):
         node.new_server("/x", msg_type="image")
-    with pytest.raises(nep.BadTopicError, match="ROS 2 allows letters of ASCII"):
+    with pytest.raises(nep.BadTopicError, match=r"'/ü' .*ASCII"):
         node.new_client("/ü")
-    with pytest.raises(nep.NepError, match="'ros2' has no direct connections"):
+    with pytest.raises(nep.NepError, match=r"'ros2' .*direct connections"):
         node.new_client("/x", node.direct(port=7000))
     folder = tmp_path / "my_robot" / "srv"
     folder.mkdir(parents=True)
@@ -231,7 +231,7 @@ def test_a_server_that_dies_while_it_is_called_is_reported(make: Make) -> None:
         assert client.call({}) == {"pid": program.process.pid}
         assert make("viewer").graph().services["/x"].msg_type == "nep_msgs/srv/Call"
         program.kill()
-        with pytest.raises(nep.ServerGoneError, match="the server of '/x' ended while it was called"):
+        with pytest.raises(nep.ServerGoneError, match="'/x'"):
             future.result(LONG_S)
     with running(SERVER) as program:  # and the next one is found
         program.line()
@@ -284,12 +284,10 @@ def test_a_server_whose_type_is_not_known_is_told_at_the_call(make: Make) -> Non
         assert other.line() == "ready"
         eventually(lambda: "/odd" in node.graph().services)
         assert not client.is_connected
-        with pytest.raises(
-            nep.NepError, match=r"no type of service 'odd_msgs/srv/Odd' is known; .*\.srv files"
-        ):
+        with pytest.raises(nep.NepError, match=r"'odd_msgs/srv/Odd'.*\.srv files"):
             client.call({})
         late = node.new_client("/odd")
-        with pytest.raises(nep.NepError, match="no type of service"):
+        with pytest.raises(nep.NepError, match="'odd_msgs/srv/Odd'"):
             late.call({}, timeout_s=LONG_S)
         told = node.new_client("/odd", msg_type="std_srvs/Trigger")
         with pytest.raises(nep.NoServerError):

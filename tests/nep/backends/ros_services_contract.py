@@ -43,9 +43,7 @@ def registered(make: Make) -> Make:
 def test_a_server_that_takes_too_long_is_another_error(make: Make) -> None:
     server = make("server").new_server("/slow")
     client = make("client").new_client("/slow")
-    with pytest.raises(
-        nep.ServiceTimeoutError, match="timed out after 0\\.2 s while waiting for an answer of '/slow'"
-    ):
+    with pytest.raises(nep.ServiceTimeoutError, match=r"0\.2 s.*'/slow'"):
         client.call({"n": 1}, timeout_s=0.2)
     assert server.listen_info(30.0) == {"n": 1}
     server.send_info({})
@@ -75,7 +73,7 @@ def test_the_graph_tells_of_services_and_not_of_those_of_rospy(make: Make) -> No
 
 def test_a_second_server_of_a_program_is_refused_until_the_first_is_closed(make: Make) -> None:
     first = make("a").new_server("/x")
-    with pytest.raises(nep.NepError, match="this program serves '/x' already"):
+    with pytest.raises(nep.NepError, match=r"program .*'/x'.*ROS"):
         make("b").new_server("/x")
     first.close()
     make("c").new_server("/x", lambda request: request, threads=1)
@@ -83,7 +81,7 @@ def test_a_second_server_of_a_program_is_refused_until_the_first_is_closed(make:
 
 
 def test_types_that_are_not_there_are_refused(make: Make) -> None:
-    with pytest.raises(nep.NepError, match=r"there is no ROS service 'std_srvs/SetBoot' here.*-srvs'"):
+    with pytest.raises(nep.NepError, match=r"'std_srvs/SetBoot'.*-srvs'"):
         make("a").new_server("/x", msg_type="std_srvs/SetBoot")
-    with pytest.raises(nep.NepError, match="a service of ROS cannot have the type 'image'"):
+    with pytest.raises(nep.NepError, match=r"ROS service.*'image'.*'std_srvs/SetBool'"):
         make("b").new_server("/x", msg_type="image")

@@ -232,7 +232,7 @@ def test_a_callback_may_close_its_node_and_spin_another(make: Nodes) -> None:
 def test_what_is_no_node_is_refused(make: Nodes) -> None:
     node = make("a", "memory")
     for wrong in ((), (None,), (node, "b")):
-        with pytest.raises(ValueError, match="give it one node or more"):
+        with pytest.raises(ValueError, match=r"spin .*one or more nodes"):
             nep.spin(*wrong)  # type: ignore[arg-type]
     with pytest.raises(ValueError, match="timeout_s is -1"):
         nep.spin(node, timeout_s=-1)
@@ -338,12 +338,12 @@ def test_without_room_for_one_more_file_it_says_so(make: Nodes, monkeypatch: pyt
         raise OSError(errno.EMFILE, "too many open files")
 
     monkeypatch.setattr(selectors, "DefaultSelector", no_room)
-    with pytest.raises(nep.TooManyFilesError, match="no room for a thread that waits"):
+    with pytest.raises(nep.TooManyFilesError, match=r"thread .*files open"):
         nep.spin(*nodes)
 
     async def main() -> None:
         sub = nodes[1].new_sub("t")
-        with pytest.raises(nep.TooManyFilesError, match="no room for a thread that waits"):
+        with pytest.raises(nep.TooManyFilesError, match=r"thread .*files open"):
             await sub.receive_async(0.01)
         monkeypatch.undo()
         assert await sub.receive_async(0.01) is None

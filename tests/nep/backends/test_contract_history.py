@@ -174,7 +174,7 @@ def test_a_back_end_without_says_so(make: Make, monkeypatch: pytest.MonkeyPatch)
     monkeypatch.setattr("nep.backends.base.Backend.has_history", False, raising=False)
     object.__setattr__(node._backend, "has_history", False)
     try:
-        with pytest.raises(ValueError, match=f"the back end '{node._backend.name}' keeps no history"):
+        with pytest.raises(ValueError, match=f"'{node._backend.name}' .*history"):
             node.new_pub("topic", history=1)
     finally:
         object.__setattr__(node._backend, "has_history", True)
@@ -183,7 +183,7 @@ def test_a_back_end_without_says_so(make: Make, monkeypatch: pytest.MonkeyPatch)
 def test_the_original_wire_has_none() -> None:
     with nep.node("a") as node:
         direct = node.direct(port=9999)
-        with pytest.raises(ValueError, match="the original wire keeps no history"):
+        with pytest.raises(ValueError, match=r"original wire .*history"):
             node.new_pub("topic", "json", direct, history=2)
 
 

@@ -192,7 +192,10 @@ def test_a_dict_is_checked_and_arrives(make: Make) -> None:
     a, b = make("a"), make("b")
     sub, pub = b.new_sub("t", Named), a.new_pub("t", Named)
     pub.publish({"name": "x", "more": 1})
-    assert pub.problem == "cannot encode a 'dict' as 'Named'; more is no field of 'Named'; known are 'name'"
+    assert (
+        pub.problem
+        == "cannot encode a 'dict' as 'Named'; more is not a field of 'Named'; known names: 'name'"
+    )
     pub.publish({"name": "x"})
     assert sub.listen(timeout_s=30.0) == (True, {"name": "x"})
 

@@ -55,9 +55,10 @@ print(sub.listen(timeout_s=30.0))
     )
     with running(code) as program:
         sentence, count = program.line(), int(program.line())
-        assert sentence.startswith(f"no room for a publisher of 't{count}': this program has 2")
+        assert sentence.startswith(f"can't create a publisher of 't{count}': this program has 2")
         assert sentence.endswith(
-            " of 256 files open; close unused nodes and files, or raise the limit with 'ulimit -n 8192' before you start it"
+            " of 256 files open; close unused nodes and files, "
+            "or raise the limit with 'ulimit -n 8192' before you start it"
         )
         assert count > 60
         assert program.line() == "True"

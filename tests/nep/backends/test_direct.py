@@ -168,9 +168,9 @@ def test_what_cannot_be() -> None:
         with pytest.raises(nep.NepError, match="unknown mode 'one2one'; did you mean 'one2many'"):
             node.direct(mode="one2one")
         for port in ("http", 0, 65536, "-1"):
-            with pytest.raises(nep.NepError, match="is no port"):
+            with pytest.raises(nep.NepError, match=f"'{port}' .* 1 to 65535"):
                 node.direct(port=port)
-        with pytest.raises(nep.NepError, match="'memory' has no direct connections"):
+        with pytest.raises(nep.NepError, match=r"'memory' .*direct connections"):
             node.new_pub("t", "json", node.direct())
 
 

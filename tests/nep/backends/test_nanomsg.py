@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import shutil
 import socket
 import subprocess
@@ -72,15 +73,15 @@ def test_a_large_message_is_warned_of_once(
     for _ in range(2):
         pub.publish(bytes(2**20 + 1))
         assert sub.listen(timeout_s=30.0)[0]
-    assert caplog.text.count("programs that use libnanomsg take no more than 1048576") == 1
+    assert len(re.findall("'t' has 1048577 bytes.*libnanomsg.* 1048576 bytes", caplog.text)) == 1
 
 
 def test_what_cannot_be(node: nep.Node, port: int) -> None:
-    with pytest.raises(nep.NepError, match="no direct connections of mode 'many2many'"):
+    with pytest.raises(nep.NepError, match=r"'nanomsg' .*'many2many'.*'one2many'"):
         node.new_pub("t", "json", node.direct(port=port, mode="many2many"))
-    with pytest.raises(nep.NepError, match="leave out wire='native'"):
+    with pytest.raises(nep.NepError, match="wire='native'"):
         node.new_sub("t", "json", node.direct(port=port, wire="native"))
-    with pytest.raises(nep.NepError, match="meet on one computer only"):
+    with pytest.raises(nep.NepError, match=r"'nanomsg' .*same computer.*'192\.0\.2\.1"):
         node.new_pub("t", "json", node.hybrid("192.0.2.1"))
     node.new_pub("t", "json", node.direct(port=port))
     with pytest.raises(nep.AddressInUseError):
@@ -111,8 +112,8 @@ def test_subscribers_of_the_two_back_ends_leave_each_other_s_publishers_alone(
         for n, sub in enumerate(subs):
             assert sub.listen(timeout_s=30.0) == (True, n)
             assert sub.listen() == (False, {})
-    assert "of 'a' cannot be connected to: it is an endpoint of 'nanomsg'" in caplog.text
-    assert "of 'b' cannot be connected to: it is not an endpoint of 'nanomsg'" in caplog.text
+    assert "of 'a': it is an endpoint of 'nanomsg'" in caplog.text
+    assert "of 'b': it is not an endpoint of 'nanomsg'" in caplog.text
 
 
 def test_hellos_whose_connection_never_comes_make_room_for_others(master: Master) -> None:

@@ -285,7 +285,7 @@ def test_without_a_master_a_sentence_says_what_to_start(debian: None) -> None:
     address = f"127.0.0.1:{free_port()}"
     with (
         nep.node("n", "ros", master=f"http://{address}/", wait_s=0.2) as node,
-        pytest.raises(nep.MasterUnreachable, match=f"no ROS master answers at '{address}'.*'roscore'"),
+        pytest.raises(nep.MasterUnreachable, match=f"'{address}'.*'roscore'"),
     ):
         node.new_pub("topic")
     with (
@@ -297,9 +297,9 @@ def test_without_a_master_a_sentence_says_what_to_start(debian: None) -> None:
 
 def test_what_cannot_be(ros: str) -> None:
     with nep.node("n", "ros", master=ros) as node:
-        with pytest.raises(nep.NepError, match="no direct connections"):
+        with pytest.raises(nep.NepError, match=r"'ros' .*direct connections"):
             node.new_pub("topic", "json", node.direct())
-        with pytest.raises(nep.NepError, match="there is no ROS message 'nav_nothing/Odometry' here"):
+        with pytest.raises(nep.NepError, match="'nav_nothing/Odometry'"):
             node.new_pub("topic", "nav_nothing/Odometry")
         with pytest.raises(nep.NepError, match="sudo apt install python3-geometry-msgs"):
             node.new_pub("topic", "geometry_msgs/Twisst")

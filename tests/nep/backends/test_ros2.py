@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import os
 import random
+import re
 import shutil
 import struct
 import subprocess
@@ -143,7 +144,7 @@ def test_names() -> None:
 def test_domains_that_are_none(said: str) -> None:
     with pytest.raises(nep.NepError, match="set it to a number from 0 to 232"):
         domain(None, {"ROS_DOMAIN_ID": said})
-    with pytest.raises(nep.NepError, match="is no domain of ROS 2; use a number from 0 to 232"):
+    with pytest.raises(nep.NepError, match=r"ROS 2 domain.* 0 to 232"):
         domain(said, {})
 
 
@@ -173,7 +174,7 @@ def test_only_this_computer_is_reached_unless_it_is_said() -> None:
     assert "192.0.2.1" not in str(configuration(named | {"ROS_LOCALHOST_ONLY": "1"}))
     assert '<Peer Address="&quot;&lt;"/>' in peers
     assert configuration({"CYCLONEDDS_URI": "file:///mine.xml"}) is None
-    with pytest.raises(nep.NepError, match="use SUBNET, LOCALHOST or OFF"):
+    with pytest.raises(nep.NepError, match=r"DISCOVERY_RANGE .*'EVERYWHERE'.* SUBNET, LOCALHOST or OFF"):
         configuration({"ROS_AUTOMATIC_DISCOVERY_RANGE": "everywhere"})
 
 
@@ -196,9 +197,7 @@ def test_a_computer_that_has_no_wheels_is_told_what_to_build(monkeypatch: pytest
 
     monkeypatch.setattr("platform.machine", lambda: "aarch64")
     monkeypatch.setattr("sys.platform", "linux")
-    with pytest.raises(
-        nep.NepError, match="Cyclone DDS has no wheel for 'aarch64'; build 'cyclonedds' 11 there"
-    ):
+    with pytest.raises(nep.NepError, match=r"Cyclone DDS .*'aarch64'.*'cyclonedds' 11"):
         dds(missing)  # type: ignore[arg-type]
 
 
@@ -238,15 +237,17 @@ def test_who_fits_is_no_alert() -> None:
 
 
 def test_mismatches_are_alerts_in_plain_words() -> None:
-    heard = "“c” hears nothing of “a” on “t”: it wants "
+    heard = "“c” does not receive “t” from “a”: it requests "
     assert alerts([party("a", is_reliable=False)], [party("c")]) == {
-        "ros2-reliability:t": heard + "“reliable”, and gets “best effort”"
+        "ros2-reliability:t": heard + "“reliable”, but the publisher offers “best effort”"
     }
     assert alerts([party("a")], [party("c", kind="std_msgs/msg/Int8")]) == {
-        "ros2-type:t": heard + "“std_msgs/msg/Int8”, and gets “std_msgs/msg/String”"
+        "ros2-type:t": heard + "“std_msgs/msg/Int8”, but the publisher offers “std_msgs/msg/String”"
     }
     (said,) = alerts([party("a"), party("b", is_latched=True)], [party("c", is_latched=True)]).values()
-    assert said.startswith(heard + "what was published before, too")
+    assert said == (
+        f"{heard}earlier messages (“transient local”), but the publisher does not keep them (“volatile”)"
+    )
     assert alerts([party("a", typehash="RIHS01_1")], [party("c", typehash="RIHS01_2")]) == {
         "ros2-definition:t": "“c” and “a” have different definitions of “std_msgs/msg/String” on “t”"
     }
@@ -288,31 +289,35 @@ def test_hashes_are_those_of_ros_2(types: MessageTypes) -> None:
 @pytest.mark.parametrize(
     ("name", "payload", "sentence"),
     [
-        ("geometry_msgs/msg/Twist", {"linear": {"q": 1}}, "'linear.q' is no field of 'geometry_msgs/msg/Vec"),
+        ("geometry_msgs/msg/Twist", {"linear": {"q": 1}}, r"'linear\.q' .*'x', 'y', 'z'"),
         ("geometry_msgs/msg/Twist", {"linear": 5}, "'linear' is a 'int'; give a map of the fields"),
-        ("geometry_msgs/msg/Twist", {1: 2}, "'1' is no field"),
+        ("geometry_msgs/msg/Twist", {1: 2}, "'1' .*'linear', 'angular'"),
         (
             "sensor_msgs/msg/Image",
             {"height": -1},
             "'height' must be from 0 to 4294967295, the range of 'uint32'",
         ),
-        ("sensor_msgs/msg/Image", {"data": [0, 256]}, r"'data\[1\]' is not from 0 to 255"),
+        ("sensor_msgs/msg/Image", {"data": [0, 256]}, r"'data\[1\]' .* 0 to 255"),
         ("sensor_msgs/msg/Image", {"data": "text"}, "'data' is a 'str'; give a list"),
         ("sensor_msgs/msg/JointState", {"name": ["a", 1]}, r"'name\[1\]' is a 'int'; give a 'str'"),
         ("sensor_msgs/msg/JointState", {"position": [1, None]}, r"'position\[1\]' is a 'NoneType'"),
         ("sensor_msgs/msg/JointState", {"position": b"ab"}, "'position' is a 'bytes'; give a list"),
         ("geometry_msgs/msg/PoseWithCovariance", {"covariance": []}, "'covariance' has 0 items; give 36"),
-        ("std_msgs/msg/UInt64", {"data": 2**64}, "'data' is not from 0 to 18446744073709551615"),
-        ("std_msgs/msg/Int64", {"data": 2**63}, "'data' is not from -9223372036854775808 to"),
+        ("std_msgs/msg/UInt64", {"data": 2**64}, "'data' .* 0 to 18446744073709551615"),
+        ("std_msgs/msg/Int64", {"data": 2**63}, "'data' .* -9223372036854775808 to 9223372036854775807"),
         ("std_msgs/msg/Int64", {"data": 1.0}, "'data' is a 'float'; give a whole number"),
         ("std_msgs/msg/Int8", {"data": True}, "'data' is a 'bool'"),
         ("std_msgs/msg/Float32", {"data": 1e39}, "'data' is too large for 'float32'"),
         ("std_msgs/msg/Float64", {"data": 10**400}, "'data' is too large for 'float64'"),
         ("std_msgs/msg/Bool", {"data": 1}, "'data' is a 'int'; give True or False"),
         ("std_msgs/msg/String", {"data": "\ud800"}, "'data' contains an unpaired surrogate"),
-        ("std_msgs/msg/String", {"data": "a\0"}, "'data' holds a zero byte"),
+        ("std_msgs/msg/String", {"data": "a\0"}, "'data' .*null character"),
         ("std_msgs/msg/Float32MultiArray", {"data": [1e39]}, r"'data\[0\]' is too large"),
-        ("tf2_msgs/msg/TFMessage", {"transforms": [{"child": 1}]}, r"'transforms\[0\].child' is no field"),
+        (
+            "tf2_msgs/msg/TFMessage",
+            {"transforms": [{"child": 1}]},
+            r"'transforms\[0\]\.child' .*'child_frame_id'",
+        ),
     ],
 )
 def test_what_does_not_fit_is_named_with_its_place(
@@ -366,23 +371,21 @@ def test_bytes_that_are_cut_off_are_no_message(types: MessageTypes, cut: int) ->
 def test_definitions_that_cannot_be(types: MessageTypes, tmp_path: Path) -> None:
     types.add("mine/Arm", "float64[2] joints\n")
     types.add("mine/msg/Arm", "float64[2] joints\n")  # the same again
-    with pytest.raises(nep.NepError, match="'mine/msg/Arm' is known with other fields"):
+    with pytest.raises(nep.NepError, match=r"'mine/msg/Arm' .*other fields"):
         types.add("mine/Arm", "float64[3] joints\n")
     with pytest.raises(nep.NepError, match="the definition of 'mine/msg/Leg' cannot be read"):
         types.add("mine/Leg", "nonsense\n")
-    with pytest.raises(nep.NepError, match="'mine/msg/Leg' uses 'no/msg/Thing' for its field 'a'"):
+    with pytest.raises(nep.NepError, match=r"'mine/msg/Leg' .*'no/msg/Thing' .*'a'"):
         types.add("mine/Leg", "no/Thing a\n")
-    with pytest.raises(nep.NepError, match="is no type of a message of ROS"):
+    with pytest.raises(nep.NepError, match=r"'mine' .*'std_msgs/msg/String'"):
         types.add("mine", "int8 a\n")
-    with pytest.raises(nep.NepError, match=r"there is no \.msg file"):
+    with pytest.raises(nep.NepError, match=rf"\.msg files .*'{re.escape(str(tmp_path))}'"):
         types.add_folder(tmp_path)
     assert "mine/msg/Leg" not in types.names
 
 
 def test_wide_strings_are_refused_in_one_sentence(types: MessageTypes) -> None:
-    with pytest.raises(
-        nep.NepError, match="'mine/msg/Wide' has a wide string, 'a', which 'ros2' cannot carry"
-    ):
+    with pytest.raises(nep.NepError, match=r"'mine/msg/Wide' .*'a' .*wstring.*'ros2'"):
         types.add("mine/Wide", "wstring a\n")
 
 
@@ -399,9 +402,9 @@ def test_a_folder_s_wrong_file_is_told_when_it_is_asked_for(types: MessageTypes,
     assert types.decode("folder/msg/Good", types.encode("folder/msg/Good", {"a": -1})) == {
         "a": -1, "b": {"c": [False, False]},
     }  # fmt: skip
-    with pytest.raises(nep.NepError, match="'folder/msg/Wide' has a wide string"):
+    with pytest.raises(nep.NepError, match=r"'folder/msg/Wide' .*wstring"):
         types.checked("folder/Wide")
-    with pytest.raises(nep.NepError, match="'folder/msg/Uses' uses 'folder/msg/Wide' for its field 'a'"):
+    with pytest.raises(nep.NepError, match=r"'folder/msg/Uses' .*'folder/msg/Wide' .*'a'"):
         types.checked("folder/Uses")
 
 
@@ -437,9 +440,7 @@ def test_bounds_of_arrays_and_texts_are_kept(types: MessageTypes, payload: objec
 @pytest.mark.parametrize(("shape", "count"), [((2, 3), 2), ((), 0)])
 def test_an_array_has_one_dimension(types: MessageTypes, shape: tuple[int, ...], count: int) -> None:
     np = pytest.importorskip("numpy")
-    with pytest.raises(
-        nep.EncodeError, match=rf"'data' has {count} dimensions; give one, such as by 'ravel\(\)'"
-    ):
+    with pytest.raises(nep.EncodeError, match=rf"'data' .*{count} dimensions.*'ravel\(\)'"):
         types.encode("sensor_msgs/msg/Image", {"data": np.zeros(shape, np.uint8)})
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 import io
 import math
+import re
 import struct
 import sys
 from pathlib import Path
@@ -84,9 +85,9 @@ def test_what_is_left_out_is_zero_or_empty() -> None:
 @pytest.mark.parametrize(
     ("payload", "sentence"),
     [
-        ({"i8": 128}, "field 'i8' is 128; 'int8' goes from -128 to 127"),
-        ({"u64": -1}, "field 'u64' is -1; 'uint64' goes from 0 to 18446744073709551615"),
-        ({"u64": 2**64}, "field 'u64' is 18446744073709551616; 'uint64' goes"),
+        ({"i8": 128}, "field 'i8' is 128; 'int8' must be from -128 to 127"),
+        ({"u64": -1}, "field 'u64' is -1; 'uint64' must be from 0 to 18446744073709551615"),
+        ({"u64": 2**64}, "field 'u64' is 18446744073709551616; 'uint64' must be from 0 to"),
         ({"i8": True}, "field 'i8' is True; give a 'int8'"),
         ({"i8": 1.0}, "field 'i8' is 1.0; give a 'int8'"),
         ({"flag": 2}, "field 'flag' is 2; give a 'bool'"),
@@ -104,9 +105,9 @@ def test_what_is_left_out_is_zero_or_empty() -> None:
         ({"words": "ab"}, "field 'words' is 'ab'; give a 'string[2]'"),
         ({"data": [256]}, "field 'data' contains a value that is not an integer from 0 to 255"),
         ({"data": "ab"}, "field 'data' is 'ab'; give a 'uint8[]'"),
-        ({"numbers": [1, 40000]}, "field 'numbers[1]' is 40000; 'int16' goes from -32768 to 32767"),
+        ({"numbers": [1, 40000]}, "field 'numbers[1]' is 40000; 'int16' must be from -32768 to 32767"),
         ({"numbers": [1, True]}, "field 'numbers[1]' is True"),
-        ({"points": [{}, {"z": 1}]}, "field 'points[1].z' does not exist; known are 'x', 'y'"),
+        ({"points": [{}, {"z": 1}]}, "field 'points[1].z' does not exist; known names: 'x', 'y'"),
         ({"points": [5]}, "field 'points[0]' is 5; give a 'own/Point'"),
         ({"thing": {"header": {"frame": 1}}}, "field 'thing.header.frame' does not exist; did you mean"),
         ({"txt": ""}, "field 'txt' does not exist; did you mean 'text'?"),
@@ -152,13 +153,13 @@ def test_any_bytes_become_a_map_or_a_decode_error(data: bytes) -> None:
 def test_lengths_that_nobody_can_have_take_no_memory() -> None:
     empty = parse("a/A", "B[] all\n" + "=" * 80 + "\nMSG: a/B\n")
     assert empty.decode(struct.pack("<I", 3)) == {"all": [{}, {}, {}]}
-    with pytest.raises(nep.DecodeError, match="more inside than can be there"):
+    with pytest.raises(nep.DecodeError, match=r"'all' .*more nested messages"):
         empty.decode(b"\xff\xff\xff\xff")
     numbers = parse("a/A", "float64[] all")
     with pytest.raises(nep.DecodeError, match="'all' has 4294967295 elements"):
         numbers.decode(b"\xff\xff\xff\xff" + bytes(100))
     fixed = parse("a/A", "uint8[4000000000] all")
-    with pytest.raises(nep.DecodeError, match="'all' is cut off"):
+    with pytest.raises(nep.DecodeError, match=r"100 bytes .*'all' is truncated"):
         fixed.decode(bytes(100))
 
 
@@ -166,16 +167,20 @@ def test_messages_that_hold_each_other_a_million_times_end() -> None:
     line = "=" * 80
     levels = "".join(f"{line}\nMSG: a/L{n}\nL{n + 1} a\nL{n + 1} b\nL{n + 1} c\n" for n in range(25))
     bomb = parse("a/L", f"L0 a\n{levels}{'=' * 80}\nMSG: a/L25\n")
-    with pytest.raises(nep.DecodeError, match="more inside than can be there"):
+    with pytest.raises(nep.DecodeError, match=r"'a\.a\..* more nested messages"):
         bomb.decode(b"")
 
 
 @pytest.mark.parametrize(
-    "text",
-    ["A again", "nothing/Known x", "float64", "float64 x y", "int8[x] y", "float64[1", "B b", "\0"],
+    ("text", "part"),
+    [
+        ("A again", "A"), ("nothing/Known x", "nothing/Known"), ("float64", "float64"),
+        ("float64 x y", "float64 x y"), ("int8[x] y", "int8[x] y"), ("float64[1", "float64[1"),
+        ("B b", "B"), ("\0", "\\x00"),
+    ],
 )  # fmt: skip
-def test_definitions_that_cannot_be(text: str) -> None:
-    with pytest.raises(nep.NepError, match="the definition of 'a/A' cannot be read; see"):
+def test_definitions_that_cannot_be(text: str, part: str) -> None:
+    with pytest.raises(nep.NepError, match=f"'a/A' .*'{re.escape(part)}'"):
         parse("a/A", text)
 
 

@@ -108,7 +108,7 @@ def test_nep_calls_a_program_of_ros(ros: str) -> None:
             )
             assert client.line() == "{'success': True, 'status_message': '480 5 8.0 eye'}"
             assert "use the same version on both sides" in client.line()
-            assert "there is no ROS service 'nothing_msgs/Known' here" in client.line()
+            assert "unknown ROS service 'nothing_msgs/Known'" in client.line()
             assert client.line() == "['/camera', '/fails', '/other', '/switch', '/unknown']"
             client.end()
 
@@ -277,7 +277,7 @@ def test_a_server_whose_node_s_name_another_takes_says_so_instead_of_waiting(ros
             assert first.line().startswith("shutdown request: ")
             assert first.line().startswith("server of '/x' is closed")
             for _each in range(2):
-                assert first.line().startswith("rospy was shut down in this program")
+                assert first.line().startswith("rospy was shut down")
             assert first.line() == "True"
             _said, errors = first.end()
             assert (first.process.returncode, "Traceback" in errors) == (0, False)

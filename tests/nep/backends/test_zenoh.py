@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import itertools
 import os
+import re
 import signal
 import socket
 import subprocess
@@ -298,32 +299,32 @@ def test_places(monkeypatch: pytest.MonkeyPatch) -> None:
         "local/../x y",
         "tcp/a, b",
     ):
-        with pytest.raises(nep.NepError, match="is no place where nodes of 'zenoh' meet; use 'local'"):
+        with pytest.raises(nep.NepError, match=f"'{re.escape(wrong)}' .*zenoh.*'local'"):
             nep.node("a", "zenoh", master=wrong)
-    with pytest.raises(TypeError, match="is a 'str', not a 'int'"):
+    with pytest.raises(TypeError, match="'str', not a 'int'"):
         nep.node("a", "zenoh", master=5)  # type: ignore[arg-type]
 
 
 def test_direct_connections_make_no_sense(make: Make) -> None:
     node = make("a")
-    with pytest.raises(nep.NepError, match="'zenoh' has no direct connections; leave the configuration out"):
+    with pytest.raises(nep.NepError, match=r"'zenoh' .*direct connections.*omit the configuration"):
         node.new_pub("t", "json", node.direct(port=7000))
-    with pytest.raises(nep.NepError, match="no direct connections"):
+    with pytest.raises(nep.NepError, match=r"'zenoh' .*direct connections"):
         node.new_sub("t", "json", node.direct(port=7000))
 
 
 def test_no_router_and_no_file_are_told(port: int, tmp_path: Path) -> None:
     with nep.node("a", "zenoh", master=f"tcp/127.0.0.1:{port}", wait_s=0.2) as node:
-        with pytest.raises(nep.NepError, match=r"cannot open a session at 'tcp/.*; is a router there"):
+        with pytest.raises(nep.NepError, match=f"'tcp/127.0.0.1:{port}': .*router"):
             node.new_pub("t")
-        with pytest.raises(nep.NepError, match="cannot open a session"):
+        with pytest.raises(nep.NepError, match=f"'tcp/127.0.0.1:{port}': .*router"):
             node.graph(0.1)
     bad = tmp_path / "bad.json5"
     bad.write_text("{mode: 'nonsense'}")
     for path in (bad, tmp_path / "missing.json5"):
         with (
             nep.node("a", "zenoh", master=str(path)) as node,
-            pytest.raises(nep.NepError, match="is no configuration of zenoh"),
+            pytest.raises(nep.NepError, match=re.escape(f"'{path}'")),
         ):
             node.new_sub("t")
 
@@ -360,7 +361,7 @@ def test_a_folder_that_is_no_folder(monkeypatch: pytest.MonkeyPatch, tmp_path: P
     monkeypatch.setenv("XDG_RUNTIME_DIR", str(tmp_path))
     with (
         nep.node("a", "zenoh", master="local") as node,
-        pytest.raises(nep.NepError, match=r"nodes cannot meet at .*; set XDG_RUNTIME_DIR"),
+        pytest.raises(nep.NepError, match=r"nep-zenoh' .*XDG_RUNTIME_DIR"),
     ):
         node.new_pub("t")
 
@@ -391,7 +392,7 @@ def test_a_router_joins_programs_and_may_be_started_again(make: Make, port: int)
             assert names(node) == {"here", "peer"}
             first.kill()
             eventually(lambda: pub.subscribers == 0)
-            eventually(lambda: f"no router of zenoh answers at '{where}' now" in trouble(node))
+            eventually(lambda: f"no zenoh router replied at '{where}'" in trouble(node))
             ask(peer, "publish missed")
             with running(ROUTER, router(port)) as second:
                 second.line()
@@ -471,8 +472,8 @@ def test_a_forked_child_is_told_and_ends_and_holds_nothing(place: str, make: Mak
     with running(code) as parent:
         said = {parent.line() for _ in range(4)}
         assert "fine" in said
-        assert sum("stayed with the program when it was forked" in each for each in said) == 2
-        assert sum("does not work in a program that was forked" in each for each in said) == 1
+        assert sum("belongs to the parent process" in each for each in said) == 2
+        assert sum("does not work in a forked process" in each for each in said) == 1
         assert names(here) == {"here", "parent"}
         import psutil
 

@@ -199,10 +199,7 @@ def test_who_is_not_trusted_is_refused_in_a_sentence(lab: Lab, certificate: str,
     """Without a certificate, with one that nobody signed, and where the router's own is not trusted."""
     with nep.node("a", "zenoh", master=lab.master(certificate, authority), wait_s=1.0) as node:
         for make in (lambda: node.new_pub("open"), lambda: node.new_client("open"), node.graph):
-            with pytest.raises(
-                nep.NepError,
-                match=r"cannot open a session at .*; is a router there, and does each side trust the other",
-            ):
+            with pytest.raises(nep.NepError, match=r"\.json5': .*trusts the certificate"):
                 make()
 
 
@@ -211,7 +208,7 @@ def test_an_endpoint_alone_has_no_certificate(lab: Lab, protocol: str) -> None:
     where = lab.endpoint.replace("tls/", f"{protocol}/")
     with (
         nep.node("a", "zenoh", master=where, wait_s=0.2) as node,
-        pytest.raises(nep.NepError, match="cannot open a session at"),
+        pytest.raises(nep.NepError, match=f"'{where}': "),
     ):
         node.new_sub("open")
 
@@ -219,7 +216,7 @@ def test_an_endpoint_alone_has_no_certificate(lab: Lab, protocol: str) -> None:
 def test_certificates_that_are_not_there_are_told(lab: Lab) -> None:
     with (
         nep.node("a", "zenoh", master=lab.master("missing"), wait_s=1.0) as node,
-        pytest.raises(nep.NepError, match="cannot open a session at"),
+        pytest.raises(nep.NepError, match=r"\.json5': "),
     ):
         node.new_sub("open")
 
@@ -257,7 +254,7 @@ def test_a_service_that_is_denied_is_told_at_the_call(make: Make) -> None:
     assert guest.new_client("open").call(1, timeout_s=LONG_S) == 1
     secret = guest.new_client("secret")
     assert secret.is_connected
-    with pytest.raises(nep.NepError, match=r"is there and did not answer; .* forbids 'nep/v1/serve/secret/"):
+    with pytest.raises(nep.NepError, match=r"'secret' .*'nep/v1/serve/secret/"):
         secret.call(2, timeout_s=LONG_S)
     assert robot.new_client("secret").call(3, timeout_s=LONG_S) == 3
     assert seen == [1, 3]

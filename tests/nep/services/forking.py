@@ -37,5 +37,5 @@ def check_fork(node: str, at: str = "None") -> None:
     `node` and `at` are Python for the node, and for where its server and client meet.
     """
     with running(CODE.format(node=node, at=at)) as program:
-        assert "stayed with the program when it was forked" in program.line()
+        assert "client of '/x' belongs to the parent process" in program.line()
         assert [program.line() for _ in range(2)] == ["7", "2"]

@@ -46,7 +46,7 @@ def test_a_server_that_dies_while_it_is_called_is_reported_at_once(client) -> No
         future = client.call_async("hang", timeout_s=None)
         assert program.line() == "asked"
         program.kill()
-        with pytest.raises(nep.ServerGoneError, match="the server of '/x' ended while it was called"):
+        with pytest.raises(nep.ServerGoneError, match="'/x'"):
             future.result(LONG_S)
     with running(SERVER) as program:  # and the next one is found
         assert program.line() == "ready"
@@ -278,7 +278,7 @@ def test_more_calls_than_a_server_has_room_for_are_refused(master: Master) -> No
         eventually(lambda: server.refused == 200)
         refused = [each for each in calls if each.done()]
         eventually(lambda: sum(each.done() for each in calls) == 200)
-        with pytest.raises(nep.RequestRefusedError, match="too many calls that wait"):
+        with pytest.raises(nep.RequestRefusedError, match=r"'/full' .*too many"):
             next(each for each in calls if each.done()).result()
         assert len(refused) <= 200
         stopper = threading.Thread(target=lambda: a.spin(LONG_S), name="spin")
@@ -294,9 +294,9 @@ def test_too_large_a_call_or_answer_is_an_error(master: Master) -> None:
         a.new_server("/big", lambda n: b"x" * n, threads=1)
         client = b.new_client("/big", msg_type="msgpack", timeout_s=LONG_S)
         most = 64 * 2**20
-        with pytest.raises(nep.NepError, match="67108869 bytes, 67108864 are allowed"):
+        with pytest.raises(nep.NepError, match=r"67108869 bytes.* 67108864"):
             client.call(b"x" * most)
-        with pytest.raises(nep.ServiceError, match="67108869 bytes, 67108864 are allowed"):
+        with pytest.raises(nep.ServiceError, match=r"67108869 bytes.* 67108864"):
             client.call(most)
         assert client.call(2) == b"xx"
 

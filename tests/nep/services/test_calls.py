@@ -285,9 +285,7 @@ def test_a_server_that_takes_too_long_is_another_error_and_its_answer_is_dropped
     server = make("server").new_server("/slow", lambda request: go_on.wait(LONG_S) and {}, threads=1)
     client = make("client").new_client("/slow")
     eventually(lambda: client.is_connected)
-    with pytest.raises(
-        nep.ServiceTimeoutError, match="timed out after 0\\.2 s while waiting for an answer of '/slow'"
-    ):
+    with pytest.raises(nep.ServiceTimeoutError, match=r"0\.2 s.*'/slow'"):
         client.call({}, timeout_s=0.2)
     go_on.set()
     eventually(lambda: client.late == 1)
@@ -445,9 +443,7 @@ def test_a_callback_that_waits_for_its_own_thread_is_told_so_in_time(make: Make)
     inner = make("inner").new_client("/self", timeout_s=0.3)
     server = node.new_server("/self", lambda deep: inner.call(deep - 1) if deep else "done", threads=1)
     client = make("client").new_client("/self", timeout_s=LONG_S)
-    with pytest.raises(
-        nep.ServiceError, match="ServiceTimeoutError: a reply from '/self' did not come within"
-    ):
+    with pytest.raises(nep.ServiceError, match=r"ServiceTimeoutError: .*0\.3 s.*'/self'"):
         client.call(1)
     assert client.call(0) == "done"
     assert server.errors == 1
@@ -469,15 +465,15 @@ def test_listen_and_send_as_the_original_has_it(make: Make) -> None:
     server = make("server").new_server("/x")
     client = make("client").new_client("/x", timeout_s=LONG_S)
     assert server.listen_info(timeout_s=0) is None
-    with pytest.raises(nep.NepError, match="no request to answer"):
+    with pytest.raises(nep.NepError, match="'listen_info'"):
         server.send_info({})
-    with pytest.raises(nep.NepError, match="nothing was sent"):
+    with pytest.raises(nep.NepError, match="'send_info'"):
         client.listen_info()
     client.send_info({"a": 1})
-    with pytest.raises(nep.NepError, match="take the last answer first"):
+    with pytest.raises(nep.NepError, match="'listen_info'"):
         client.send_info({"a": 2})
     assert server.listen_info() == {"a": 1}
-    with pytest.raises(nep.NepError, match="answer the last request first"):
+    with pytest.raises(nep.NepError, match="'send_info'"):
         server.listen_info()
     with pytest.raises(nep.EncodeError):
         server.send_info({1, 2})
@@ -562,9 +558,9 @@ def test_the_longest_name_is_served(make: Make) -> None:
 
 
 def test_nobody_publishes_where_services_are_listed(make: Make) -> None:
-    with pytest.raises(nep.BadTopicError, match="are services"):
+    with pytest.raises(nep.BadTopicError, match=r"'nep\.service:/x'.*'nep\.service:'"):
         make("node").new_pub("nep.service:/x")
-    with pytest.raises(nep.BadTopicError, match="are services"):
+    with pytest.raises(nep.BadTopicError, match=r"'nep\.service:/x'.*'nep\.service:'"):
         make("node").new_sub("nep.service:/x")
 
 
@@ -601,7 +597,7 @@ def test_calls_beyond_the_bound_are_refused_at_the_call(make: Make) -> None:
     client = make("client").new_client("/nobody", timeout_s=None)
     for _ in range(1000):
         client.call_async({})
-    with pytest.raises(nep.NepError, match="1000 calls of '/nobody' are under way"):
+    with pytest.raises(nep.NepError, match=r"1000 .*'/nobody'"):
         client.call_async({})
 
 
@@ -611,7 +607,5 @@ def test_a_coroutine_function_is_refused_where_nobody_awaits_it(master: Master) 
 
     with nep.node("server", master=master.address) as node:
         for make in (node.new_server, node.new_respondent):
-            with pytest.raises(
-                ValueError, match="callback is a coroutine function, which nobody awaits here"
-            ):
+            with pytest.raises(ValueError, match=r"callback .*coroutine function"):
                 make("a", answer)

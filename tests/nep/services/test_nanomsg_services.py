@@ -106,7 +106,7 @@ def test_pynng_asks_and_answers_with_the_header(node: nep.Node, port: int) -> No
         future = client.call_async(5)
         theirs.recv()
         theirs.send(b"nonsense")
-        with pytest.raises(nep.NepError, match="a call has two parts"):
+        with pytest.raises(nep.NepError, match=r"two parts.* 16 bytes"):
             future.result(LONG_S)
 
 
@@ -137,7 +137,7 @@ def test_a_server_that_dies_while_it_is_called_is_reported_at_once(
         assert program.line() == "asked"
         assert client.call({}) == {"pid": program.process.pid}
         program.kill()
-        with pytest.raises(nep.ServerGoneError, match="the server of '/x' ended while it was called"):
+        with pytest.raises(nep.ServerGoneError, match="'/x'"):
             future.result(LONG_S)
     with running(SERVER, str(port), wire) as program:  # and the next one is found
         program.line()
@@ -192,7 +192,7 @@ def test_what_cannot_be_is_refused(node: nep.Node, port: int) -> None:
     at = node.direct("127.0.0.1", port)
     with node.new_server("/x", lambda request: request, at), pytest.raises(nep.AddressInUseError):
         node.new_server("/x", lambda request: request, at)
-    with pytest.raises(nep.NepError, match="is JSON; leave out msg_type, or use wire='native'"):
+    with pytest.raises(nep.NepError, match=r"JSON.*msg_type.*wire='native'"):
         node.new_client("/x", at, msg_type="msgpack")
     node.close()
     for make in (node.new_server, node.new_client):

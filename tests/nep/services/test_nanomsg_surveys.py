@@ -184,9 +184,9 @@ def test_what_cannot_be_is_refused(node: nep.Node, port: int) -> None:
         assert surveyor.ask({}) == []
         with pytest.raises(nep.AddressInUseError):
             node.new_surveyor("/who", 1000, at)
-    with pytest.raises(nep.NepError, match="is JSON"):
+    with pytest.raises(nep.NepError, match=r"JSON.*msg_type"):
         node.new_surveyor("/who", 1000, at, msg_type="msgpack")
-    with pytest.raises(nep.NepError, match="leave out wire='tcp'"):
+    with pytest.raises(nep.NepError, match="wire='tcp'"):
         node.new_surveyor("/who", 1000, node.direct("127.0.0.1", port, wire="tcp"))
     node.close()
     for make in (node.new_surveyor, node.new_respondent):

@@ -148,7 +148,7 @@ def test_sending_and_listening_as_the_original_has_it(make: Make) -> None:
     respondent = make("respondent").new_respondent("/who")
     surveyor = make("surveyor").new_surveyor("/who", LONG_MS)
     assert respondent.listen_json() == (False, {})
-    with pytest.raises(nep.NepError, match="nothing was asked"):
+    with pytest.raises(nep.NepError, match="'send_json'"):
         surveyor.listen_json()
     surveyor.send_json({"n": 1})
     assert respondent.listen_json(block_mode=True) == (True, {"n": 1})
@@ -225,7 +225,7 @@ def test_a_survey_and_a_service_of_one_name_are_two_things(make: Make) -> None:
     assert node.new_client("/who", timeout_s=LONG_S).call({}) == "the server"
     assert [each["says"] for each in node.new_surveyor("/who", LONG_MS).ask({})] == [1]
     for make_one in (node.new_server, node.new_client, node.new_surveyor, node.new_respondent):
-        with pytest.raises(nep.BadTopicError, match="are surveys'"):
+        with pytest.raises(nep.BadTopicError, match=r"'survey:/who'.*'survey:'"):
             make_one("survey:/who")
 
 
@@ -252,7 +252,7 @@ def test_what_cannot_be_is_refused(make: Make) -> None:
         surveyor.ask({1, 2})
     with pytest.raises(ValueError, match="callback is a 'str'"):
         node.new_respondent("/who", "json")
-    with pytest.raises(nep.NepError, match=r"a survey needs a master|no direct connections"):
+    with pytest.raises(nep.NepError, match=rf"'{node._backend.name}' .*(master|direct connections)"):
         node.new_surveyor("/who", 1000, node.direct("127.0.0.1", 9000))
 
 
@@ -260,11 +260,11 @@ def test_a_back_end_without_them_says_so(master: Master, monkeypatch: pytest.Mon
     with nep.node("here") as node:
         monkeypatch.delattr(ZeromqTransport, "survey")
         for make_one in (node.new_surveyor, node.new_respondent):
-            with pytest.raises(nep.NepError, match="'zeromq' has no surveys; use"):
+            with pytest.raises(nep.NepError, match=r"'zeromq' .*surveys"):
                 make_one("/who")
         monkeypatch.delattr(ZeromqTransport, "server")
         for make_one in (node.new_server, node.new_client, node.new_surveyor, node.new_respondent):
-            with pytest.raises(nep.NepError, match="'zeromq' has no services; use"):
+            with pytest.raises(nep.NepError, match=r"'zeromq' .*services"):
                 make_one("/who")
 
 

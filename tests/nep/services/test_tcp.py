@@ -119,9 +119,9 @@ def test_who_ends_its_side_after_the_call_gets_the_answer(node: nep.Node, port: 
     ("said", "reason"),
     [
         (b"GET / HTTP/1.1\r\nHost: localhost\r\n\r\n", "542393671 bytes"),
-        (b"\0\0\0\0", "its size is 0 bytes"),
-        (struct.pack("<I", 16 + 2**26 + 1), "too large"),
-        (b"\xff" * 1000, "its size is 4294967295 bytes"),
+        (b"\0\0\0\0", "declares 0 bytes"),
+        (struct.pack("<I", 16 + 2**26 + 1), "67108881 bytes"),
+        (b"\xff" * 1000, "4294967295 bytes"),
     ],
 )
 def test_what_has_no_beginning_ends_the_connection_and_is_counted(
@@ -291,7 +291,7 @@ def test_a_port_that_is_held_and_an_address_that_is_none(node: nep.Node, port: i
     server.close()
     server.close()
     serve(node, port)
-    with pytest.raises(nep.AddressInUseError, match="no address of this computer"):
+    with pytest.raises(nep.AddressInUseError, match=rf"'192\.0\.2\.1:{port}' .*address of this computer"):
         node.new_server("/y", print, node.direct("192.0.2.1", port, wire="tcp"))
     with pytest.raises(nep.NepError):
         node.new_client("/y", node.direct("*", port, wire="tcp"))
@@ -304,7 +304,7 @@ def test_topics_have_no_plain_tcp(node: nep.Node, port: int) -> None:
         lambda: node.new_sub("t", "json", at),
         lambda: node.new_callback("t", "json", print, at),
     ):
-        with pytest.raises(nep.NepError, match="calls of services only; leave out wire='tcp'"):
+        with pytest.raises(nep.NepError, match=r"TCP .*wire='tcp'"):
             make()
 
 

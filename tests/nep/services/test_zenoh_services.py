@@ -103,7 +103,7 @@ def test_a_server_that_dies_while_it_is_called_is_reported_at_once(make: Make, p
         assert program.line() == "asked"
         assert client.call({}) == {"pid": program.process.pid}
         program.kill()
-        with pytest.raises(nep.ServerGoneError, match="the server of '/x' ended while it was called"):
+        with pytest.raises(nep.ServerGoneError, match="'/x'"):
             future.result(LONG_S)
     eventually(lambda: not client.is_connected)
     waiting = client.call_async({})
@@ -133,7 +133,7 @@ def test_a_server_that_is_stopped_keeps_its_calls(make: Make, place: str) -> Non
         program.line()
         assert client.call({}) == {"pid": program.process.pid}
         program.stop()
-        with pytest.raises(nep.ServiceTimeoutError, match=r"did not come within 0\.3 s"):
+        with pytest.raises(nep.ServiceTimeoutError, match=r"0\.3 s.*'/x'"):
             client.call({}, timeout_s=0.3)
         future = client.call_async({})
         program.signal(signal.SIGCONT)
@@ -207,7 +207,7 @@ def test_a_client_of_nep_calls_a_program_of_zenoh(
     token = stranger.liveliness().declare_token("nep/v1/live/someone/srv/ab/%2Fecho/1")
     assert client.call({"n": 1}) == {"n": 1}
     for what in ("nothing", "nonsense", "error"):  # and it is not said that it has ended
-        with pytest.raises(nep.NepError, match=f"is there and did not answer.* forbids '{key}'"):
+        with pytest.raises(nep.NepError, match=f"'/echo' .*'{key}'"):
             client.call(what)
     assert client.call("twice") == 1
     eventually(lambda: client.late == 1)
@@ -256,7 +256,7 @@ def test_wildcards_hear_no_services(make: Make) -> None:
 def test_direct_servers_are_refused(make: Make) -> None:
     node = make("node")
     for made in (node.new_server, node.new_client):
-        with pytest.raises(nep.NepError, match="'zenoh' has no direct connections"):
+        with pytest.raises(nep.NepError, match=r"'zenoh' .*direct connections"):
             made("/x", configuration=node.direct(port=7000))
 
 
@@ -325,7 +325,7 @@ def test_a_forked_child_is_told_and_ends(place: str) -> None:
     node.close()
     """
     with running(code) as program:
-        assert "stayed with the program when it was forked" in program.line()
+        assert "client of '/x' belongs to the parent process" in program.line()
         assert [program.line() for _ in range(3)] == ["7", "fine", "2"]
 
 
