@@ -94,11 +94,11 @@ def test_grey_and_depth_have_numbers() -> None:
 @pytest.mark.parametrize(
     ("sent", "words"),
     [
-        (message(b""), "nothing in it"),
-        (message(b"no picture"), "no picture"),
-        (message(b"123", shape=[4, 6], encoding="mono8"), "another size"),
-        (message(b"123", shape="wide", encoding="bgr8"), "no shape"),
-        (message(b"\x89PNG\r\n\x1a\n" + b"\0" * 40), "no picture"),
+        (message(b""), "the image is empty"),
+        (message(b"no picture"), "neither a JPEG nor a PNG image"),
+        (message(b"123", shape=[4, 6], encoding="mono8"), "does not match an image of 6 x 4 pixels with 1 bytes each"),
+        (message(b"123", shape="wide", encoding="bgr8"), "'wide' is not the shape of an image"),
+        (message(b"\x89PNG\r\n\x1a\n" + b"\0" * 40), "the PNG image is damaged"),
     ],
 )
 def test_what_is_no_picture_is_a_sentence(sent: Message, words: str) -> None:

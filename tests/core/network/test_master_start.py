@@ -46,7 +46,7 @@ def test_a_program_that_is_no_master_is_named_once_and_asked_more_and_more_seldo
     assert asked == [0.0, 2.0, 6.0, 14.0, 30.0, 60.0, 90.0]
     assert asked[-1] - asked[-2] == AGAIN_AT_MOST_S
     assert len(told) == 1
-    assert f"(process {os.getpid()}), which is no master." in told[0]
+    assert f"(process {os.getpid()}) uses port " in told[0]
     assert "NEP_MASTER=" in told[0]
     assert not start.runs
     assert not [each for each in psutil.Process().children() if "master" in each.cmdline()]

@@ -8,7 +8,7 @@ import pytest
 
 from tests.core.network_of_ones_own import alone
 
-FIREWALL = "10.9.9.2 is switched off, in another network, or its firewall keeps programs out."
+FIREWALL = "10.9.9.2 is off, is in another network, or has a firewall that blocks the connection."
 LOOK = """
 import sys, threading, time
 from pathlib import Path
@@ -36,7 +36,7 @@ def test_with_the_loopback_down_studio_says_so_once_with_the_next_step(tmp_path:
     assert "Traceback" not in done.stderr
     alert, lines = done.stdout.splitlines()
     assert alert == (
-        "companion:master The master can't be started. Programs of this computer cannot reach each other: network is unreachable. Turn on the loopback interface. A firewall or a sandbox may have turned it off. help.doctor"
+        "companion:master The master can't be started. Programs on this computer can't reach each other: network is unreachable. Turn on the loopback interface. A firewall or a sandbox may have turned it off. help.doctor"
     )
     assert lines == "1 line"
 

@@ -91,7 +91,7 @@ def test_a_refusal_is_an_alert_with_the_way_out_until_it_works(world, make):
     world.answer(reach)
     (alert,) = alerts.active
     assert (alert.id, alert.action) == (ALERT, "network.others")
-    assert "it has 10.0.0.7." in alert.detail
+    assert alert.detail == f"{world.refusal}."
     assert reach.hosts == ()
     world.refusal = ""
     reach.listen_at(["10.0.0.7"])

@@ -32,7 +32,7 @@ def test_ros_1_is_seen_heard_and_lost() -> None:
     assert seen["types"] == ["geometry_msgs/Twist", "std_msgs/String"]
     assert (seen["generations"], seen["cpu"], seen["seq"]) == (["ros"], [None], [None, None])
     assert (seen["native"], seen["gone"], seen["left"]) == ([], [True, True], ["off", 0])
-    assert str(seen["lost"]).startswith("no ROS master answers at '127.0.0.1:")
+    assert str(seen["lost"]).startswith("no ROS master replied at '127.0.0.1:")
 
 
 def test_ros_2_is_seen_and_heard_also_who_does_not_insist() -> None:

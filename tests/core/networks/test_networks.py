@@ -80,12 +80,12 @@ def test_whatever_is_kept_and_is_no_choice_is_left_out(kept: object, tmp_path: P
 @pytest.mark.parametrize(
     ("kind", "address", "said"),
     [
-        ("ros2", "-1", "is no domain of ROS 2; use a number from 0 to 232"),
-        ("ros2", "233", "is no domain of ROS 2"),
-        ("ros2", str(2**64 - 1), "is no domain of ROS 2"),
-        ("zenoh", "somewhere", "is no place where nodes of 'zenoh' meet"),
-        ("ros", "::", "is no address of a ROS master"),
-        ("ros", "http://", "is no address of a ROS master"),
+        ("ros2", "-1", "is not a ROS 2 domain; use a number from 0 to 232"),
+        ("ros2", "233", "is not a ROS 2 domain"),
+        ("ros2", str(2**64 - 1), "is not a ROS 2 domain"),
+        ("zenoh", "somewhere", "is not a zenoh address; use 'local'"),
+        ("ros", "::", "is not an address of a ROS master"),
+        ("ros", "http://", "is not an address of a ROS master"),
     ],
 )
 def test_a_wrong_address_is_refused_in_words_and_what_was_chosen_stays(

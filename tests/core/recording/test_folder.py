@@ -51,7 +51,7 @@ def test_each_file_with_what_is_in_it(folder, tmp_path, monkeypatch):
     assert not found["cut.MCAP"].is_complete
     assert found["cut.MCAP"].message_count == 5
     assert found["mended.mcap"].is_repaired
-    assert "no MCAP file" in found["none.mcap"].problem
+    assert "not an MCAP file" in found["none.mcap"].problem
     monkeypatch.setattr(folder_module, "read_facts", pytest.fail)
     assert {each.path.name: each for each in look(folder).files} == found  # nothing is opened again
 

@@ -378,7 +378,7 @@ def test_it_says_everything_in_every_code_page(master, saved, page):
 def test_a_master_whose_name_nobody_knows(saved):
     code, out = run(saved(workspace(started(say("Hi")))), master="nosuchhost.invalid:7781")
     assert code == UNUSABLE
-    assert out.startswith("no computer is called 'nosuchhost.invalid' here; ")
+    assert out.startswith("unknown computer 'nosuchhost.invalid'; ")
 
 
 PROGRAM = """
