@@ -26,4 +26,4 @@ def test_a_folder_that_takes_no_files_is_an_alert_and_originals_are_served(
         native.wait(lambda: "gateway:file" in native.alerts)
     finally:
         gateway.close()
-    assert "cannot be kept" in native.alerts["gateway:file"]
+    assert "Can't save the ports" in native.alerts["gateway:file"]

@@ -199,7 +199,7 @@ def test_its_menus(qtbot, view, them, window) -> None:
     QTest.mouseClick(them.target, Qt.RightButton, pos=QPoint(round(box["left"]) + 14, round(box["top"]) + 14))
     label = json.dumps("Remove from backpack")
     them.wait_for(f"!!{row.format(label)}")
-    assert not them.ask(f"!!{row.format(json.dumps('Put into'))}")
+    assert not them.ask(f"!!{row.format(json.dumps('Add to'))}")
 
 
 def test_variables_are_meant_by_their_names(qtbot, view, them, window) -> None:

@@ -113,7 +113,7 @@ def test_show_me_leads_to_the_category_then_to_the_block_and_ends_with_it(empty:
 
 def test_who_uses_the_keys_is_told_of_keys_and_led_to_the_category(empty: Person) -> None:
     said = "document.querySelector('.nepBeginKeys').textContent"
-    assert empty.ask(said).startswith("Without the mouse: Ctrl+B and the arrow keys find it")
+    assert empty.ask(said).startswith("With the keyboard: press Ctrl+B, choose it with the arrow keys")
     empty.view.setFocus()
     empty.wait_for("document.hasFocus()")
     for _ in range(MANY):
@@ -124,7 +124,7 @@ def test_who_uses_the_keys_is_told_of_keys_and_led_to_the_category(empty: Person
         empty.wait_for(f"document.activeElement.outerHTML !== {json.dumps(before)}")
     empty.press(Qt.Key.Key_Return)
     empty.wait_for("document.activeElement.id.toLowerCase().includes('events')")
-    empty.wait_for(f"({BUBBLE}).startsWith('Enter takes it')")
+    empty.wait_for(f"({BUBBLE}).startsWith('Press Enter to pick it up')")
 
 
 def test_escape_and_the_window_take_the_ring_away(empty: Person, view: BlocklyView) -> None:

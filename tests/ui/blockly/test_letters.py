@@ -89,7 +89,7 @@ def test_a_block_is_moved_with_keys_and_put_down(qtbot, them):
     on_a_block(them)
     them.press(Qt.Key_M, Qt.ControlModifier)
     them.wait_for("!!document.querySelector('.blocklyDragging')")
-    them.wait_for("document.querySelector('.blocklyToast')?.textContent.includes('puts it down')")
+    them.wait_for("document.querySelector('.blocklyToast')?.textContent.includes('to place it')")
     for _ in range(6):
         them.press(Qt.Key_Right, Qt.ControlModifier)
     them.press(Qt.Key_Return)

@@ -82,7 +82,7 @@ def test_with_keys_a_grey_value_goes_out_of_a_list_in_a_gap(view, person):
     them.wait_for(FOCUSED, "a")
     before = them.newest()
     them.press(Qt.Key_F10, Qt.ShiftModifier)
-    choose(them, "Take item 1 out")
+    choose(them, "Remove item 1 from the list")
     them.until(lambda: written(in_the_gap(them)) == ["b", "c"], "the first one is gone")
     assert in_the_gap(them)["inputs"]["ITEM0"]["block"]["id"] == "b"
     them.wait_for(FOCUSED, "b")
@@ -94,16 +94,16 @@ def test_with_the_mouse_the_item_under_it_goes(view, person):
     them = person(state=workspace(words_list() | {"x": 40, "y": 40}))
     before = them.newest()
     right_click(them, "[data-id=b] > .blocklyPath")
-    choose(them, "Take item 2 out")
+    choose(them, "Remove item 2 from the list")
     them.until(lambda: written(them.tops()[0]) == ["a", "c"], "the middle one is gone")
     view.undo()
     them.until(lambda: them.newest() == before, "all as it was")
     right_click(them, "[data-id=c] > .blocklyPath")
-    choose(them, "Take item 3 out")
+    choose(them, "Remove item 3 from the list")
     them.until(lambda: written(them.tops()[0]) == ["a", "b"], "the last one is gone")
     right_click(them, "[data-id=l] > .blocklyPath")
     them.wait_for(f"{MENU}.length > 0")
-    assert not any(words.startswith("Take") for words in them.ask(MENU))
+    assert not any(words.startswith("Remove item") for words in them.ask(MENU))
 
 
 def test_any_input_of_a_function_goes_and_its_uses_follow(view, person):
@@ -111,7 +111,7 @@ def test_any_input_of_a_function_goes_and_its_uses_follow(view, person):
     use = call("g", id="c", who=text("Ada"), when=text("now"))
     them = person(state=workspace(started(use) | {"x": 28, "y": 28}, greet | {"x": 28, "y": 252}))
     right_click(them, "[data-id=g] > .blocklyPath")
-    choose(them, "Take the input “who”")
+    choose(them, "Remove the input “who”")
     shown = "document.querySelector('[data-id=c]').textContent"
     them.wait_for(f"{shown}.includes('when') && !{shown}.includes('who')")
     view.undo()

@@ -60,11 +60,11 @@ def corner(them: Person, selector: str, side: str = "top") -> QPoint:
             "ever",
             "[data-id=angle] > .blocklyPath",
             "top",
-            "“repeat forever” gives no value, so no gap takes it.",
+            "“repeat forever” has no value, so it doesn't fit into a slot for values.",
         ),
         ("turn", "[data-id=ever] > .blocklyPath", "bottom", "“repeat forever” can't have blocks below it"),
-        ("battery", "[data-id=start] > .blocklyPath", "bottom", "“battery” is a value. Put it into a gap"),
-        ("start", "[data-id=turn] > .blocklyPath", "bottom", "“when started” begins a script"),
+        ("battery", "[data-id=start] > .blocklyPath", "bottom", "“battery” is a value. Drag it into a slot"),
+        ("start", "[data-id=turn] > .blocklyPath", "bottom", "“when started” starts a script"),
     ],
 )
 def test_a_wrong_drop_says_why_and_uncovers_the_place(qtbot, them, id, selector, side, words):

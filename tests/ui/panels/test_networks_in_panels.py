@@ -24,7 +24,7 @@ from tests.ui.fakes import Session
 from tests.ui.panel_case import OUT_OF_SIGHT, Window, ticks
 from tests.ui.panels.test_words import rows_of
 
-REASON = "no ROS master answers at '127.0.0.1:11311'; start one with 'roscore'"
+REASON = "no ROS master replied at '127.0.0.1:11311'; start one with 'roscore'"
 Look = Callable[[str], Fake]
 
 

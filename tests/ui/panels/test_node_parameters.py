@@ -125,7 +125,7 @@ def test_a_value_is_set_with_return_and_what_was_typed_stays_when_it_is_refused(
     QTest.keyClicks(part.field, "9")
     QTest.keyClick(part.field, Qt.Key.Key_Return)
     world.settle(qtbot)
-    assert part.sentence.text() == "The parameter 'speed' cannot be 9.0; the most is 2."
+    assert part.sentence.text() == "The parameter 'speed' cannot be 9.0; the maximum is 2."
     assert (part.field.text(), part.field.property("wrong")) == ("9", "true")
     part.field.selectAll()
     QTest.keyClicks(part.field, "fast")

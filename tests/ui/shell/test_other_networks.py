@@ -20,7 +20,7 @@ from tests.ui.clipping import clipped
 from tests.ui.panels.test_words import said_by
 
 pytest_plugins = ["tests.ui.shell_fixtures"]
-LONG = "no ROS master answers at '127.0.0.1:42787' (waited 2 s); start one with 'roscore', or with another"
+LONG = "no ROS master replied at '127.0.0.1:42787' (waited 2 s); start one with 'roscore', or with another"
 
 
 @pytest.fixture
@@ -86,7 +86,7 @@ def test_a_wrong_address_says_so_and_stays_as_it_was_typed(sheet: OtherNetworksS
     assert [fake.address for fake in world.made] == ["9"]
     row.address.setText("x")
     QTest.keyClick(row.address, Qt.Key.Key_Return)
-    assert "'x' is no domain" in states(sheet)[1]
+    assert "'x' is not a ROS 2 domain" in states(sheet)[1]
     assert sheet.isVisible()
     assert row.switch.isChecked(), "what was right goes on"
     row.address.setText(" 10 ")

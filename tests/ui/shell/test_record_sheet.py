@@ -243,7 +243,7 @@ def test_keeping_needs_the_flight_recorder_which_one_press_switches_on(window, r
     sheet.ring_topics.show_patterns(("/b\x01",), ())
     sheet.ring_topics.settled.emit()
     assert recorder.session.recordings.wish.patterns == ("/arm/*",)
-    assert "cannot be a topic" in sheet.ring_words.text()
+    assert "is not a valid topic name" in sheet.ring_words.text()
     sheet.ring.click()
     assert recorder.ops()[-1] == "end_ring"
 
