@@ -176,11 +176,24 @@ def test_keys_as_they_are_written(board: nep.Blackboard, text: str, names: tuple
 
 
 @pytest.mark.parametrize(
-    "key", ["", (), ("",), 5, None, b"a", ("a", 5), "x" * 1001, ".".join("a" * 33), "\ud800", ["a"]]
+    ("key", "named"),
+    [
+        ("", "''"),
+        ((), "''"),
+        (("",), "''"),
+        (5, "'int'"),
+        (None, "'NoneType'"),
+        (b"a", "'bytes'"),
+        (("a", 5), "'tuple'"),
+        ("x" * 1001, r"\(1001 characters\)' .*1000"),
+        (".".join("a" * 33), r"a\.a' .*32"),
+        ("\ud800", r"\\ud800' .*surrogate"),
+        (["a"], "'list'"),
+    ],
 )
-def test_keys_that_cannot_be(board: nep.Blackboard, key: str) -> None:
+def test_keys_that_cannot_be(board: nep.Blackboard, key: str, named: str) -> None:
     for use in (board.get, board.age_s, board.remove, lambda each: board.put(each, 1)):
-        with pytest.raises(nep.BadKeyError, match="cannot be a key"):
+        with pytest.raises(nep.BadKeyError, match=named):
             use(key)
     assert len(board) == 0
 
@@ -268,7 +281,7 @@ def test_there_is_a_most_of_keys_and_of_bytes(clock: Clock) -> None:
     assert 0 < len(small) < 10
     assert small.bytes <= 10_000
     before = small.keys()
-    with pytest.raises(nep.BadValueError, match="there is room for 10000"):
+    with pytest.raises(nep.BadValueError, match=r"'large' .*10000 "):
         small.put("large", "x" * 8_000_000)
     assert small.keys() == before
     small.put("99", "")
@@ -302,7 +315,7 @@ def test_values_that_are_too_deep_or_hold_themselves(board: nep.Blackboard) -> N
     for _number in range(10_000):
         deep = [deep]
     for value in (loop, round_, deep):
-        with pytest.raises(nep.BadValueError, match="too deep"):
+        with pytest.raises(nep.BadValueError, match=r"'x' .*contains itself, .*levels"):
             board.put("x", value)
     assert len(board) == 0
     level: object = 1
@@ -479,5 +492,5 @@ def test_a_board_that_is_forgotten_is_freed(clock: Clock) -> None:
 def test_a_coroutine_function_is_refused_where_nobody_awaits_it() -> None:
     async def changed(_change: object) -> None: ...
 
-    with pytest.raises(ValueError, match="callback is a coroutine function, which nobody awaits here"):
+    with pytest.raises(ValueError, match="callback is a coroutine function"):
         nep.Blackboard().on_change("*", changed)

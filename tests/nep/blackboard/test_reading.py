@@ -100,7 +100,7 @@ def test_fields_that_are_kept_and_renamed() -> None:
     }
     assert read(MessageReading("h", []), payload) == {}
     assert read(MessageReading("h", ["x"]), [1]) == {}
-    with pytest.raises(ValueError, match="fields is a text"):
+    with pytest.raises(ValueError, match=r"fields is .*a list"):
         MessageReading("h", "name")
     with pytest.raises(nep.BadKeyError):
         MessageReading("h", [""])

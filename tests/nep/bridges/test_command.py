@@ -158,7 +158,7 @@ def test_a_master_that_is_not_there_yet_is_waited_for(file, place):
     path = file('[[topics]]\na = "/t"\ndirection = "b->a"\n', address)
     with running(COMMAND, "bridge", path, "--json") as program, nep.node("b", "zenoh", master=place) as on_b:
         report = when(program, lambda it: it["sides"][0]["problem"])
-        assert report["sides"][0]["problem"].startswith("no master answers at")
+        assert re.match(f"no master .*'{address}' .*'nep master'", report["sides"][0]["problem"])
         assert not report["is_ready"]
         eventually(lambda: "/t" in on_b.graph().topics)
         on_b.new_pub("/t").publish("early")
@@ -246,14 +246,14 @@ def test_on_a_terminal_a_table_stands_in_its_place_and_warnings_above_it(file, n
         ((), "give a file or two ends, such as 'zeromq:/chatter ros:/chatter'; --example prints a file"),
         (("zeromq:/t",), "'zeromq:/t' is only one end; add the other one, such as 'ros:/chatter'"),
         (("zeromq:/t", "zeromk:/t"), "unknown back end 'zeromk'; did you mean 'zeromq'?"),
-        (("zeromq", "zenoh:/t"), "'zeromq' is no BACKEND:TOPIC; write it as 'zeromq:/topic' or"),
+        (("zeromq", "zenoh:/t"), "'zeromq' is not in the form BACKEND:TOPIC; write it as 'zeromq:/topic' or"),
         (("zeromq:", "zenoh:"), "the topic name is missing; write it as 'zeromq:/topic ros:/topic'"),
-        (("zeromq:/a/*", "zenoh:/b"), "'/a/*' and '/b' do not go together; use the same '*' or '**'"),
+        (("zeromq:/a/*", "zenoh:/b"), "'/a/*' and '/b' have different wildcards; use the same '*' or '**'"),
         (("zeromq:/t", "zmq:/u"), "both sides are the network 'zeromq:"),
         (("zeromq:/t", "zenoh:/t", "--direction", "a-b"), "'a-b' is not a direction; did you mean 'a->b'?"),
-        (("zenoh@nowhere:/t", "zeromq:/t"), "'nowhere' is no place where nodes of 'zenoh' meet"),
+        (("zenoh@nowhere:/t", "zeromq:/t"), "'nowhere' is not a zenoh address; use 'local'"),
         (("zeromq:/t", "memory:/t"), "the back end 'memory' connects nodes of one program only"),
-        (("zeromq:/a b", "zenoh:/t"), "'/a b' cannot be a topic"),
+        (("zeromq:/a b", "zenoh:/t"), "'/a b' is not a valid topic name; the character ' ' is not allowed"),
         (("missing.toml",), "'missing.toml' cannot be read: no such file or directory; 'nep bridge --ex"),
         (("missing.toml", "--rate", "3"), "--direction and --rate can't be used with a file"),
     ],
@@ -287,7 +287,7 @@ def test_a_file_is_checked_without_joining_anything(file):
         _out, err = program.end()
         assert program.process.returncode == 1
         assert re.fullmatch(
-            r"nep: line 9 of '.*lab\.toml', topics\[1\]\.max_rate: there is no such key; did you mean "
+            r"nep: line 9 of '.*lab\.toml', topics\[1\]\.max_rate: unknown key; did you mean "
             r"'max_rate_hz'\?\n",
             err,
         )

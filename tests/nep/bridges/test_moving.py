@@ -77,11 +77,13 @@ def test_command_line_refuses_what_moves_a_robot_before_it_joins(type_in, tmp_pa
 
         code, said, _out = bridge("/Rover/command", msg_type="robot/command")
         assert code == 2
-        assert "'/Rover/command' moves a robot; add --allow-moving /Rover/command" in said
+        assert "'/Rover/command' moves a robot; make sure that nobody is in its way, then add" in said
+        assert "then add --allow-moving /Rover/command" in said
         describe(b.node("rover"), "Rover", "/orders")
         code, said, _out = bridge("/orders")
         assert code == 2
-        assert "'/orders' moves Rover; add --allow-moving Rover" in said
+        assert "'/orders' moves Rover; make sure that nobody is in the way, then add" in said
+        assert "then add --allow-moving Rover" in said
         assert bridge("robot_action")[0] == 2
         code, _said, out = bridge("/orders", "--allow-moving", "Rover")
         assert (code, json.loads(out.splitlines()[0])["routes"][0]["problem"]) == (0, "")

@@ -1,5 +1,7 @@
 from __future__ import annotations
 
+import re
+
 import pytest
 
 import nep
@@ -112,7 +114,7 @@ def test_numbers_that_the_originals_cannot_read_are_an_alert(scene):
         scene.native.data_of(Message("cam", floats.data, "image", "image", extension=floats.extension))
         is None
     )
-    assert "they read JPEG and PNG" in scene.alerts[0].sentence
+    assert re.search("“cam”: .*JPEG and PNG", scene.alerts[0].sentence)
 
 
 @pytest.mark.parametrize("encoding", ["bgr8", ["bgr8"], {"bgr8": 1}, 7, b"jpeg"])
@@ -126,7 +128,7 @@ def test_a_name_that_is_no_native_topic_is_an_alert_and_is_not_tried_at_once_aga
     assert not scene.native.subscribe("not a topic", "json")
     scene.native.publish("not a topic", "json", b"1")
     (alert,) = scene.alerts
-    assert "“not a topic” stays among programs of the original NEP" in alert.sentence
+    assert re.match("“not a topic” .*the character ' '", alert.sentence)
     assert alert.hint
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Iterator
 from typing import Any
 
@@ -41,7 +42,7 @@ def node(request: pytest.FixtureRequest, master: Master) -> Iterator[nep.Node]:
         ),
         ({"msg_type": "x" * 201}, "characters\\)'; use at most 200 characters"),
         ({"topic": b"t"}, "a topic name must be a 'str'"),
-        ({"qos": "sensor"}, "has no qualities of service; leave out qos"),
+        ({"qos": "sensor"}, r"the back end '(memory|zeromq)' .*\bqos"),
         (
             {"configuration": "direct"},
             "configuration is a 'str'; create one with 'node.hybrid' or 'node.direct'",
@@ -63,7 +64,7 @@ def test_a_subscriber_of_wrong_arguments_is_not_made(
         ({"latched": "no"}, "latched is 'no'; give True or False"),
         ({"msg_type": None}, "msg_type is a 'NoneType'; give a 'str'"),
         ({"topic": 5}, "a topic name must be a 'str'"),
-        ({"qos": "sensor"}, "has no qualities of service; leave out qos"),
+        ({"qos": "sensor"}, r"the back end '(memory|zeromq)' .*\bqos"),
     ],
 )
 def test_a_publisher_of_wrong_arguments_is_not_made(
@@ -93,7 +94,7 @@ def test_a_callback_is_a_function(node: nep.Node) -> None:
         ({"max_messages": True}, "max_messages is True; give a whole number of at least 1"),
         ({"with_message": 1}, "with_message is 1; give True or False"),
         ({"topic": 5}, "a topic name must be a 'str'"),
-        ({"qos": "sensor"}, "has no qualities of service; leave out qos"),
+        ({"qos": "sensor"}, r"the back end '(memory|zeromq)' .*\bqos"),
     ],
 )
 def test_a_callback_of_wrong_arguments_is_not_made(
@@ -140,18 +141,18 @@ def test_a_time_is_no_less_than_nothing(node: nep.Node, time_s: float) -> None:
     [
         (
             {"ip": "[::1]"},
-            r"'\[::1\]' is an IPv6 address, which nep does not speak; use one such as '127.0.0.1'",
+            r"'\[::1\]' is an IPv6 address, .*'127\.0\.0\.1'",
         ),
         ({"ip": "fe80::1"}, "'fe80::1' is an IPv6 address"),
         ({"ip": "http://robot"}, "'http://robot' is a URL"),
-        ({"ip": "robot:7780"}, "'robot:7780' is no address of a computer"),
-        ({"ip": "a b"}, "'a b' is no address of a computer"),
-        ({"ip": ""}, "'' is no address of a computer"),
-        ({"ip": "999.1.1.1"}, "'999.1.1.1' is no address of a computer"),
-        ({"ip": "1.2.3"}, "'1.2.3' is no address of a computer"),
-        ({"ip": None}, "'None' is no address of a computer"),
-        ({"port": 0}, "'0' is no port"),
-        ({"port": True}, "'True' is no port"),
+        ({"ip": "robot:7780"}, "'robot:7780' .*address of a computer"),
+        ({"ip": "a b"}, "'a b' .*address of a computer"),
+        ({"ip": ""}, "'' .*address of a computer"),
+        ({"ip": "999.1.1.1"}, "'999.1.1.1' .*address of a computer"),
+        ({"ip": "1.2.3"}, "'1.2.3' .*address of a computer"),
+        ({"ip": None}, "'None' .*address of a computer"),
+        ({"port": 0}, "'0' .*from 1 to 65535"),
+        ({"port": True}, "'True' .*from 1 to 65535"),
         ({"wire": "nativ"}, "wire is 'nativ'; use 'original', 'native' or 'tcp'"),
         ({"generation": "C"}, "generation is 'C'; use 'A' or 'B'"),
     ],
@@ -165,24 +166,24 @@ def test_a_direct_connection_to_what_is_no_address(given: dict[str, Any], senten
 def test_a_direct_connection_that_cannot_be_leaves_no_socket_behind(wire: Any) -> None:
     with nep.node("direct") as node:  # closing it would wait for a socket that is left
         anywhere = node.direct("*", 5003, "many2one", wire=wire)
-        with pytest.raises(nep.NepError, match=r"'\*:5003' cannot be connected to; use a computer's address"):
+        with pytest.raises(nep.NepError, match=r"'\*:5003'; .*a computer's address"):
             node.new_pub("t", "json", anywhere)
         elsewhere = node.direct("192.0.2.1", 5003, "one2many", wire=wire)
-        with pytest.raises(nep.AddressInUseError, match=r"'192\.0\.2\.1:5003' is no address of this"):
+        with pytest.raises(nep.AddressInUseError, match=r"'192\.0\.2\.1:5003'"):
             node.new_pub("t", "json", elsewhere)
         last = node.direct("127.0.0.1", 65535, "many2many", wire=wire)  # a subscriber's port is one higher
-        with pytest.raises(nep.NepError, match=r"'127\.0\.0\.1:65536' cannot be connected to"):
+        with pytest.raises(nep.NepError, match=r"'127\.0\.0\.1:65536'; .*up to 65535"):
             node.new_sub("t", "json", last)
 
 
 def test_a_master_is_no_ipv6_address() -> None:
     for given in ("[::1]:7780", "::1", "[::1]"):
-        with pytest.raises(nep.NepError, match="is an IPv6 address, which nep does not speak"):
+        with pytest.raises(nep.NepError, match=r"::1.*' is an IPv6 address, .*'127\.0\.0\.1'"):
             master_address(given)
     for given in ("http://robot", "robot:7780:1", "a:b:c"):
-        with pytest.raises(nep.NepError, match="is no address of a master"):
+        with pytest.raises(nep.NepError, match=rf"'{given}.*write it as '127\.0\.0\.1:7780'"):
             master_address(given)
-    with pytest.raises(ValueError, match="an address is a 'str'"):
+    with pytest.raises(ValueError, match="a 'str' such as '"):
         master_address(7780)  # type: ignore[arg-type]
 
 
@@ -230,7 +231,7 @@ def test_one_bad_endpoint_keeps_nobody_from_hearing_the_others(
         assert sub.listen(timeout_s=30.0) == (True, "heard")
         assert sub.refused == (2 if endpoint else 0)
         if endpoint:
-            assert "of 'bad' cannot be connected to" in transport.counts().problem
+            assert re.search(r"'.*' of 'bad': .*\(2 so far\)", transport.counts().problem)
             assert "\x1b" not in transport.counts().problem + caplog.text
             for each in bad:
                 transport.publisher_removed(each.publisher.id, 0, is_closed=False)

@@ -160,8 +160,8 @@ def test_a_storm_is_cut_and_what_is_left_out_is_counted_exactly(kept):
     for number in range(10_000):
         handler.logger.info("%d", number)
     handler.close()
-    told = sum(int(text.split()[0]) for text in kept.texts if "left out" in text)
-    shown = [text for text in kept.texts if "left out" not in text]
+    told = sum(int(text.split()[0]) for text in kept.texts if not text.isdigit())
+    shown = [text for text in kept.texts if text.isdigit()]
     assert shown == [str(number) for number in range(BURST)]
     assert told == 10_000 - BURST
 
@@ -174,8 +174,9 @@ def test_after_a_pause_records_come_again(kept):
     now[0] = 0.11
     handler.logger.info("d")
     handler.close()
-    assert [text for text in kept.texts if "left out" not in text] == ["a", "b", "d"]
-    assert "1 log record was dropped: the limit is 10 per second" in kept.texts
+    dropped = "1 log record was dropped: the limit is 10 per second"
+    assert [text for text in kept.texts if text != dropped] == ["a", "b", "d"]
+    assert dropped in kept.texts
 
 
 def test_records_wait_for_a_master_and_are_given_up_when_it_never_comes():
@@ -245,7 +246,7 @@ def test_a_long_silence_saves_up_no_more_than_one_burst(kept):
     for number in range(10):
         handler.logger.info("%d", number)
     handler.close()
-    assert [text for text in kept.texts if "left out" not in text] == ["0", "1", "2"]
+    assert [text for text in kept.texts if text.isdigit()] == ["0", "1", "2"]
 
 
 def test_what_publishing_itself_logs_is_not_published():
@@ -279,8 +280,8 @@ def test_without_a_master_no_more_records_wait_than_fit():
         handler.logger.info("%d", number)
     came.set()
     handler.close(10.0)
-    assert len([text for text in kept.texts if "left out" not in text]) == 1_000
-    assert any(text.startswith("2000 log records were left out") for text in kept.texts)
+    assert len([text for text in kept.texts if text.isdigit()]) == 1_000
+    assert any(text.startswith("2000 log records ") for text in kept.texts)
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="limits memory as Linux does")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import re
 import threading
 from collections.abc import Iterator, Mapping
 
@@ -65,9 +66,9 @@ def test_others_set_them_and_are_told_why_not(make: Make) -> None:
         theirs.set("speed", 1.5)
         assert (theirs.get("speed"), node.parameters["speed"]) == (1.5, 1.5)
         refusals = {
-            "the parameter 'speed' cannot be 7; the most is 2": ("speed", 7),
+            "the parameter 'speed' cannot be 7; the maximum is 2": ("speed", 7),
             "the parameter 'speed' cannot be 'fast'; give a 'float'": ("speed", "fast"),
-            "the parameter 'spead': there is none; did you mean 'speed'?": ("spead", 1),
+            "the parameter 'spead': it does not exist; did you mean 'speed'?": ("spead", 1),
             "the parameter 'serial' cannot be 'X2'; only its node can change it": ("serial", "X2"),
         }
         for sentence, (name, value) in refusals.items():
@@ -125,7 +126,7 @@ def test_what_is_no_call_of_parameters_is_refused(pair: tuple[nep.Node, nep.Node
     client = other.new_client(place_of(node.id), timeout_s=30.0)
     for wrong in (None, 5, [], {"set": 5}, {"set": [1]}, "list"):
         answer = client.call(wrong)
-        assert "a call of parameters is a map" in answer["refused"]  # type: ignore[index]
+        assert re.search(r"\bmap\b.*'set'", answer["refused"])  # type: ignore[index]
     assert client.call({})["parameters"][0]["value"] == 1  # type: ignore[index]
     assert client.call({"set": {"speed": [[]] * 10}})["refused"].startswith(
         "the parameter 'speed' cannot be [[]"
@@ -184,16 +185,16 @@ def test_a_value_is_a_copy(make: Make) -> None:
 @pytest.mark.parametrize(
     ("name", "default", "more", "sentence"),
     [
-        ("x", 1, {}, "it is declared already"),
+        ("x", 1, {}, "'x' cannot be 1; .*'set'"),
         ("y", 5, {"max": 2}, "the maximum is 2"),
         ("y", 5, {"choices": (1, 2)}, "use 1 or 2"),
         ("y", 5, {"choices": (1, "a")}, "give a 'int'"),
-        ("y", "a", {"max": 2}, "only numbers have limits"),
-        ("y", 1, {"max": float("nan")}, "only numbers have limits"),
+        ("y", "a", {"max": 2}, "'y' cannot be 'a'; .*limits"),
+        ("y", 1, {"max": float("nan")}, "'y' cannot be 1; .*limits .*finite"),
         ("y", 1, {"type": bytes}, "its type must be 'bool', 'int'"),
         ("y", None, {}, "its type must be 'bool', 'int'"),
-        ("a b", 1, {}, "cannot be a topic"),
-        ("", 1, {}, "cannot be a topic"),
+        ("a b", 1, {}, "'a b' .*the character ' '"),
+        ("", 1, {}, "'' .*1 to 200"),
     ],
 )
 def test_what_cannot_be_declared(
@@ -222,7 +223,7 @@ def test_which_node_is_meant(master: Master) -> None:
             tool.parameters_of("tool")
         for node in (one, two):
             node.parameters.declare("who", node.id)
-        with pytest.raises(nep.NepError, match=f"2 nodes are called 'a'; use an id: .*{one.id}"):
+        with pytest.raises(nep.NepError, match=f"2 nodes .*'a'; .*{one.id}"):
             tool.parameters_of("a")
         with tool.parameters_of(two.id, timeout_s=30.0) as theirs:
             assert theirs.get("who") == two.id

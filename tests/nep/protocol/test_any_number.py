@@ -215,7 +215,7 @@ def test_what_cannot_be_encoded_is_one_answer_that_fails_and_no_other(
         pub = other.new_pub("/still")
         pub.publish("here")
         assert still.listen(30.0) == (True, "here")
-        with pytest.raises(nep.RequestRefusedError, match="the master could not carry this out"):
+        with pytest.raises(nep.RequestRefusedError, match=r"the master .*its log"):
             honest.graph()
         assert sub.lost == 0
         master.submit(requests.Leave(node.id))

@@ -45,9 +45,9 @@ def test_notes_of_the_recording_and_what_is_made_later_come_in_their_order(path)
         assert renamed.name == "ñ" * 200
         marks.remove(early)
         for wrong in (note, early, Bookmark(1, "never")):
-            with pytest.raises(ValueError, match="cannot be changed"):
+            with pytest.raises(ValueError, match="changed"):
                 marks.remove(wrong)
-            with pytest.raises(ValueError, match="cannot be changed"):
+            with pytest.raises(ValueError, match="changed"):
                 marks.rename(wrong, "x")
         told = marks.all
     with Recording(path) as recording:
@@ -77,7 +77,7 @@ def test_a_damaged_file_is_none_and_is_kept_when_one_is_made(path, text):
 def test_what_cannot_be_kept_is_a_sentence_and_changes_nothing(path, monkeypatch):
     with Recording(path) as recording:
         marks = Bookmarks(recording)
-        with pytest.raises(RecordingError, match="letters"):
+        with pytest.raises(RecordingError, match=r"name .*characters"):
             marks.add(recording.start_ns, "\ud800")
         marks.path.mkdir()  # nothing can take its place
         with pytest.raises(RecordingError, match="cannot use the recording"):
@@ -86,7 +86,7 @@ def test_what_cannot_be_kept_is_a_sentence_and_changes_nothing(path, monkeypatch
         marks.path.rmdir()
         monkeypatch.setattr("nep.recordings.bookmarks.MAX_BOOKMARKS", 1)
         marks.add(recording.start_ns, "new")
-        with pytest.raises(RecordingError, match="no room for more"):
+        with pytest.raises(RecordingError, match="1 bookmarks, the maximum"):
             marks.add(recording.start_ns, "too many")
         assert [each["name"] for each in json.loads(marks.path.read_text())["bookmarks"]] == ["new"]
     assert sorted(each.name for each in path.parent.iterdir()) == [path.name, marks.path.name]

@@ -215,7 +215,7 @@ def test_a_part_of_it(recording, tmp_path):
 def test_nothing_is_written_over_and_nothing_half_is_left(recording, tmp_path, monkeypatch):
     export(recording, "csv", tmp_path / "out")
     before = (tmp_path / "out" / "t.csv").read_bytes()
-    with pytest.raises(RecordingError, match="such a file already"):
+    with pytest.raises(RecordingError, match=r"\.csv'; .*already exists"):
         export(recording, "csv", tmp_path / "out")
     assert (tmp_path / "out" / "t.csv").read_bytes() == before
     monkeypatch.setattr("nep.recordings.export.MAX_COLUMNS", 3)
@@ -240,7 +240,7 @@ def test_sentences(recording, tmp_path, monkeypatch):
         pytest.raises(RecordingError, match="no topic has images"),
     ):
         export(plain, "mp4", tmp_path)
-    with pytest.raises(ValueError, match="no format"):
+    with pytest.raises(ValueError, match="'xls'"):
         export(recording, "xls", tmp_path)
     with pytest.raises(RecordingError, match="no topic has values"):
         export(recording, "csv", tmp_path, Part(topics=("/camera",)))
@@ -280,11 +280,11 @@ def test_a_part_as_a_recording_has_the_same_bytes_and_times_and_what_was_said(tm
             len(wanted),
             (len(wanted),) * 2,
         )
-        with pytest.raises(RecordingError, match="such a file already"):
+        with pytest.raises(RecordingError, match=r"a\.mcap'; .*already exists"):
             export(whole, "mcap", tmp_path / "out", part)
-        with pytest.raises(RecordingError, match="no such topic"):
+        with pytest.raises(RecordingError, match=r"a\.mcap'; .*topics"):
             export(whole, "mcap", tmp_path / "none", Part(topics=["/nowhere"]))
-        with pytest.raises(RecordingError, match="in that part"):
+        with pytest.raises(RecordingError, match=r"a\.mcap'; .*part"):
             export(whole, "mcap", tmp_path / "none", Part(start_ns=times[-1] + 1))
     with Recording(made.path) as recording:
         assert recording.is_complete

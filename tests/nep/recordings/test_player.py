@@ -140,7 +140,7 @@ def test_a_part_is_played_again_and_again_until_that_ends(recording, times):
     found = [seq for _at, seq in run(playback, clock, 3.0)]
     assert found[: 2 * COUNT] == [*range(COUNT), *range(COUNT)]  # the first one, too, each time
     for part in ((5, 5), (times[9], times[3])):
-        with pytest.raises(ValueError, match="no length"):
+        with pytest.raises(ValueError, match="empty"):
             playback.loop(*part)
 
 
@@ -189,7 +189,7 @@ def test_pause_keeps_the_place_and_wrong_speeds_are_refused(recording):
     assert run(playback, clock, 0.02)[-1][1] < 30
     assert playback.status().position_ns >= place
     for wrong in (0.0, -1.0, 0.09, 10.1, float("nan"), float("inf")):
-        with pytest.raises(ValueError, match="no speed"):
+        with pytest.raises(ValueError, match=r"0\.1 to 10"):
             playback.speed = wrong
 
 
@@ -232,7 +232,7 @@ def test_the_players_thread_gives_all_in_order_and_jumps_apart(recording, times)
         player.order(lambda each: each.seek(times[50]))
         until(lambda: jumps)
         assert {each.seq for each in jumps[0]} == {49, 50}
-        with pytest.raises(ValueError, match="no speed"):
+        with pytest.raises(ValueError, match=r"0\.1 to 10"):
             player.order(lambda each: setattr(each, "speed", 0.0))
         assert player.status.position_ns == times[50]
     player.close()

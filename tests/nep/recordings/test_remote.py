@@ -69,7 +69,7 @@ def test_what_can_not_be_read_is_said_and_others_are_read_on(
     tmp_path: Path, path: Path, reader: ReaderProcess
 ) -> None:
     (tmp_path / "none.mcap").write_bytes(b"none")
-    with pytest.raises(RecordingError, match="no MCAP file"):
+    with pytest.raises(RecordingError, match=r"none\.mcap'; .*MCAP file"):
         reader.open(tmp_path / "none.mcap")
     with pytest.raises(RecordingError):
         reader.open(tmp_path / "gone.mcap")
@@ -86,9 +86,9 @@ def test_what_can_not_be_read_is_said_and_others_are_read_on(
 def test_a_process_that_dies_is_a_sentence_and_the_next_file_has_a_new_one(path: Path) -> None:
     with ReaderProcess(DIES) as reader:
         for _again in range(2):
-            with pytest.raises(RecordingError, match="has ended"):
+            with pytest.raises(RecordingError, match=r"a\.mcap'; .*process"):
                 reader.open(path)
-    with ReaderProcess(["/no/such/program"]) as reader, pytest.raises(RecordingError, match="started"):
+    with ReaderProcess(["/no/such/program"]) as reader, pytest.raises(RecordingError, match="/such/program"):
         reader.open(path)
 
 

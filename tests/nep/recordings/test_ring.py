@@ -123,16 +123,16 @@ def test_what_a_process_left_behind_is_removed_and_what_another_one_has_is_not(t
 
 
 def test_sentences(tmp_path):
-    with pytest.raises(ValueError, match="more than 0 seconds"):
+    with pytest.raises(ValueError, match="above 0"):
         FlightRecorder(tmp_path, seconds=0.0)
-    with pytest.raises(ValueError, match="more than 0 seconds"):
+    with pytest.raises(ValueError, match="above 0"):
         FlightRecorder(tmp_path, seconds=float("nan"))
     (tmp_path / "file").write_bytes(b"")
     with pytest.raises(RecordingError):
         FlightRecorder(tmp_path / "file")
     with FlightRecorder(tmp_path / "ring", clock=TestClock(), limits=limits()) as ring:
         ring.post([json_message(1)])
-        with pytest.raises(RecordingError, match="such a file already"):
+        with pytest.raises(RecordingError, match=r"file'; .*already exists"):
             ring.keep(tmp_path / "file", 1.0)
         with pytest.raises(RecordingError):
             ring.keep(tmp_path / "nowhere" / "a.mcap", 1.0)
@@ -156,7 +156,7 @@ def test_nothing_is_kept_of_nothing_and_of_a_ring_that_has_ended(tmp_path):
         ring.keep(tmp_path / "a.mcap", 1.0)
     ring.post([json_message(1)])
     for wrong in (0.0, -1.0, float("nan"), float("inf")):
-        with pytest.raises(ValueError, match="more than 0 seconds"):
+        with pytest.raises(ValueError, match="above 0"):
             ring.keep(tmp_path / "a.mcap", wrong)
     ring.close()
     ring.close()

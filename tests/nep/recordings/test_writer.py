@@ -254,7 +254,7 @@ def test_an_error_of_our_own_ends_it_with_a_sentence_and_what_came_before_is_kep
     until(lambda: writer.problem)
     status = writer.close()
     assert not writer.flush()
-    assert "error of nep's own, ZeroDivisionError" in status.problem
+    assert "ZeroDivisionError('integer " in status.problem
     assert told == [status.problem]
     assert status.message_count == 2
     assert [each.seq for each in read(path)] == [1, 2]
@@ -287,7 +287,7 @@ class FailingBytes:
 def test_no_file_is_written_over_and_no_folder_is_no_reason_for_a_traceback(tmp_path):
     path = tmp_path / "a.mcap"
     path.write_bytes(b"mine")
-    with pytest.raises(RecordingError, match="such a file already"):
+    with pytest.raises(RecordingError, match=r"a\.mcap'; .*already exists"):
         RecordingWriter(path)
     assert path.read_bytes() == b"mine"
     with pytest.raises(RecordingError, match="cannot use the recording"):

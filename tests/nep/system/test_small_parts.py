@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import errno
+import re
 import select
 import selectors
 import socket
@@ -127,7 +128,7 @@ def package(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 def test_an_empty_package_is_an_error(package: Path) -> None:
     (package / "base.py").write_text("x = 1\n")
-    with pytest.raises(PluginsMissingError, match="no module of 'plugs_for_test' binds 'BACKEND'"):
+    with pytest.raises(PluginsMissingError, match=r"'plugs_for_test' .*'BACKEND'"):
         discover("plugs_for_test", "BACKEND", Backend)
 
 
@@ -270,7 +271,7 @@ def test_addresses(monkeypatch: pytest.MonkeyPatch, given_: str | None, address:
     ],
 )
 def test_what_is_no_address(address: str) -> None:
-    with pytest.raises(nep.NepError, match="is no address of a master"):
+    with pytest.raises(nep.NepError, match=rf"'{re.escape(address)}.*'127\.0\.0\.1:7780'"):
         addresses.master_address(address)
 
 
@@ -281,7 +282,7 @@ def test_did_you_mean() -> None:
 
 def test_names_of_nodes() -> None:
     for name in ("", "x" * 201):
-        with pytest.raises(nep.NepError, match="cannot be a node's name"):
+        with pytest.raises(nep.BadNameError, match=f"it has {len(name)} bytes; 1 to 200"):
             nep.node(name)
 
 

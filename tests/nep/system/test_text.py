@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import unicodedata
 
 import pytest
@@ -26,7 +27,7 @@ CONTROLS += [*"\u2066\u2067\u2068\u2069\u200e\u200f\u061c\u200b\ufeff", "\ud800"
 def test_a_name_with_a_letter_that_controls_is_refused_and_the_sentence_can_be_shown(control: str) -> None:
     name = f"arm{control}2"
     assert control_in(name) == ascii(control)[1:-1]
-    with pytest.raises(nep.BadNameError, match="cannot be a node's name") as bad_name:
+    with pytest.raises(nep.BadNameError, match=re.escape(ascii(name)[1:-1])) as bad_name:
         nep.node(name)
     with pytest.raises(nep.BadTopicError) as bad_topic:
         check_topic(f"/{name}")
