@@ -44,7 +44,7 @@ def test_it_looks_when_it_is_first_seen_and_shows_the_worst_first(panel, window)
     assert window.session.doctor.looked == 1
     assert panel.shown == list(FOUND)
     assert len(panel.rows) == len(FOUND)
-    assert panel.rows[0].accessibleName().startswith("error: Port 7780 is held by")
+    assert panel.rows[0].accessibleName().startswith("error: “python3 server.py” (process 77) uses port 7780")
     assert panel.chip.accessibleName() == "2"
     panel.refresh()
     assert window.session.doctor.looked == 1  # nothing changed, nothing done
@@ -147,7 +147,7 @@ def test_the_report_is_copied_as_text(panel, window) -> None:
     (copy,) = panel.more_actions()
     copy.trigger()
     text = QGuiApplication.clipboard().text()
-    assert text.startswith("x Port 7780 is held by")
+    assert text.startswith("x “python3 server.py” (process 77) uses port 7780")
     assert text.count("\n") >= len(FOUND)
     assert window.toasts == ["Copied the report"]
 
