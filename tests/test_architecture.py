@@ -177,21 +177,21 @@ def environ_without_screen() -> dict[str, str]:
     return {**os.environ, "QT_QPA_PLATFORM": "offscreen"}
 
 
-def test_the_product_is_read_at_all() -> None:
+def test_all_packages_are_scanned() -> None:
     names = {module.name for module in modules()}
     assert {"nep", "app", "app.__main__", "app.ui", "app.core", "app.blocks", "app.robots"} <= names
 
 
-def test_imports_point_down() -> None:
+def test_imports_follow_the_layers() -> None:
     assert [fault for module in modules() for fault in faults_of_layers(module)] == []
 
 
-def test_an_import_that_points_up_is_found() -> None:
+def test_upward_import_is_detected() -> None:
     tree = ast.parse("def f():\n    from app.ui import theme\n")
     assert faults_of_layers(Module("app.core.x", Path("x.py"), tree)) == ["app.core.x:2 imports app.ui.theme"]
 
 
-def test_qt_is_only_in_app_ui() -> None:
+def test_qt_is_imported_only_in_app_ui() -> None:
     faults = [
         f"{module.name}:{item.line} imports {item.target}"
         for module in modules()
@@ -240,11 +240,11 @@ def test_plug_ins_do_not_import_each_other() -> None:
     assert faults == []
 
 
-def test_a_small_module_with_one_importer_earns_its_file() -> None:
+def test_small_modules_with_one_importer_are_justified() -> None:
     assert small_with_one_importer(modules()) == EARNED.keys()
 
 
-def test_a_small_module_with_one_importer_is_found(tmp_path: Path) -> None:
+def test_small_module_with_one_importer_is_detected(tmp_path: Path) -> None:
     def module(name: str, source: str) -> Module:
         path = tmp_path / f"{name}.py"
         path.write_text(source, encoding="utf-8")
@@ -271,18 +271,18 @@ def classes_with_two_meanings(found: Iterable[Module]) -> dict[str, list[str]]:
     return {name: where for name, where in places.items() if len(where) > 1}
 
 
-def test_a_class_name_means_one_thing() -> None:
+def test_class_names_are_unique() -> None:
     ours = [module for module in modules() if module.name not in NAMED_BY_ROS]
     assert classes_with_two_meanings(ours) == {}
 
 
-def test_a_class_name_with_two_meanings_is_found() -> None:
+def test_duplicate_class_name_is_detected() -> None:
     one = Module("nep.one", Path("one.py"), ast.parse("class Alert: ...\nclass _Tile: ...\n"))
     two = Module("app.two", Path("two.py"), ast.parse("class _Tile:\n    class Alert: ...\n"))
     assert classes_with_two_meanings([one, two]) == {"Alert": ["nep.one:1", "app.two:2"]}
 
 
-def test_nobody_sleeps() -> None:
+def test_no_code_calls_sleep() -> None:
     folders = ("nep", "app", "tools", "bench", "tests")
     paths = [ROOT / "dev.py", *(path for folder in folders for path in ROOT.glob(f"{folder}/**/*.py"))]
     faults = [
@@ -298,7 +298,7 @@ def test_nobody_sleeps() -> None:
 @pytest.mark.parametrize(
     "source", ["time.sleep(1)", "sleep(1)", "QThread.msleep(5)", "await asyncio.sleep(0)"]
 )
-def test_a_sleep_is_found(source: str) -> None:
+def test_sleep_call_is_detected(source: str) -> None:
     assert sleeps(ast.parse(f"async def f():\n    {source}\n")) == [2]
 
 
@@ -337,13 +337,13 @@ def places_that_replace_files(tree: ast.AST) -> list[int]:
     ]
 
 
-def test_files_are_replaced_in_one_place_which_tries_again_on_windows() -> None:
+def test_files_are_replaced_only_by_the_helper_that_retries_on_windows() -> None:
     assert places_that_replace_files(ast.parse("path.replace(other)\n'a'.replace('a', 'b')\n")) == [1]
     found = {module.name for module in modules() if places_that_replace_files(module.tree)}
     assert found - {"nep.system.replace_file", "app.ui.blockly.view"} == set(), "the latter replaces a tab"
 
 
-def test_qt_does_not_lose_references_of_none() -> None:
+def test_qt_does_not_lose_references_to_none() -> None:
     """PySide6 6.12.0 for Linux loses one at every void call; Python 3.10 and 3.11 then abort."""
     program = (
         "import sys\n"
@@ -366,7 +366,7 @@ def test_qt_does_not_lose_references_of_none() -> None:
     assert abs(int(done.stdout)) < 100
 
 
-def test_nep_loads_without_qt_and_pictures() -> None:
+def test_nep_loads_without_qt_numpy_and_opencv() -> None:
     heavy = sorted({*QT, "numpy", "cv2"})
     program = f"import sys, nep\nprint([name for name in {heavy} if name in sys.modules])"
     done = subprocess.run(
@@ -381,7 +381,7 @@ def requirements(extra: str = "") -> list[Requirement]:
     return [item for item in found if item.marker is None or item.marker.evaluate({"extra": extra})]
 
 
-def test_the_distribution_says_what_it_needs() -> None:
+def test_distribution_declares_its_requirements() -> None:
     metadata = distribution("nep-studio").metadata
     assert metadata["License-Expression"] == "MIT"
     assert metadata["Requires-Python"] == "<3.14,>=3.10"
@@ -396,7 +396,7 @@ def test_the_distribution_says_what_it_needs() -> None:
     assert "5.0.0.93" not in image["opencv-python-headless"]
 
 
-def test_the_commands_of_the_distribution_exist() -> None:
+def test_entry_points_of_the_distribution_exist() -> None:
     commands = {item.name: item.value for item in distribution("nep-studio").entry_points}
     assert set(commands) == {"nep", "nep-studio"}
     for value in commands.values():
@@ -418,7 +418,7 @@ def pinned() -> dict[str, list[Requirement]]:
     return found
 
 
-def test_studio_and_its_tests_are_installed_from_the_same_files() -> None:
+def test_studio_requirements_are_a_subset_of_the_dev_requirements() -> None:
     # Where a package is wanted, for which the extra dev may have one reason more, is told behind a semicolon.
     studio, dev = (
         set(re.sub(r" ;.*", "", (ROOT / "requirements" / f"{extra}.txt").read_text("utf-8")).split("\n"))
@@ -431,7 +431,7 @@ def normalised(name: str) -> str:
     return re.sub(r"[-_.]+", "-", name).lower()
 
 
-def test_everything_that_is_installed_for_us_is_pinned() -> None:
+def test_all_installed_packages_are_pinned() -> None:
     pins = pinned()
     waiting = [item for extra in ("", "studio", "image", "test", "dev") for item in requirements(extra)]
     seen: set[str] = set()
@@ -450,7 +450,7 @@ def test_everything_that_is_installed_for_us_is_pinned() -> None:
     assert len(seen) > 20
 
 
-def test_links_between_the_documents_lead_somewhere() -> None:
+def test_links_between_documents_resolve() -> None:
     pages = [ROOT / "README.md", ROOT / "CONTRIBUTING.md", *(ROOT / "docs").rglob("*.md")]
     missing = [
         f"{page.relative_to(ROOT)}: {target}"
@@ -464,7 +464,7 @@ def test_links_between_the_documents_lead_somewhere() -> None:
     assert missing == []
 
 
-def test_a_page_says_who_can_do_what() -> None:
+def test_trust_page_states_what_is_and_is_not_guaranteed() -> None:
     page = (ROOT / "docs" / "trust.md").read_text(encoding="utf-8")
     for named in ("Programs of yours on this computer", "Other users of this computer", "after `--listen`"):
         assert named in page

@@ -13,7 +13,7 @@ from tests.conftest import may_take
 from tools.check import ROOT, Check, Outcome, checks, run, run_all, summary
 
 
-def test_the_cheapest_mistakes_are_found_first_and_tests_are_last() -> None:
+def test_checks_run_in_order_with_tests_last() -> None:
     names = [check.name for check in checks(fast=False)]
     assert names == ["ruff check", "ruff format", "mypy", "lint-imports", "tests read", "pytest"]
     assert [check.name for check in checks(fast=True)] == names[:-2]
@@ -24,14 +24,14 @@ def test_arguments_reach_pytest() -> None:
 
 
 @pytest.mark.parametrize("code", [0, 1, 3])
-def test_an_exit_code_decides(code: int, capfd: pytest.CaptureFixture[str]) -> None:
+def test_exit_code_decides_if_a_check_passed(code: int, capfd: pytest.CaptureFixture[str]) -> None:
     command = (sys.executable, "-c", f"import sys; print('said'); sys.exit({code})")
     outcome = run(Check("one", command))
     assert outcome.passed is (code == 0)
     assert capfd.readouterr().out.splitlines() == ["", "=== one", "said"]
 
 
-def test_what_runs_beside_others_says_something_only_when_it_failed(
+def test_parallel_check_prints_its_output_only_on_failure(
     capfd: pytest.CaptureFixture[str],
 ) -> None:
     def says(words: str, code: int) -> tuple[str, ...]:
@@ -53,7 +53,7 @@ def test_what_runs_beside_others_says_something_only_when_it_failed(
     assert said[:-2].count("loud") == 1
 
 
-def test_what_the_tests_compile_is_written_also_where_the_computer_is_told_not_to(
+def test_bytecode_of_tests_is_written_despite_the_environment_setting(
     monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
 ) -> None:
     monkeypatch.setenv("PYTHONDONTWRITEBYTECODE", "1")
@@ -61,13 +61,13 @@ def test_what_the_tests_compile_is_written_also_where_the_computer_is_told_not_t
     assert capfd.readouterr().out.splitlines()[-1] == "False"
 
 
-def test_the_summary_names_what_failed() -> None:
+def test_summary_names_failed_checks() -> None:
     lines = summary([Outcome("mypy", True, 1.25), Outcome("pytest", False, 60.0)]).splitlines()
     assert lines[0].split() == ["mypy", "ok", "1.2", "s"]
     assert lines[1].split() == ["pytest", "FAILED", "60.0", "s"]
 
 
-def test_with_two_processes_more_than_processors_the_last_opens_no_windows() -> None:
+def test_last_of_surplus_test_workers_gets_no_window_tests() -> None:
     window, waiting = "tests/e2e/test_stop.py", "tests/nep/services/test_calls.py"
     assert not may_take("gw3", 4, 2, window)
     assert may_take("gw3", 4, 2, waiting)
@@ -75,7 +75,7 @@ def test_with_two_processes_more_than_processors_the_last_opens_no_windows() -> 
     assert may_take("gw5", 6, 8, window)
 
 
-def test_a_process_of_tests_that_crashes_fails_one_test_and_the_others_run_to_their_end(
+def test_crashed_test_worker_fails_one_test_and_the_others_complete(
     tmp_path: Path,
 ) -> None:
     """Each process had done some files by then, and the one that comes for it gets files of one test."""

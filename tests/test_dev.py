@@ -69,41 +69,41 @@ class FakeSystem:
         return dev.Computer(which=self.which, ask=self.ask, do=self.do, **(known | changes))
 
 
-def test_nothing_is_run_when_nothing_is_missing() -> None:
+def test_nothing_runs_when_no_package_is_missing() -> None:
     system = FakeSystem(installed=set(PACKAGES))
     dev.bring_system_packages(system.computer())
     assert system.ran == []
 
 
-def test_only_what_is_missing_is_installed_and_lists_that_are_good_are_not_renewed() -> None:
+def test_only_missing_packages_are_installed_without_refreshing_valid_lists() -> None:
     system = FakeSystem(installed=set(PACKAGES) - {"libnss3"}, listed={"libnss3"})
     dev.bring_system_packages(system.computer())
     assert [command[-1] for command in system.ran] == ["libnss3"]
     assert "DPkg::Lock::Timeout=600" in system.ran[0]
 
 
-def test_absent_lists_are_renewed_first() -> None:
+def test_missing_package_lists_are_refreshed_first() -> None:
     system = FakeSystem(served={*PACKAGES, "xvfb", "python3.11-venv"})
     dev.bring_system_packages(system.computer(environ={}, has_ensurepip=False))
     assert ["update" in command for command in system.ran] == [True, False]
     assert {*PACKAGES, "xvfb", "python3.11-venv"} <= system.installed
 
 
-def test_old_lists_are_renewed_after_a_failure_and_a_second_one_is_told() -> None:
+def test_package_lists_are_refreshed_after_a_failure_and_a_second_failure_is_reported() -> None:
     system = FakeSystem(listed=set(PACKAGES), fails=True)
     with pytest.raises(dev.Trouble, match="no space left"):
         dev.bring_system_packages(system.computer())
     assert [("update" in command) for command in system.ran] == [False, True, False]
 
 
-def test_a_package_that_nobody_has_is_named() -> None:
+def test_unavailable_package_is_named() -> None:
     system = FakeSystem(served=set(PACKAGES) - {"libnss3"})
     with pytest.raises(dev.Trouble, match="no package for libnss3"):
         dev.bring_system_packages(system.computer())
 
 
 @pytest.mark.parametrize("name", ["libasound2", "libasound2t64"])
-def test_a_package_is_known_by_its_old_and_its_new_name(name: str) -> None:
+def test_package_is_recognized_by_its_old_and_new_name(name: str) -> None:
     system = FakeSystem(installed=set(PACKAGES) - {"libasound2"} | {name})
     assert system_packages.missing_packages(system.computer()) == []
     found, unknown = system_packages.available(
@@ -112,7 +112,7 @@ def test_a_package_is_known_by_its_old_and_its_new_name(name: str) -> None:
     assert (found, unknown) == ([name], [])
 
 
-def test_an_ordinary_user_gets_the_one_line_to_type() -> None:
+def test_user_without_root_gets_the_command_to_type() -> None:
     system = FakeSystem(installed=set(PACKAGES) - {"libnss3", "libgl1"}, listed={"libgl1"})
     with pytest.raises(dev.Trouble) as trouble:
         dev.bring_system_packages(system.computer(root=False))
@@ -122,7 +122,7 @@ def test_an_ordinary_user_gets_the_one_line_to_type() -> None:
     assert system.ran == []
 
 
-def test_packages_of_tests_are_installed_for_root_and_named_to_others(
+def test_test_packages_are_installed_for_root_and_printed_for_others(
     capsys: pytest.CaptureFixture[str],
 ) -> None:
     names = {name for packages in system_packages.TEST_PACKAGES.values() for name in packages}
@@ -138,7 +138,7 @@ def test_packages_of_tests_are_installed_for_root_and_named_to_others(
     assert len(system.ran) == ran
 
 
-def test_missing_packages_of_tests_do_not_keep_others_from_being_installed(
+def test_missing_test_packages_do_not_block_installing_others(
     capsys: pytest.CaptureFixture[str],
 ) -> None:
     mono, *others = system_packages.TEST_PACKAGES.values()
@@ -149,7 +149,7 @@ def test_missing_packages_of_tests_do_not_keep_others_from_being_installed(
     assert "mono-mcs" in capsys.readouterr().out
 
 
-def test_bringing_them_is_a_command_of_its_own(capsys: pytest.CaptureFixture[str]) -> None:
+def test_system_packages_command_installs_or_prints_the_command(capsys: pytest.CaptureFixture[str]) -> None:
     system = FakeSystem(installed=set(PACKAGES) - {"libnss3"}, listed={"libnss3"})
     assert system_packages.main(system.computer(root=False)) == 2
     assert "sudo apt-get install" in capsys.readouterr().err
@@ -157,7 +157,7 @@ def test_bringing_them_is_a_command_of_its_own(capsys: pytest.CaptureFixture[str
     assert "libnss3" in system.installed
 
 
-def test_other_systems_are_left_alone() -> None:
+def test_other_operating_systems_are_skipped() -> None:
     system = FakeSystem()
     for platform in ("win32", "darwin"):
         computer = system.computer(platform=platform, environ={})
@@ -167,7 +167,7 @@ def test_other_systems_are_left_alone() -> None:
     assert system.ran == []
 
 
-def test_a_python_that_is_too_old_or_new_is_refused_with_the_range() -> None:
+def test_unsupported_python_version_is_rejected_with_the_range() -> None:
     for version in ((3, 9), (3, 14)):
         with pytest.raises(dev.Trouble, match=r"3\.10 to 3\.13 is needed"):
             dev.run(FakeSystem().computer(version=version), "test", [])
@@ -201,7 +201,9 @@ def test_packages_are_installed_once_and_again_when_the_pins_change(folder: Path
 
 
 @pytest.mark.parametrize("extra", ["studio", "dev"])
-def test_packages_are_taken_by_their_hashes_and_ours_brings_no_others(folder: Path, extra: str) -> None:
+def test_packages_are_installed_by_hash_and_the_project_without_dependencies(
+    folder: Path, extra: str
+) -> None:
     system = FakeSystem()
     dev.make_environment(fake_pip(system), folder, extra)
     installer, packages, ours = (command for command in system.ran if "install" in command)
@@ -211,7 +213,7 @@ def test_packages_are_taken_by_their_hashes_and_ours_brings_no_others(folder: Pa
 
 
 @pytest.mark.parametrize("missing", ["requirements/installer.txt", "uv"])
-def test_where_uv_cannot_be_had_or_cannot_reach_its_packages_pip_does_it(
+def test_pip_is_used_if_uv_is_unavailable_or_offline(
     folder: Path, missing: str, capsys: pytest.CaptureFixture[str]
 ) -> None:
     system = FakeSystem()
@@ -229,7 +231,7 @@ def test_where_uv_cannot_be_had_or_cannot_reach_its_packages_pip_does_it(
     assert dev.is_fresh(folder, "studio")
 
 
-def test_what_demo_installed_is_not_enough_for_tests_but_the_other_way_round(folder: Path) -> None:
+def test_dev_environment_satisfies_studio_but_not_the_reverse(folder: Path) -> None:
     system = FakeSystem()
     dev.make_environment(fake_pip(system), folder, "studio")
     assert not dev.is_fresh(folder, "dev")
@@ -237,19 +239,19 @@ def test_what_demo_installed_is_not_enough_for_tests_but_the_other_way_round(fol
     assert dev.is_fresh(folder, "studio")
 
 
-def test_an_installation_that_failed_is_tried_again(folder: Path) -> None:
+def test_failed_installation_is_retried(folder: Path) -> None:
     failing = replace(fake_pip(FakeSystem()), do=lambda command, environ, log: 1)
     with pytest.raises(dev.Trouble, match="packages could not be installed"):
         dev.make_environment(failing, folder, "dev")
     assert not dev.is_fresh(folder, "dev")
 
 
-def test_the_interpreter_is_found_on_every_system() -> None:
+def test_interpreter_path_of_the_environment_on_each_system() -> None:
     assert dev.venv_python(Path("v"), "win32") == Path("v/Scripts/python.exe")
     assert dev.venv_python(Path("v"), "darwin") == Path("v/bin/python")
 
 
-def test_the_sandbox_is_off_only_for_root() -> None:
+def test_sandbox_is_disabled_only_for_root() -> None:
     system = FakeSystem()
     with dev.screen(system.computer(root=True)) as environ:
         assert environ["QTWEBENGINE_DISABLE_SANDBOX"] == "1"
@@ -258,7 +260,7 @@ def test_the_sandbox_is_off_only_for_root() -> None:
 
 
 @pytest.mark.skipif(sys.platform != "linux" or not shutil.which("Xvfb"), reason="no Xvfb")
-def test_a_virtual_screen_lives_as_long_as_its_block() -> None:
+def test_virtual_screen_lives_as_long_as_its_context() -> None:
     with dev.screen(FakeSystem().computer(environ={})) as environ:
         address = f"/tmp/.X11-unix/X{environ['DISPLAY'][1:]}"
         with socket.socket(socket.AF_UNIX) as client:
@@ -289,7 +291,7 @@ except KeyboardInterrupt:
 
 @pytest.mark.skipif(sys.platform == "win32", reason="process groups of POSIX")
 @pytest.mark.parametrize("handler", ["", "signal.signal(signal.SIGINT, signal.SIG_IGN)"])
-def test_ctrl_c_ends_what_was_started_also_when_it_does_not_want_to(handler: str) -> None:
+def test_ctrl_c_ends_child_processes_even_if_they_ignore_it(handler: str) -> None:
     process = subprocess.Popen(
         [sys.executable, "-c", WATCHING.replace("{handler}", handler)],
         cwd=ROOT,
@@ -307,13 +309,13 @@ def test_ctrl_c_ends_what_was_started_also_when_it_does_not_want_to(handler: str
         assert process.stdout.read() == b""
 
 
-def test_a_script_that_this_revision_lacks_is_told_in_a_sentence(capsys: pytest.CaptureFixture[str]) -> None:
+def test_missing_script_is_reported(capsys: pytest.CaptureFixture[str]) -> None:
     lacking = {"nothing": ("tools/nothing.py", "dev")}
     with pytest.raises(dev.Trouble, match=r"'nothing' needs 'tools/nothing.py'"):
         dev.script(FakeSystem().computer(), "nothing", [], lacking)
 
 
-def test_trouble_ends_with_code_2_and_its_sentence(capsys: pytest.CaptureFixture[str]) -> None:
+def test_trouble_exits_with_code_2_and_its_message(capsys: pytest.CaptureFixture[str]) -> None:
     numbers = [getattr(signal, name) for name in ("SIGTERM", "SIGHUP") if hasattr(signal, name)]
     previous = [(number, signal.getsignal(number)) for number in numbers]
     try:
@@ -325,7 +327,7 @@ def test_trouble_ends_with_code_2_and_its_sentence(capsys: pytest.CaptureFixture
     assert capsys.readouterr().err.startswith("dev.py: Python 3.10 to 3.13 is needed")
 
 
-def test_ci_runs_exactly_the_command_of_the_readme() -> None:
+def test_ci_runs_the_command_of_the_readme() -> None:
     last = (ROOT / ".ci" / "run").read_text(encoding="utf-8").splitlines()[-1]
     assert last == "exec python3 dev.py test"
     assert "\npython3 dev.py test" in (ROOT / "README.md").read_text(encoding="utf-8")

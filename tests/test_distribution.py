@@ -93,16 +93,14 @@ def built(tmp_path_factory: pytest.TempPathFactory) -> Built:
 
 
 @pytest.mark.long
-def test_a_build_elsewhere_and_straight_from_the_sources_makes_the_same_bytes(
-    built: Built, tmp_path: Path
-) -> None:
+def test_builds_are_reproducible(built: Built, tmp_path: Path) -> None:
     again = build(tmp_path / "another place", "--sdist", "--wheel")
     for one, other in ((built.sdist, again.sdist), (built.wheel, again.wheel)):
         assert one.name == other.name
         assert hashlib.sha256(one.read_bytes()).digest() == hashlib.sha256(other.read_bytes()).digest()
 
 
-def test_the_wheel_has_what_programs_need_and_nothing_else(built: Built) -> None:
+def test_wheel_contains_exactly_the_expected_files(built: Built) -> None:
     ours = {name for name in built.sources if name.startswith(("nep/", "app/"))}
     read_by_people = {name for name in ours if name.startswith(EDITOR) or name.endswith((".po", ".pot"))}
     expected = ours - read_by_people
@@ -114,11 +112,11 @@ def test_the_wheel_has_what_programs_need_and_nothing_else(built: Built) -> None
     assert built.in_wheel() == {*expected, "nep/locale/languages.json"}
 
 
-def test_the_source_distribution_is_what_git_knows(built: Built) -> None:
+def test_source_distribution_contains_exactly_the_tracked_files(built: Built) -> None:
     assert built.in_sdist() == {*built.sources, "PKG-INFO"}
 
 
-def test_the_metadata_is_valid_and_true(built: Built) -> None:
+def test_distribution_metadata_is_valid_and_correct(built: Built) -> None:
     told = built.metadata()
     assert (told.name, str(told.version), told.license_expression) == ("nep-studio", __version__, "MIT")
     assert f" {told.author}\n" in (ROOT / "LICENSE").read_text(encoding="utf-8")
@@ -136,7 +134,7 @@ def test_the_metadata_is_valid_and_true(built: Built) -> None:
         assert "nep=nep.cli:main" in archive.read(f"{about}/entry_points.txt").decode().replace(" ", "")
 
 
-def test_the_long_description_reads_well_where_there_are_no_files(built: Built) -> None:
+def test_long_description_renders_without_links_to_local_files(built: Built) -> None:
     # PyPI's own renderer; `twine check` without it lets any Markdown pass.
     pytest.importorskip("comrak", reason="readme-renderer[md] has no wheels for this system")
     from readme_renderer.markdown import render
@@ -183,9 +181,7 @@ def fresh_environment(folder: Path, asked_for: Iterable[Requirement]) -> Path:
     return venv_python(folder, sys.platform)
 
 
-def test_nep_works_from_the_wheel_alone_in_a_fresh_environment_outside_the_repository(
-    built: Built, tmp_path: Path
-) -> None:
+def test_nep_works_from_the_wheel_in_a_fresh_environment(built: Built, tmp_path: Path) -> None:
     python = fresh_environment(tmp_path / "fresh", built.metadata().requires_dist or ())
     pip = [sys.executable, "-m", "pip", "--python", python, "install", "--no-deps", "--no-index"]
     for step in (

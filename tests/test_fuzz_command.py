@@ -44,16 +44,14 @@ class Fuzzing:
         return fuzz(computer, given, self.folder)
 
 
-def test_the_time_is_shared_and_what_is_slow_gets_twice_as_much() -> None:
+def test_fuzz_time_is_divided_and_slow_targets_get_twice_as_much() -> None:
     assert seconds_each({"a": 1, "b": 1, "c": 4}, 2) == {"a": 30, "b": 30, "c": 60}
     assert seconds_each({"a": 1}, 0.001) == {"a": 1}
     assert seconds_each({}, 5) == {}
     assert sum(seconds_each({name: each.slower for name, each in TARGETS.items()}, 15).values()) < 16 * 60
 
 
-def test_all_targets_are_tried_and_nothing_is_found(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_all_fuzz_targets_run_without_findings(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     system = Fuzzing(tmp_path)
     assert system.run("--", "--minutes", "3") == 0
     assert system.ran[-1][2:] == [str(tmp_path), "quick=60", "slow=120"]
@@ -61,7 +59,7 @@ def test_all_targets_are_tried_and_nothing_is_found(
     assert Fuzzing(tmp_path).run("quick") == 0, "the environment is there"
 
 
-def test_findings_are_told_and_those_of_before_are_not(
+def test_new_findings_are_reported_and_earlier_ones_are_not(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     finds = {"quick-1.bin": b"x", "quick-1.txt": b"RecursionError", "slow-timeout-5": b"y"}
@@ -75,11 +73,11 @@ def test_findings_are_told_and_those_of_before_are_not(
     assert findings_in(tmp_path / "none") == []
 
 
-def test_a_target_that_ended_early_is_no_success(tmp_path: Path) -> None:
+def test_fuzz_target_that_ended_early_is_a_failure(tmp_path: Path) -> None:
     assert Fuzzing(tmp_path, code=1).run() == 1
 
 
-def test_what_cannot_be_done_is_a_sentence(tmp_path: Path) -> None:
+def test_invalid_fuzz_requests_are_reported(tmp_path: Path) -> None:
     with pytest.raises(Trouble, match="no target 'nothing'"):
         Fuzzing(tmp_path).run("nothing")
     with pytest.raises(Trouble, match="Linux only"):
@@ -91,7 +89,7 @@ def test_what_cannot_be_done_is_a_sentence(tmp_path: Path) -> None:
             Fuzzing(tmp_path).run("--minutes", minutes)
 
 
-def test_targets_can_be_named_and_a_finding_tried_again(
+def test_fuzz_targets_are_listed_and_a_finding_can_be_rerun(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     assert Fuzzing(tmp_path).run("--list") == 0

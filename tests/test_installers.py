@@ -19,7 +19,7 @@ DESKTOP = FOLDER / "linux" / "nep-studio.desktop"
 MIME = "{http://www.freedesktop.org/standards/shared-mime-info}"
 
 
-def test_the_desktop_file_takes_several_files_of_our_type() -> None:
+def test_desktop_file_opens_several_nepb_files() -> None:
     parser = configparser.ConfigParser(interpolation=None)
     parser.optionxform = str  # type: ignore[assignment,method-assign]
     parser.read(DESKTOP, "utf-8")
@@ -32,18 +32,18 @@ def test_the_desktop_file_takes_several_files_of_our_type() -> None:
 
 
 @pytest.mark.skipif(shutil.which("desktop-file-validate") is None, reason="needs desktop-file-utils")
-def test_the_desktop_file_is_valid() -> None:
+def test_desktop_file_is_valid() -> None:
     done = subprocess.run(["desktop-file-validate", DESKTOP], capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stdout
 
 
-def test_linux_knows_the_type_by_its_suffix() -> None:
+def test_mime_type_matches_the_file_suffix() -> None:
     (kind,) = ET.parse(FOLDER / "linux" / "nep-studio-mime.xml").getroot().iter(f"{MIME}mime-type")
     assert kind.get("type") == TYPE
     assert [glob.get("pattern") for glob in kind.iter(f"{MIME}glob")] == [f"*{SUFFIX}"]
 
 
-def test_windows_opens_the_file_as_one_argument() -> None:
+def test_windows_registry_opens_the_file_as_one_argument() -> None:
     text = (FOLDER / "windows" / "nep-studio.reg").read_text("utf-8")
     assert text.startswith("Windows Registry Editor Version 5.00\n\n")
     keys = re.findall(r"^\[HKEY_CURRENT_USER\\Software\\Classes\\(.+)\]$", text, re.MULTILINE)

@@ -96,7 +96,7 @@ def report(tmp_path_factory: pytest.TempPathFactory) -> str:
         ("test_events[11]", "descriptors are left behind: ['anon_inode:[eventfd]']"),
     ],
 )
-def test_what_is_left_fails_the_test_that_left_it(report: str, test: str, words: str) -> None:
+def test_leftover_resource_fails_the_test_that_created_it(report: str, test: str, words: str) -> None:
     assert f"ERROR test_inner.py::{test} - " in report
     assert words in report
 
@@ -104,6 +104,6 @@ def test_what_is_left_fails_the_test_that_left_it(report: str, test: str, words:
 @pytest.mark.parametrize(
     "test", ["test_tidy", "test_a_first_use_of_libzmq", "test_pipes[0]", "test_tidy_again"]
 )
-def test_what_is_tidy_or_kept_by_a_library_passes(report: str, test: str) -> None:
+def test_clean_tests_and_library_resources_pass(report: str, test: str) -> None:
     assert f"PASSED test_inner.py::{test}\n" in report
     assert f"ERROR test_inner.py::{test} " not in report

@@ -96,7 +96,7 @@ def found(again: float = 1.0, nep: float = 0.4, sizes: list[int] = SIZES) -> dic
     }
 
 
-def test_a_size_counts_only_when_plain_is_within_5_percent_of_itself(figures: ModuleType) -> None:
+def test_measurement_counts_only_if_the_plain_repetition_is_within_5_percent(figures: ModuleType) -> None:
     assert "| does not count |" not in figures.report(found(again=1.049))
     assert figures.does_count(found(again=1.049))
     for again in (1.06, 0.94):
@@ -105,7 +105,7 @@ def test_a_size_counts_only_when_plain_is_within_5_percent_of_itself(figures: Mo
         assert not figures.does_count(found(again=again))
 
 
-def test_goals_are_reached_missed_or_do_not_count(figures: ModuleType) -> None:
+def test_goals_are_reached_missed_or_not_counted(figures: ModuleType) -> None:
     assert [goal.is_reached for goal in figures.goals(found(nep=0.49))] == [True, True, True]
     assert [goal.is_reached for goal in figures.goals(found(nep=0.55))] == [True, False, True]
     assert [goal.is_reached for goal in figures.goals(found(nep=1.2))] == [False, False, False]
@@ -113,11 +113,11 @@ def test_goals_are_reached_missed_or_do_not_count(figures: ModuleType) -> None:
     assert "does not count" in str(figures.goals(found(nep=0.4, again=1.1))[0])
 
 
-def test_a_part_of_the_sizes_reaches_no_goal(figures: ModuleType) -> None:
+def test_goals_need_all_sizes(figures: ModuleType) -> None:
     assert figures.goals(found(sizes=SIZES[:2])) == []
 
 
-def test_figures_have_the_paper_s_numbers(figures: ModuleType) -> None:
+def test_figures_have_the_numbers_of_the_paper(figures: ModuleType) -> None:
     """Figure 9 of the paper is R-remote, figure 10 is L-local."""
     run = found()
     run["scenarios"].append(run["scenarios"][0] | {"name": "remote"})
@@ -130,18 +130,18 @@ def test_figures_have_the_paper_s_numbers(figures: ModuleType) -> None:
     assert "### Figure 10: L-local" in said
 
 
-def test_r_remote_takes_200_trips_of_each_size(paper: ModuleType) -> None:
+def test_remote_scenario_takes_200_trips_of_each_size(paper: ModuleType) -> None:
     for size in paper.SIZES["remote"]:
         assert paper.REMOTE_BLOCKS * paper.trips("remote", size) == 200
 
 
-def test_what_was_not_run_is_said(figures: ModuleType) -> None:
+def test_skipped_measurements_are_reported(figures: ModuleType) -> None:
     said = figures.report(found())
     assert "- rospy: not run, it is missing" in said
     assert "R-remote: not run, there is no 'ip'" in said
 
 
-def test_writing_replaces_what_was_measured_and_nothing_else(figures: ModuleType, tmp_path: Path) -> None:
+def test_writing_replaces_only_the_measured_scenarios(figures: ModuleType, tmp_path: Path) -> None:
     (tmp_path / "images").mkdir()
     document = tmp_path / "figures.md"
     document.write_text(f"before\n{figures.BEGIN}\nold\n{figures.END}\nafter\n", encoding="utf-8")
@@ -163,13 +163,13 @@ def test_writing_replaces_what_was_measured_and_nothing_else(figures: ModuleType
     assert (tmp_path / "images" / "figure-10.png").read_bytes().startswith(b"\x89PNG")
 
 
-def test_the_document_says_what_its_numbers_say(figures: ModuleType) -> None:
+def test_figures_document_matches_its_numbers(figures: ModuleType) -> None:
     numbers = json.loads((ROOT / "docs" / "figures.json").read_text(encoding="utf-8"))
     text = (ROOT / "docs" / "figures.md").read_text(encoding="utf-8")
     assert figures.report(numbers, "images") in text
 
 
-def test_linear_is_up_to_1_2_times_the_cost_from_10_to_50(
+def test_cost_is_linear_up_to_a_factor_of_1_2_from_10_to_50_endpoints(
     fan: ModuleType, capsys: pytest.CaptureFixture[str]
 ) -> None:
     def taken(factor: float, again: float = 1.0) -> dict:
@@ -203,7 +203,7 @@ def need_networks(figures: ModuleType) -> None:
 
 
 @pytest.mark.timeout(60)
-def test_the_link_delays_and_is_no_faster_than_it_should_be(figures: ModuleType) -> None:
+def test_link_applies_its_delay_and_rate_limit(figures: ModuleType) -> None:
     need_networks(figures)
     done = in_a_network(LINK)
     if "TUN device" in done.stderr:
@@ -217,9 +217,7 @@ def test_the_link_delays_and_is_no_faster_than_it_should_be(figures: ModuleType)
 
 
 @pytest.mark.timeout(60)
-def test_with_netem_the_link_is_a_pair_that_tc_delays_at_both_ends(
-    figures: ModuleType, tmp_path: Path
-) -> None:
+def test_netem_link_is_a_veth_pair_delayed_at_both_ends(figures: ModuleType, tmp_path: Path) -> None:
     need_networks(figures)
     said = tmp_path / "said"
     tc = tmp_path / "tc"
@@ -237,7 +235,7 @@ def test_with_netem_the_link_is_a_pair_that_tc_delays_at_both_ends(
 
 
 @pytest.mark.timeout(120)
-def test_both_scenarios_are_measured_and_rows_that_are_missing_say_so(
+def test_both_scenarios_are_measured_and_missing_rows_are_reported(
     figures: ModuleType, tmp_path: Path
 ) -> None:
     need_networks(figures)

@@ -44,7 +44,7 @@ def write(tmp_path: Path) -> Iterator[Write]:
     english_categories.cache_clear()
 
 
-def test_a_back_end(write: Write) -> None:
+def test_back_end_plug_in_is_discovered(write: Write) -> None:
     write(
         "nep.backends",
         "looped",
@@ -61,7 +61,7 @@ def test_a_back_end(write: Write) -> None:
         assert subscriber.listen(timeout_s=30.0) == (True, {"hello": 1})
 
 
-def test_a_category_is_in_the_toolbox_and_its_block_compiles(write: Write) -> None:
+def test_category_plug_in_is_in_the_toolbox_and_its_block_compiles(write: Write) -> None:
     write(
         "app.blocks.categories",
         "greetings",
@@ -89,7 +89,7 @@ def test_a_category_is_in_the_toolbox_and_its_block_compiles(write: Write) -> No
     assert not program.problems
 
 
-def test_a_robot_is_described_found_driven_and_made_into_blocks(write: Write, master: Master) -> None:
+def test_robot_plug_in_is_described_driven_and_offered_as_blocks(write: Write, master: Master) -> None:
     module = write(
         "app.robots",
         "lamp",
@@ -143,7 +143,7 @@ def test_a_robot_is_described_found_driven_and_made_into_blocks(write: Write, ma
             driver.close()
 
 
-def test_a_package_that_lost_its_plug_ins_is_told(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_package_without_plug_ins_raises(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     (tmp_path / "emptied").mkdir()
     (tmp_path / "emptied" / "__init__.py").write_text("")
     monkeypatch.syspath_prepend(str(tmp_path))

@@ -15,7 +15,7 @@ def one_sentence(pseudo, monkeypatch) -> None:
     monkeypatch.setattr(shown, "marked", lambda: found)
 
 
-def test_what_nobody_marked_is_told(one_sentence) -> None:
+def test_untranslated_words_are_detected(one_sentence) -> None:
     forgotten = "a word that nobody marked"
     assert untranslated(_(forgotten)) == ["word", "that", "nobody", "marked"]
     told = _("{robot} waits").format(robot="Pepper's friend")
@@ -25,13 +25,13 @@ def test_what_nobody_marked_is_told(one_sentence) -> None:
     assert untranslated(ngettext("{count} word", "{count} words", 1).format(count=1)) == ["word"]
 
 
-def test_lists_numbers_and_markup(pseudo) -> None:
+def test_lists_numbers_and_markup_are_recognized_as_translated(pseudo) -> None:
     assert untranslated(listed(["Pepper", "ana", "ben"], "or"), "ana", "ben") == []
     assert number(0.5) == "0,5"
     assert untranslated("<b>3 ms</b> `nep topic list` Ctrl+Enter") == []
 
 
-def test_the_sentences_of_the_sources_and_of_blocks_are_known() -> None:
+def test_translatable_texts_of_sources_and_blocks_are_known() -> None:
     assert (None, "a word that nobody marked") not in marked()
     assert any(context == "block" for context, _english in marked())
     assert any(context is None for context, _english in marked())

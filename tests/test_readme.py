@@ -107,7 +107,9 @@ def virtual_pepper(master: Master) -> Iterator[Program]:
         yield program
 
 
-def test_blocks_run_in_order_and_print(virtual_pepper: Program, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_readme_blocks_run_in_order_and_print(
+    virtual_pepper: Program, monkeypatch: pytest.MonkeyPatch
+) -> None:
     monkeypatch.setenv(
         "NEP_MASTER", os.environ["NEP_MASTER"]
     )  # the master of docs/first-programs.md takes its place

@@ -21,11 +21,11 @@ def book() -> reference.Reference:
     return reference.reference()
 
 
-def test_the_pages_are_what_the_code_says() -> None:
+def test_reference_pages_are_up_to_date() -> None:
     assert reference.main(["--check"]) == 0, "docstrings have changed: python3 dev.py reference"
 
 
-def test_every_public_name_has_its_place(book: reference.Reference) -> None:
+def test_every_public_name_is_in_the_reference(book: reference.Reference) -> None:
     names = {each for each in nep.__all__ if not each.startswith("_")} - book.spellings.keys()
     types = {*nep.geometry.__all__, *nep.sensor.__all__}
     assert book.names == names | types
@@ -52,7 +52,7 @@ def test_every_public_name_has_a_docstring(book: reference.Reference) -> None:
     assert silent == []
 
 
-def test_nothing_internal_appears() -> None:
+def test_internal_names_are_absent_from_the_reference() -> None:
     found = [
         f"{name}: {line}"
         for name, page in reference.pages().items()
@@ -62,7 +62,7 @@ def test_nothing_internal_appears() -> None:
     assert found == []
 
 
-def test_what_is_called_internal_is_there(book: reference.Reference) -> None:
+def test_members_listed_as_internal_exist(book: reference.Reference) -> None:
     for each in reference.INTERNAL:
         owner, _, member = each.partition(".")
         found = book.find(owner)
@@ -72,7 +72,7 @@ def test_what_is_called_internal_is_there(book: reference.Reference) -> None:
         assert member in inherited, f"{each} is gone: {init}"
 
 
-def test_lines_are_as_wide_as_a_page_and_links_lead_somewhere() -> None:
+def test_reference_lines_fit_the_width_and_links_resolve() -> None:
     pages = reference.pages()
     headings = {
         name: {
@@ -101,7 +101,7 @@ Second, with 0.5.4 in it.
 """
 
 
-def test_a_docstring_is_taken_apart() -> None:
+def test_docstring_is_split_into_paragraphs_arguments_and_errors() -> None:
     words = reference.words_of(DOCSTRING, ["count", "size"])
     assert words.names == {"count": "how many there are.", "size": "`size` is in metres."}
     assert words.raises == ("`NepError` when it fails, and `ValueError`.",)
@@ -113,13 +113,13 @@ def test_a_docstring_is_taken_apart() -> None:
     )
 
 
-def test_a_list_in_columns_is_taken_apart() -> None:
+def test_two_column_list_is_parsed() -> None:
     words = reference.words_of("A thing.\n\n`a`   one\n`long`  two\n       and three\n`b` four", [])
     assert words.names == {"a": "one", "long": "two and three", "b": "four"}
     assert words.paragraphs == ("A thing.",)
 
 
-def test_the_first_sentence_stays_where_it_is() -> None:
+def test_first_sentence_is_not_parsed_as_an_argument() -> None:
     words = reference.words_of("`name` is no name. `name`: the name.", ["name"])
     assert words.paragraphs == ("`name` is no name.",)
     assert words.names == {"name": "the name."}

@@ -107,7 +107,7 @@ def _quoted() -> Iterator[tuple[str, str]]:
                 yield place, quoted.removesuffix("()")
 
 
-def test_every_file_that_is_named_is_there() -> None:
+def test_every_referenced_file_exists() -> None:
     named = {(place, path) for place, text in _texts().items() for path in _PATH.findall(text)}
     named |= {(place, quoted) for place, quoted in _quoted() if _PLACE.fullmatch(quoted)}
     assert len(named) > 150
@@ -115,13 +115,13 @@ def test_every_file_that_is_named_is_there() -> None:
     assert {each for each in missing if each[1] not in ELSEWHERE} == set()
 
 
-def test_every_module_and_member_that_is_named_is_there() -> None:
+def test_every_referenced_module_and_member_exists() -> None:
     named = [(place, quoted) for place, quoted in _quoted() if _DOTTED.fullmatch(quoted)]
     assert len(named) > 50
     assert {each for each in named if not _is_there(each[1])} == set()
 
 
-def test_every_class_that_is_named_is_known_to_the_sources() -> None:
+def test_every_referenced_class_exists() -> None:
     named = [
         (place, quoted)
         for place, quoted in _quoted()
@@ -131,14 +131,14 @@ def test_every_class_that_is_named_is_known_to_the_sources() -> None:
     assert {each for each in named if not _words().issuperset(each[1].split("."))} == set()
 
 
-def test_every_decision_that_is_named_is_there() -> None:
+def test_every_referenced_decision_exists() -> None:
     there = {path.name[:4] for path in (ROOT / "docs" / "adr").glob("*.md")}
     named = {(place, number) for place, text in _texts().items() for number in _DECISION.findall(text)}
     assert len(named) > 20
     assert {each for each in named if each[1] not in there} == set()
 
 
-def test_every_link_of_a_document_leads_somewhere() -> None:
+def test_every_document_link_resolves() -> None:
     links = [
         (place, link)
         for place, text in _texts().items()
@@ -173,7 +173,7 @@ def test_every_anchor_of_a_link_is_a_heading() -> None:
     } == set()
 
 
-def test_what_is_not_there_is_found() -> None:
+def test_missing_references_are_detected() -> None:
     assert _is_there("nep.masters.graph.Graph")
     assert _is_there("nep.node")
     assert not _is_there("nep.masters.graph.Nothing")
@@ -185,7 +185,7 @@ def test_what_is_not_there_is_found() -> None:
 
 
 @pytest.mark.parametrize("name", ["compare-blocks", "compare-monitors"])
-def test_each_row_of_a_comparison_has_its_test(name: str) -> None:
+def test_each_supported_row_of_a_comparison_names_existing_tests(name: str) -> None:
     """Every row in which Studio has a Y names tests that are there."""
     rows = [
         line for line in (ROOT / "docs" / f"{name}.md").read_text("utf-8").splitlines()

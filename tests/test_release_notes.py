@@ -34,37 +34,37 @@ The newest is on top.
 """
 
 
-def test_a_section_ends_where_the_next_begins() -> None:
+def test_section_ends_at_the_next_heading() -> None:
     assert section(TEXT, "1.10.0") == "### Added\n\n- Pictures, see [the guide](docs/web.md).\n"
     assert section(TEXT, "1.1.0") == "- An older thing.\n"
 
 
 @pytest.mark.parametrize("version", ["1.1", "10.0", "1.10.0rc1", "2026-12-01", "1.10"])
-def test_what_only_looks_alike_is_another_version(version: str) -> None:
+def test_similar_version_is_not_matched(version: str) -> None:
     with pytest.raises(RefusedError, match="no section '## "):
         section(TEXT, version)
 
 
-def test_a_section_without_a_word_is_refused() -> None:
+def test_empty_section_is_rejected() -> None:
     with pytest.raises(RefusedError, match=r"says nothing of 1\.0\.0"):
         section(TEXT, "1.0.0")
 
 
-def test_a_tag_must_be_the_version_of_the_sources() -> None:
+def test_tag_must_match_the_version_of_the_sources() -> None:
     assert checked_version("v1.2.3", "1.2.3") == checked_version("1.2.3", "1.2.3") == "1.2.3"
     for tag in ("v1.2.4", "v1.2", "vv1.2.3", "release-1.2.3", ""):
         with pytest.raises(RefusedError, match=r"is not the version of nep/version\.py"):
             checked_version(tag, "1.2.3")
 
 
-def test_links_to_files_become_whole_and_others_stay() -> None:
+def test_relative_links_become_absolute_and_others_stay() -> None:
     text = "[guide](docs/web.md), [there](https://example.org/a.md), [below](#added), [x](mailto:a@b.org)"
     assert with_links(text, "https://example.org/blob/v1/") == text.replace(
         "](docs/", "](https://example.org/blob/v1/docs/"
     )
 
 
-def test_the_command_prints_the_notes_or_says_why_not(
+def test_command_prints_the_notes_or_an_error(
     tmp_path: Path, capfdbinary: pytest.CaptureFixture[bytes]
 ) -> None:
     changelog = tmp_path / "CHANGELOG.md"
@@ -81,7 +81,7 @@ def test_the_command_prints_the_notes_or_says_why_not(
         assert said.err.startswith(b"release notes: ")
 
 
-def test_the_newest_section_of_our_changelog_is_found() -> None:
+def test_newest_section_of_the_changelog_is_found() -> None:
     text = CHANGELOG.read_text(encoding="utf-8")
     newest = re.findall(r"^## (\S+)", text, re.MULTILINE)[0]
     assert section(text, newest).startswith("### ")

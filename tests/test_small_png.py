@@ -25,7 +25,7 @@ def picture(tmp_path: Path) -> Path:
     return path
 
 
-def test_it_is_smaller_and_looks_the_same(picture: Path) -> None:
+def test_shrunk_image_is_smaller_and_looks_the_same(picture: Path) -> None:
     before, size = cv2.imread(str(picture)), picture.stat().st_size
     assert shrink(picture) == picture.stat().st_size < size
     after = cv2.imread(str(picture))
@@ -35,13 +35,13 @@ def test_it_is_smaller_and_looks_the_same(picture: Path) -> None:
     assert len(np.unique(after.reshape(-1, 3), axis=0)) <= 256
 
 
-def test_fewer_colours_are_smaller_still(picture: Path) -> None:
+def test_fewer_colours_make_the_file_smaller(picture: Path) -> None:
     before = shrink(picture)
     assert shrink(picture, 64) < before
     assert len(np.unique(cv2.imread(str(picture)).reshape(-1, 3), axis=0)) <= 64
 
 
-def test_few_colours_stay_as_they_are(tmp_path: Path) -> None:
+def test_image_with_few_colours_is_unchanged(tmp_path: Path) -> None:
     path = tmp_path / "few.png"
     made = np.arange(0, 250, 5, dtype=np.uint8).reshape(5, 10, 1).repeat(3, axis=2)
     cv2.imwrite(str(path), made)

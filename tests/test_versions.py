@@ -46,7 +46,7 @@ def here(**others: str) -> dict[str, str]:
     return {sys.executable: f"{HERE} cpython {sys.executable}\n", **others}
 
 
-def test_pythons_are_found_here_on_the_path_by_the_launcher_and_in_pyenv(tmp_path: Path) -> None:
+def test_pythons_are_found_on_the_path_by_the_launcher_and_in_pyenv(tmp_path: Path) -> None:
     first, second, third = OTHERS
     folders = [tmp_path / ".pyenv" / "versions" / f"{third}.{last}" for last in ("9", "10", "0t")]
     for each in folders:
@@ -71,19 +71,19 @@ def test_pythons_are_found_here_on_the_path_by_the_launcher_and_in_pyenv(tmp_pat
 
 
 @pytest.mark.parametrize("said", ["", "3.9 cpython /bin/x\n", "pyenv: python3.12: command not found", "\0"])
-def test_what_does_not_say_that_it_is_that_python_is_none(said: str, tmp_path: Path) -> None:
+def test_program_that_does_not_report_the_expected_version_is_ignored(said: str, tmp_path: Path) -> None:
     system = Pythons({"/shim": said, sys.executable: said}, {f"python{each}": "/shim" for each in PROMISED})
     assert found(system.computer(), tmp_path) == {}
     with pytest.raises(Trouble, match="none of these Pythons is here; install one"):
         versions(system.computer(), [], tmp_path / "made", tmp_path)
 
 
-def test_another_kind_of_python_is_not_one_that_is_promised(tmp_path: Path) -> None:
+def test_other_python_implementations_are_ignored(tmp_path: Path) -> None:
     system = Pythons({sys.executable: f"{HERE} pypy {sys.executable}\n"})
     assert found(system.computer(), tmp_path) == {}
 
 
-def test_each_python_gets_two_environments_by_hashes_and_they_are_made_once(
+def test_each_python_gets_two_environments_created_once_with_hashes(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     for expected in (2, 0):
@@ -99,7 +99,7 @@ def test_each_python_gets_two_environments_by_hashes_and_they_are_made_once(
     assert system.ran[2][1:2] == ["-I"], "what was installed is tried, not the sources here"
 
 
-def test_arguments_reach_pytest_and_folders_of_a_person_are_instead_of_ours(tmp_path: Path) -> None:
+def test_arguments_reach_pytest_and_given_folders_replace_the_default(tmp_path: Path) -> None:
     for given, rest in (
         (["-k", "wire"], ["-k", "wire", "tests/nep", "tests/interop"]),
         (
@@ -112,7 +112,7 @@ def test_arguments_reach_pytest_and_folders_of_a_person_are_instead_of_ours(tmp_
         assert system.ran[-1][4:] == rest
 
 
-def test_what_is_packaged_on_a_mac_is_made_of_wheels_for_the_oldest_macos(tmp_path: Path) -> None:
+def test_mac_package_uses_wheels_for_the_oldest_macos(tmp_path: Path) -> None:
     system = Pythons({})
     mac = system.computer("darwin", "arm64")
     environment(mac, "python3", tmp_path / "env", "package", is_for_oldest=True)
@@ -126,7 +126,7 @@ def test_what_is_packaged_on_a_mac_is_made_of_wheels_for_the_oldest_macos(tmp_pa
 
 
 @pytest.mark.parametrize(("platform", "is_for_oldest"), [("darwin", False), ("linux", True), ("win32", True)])
-def test_elsewhere_pip_chooses_the_wheels(platform: str, is_for_oldest: bool, tmp_path: Path) -> None:
+def test_pip_chooses_the_wheels_on_other_systems(platform: str, is_for_oldest: bool, tmp_path: Path) -> None:
     system = Pythons({})
     environment(
         system.computer(platform), "python3", tmp_path / "env", "package", is_for_oldest=is_for_oldest
@@ -144,7 +144,7 @@ def test_elsewhere_pip_chooses_the_wheels(platform: str, is_for_oldest: bool, tm
         ("library_alone.py", "plain: use"),
     ],
 )
-def test_a_step_that_fails_is_named_and_the_tests_run_all_the_same(
+def test_failed_step_is_reported_and_the_tests_still_run(
     fails: str, told: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     system = Pythons(here(), fails=fails)
@@ -153,7 +153,7 @@ def test_a_step_that_fails_is_named_and_the_tests_run_all_the_same(
     assert f"Python {HERE}  FAILED: {told}" in capsys.readouterr().err
 
 
-def test_a_file_that_was_built_is_installed_instead_of_this_folder(tmp_path: Path) -> None:
+def test_built_file_is_installed_instead_of_the_source_folder(tmp_path: Path) -> None:
     built = tmp_path / "nep_studio-1.0.0-py3-none-any.whl"
     system = Pythons(here())
     with pytest.raises(Trouble, match=f"there is no file {re.escape(str(built))}"):
@@ -165,7 +165,7 @@ def test_a_file_that_was_built_is_installed_instead_of_this_folder(tmp_path: Pat
     assert ours[-1] == str(built)
 
 
-def test_an_environment_that_failed_is_made_again_and_tests_that_fail_are_told(
+def test_failed_environment_is_recreated_and_failed_tests_are_reported(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     with pytest.raises(Trouble, match="could not be made"):
@@ -177,12 +177,12 @@ def test_an_environment_that_failed_is_made_again_and_tests_that_fail_are_told(
     assert f"Python {HERE}  FAILED: tests" in capsys.readouterr().err
 
 
-def test_a_python_that_nobody_promised_cannot_be_asked_for(tmp_path: Path) -> None:
+def test_unsupported_python_version_is_rejected(tmp_path: Path) -> None:
     with pytest.raises(SystemExit):
         versions(Pythons(here()).computer(), ["--only", "3.9"], tmp_path, tmp_path)
 
 
-def test_the_libraries_of_qt_are_not_asked_for(tmp_path: Path) -> None:
+def test_versions_command_needs_no_qt_libraries(tmp_path: Path) -> None:
     system = Pythons({})
     with pytest.raises(Trouble, match="none of these"):
         dev.run(system.computer(), "versions", ["--only", "3.13"])
@@ -190,7 +190,7 @@ def test_the_libraries_of_qt_are_not_asked_for(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("name", ["library", "test"])
-def test_nothing_of_qt_is_in_what_they_are_made_of(name: str) -> None:
+def test_requirements_of_the_versions_environments_exclude_qt(name: str) -> None:
     ours = pinned(name)
     assert {"pyzmq", "orjson", "hatchling"} <= ours.keys()
     assert ours.keys().isdisjoint(QT)

@@ -116,12 +116,12 @@ def is_pseudo(text: str) -> bool:
     return not has_words(text) or (text.strip().startswith("[") and text.strip().endswith("]"))
 
 
-def test_the_words_of_the_sources_are_those_of_the_translators(words) -> None:
+def test_translation_template_is_up_to_date(words) -> None:
     """In short: run ``python tools/words.py update`` after a sentence changed."""
     assert words.check() == []
 
 
-def test_a_stale_list_is_told(words, tmp_path) -> None:
+def test_outdated_translation_template_is_reported(words, tmp_path) -> None:
     made = words.template()
     made.delete("A number.")
     made.add("A word that was taken out again.")
@@ -131,14 +131,14 @@ def test_a_stale_list_is_told(words, tmp_path) -> None:
     assert any("'A word that was taken out again.' is in nep-studio.pot" in sentence for sentence in told)
 
 
-def test_the_check_refuses_what_a_hasty_translator_wrote(words, spanish, tmp_path) -> None:
+def test_check_rejects_translations_with_wrong_placeholders(words, spanish, tmp_path) -> None:
     told = "\n".join(words.check(tmp_path))
     for wrong in ("falta uno", "{robto} está mal", "{robot} {", "un mensaje de {who}", "esperar %SEGUNDOS s"):
         assert f"es: '{wrong}' has not the holes of" in told
     assert "'un mensaje'" not in told
 
 
-def test_a_wrong_translation_is_english_and_told_once(spanish, caplog) -> None:
+def test_invalid_translation_falls_back_to_english_and_is_logged_once(spanish, caplog) -> None:
     assert _("wait for {robot}").format(robot="Pepper") == "esperar a Pepper"
     for english in ("one hole is missing: {robot}", "one is wrong: {robot}", "one has braces: {robot}"):
         with caplog.at_level(logging.WARNING):
@@ -159,14 +159,14 @@ def test_plural_forms_and_contexts(spanish) -> None:
     assert pgettext("neither", "record") == "record"
 
 
-def test_a_constant_follows_the_language_that_is_chosen_later(words, tmp_path, spanish) -> None:
+def test_lazy_constant_follows_a_later_language_change(words, tmp_path, spanish) -> None:
     constant = lazy("wait for {robot}")
     assert _(constant) == "esperar a {robot}"
     install("en", tmp_path)
     assert _(constant) == "wait for {robot}"
 
 
-def test_a_constant_of_several_meanings_keeps_its_context(words, tmp_path, spanish) -> None:
+def test_lazy_constant_keeps_its_context(words, tmp_path, spanish) -> None:
     verb, noun = plazy("verb", "record"), plazy("noun", "record")
     assert (_(verb), _(noun)) == ("grabar", "récord")
     install("en", tmp_path)
@@ -174,7 +174,7 @@ def test_a_constant_of_several_meanings_keeps_its_context(words, tmp_path, spani
     assert f"{verb}" == "record"
 
 
-def test_lists_numbers_and_days(spanish) -> None:
+def test_lists_numbers_and_dates_are_localized(spanish) -> None:
     assert listed(["a", "b", "c", "d"]) == "a, b, c y d"
     assert listed(["a", "b"], "or") == "a o b"
     assert number(1234.5, ",.1f") == "1,234.5"  # as in most of Latin America
@@ -185,7 +185,7 @@ def test_lists_numbers_and_days(spanish) -> None:
     assert i18n.day_text(3, 11, 2026) == "3 November 2026"
 
 
-def test_numbers_with_the_signs_of_another_language(monkeypatch, tmp_path, words) -> None:
+def test_numbers_use_the_separators_of_the_language(monkeypatch, tmp_path, words) -> None:
     monkeypatch.setattr(words, "FORMATS", {"es": "es_ES"})
     words.po_file(tmp_path, "es").parent.mkdir(parents=True)
     words.po_file(tmp_path, "es").write_text(PO, encoding="utf-8")
@@ -198,7 +198,7 @@ def test_numbers_with_the_signs_of_another_language(monkeypatch, tmp_path, words
 @pytest.mark.parametrize(
     "data", [b"", b"\xde\x12\x04\x95", b"\xde\x12\x04\x95" + b"\xff" * 40, b"words" * 20]
 )
-def test_a_damaged_catalogue_is_english(data, spanish, tmp_path, caplog) -> None:
+def test_damaged_catalogue_falls_back_to_english(data, spanish, tmp_path, caplog) -> None:
     (tmp_path / "es" / "LC_MESSAGES" / "nep-studio.mo").write_bytes(data)
     install("es", tmp_path)
     assert i18n.language() == "en"
@@ -206,7 +206,7 @@ def test_a_damaged_catalogue_is_english(data, spanish, tmp_path, caplog) -> None
     assert "can't load" in caplog.text
 
 
-def test_which_language() -> None:
+def test_system_language_and_best_match() -> None:
     assert i18n.system_language({"LANG": "es_MX.UTF-8"}) == "es_MX.UTF-8"
     assert i18n.system_language({"LANGUAGE": "es:en", "LANG": "C.UTF-8"}) == "es"
     assert i18n.system_language({"LC_ALL": "C.UTF-8", "LANG": "es_MX"}) == "en"
@@ -220,14 +220,14 @@ def test_which_language() -> None:
     ]
 
 
-def test_nep_lang_comes_before_what_was_chosen(monkeypatch) -> None:
+def test_nep_lang_overrides_the_chosen_language(monkeypatch) -> None:
     monkeypatch.setenv("NEP_LANG", "en")
     i18n.begin("es")
     assert i18n.language() == "en"
 
 
 @pytest.mark.parametrize(("share", "expected"), [(0.9, "es"), (0.89, "en")])
-def test_the_computers_language_counts_when_it_is_offered(share, expected, spanish, monkeypatch) -> None:
+def test_system_language_is_used_if_it_is_offered(share, expected, spanish, monkeypatch) -> None:
     monkeypatch.setenv("NEP_LANG", "")
     monkeypatch.setenv("LANGUAGE", "es_MX")
     known = {"en": {"share": 1.0}, "es": {"share": share}}
@@ -242,7 +242,7 @@ def test_the_computers_language_counts_when_it_is_offered(share, expected, spani
     assert i18n.language() == "es"
 
 
-def test_the_pseudo_language_is_offered_only_while_it_is_used(pseudo, pseudo_folder) -> None:
+def test_pseudo_language_is_offered_only_while_in_use(pseudo, pseudo_folder) -> None:
     install("en")
     assert "qps" not in dict(i18n.offered())
     assert dict(i18n.offered())["en"] == "English"
@@ -250,7 +250,7 @@ def test_the_pseudo_language_is_offered_only_while_it_is_used(pseudo, pseudo_fol
     assert "qps" in dict(i18n.offered())
 
 
-def test_pseudo_words_are_longer_and_keep_what_is_no_word(words) -> None:
+def test_pseudo_text_is_longer_and_keeps_placeholders_and_code(words) -> None:
     made = words.pseudo("Run {robot} with `nep master`, %SECONDS s")
     assert made.startswith("[Řúñ {robot} ŵíťĥ `nep master`, %SECONDS š ~")
     assert made.endswith("~]")
@@ -258,7 +258,7 @@ def test_pseudo_words_are_longer_and_keep_what_is_no_word(words) -> None:
     assert words.pseudo("{robot} waits")[:3] == "[~{"
 
 
-def test_every_word_of_the_toolbox_is_translated(pseudo) -> None:
+def test_every_text_of_the_toolbox_is_translated(pseudo) -> None:
     for category in categories():
         assert is_pseudo(category.title)
         for described in category.blocks:
@@ -269,7 +269,7 @@ def test_every_word_of_the_toolbox_is_translated(pseudo) -> None:
     assert all(is_pseudo(each["name"]) for each in contents if each["kind"] != "robotHeading")
 
 
-def test_every_help_of_a_block_is_translated(pseudo) -> None:
+def test_every_block_help_is_translated(pseudo) -> None:
     for described in Catalogue([]).blocks.values():
         told = help_of(described)
         for text in (told["does"], told["more"], told["example"], *(words for _name, words in told["gaps"])):
@@ -278,13 +278,13 @@ def test_every_help_of_a_block_is_translated(pseudo) -> None:
             assert is_pseudo(name), (described.type, name)
 
 
-def test_a_translated_block_is_found_by_its_english_words_too(pseudo) -> None:
+def test_translated_block_is_found_by_its_english_words(pseudo) -> None:
     found = {described.type: described for category in categories() for described in category.blocks}
     assert "array" in found["lists_empty"].english_words
     assert found["lists_empty"].words.startswith("[")
 
 
-def test_types_and_python_stay(pseudo) -> None:
+def test_python_code_of_blocks_is_independent_of_the_language(pseudo) -> None:
     translated = {described.type: described.python for each in categories() for described in each.blocks}
     install("en")
     assert translated == {
@@ -310,14 +310,14 @@ def test_every_help_page_of_the_command_line_is_translated(pseudo) -> None:
             assert not ours or is_pseudo(_(words)), (page.name, words)
 
 
-def test_the_library_does_not_ask_for_words_it_does_not_need() -> None:
+def test_nep_import_does_not_load_gettext_in_english() -> None:
     """In English neither gettext's file nor the list of languages is read."""
     code = "import sys, nep, nep.errors; from nep.i18n import _; _('x'); print('gettext' in sys.modules)"
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert done.stdout.strip() == "False"
 
 
-def test_what_is_marked_in_the_sources_is_found_by_the_tool(words) -> None:
+def test_every_marked_text_is_in_the_template(words) -> None:
     """Babel reads no call inside an f-string, which Python's own parser does."""
     ids = [(entry.context or None, words._ids(entry.id)) for entry in words.template()]
     found = {each if len(each) == 2 else (context, *each) for context, each in ids}
@@ -340,7 +340,7 @@ ALIKE = frozenset(
 )
 
 
-def test_what_blockly_says_by_itself_is_said_in_spanish() -> None:
+def test_texts_of_blockly_are_translated_to_spanish() -> None:
     folder = resources.path("blockly")
     english, spanish = (json.loads((folder / f"msg/{each}.json").read_text("utf-8")) for each in ("en", "es"))
     in_bundle = set(re.findall(r"\b[A-Z][A-Z_0-9]+\b", (folder / "editor.js").read_text("utf-8")))
@@ -367,7 +367,7 @@ TWO_WORDS = {
 """What was said in two ways once, and the word that stayed."""
 
 
-def test_one_thing_has_one_word_in_spanish() -> None:
+def test_spanish_terms_are_consistent() -> None:
     path = i18n.LOCALE / "es" / "LC_MESSAGES" / f"{i18n.DOMAIN}.po"
     catalogue = read_po(BytesIO(path.read_bytes()))
     said = [

@@ -83,7 +83,7 @@ def reports() -> list[StopReport]:
     ]
 
 
-def test_the_run_bar_in_all_states() -> None:
+def test_run_bar_is_translated_in_all_states() -> None:
     states = [
         RunState(),
         RunState(nothing_in=object()),
@@ -110,13 +110,13 @@ def test_the_run_bar_in_all_states() -> None:
     said(view_of(RunState(), [], 0).detail)
 
 
-def test_what_became_of_a_stop() -> None:
+def test_stop_reports_are_translated() -> None:
     for report in reports():
         said(*stop_lines(report), *(robot.sentence for robot in report.robots))
         said(*(stop_words(robot, clock_words(time.localtime(0))) for robot in report.robots))
 
 
-def test_a_robot_that_may_still_move_is_known_in_our_language_and_in_english() -> None:
+def test_robot_that_may_still_move_is_recognized_in_every_language() -> None:
     ours = still_moving("Turtle", ["Xx"])
     said(ours, said_of_stop("Turtle", None))
     assert said_of_stop("Turtle", ours) == ours
@@ -124,7 +124,7 @@ def test_a_robot_that_may_still_move_is_known_in_our_language_and_in_english() -
     assert said_of_stop("Turtle", "Turtle may still move: Xx") == "Turtle may still move: Xx"
 
 
-def test_the_facts_of_a_robot() -> None:
+def test_robot_facts_are_translated() -> None:
     topics = {sensor.topic: Topic(sensor.topic) for sensor in PEPPER.sensors}
     link = RobotLink("Pepper", PEPPER)
     sensors = tuple(sensor.title for sensor in PEPPER.sensors)
@@ -148,7 +148,7 @@ def test_the_facts_of_a_robot() -> None:
         said(each.state_words)
 
 
-def test_alerts_of_health() -> None:
+def test_health_alerts_are_translated() -> None:
     alerts, now = Alerts(), [0.0]
     real = replace(PEPPER, virtual=False)
     links = [
@@ -187,7 +187,7 @@ def test_alerts_of_health() -> None:
         said(alert.title, alert.detail, alert.button or "")
 
 
-def test_who_comes_and_goes() -> None:
+def test_graph_changes_are_translated() -> None:
     def node(name: str, generation: str = "native") -> NodeInfo:
         return NodeInfo(name, name, "lab", 1, "Python", generation, 0)
 
@@ -212,7 +212,7 @@ def test_who_comes_and_goes() -> None:
         said(*lines)
 
 
-def test_questions_and_errors() -> None:
+def test_questions_and_errors_are_translated() -> None:
     question = Question({"Nao": ("Xx",), "Turtle": ("Xx", "zz")}, lambda: None)
     said(question.title, question.sentence, MayNotMoveError(["Nao", "Turtle"]))
     said(
@@ -235,13 +235,13 @@ def test_questions_and_errors() -> None:
 @pytest.mark.parametrize(
     "content", [b"", b"{}", b'{"format": "nep-behaviour"}', b'{"format": "nep-behaviour", "version": 99}']
 )
-def test_files_that_are_no_behaviours(content: bytes) -> None:
+def test_errors_of_invalid_behaviour_files_are_translated(content: bytes) -> None:
     with pytest.raises(DocumentError) as caught:
         parse_file(content, Path("/Xx"))
     said(caught.value, data=("nepb",))
 
 
-def test_values_that_a_robot_would_refuse() -> None:
+def test_errors_of_rejected_values_are_translated() -> None:
     number = Parameter("zz", "Xx", "number", minimum=1.0, maximum=9.0)
     text = Parameter("zz", "Xx", "text", min_length=2, max_length=3)
     items = Parameter("zz", "Xx", "list", min_length=2, max_length=3, each=number)
@@ -266,7 +266,7 @@ def test_values_that_a_robot_would_refuse() -> None:
     said(*check_input("Xx", (), 3))
 
 
-def test_descriptions_that_cannot_be_used() -> None:
+def test_errors_of_invalid_descriptions_are_translated() -> None:
     good = simulated.ROBOT.thing_model
     for wrong in (
         3,
@@ -284,7 +284,7 @@ def test_descriptions_that_cannot_be_used() -> None:
         said(*told, data=("title", "actions", "ref", "rb:safeStop", "rb:profile", "safeStop"))
 
 
-def test_findings_of_the_doctor() -> None:
+def test_doctor_findings_are_translated() -> None:
     now = 1_800_000_000.0
     master = ProcessFact(41, "zz", is_master=True, since_s=now - 7200)
     other = ProcessFact(77, "zz", since_s=now - 5)
@@ -313,7 +313,7 @@ def test_findings_of_the_doctor() -> None:
                 said(finding.sentence, finding.mend, data=("ip link", "py", "AirDrop", "Handoff"))
 
 
-def test_who_may_connect() -> None:
+def test_remote_access_alerts_are_translated() -> None:
     alerts = Alerts()
     settings = SimpleNamespace(get=lambda _key, default: default, set=lambda _key, _value: None)
     reach = RemoteAccess("127.0.0.1:7780", settings, alerts, lambda _event: None)
@@ -322,7 +322,7 @@ def test_who_may_connect() -> None:
         said(alert.title, alert.detail, alert.button or "")
 
 
-def test_what_is_no_request_or_answer() -> None:
+def test_errors_of_invalid_requests_and_replies_are_translated() -> None:
     for body in (
         packb(3), packb({"do": "xx"}), packb({"do": "leave", "what": []}), packb({"do": "leave"}),
         packb({"do": "leave", "what": {"node_id": 3}}),
@@ -338,7 +338,7 @@ def test_what_is_no_request_or_answer() -> None:
     said(caught.value.reason, data=("xx",))
 
 
-def test_what_was_left_out_of_a_log_or_a_terminal() -> None:
+def test_dropped_log_and_terminal_lines_are_reported_in_translation() -> None:
     handler = LogHandler("zz", lambda: pytest.fail("nothing is published"), burst=0)
     handler.emit(logging.LogRecord("x", logging.INFO, "x.py", 1, "x" * 9000, (), None))
     said(handler._drop_record_locked()["text"])

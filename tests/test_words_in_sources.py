@@ -49,7 +49,7 @@ def at_import(node: ast.AST) -> Iterator[ast.AST]:
         yield from at_import(part)
 
 
-def test_every_sentence_gets_what_its_holes_need() -> None:
+def test_every_translated_text_gets_its_placeholders() -> None:
     wrong = []
     for path, module in sources().items():
         for node in ast.walk(module):
@@ -63,7 +63,7 @@ def test_every_sentence_gets_what_its_holes_need() -> None:
     assert wrong == []
 
 
-def test_nothing_is_translated_before_the_language_is_chosen() -> None:
+def test_no_text_is_translated_at_import() -> None:
     """But for the command line, whose modules are imported when it is."""
     early = [
         f"{path}:{node.lineno}"

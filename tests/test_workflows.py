@@ -45,13 +45,13 @@ def checked(*arguments: str | Path, given: str | None = None) -> subprocess.Comp
     )
 
 
-def test_the_checker_finds_nothing() -> None:
+def test_workflow_linter_finds_no_problems() -> None:
     # A date alone must let no test fail: docs/release.md has who makes a release look for retired runners.
     done = checked("--ignore", "GitHub retired it", *sorted(FOLDER.glob("*.yml")))
     assert (done.stdout, done.stderr, done.returncode) == ("", "", 0)
 
 
-def test_the_checker_would_find_what_is_wrong() -> None:
+def test_workflow_linter_detects_mistakes() -> None:
     text = (FOLDER / "release.yml").read_text(encoding="utf-8")
     for good, bad, rule in (
         ("github.ref_type", "github.ref_typo", "undefined-property"),
@@ -66,13 +66,13 @@ def test_the_checker_would_find_what_is_wrong() -> None:
         assert rule in done.stdout, done.stdout
 
 
-def test_actions_are_ours_or_of_github_and_say_their_version() -> None:
+def test_actions_are_official_and_pinned_with_their_version() -> None:
     for path in FOLDER.glob("*.yml"):
         for line in re.findall(r"uses: (.+)", path.read_text(encoding="utf-8")):
             assert re.fullmatch(r"actions/[a-z-]+@[0-9a-f]{40} # v\d+\.\d+\.\d+", line), line
 
 
-def test_only_who_drafts_the_release_may_write() -> None:
+def test_only_the_draft_job_has_write_permission() -> None:
     for name in ("ci", "release"):
         told = workflow(name)
         assert told["permissions"] == {"contents": "read"}
@@ -80,7 +80,7 @@ def test_only_who_drafts_the_release_may_write() -> None:
         assert writing == ({"draft"} if name == "release" else set())
 
 
-def test_ci_runs_the_command_of_the_readme_on_three_systems_with_the_oldest_and_the_newest_python() -> None:
+def test_ci_runs_the_readme_command_on_three_systems_with_oldest_and_newest_python() -> None:
     job = workflow("ci")["jobs"]["test"]
     assert "\npython3 dev.py test " in (ROOT / "README.md").read_text(encoding="utf-8")
     assert job["steps"][-1]["run"] == "python dev.py test"
@@ -158,7 +158,7 @@ def drafted(place: Path) -> int:
     return 0
 
 
-def test_a_draft_has_all_packages_one_list_of_sums_and_the_notes(place: Path) -> None:
+def test_draft_has_all_packages_one_checksum_list_and_the_notes(place: Path) -> None:
     assert drafted(place) == 0
     files = {"one-setup.exe": b"1", "one.zip": b"2", "one.deb": b"3", "one two.tar.xz": b"4"}
     release = place / "release"
@@ -178,19 +178,19 @@ def test_a_draft_has_all_packages_one_list_of_sums_and_the_notes(place: Path) ->
     assert "GH_REPO=nep/studio" in said
 
 
-def test_a_package_that_is_not_the_one_that_was_built_is_not_drafted(place: Path) -> None:
+def test_package_with_a_wrong_checksum_is_not_drafted(place: Path) -> None:
     (place / "packages" / "package-linux" / "one.deb").write_bytes(b"another")
     assert drafted(place) != 0
     assert not (place / "said-to-gh").exists()
 
 
-def test_two_packages_of_one_name_are_not_drafted(place: Path) -> None:
+def test_two_packages_with_the_same_name_are_not_drafted(place: Path) -> None:
     with_sums(place / "packages" / "package-macos", {"one.deb": b"3"})
     assert drafted(place) != 0
     assert not (place / "said-to-gh").exists()
 
 
-def test_a_tag_that_is_not_the_version_stops_everything(place: Path) -> None:
+def test_tag_that_is_not_the_version_stops_the_release(place: Path) -> None:
     (place / "nep" / "version.py").write_text('__version__ = "99.0.0"\n', encoding="utf-8")
     assert drafted(place) == 1
     assert not (place / "release").exists()
@@ -297,7 +297,7 @@ def tried(place: Path, system: str) -> str:
     ],
     indirect=["runner"],
 )
-def test_a_package_is_installed_tried_where_it_is_and_removed(
+def test_package_is_installed_self_tested_and_removed(
     runner: tuple[Path, str], installed: str, portable: str | None
 ) -> None:
     place, system = runner
@@ -309,7 +309,7 @@ def test_a_package_is_installed_tried_where_it_is_and_removed(
 
 
 @pytest.mark.parametrize("runner", STAND_INS, indirect=True)
-def test_a_self_test_that_fails_fails_the_trial(runner: tuple[Path, str]) -> None:
+def test_failed_self_test_fails_the_trial(runner: tuple[Path, str]) -> None:
     place, system = runner
     (place / "studio").write_text("#!/usr/bin/env bash\nexit 1\n", encoding="utf-8")
     assert tried(place, system).startswith("Self-test of what is installed")
@@ -318,7 +318,7 @@ def test_a_self_test_that_fails_fails_the_trial(runner: tuple[Path, str]) -> Non
 @pytest.mark.parametrize(
     ("runner", "name"), [("windows", "remove"), ("linux", "bin/apt-get")], indirect=["runner"]
 )
-def test_what_an_uninstaller_leaves_fails_the_trial(runner: tuple[Path, str], name: str) -> None:
+def test_files_left_by_the_uninstaller_fail_the_trial(runner: tuple[Path, str], name: str) -> None:
     place, system = runner
     script = (place / name).read_text(encoding="utf-8")
     (place / name).write_text(re.sub(r"rm (-R )?", "true ", script), encoding="utf-8")

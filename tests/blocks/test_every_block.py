@@ -161,7 +161,7 @@ def test_every_block_compiles_and_its_python_runs(described):
     assert run.runtime.error is None
 
 
-def test_descriptions_are_sound():
+def test_block_descriptions_are_valid():
     assert not [problem for described in ALL for problem in described.problems()]
     assert {category.name for category in categories()} >= {
         "events",
@@ -184,7 +184,7 @@ def test_descriptions_are_sound():
         assert all(described.tooltip.endswith(".") for described in category.blocks)
 
 
-def test_every_command_of_a_program_exists_for_its_file_too():
+def test_every_program_command_exists_in_exported_file_module():
     import app.blocks.commands as commands
 
     assert set(commands.__all__) == COMMANDS

@@ -19,7 +19,7 @@ def read(path):
     return saved, parse(saved["robots"]["Pepper"])
 
 
-def test_these_are_the_examples_of_the_start_page():
+def test_start_page_examples_are_complete():
     named = [(read(path)[0]["name"], read(path)[0]["description"]) for path in EXAMPLES]
     assert named == [
         ("Greeting", "Waves when it sees a face"),
@@ -53,7 +53,7 @@ CLAIMS = {
 
 
 @pytest.mark.parametrize("path", EXAMPLES, ids=lambda path: path.stem)
-def test_what_a_card_and_a_note_claim_is_in_the_blocks(path):
+def test_example_descriptions_and_notes_match_their_blocks(path):
     saved, _pepper = read(path)
     used = set(types(saved["workspace"]["blocks"]["blocks"]))
     (note,) = saved["workspace"]["workspaceComments"]
@@ -65,7 +65,7 @@ def test_what_a_card_and_a_note_claim_is_in_the_blocks(path):
 
 
 @pytest.mark.parametrize("path", EXAMPLES, ids=lambda path: path.stem)
-def test_a_note_says_what_the_example_does_and_two_things_to_try_with_values_that_are_there(path):
+def test_example_note_has_description_and_two_tasks_with_existing_values(path):
     saved, _pepper = read(path)
     (note,) = saved["workspace"]["workspaceComments"]
     about, tries = note["text"].split("\n\nTry this:\n")
@@ -93,7 +93,7 @@ def blocks(saved):
 
 
 @pytest.mark.parametrize("path", EXAMPLES, ids=lambda path: path.stem)
-def test_an_example_compiles_without_problems_and_the_editor_knows_its_blocks(path):
+def test_example_compiles_without_problems_and_editor_knows_its_blocks(path):
     saved, pepper = read(path)
     assert (saved["format"], saved["version"]) == ("nep-behaviour", 1)
     program = compile_behaviour(saved["workspace"], [pepper], name=saved["name"])
@@ -114,7 +114,7 @@ def types(saved):
             yield from types(inner)
 
 
-def test_the_behaviour_of_the_designs_picture_has_the_problems_of_the_picture():
+def test_picture_behaviour_has_the_designed_problems():
     saved = json.loads(Path("tests/data/behaviours/picture-02.nepb").read_text("utf-8"))
     pepper, absent = (parse(saved["robots"][name]) for name in ("Pepper", "NAO"))
     program = compile_behaviour(saved["workspace"], [pepper], absent=[absent], name=saved["name"])
@@ -139,7 +139,7 @@ def said(link: FakeLink) -> list[object]:
     return [given["text"] for _, action, given in link.invoked if action == "say"]
 
 
-def test_greeting():
+def test_greeting_example():
     play, link = run(0)
     play.end()
     assert play.runtime.error is None
@@ -147,7 +147,7 @@ def test_greeting():
     assert [action for _, action, _ in link.invoked].count("turn") == 4
 
 
-def test_reaction_to_touch():
+def test_touch_reaction_example():
     play, link = run(1)
     until(lambda: len(said(link)) == 1)
     for times in (1, 2, 3):
@@ -161,7 +161,7 @@ def test_reaction_to_touch():
     assert play.runtime.error is None
 
 
-def test_tour_guide():
+def test_tour_guide_example():
     play, link = run(2)
     play.end()
     assert said(link)[-1] == "Thank you for coming."
@@ -174,7 +174,7 @@ def actions(link: FakeLink) -> list[str]:
     return [action for _, action, _ in link.invoked]
 
 
-def test_a_quiz_counts_what_is_right():
+def test_quiz_example_counts_correct_answers():
     link = FakeLink()
     link.sensors[("Pepper", "head_touched")] = True  # always yes
     play, link = run(3, link)
@@ -184,7 +184,7 @@ def test_a_quiz_counts_what_is_right():
     assert actions(link).count("show_emotion") == 3
 
 
-def test_a_dance_calls_its_functions():
+def test_dance_example_calls_its_functions():
     play, link = run(4)
     play.end()
     assert play.runtime.error is None
@@ -195,7 +195,7 @@ def test_a_dance_calls_its_functions():
 
 
 @pytest.mark.parametrize(("distance", "steps", "last"), [(2.0, 5, "enough"), (0.5, 0, "after 0 steps.")])
-def test_a_careful_walk_looks_before_each_step(distance, steps, last):
+def test_careful_walk_example_checks_distance_before_each_step(distance, steps, last):
     link = FakeLink()
     link.sensors |= {("Pepper", "distance"): distance, ("Pepper", "battery"): 15}
     play, link = run(5, link)
@@ -206,7 +206,7 @@ def test_a_careful_walk_looks_before_each_step(distance, steps, last):
     assert said(link)[-1] == "My battery is low."
 
 
-def test_the_finder_tells_what_it_sees():
+def test_finder_example_reports_what_it_sees():
     link = FakeLink()
     link.sensors |= {("Pepper", "sees_ball"): True, ("Pepper", "sees_face"): True}
     play, link = run(6, link)
@@ -216,7 +216,7 @@ def test_the_finder_tells_what_it_sees():
     assert actions(link).count("look_at") == 2
 
 
-def test_the_weather_station_hears_its_own_messages():
+def test_weather_station_example_receives_its_own_messages():
     play, link = run(7)
     until(lambda: bool(link.published))
     topic, message = link.published[0]

@@ -14,7 +14,7 @@ def problems(saved):
     return compile_behaviour(saved, [robot()]).problems
 
 
-def test_a_time_limit():
+def test_fix_adds_time_limit_to_wait_until():
     inner = block("control_wait_until", "w", CONDITION=block("robot_pepper_get_sees_face", ROBOT="Pepper"))
     saved = workspace(started(block("control_forever", BODY=[say("a"), inner])))
     before = copy.deepcopy(saved)
@@ -27,7 +27,7 @@ def test_a_time_limit():
     assert "at_most_s=10" in compile_behaviour(mended, [robot()]).source
 
 
-def test_a_start_for_blocks_without_one():
+def test_fix_adds_start_block_above_blocks_without_one():
     saved = workspace(say("Hi") | {"x": 100, "y": 50})
     mended = mend(saved, problems(saved)[0].mend_action or "")
     assert mended is not None
@@ -36,7 +36,7 @@ def test_a_start_for_blocks_without_one():
     assert (top["type"], top["x"], top["y"]) == ("events_started", 100, 50)
 
 
-def test_a_value_gets_no_start():
+def test_fix_adds_no_start_block_above_value_block():
     saved = workspace(block("robot_pepper_get_battery", ROBOT="Pepper"), say("Hi"))
     mended = mend(saved, "add:events_started")
     assert mended is not None
@@ -46,13 +46,13 @@ def test_a_value_gets_no_start():
     ]
 
 
-def test_an_empty_workspace_gets_a_start():
+def test_fix_adds_start_block_to_empty_workspace():
     mended = mend({}, "add:events_started")
     assert mended is not None
     assert compile_behaviour(mended, []).starts == 1
 
 
-def test_what_is_no_matter_of_blocks():
+def test_action_that_is_not_a_block_fix_changes_nothing():
     assert mend(workspace(), "connect:NAO") is None
     assert mend(workspace(), "limit:nobody") is None
 
@@ -61,7 +61,7 @@ def test_what_is_no_matter_of_blocks():
     "blocks",
     [None, 7, "x", {}, {"blocks": None}, {"blocks": 7}, {"blocks": [None, {"inputs": 3, "next": []}]}],
 )
-def test_nothing_is_mended_in_what_is_no_workspace_and_nothing_raises(blocks):
+def test_fix_on_invalid_workspace_changes_nothing_and_does_not_raise(blocks):
     saved = {"blocks": blocks}
     assert mend(saved, "limit:w") is None
     assert mend(saved, "define:w") is None

@@ -20,14 +20,14 @@ from tests.blocks.samples import robot
 
 
 @given(st.lists(st.text(), min_size=1, max_size=8))
-def test_every_name_is_one_of_pythons_and_no_name_comes_twice(words):
+def test_names_are_valid_python_identifiers_and_unique(words):
     names = Names(frozenset({"taken"}))
     made = [names.new(word, "thing") for word in words]
     assert len(set(made)) == len(made)
     assert all(name.isidentifier() and not keyword.iskeyword(name) and name != "taken" for name in made)
 
 
-def test_names_read_like_the_words():
+def test_names_resemble_the_original_words():
     names = Names(frozenset())
     assert names.new("when started", "x") == "when_started"
     assert names.new("When started!", "x") == "when_started_2"
@@ -35,7 +35,7 @@ def test_names_read_like_the_words():
     assert names.new("???", "thing") == "thing"
 
 
-def test_a_number_field():
+def test_number_field_reads_and_validates_values():
     field = NumberField("N", 5, 0, 10)
     assert [field.read(saved) for saved in (None, 3, "4.5", 2.0)] == [5, 3, 4.5, 2]
     for wrong in ("x", True, float("nan"), float("inf"), [], 11, -1):
@@ -43,7 +43,7 @@ def test_a_number_field():
             field.read(wrong)
 
 
-def test_a_choice_field_gives_back_the_value_behind_the_words():
+def test_choice_field_returns_value_of_its_label():
     field = ChoiceField("C", (("yes", True), ("three", 3), ("all", "all")))
     assert [field.read(saved) for saved in ("true", "3", "all", None)] == [True, 3, "all", True]
     assert field.words(3) == "three"
@@ -52,7 +52,7 @@ def test_a_choice_field_gives_back_the_value_behind_the_words():
     assert ChoiceField("ROBOT", (), source="robots:nao").read("NAO") == "NAO"
 
 
-def test_topics_colours_paths():
+def test_topic_colour_and_path_fields():
     assert TopicField("T").read("/a/b") == "/a/b"
     for wrong in ("", "a b", "{", "\n", "x" * 201):
         with pytest.raises(FieldError):
@@ -79,7 +79,7 @@ def test_values_as_text(value, expected):
     assert values.text(value) == expected
 
 
-def test_parts_of_messages():
+def test_message_fields_are_read_by_path():
     message = {"faces": [{"name": "Ada"}], "a.b": 1}
     assert values.part(message, "faces.0.name") == "Ada"
     assert values.part(message, "a.b") == 1
@@ -89,19 +89,19 @@ def test_parts_of_messages():
         assert values.part(message, nothing) is None
 
 
-def test_random_numbers_stay_between_their_limits():
+def test_random_numbers_stay_within_limits():
     assert {values.random_number(3, 1) for _ in range(200)} == {1, 2, 3}
     assert all(0.5 <= values.random_number(0.5, 1) <= 1 for _ in range(50))
 
 
-def test_rounds():
+def test_repeat_count_is_rounded_and_validated():
     assert list(values.repeat(2.5)) == [0, 1, 2]
     assert list(values.repeat(-3)) == []
     with pytest.raises(BehaviourError, match="“repeat” needs a number, not a text"):
         values.repeat("x")
 
 
-def test_errors_in_words():
+def test_exceptions_are_explained():
     assert explain(OverflowError(), "÷", "b").sentence == "The result of “÷” is too large."
     assert explain(MemoryError(), "÷", "b").block == "b"
     assert explain(RecursionError(), "", None).sentence == "this block is nested too deeply."
@@ -110,7 +110,7 @@ def test_errors_in_words():
     assert explain(inner, "outer", "outer").block == "inner"
 
 
-def test_a_hat_keeps_its_newest_events_and_counts_the_others():
+def test_event_block_keeps_newest_events_and_counts_dropped_ones():
     hat = Hat("x", most=3)
     for number in range(5):
         hat.happened((number,))
@@ -121,7 +121,7 @@ def test_a_hat_keeps_its_newest_events_and_counts_the_others():
     assert lone.dropped == 0  # a second touch while the script runs is one more run, not a loss
 
 
-def test_a_gate_tells_only_of_passing():
+def test_threshold_fires_only_when_crossed():
     passed = []
     gate = PassGate("below", 20, lambda: passed.append(1))
     for value, so_far in ((10, 0), (30, 0), (20, 0), (19, 1), (5, 1), (None, 1), (True, 1), (21, 1), (0, 2)):
@@ -129,7 +129,7 @@ def test_a_gate_tells_only_of_passing():
         assert len(passed) == so_far
 
 
-def test_a_change_is_a_difference():
+def test_change_fires_only_on_different_value():
     seen = []
     told = changes(lambda: seen.append(1))
     for value in (1, 1, 2, 2, 1):
@@ -146,7 +146,7 @@ def test_events_match_their_filters():
     assert event_matches("no object", {}, None, {})
 
 
-def test_what_a_robot_does_in_words():
+def test_robot_action_is_described_as_sentence():
     pepper = robot()
     turn, say = pepper.action("turn"), pepper.action("say")
     assert turn is not None
@@ -155,7 +155,7 @@ def test_what_a_robot_does_in_words():
     assert sentence(pepper, say, {"text": "Hi"}) == "Pepper says “Hi”"
 
 
-def test_places_in_a_robots_text():
+def test_placeholders_in_robot_block_text_are_parsed():
     parts = TextParts("%robot say %text loud %text %nobody %ROBOT", ["text", "robot", "Text", "live"])
     assert parts.text == "%ROBOT say %TEXT loud   "
     assert parts.arguments == {"text": "TEXT", "robot": "ROBOT_2", "Text": "TEXT_2", "live": "LIVE_2"}

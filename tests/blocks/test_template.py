@@ -17,24 +17,24 @@ PLAIN = st.recursive(
 
 
 @given(PLAIN)
-def test_a_literal_is_its_value_and_nothing_else(value):
+def test_literal_evaluates_to_its_value(value):
     tree = literal(value)
     ast.fix_missing_locations(ast.Expression(tree))
     assert ast.literal_eval(ast.unparse(tree)) == value
 
 
-def test_a_negative_literal_keeps_its_sign_under_a_power():
+def test_negative_literal_keeps_its_sign_under_a_power():
     tree = expression("%A ** %B", {"A": literal(-1), "B": literal(2)})
     assert eval(ast.unparse(tree)) == 1
 
 
 @pytest.mark.parametrize("value", [math.nan, math.inf, object(), b"bytes"])
-def test_what_is_no_plain_value_is_refused(value):
+def test_literal_of_unsupported_value_is_rejected(value):
     with pytest.raises(ValueError, match=r"program"):
         literal(value)
 
 
-def test_holes_are_filled_with_trees_not_with_text():
+def test_placeholders_are_replaced_by_syntax_trees():
     made = statements(
         "f(%A, **%REST)", {"A": literal("%B'); boom('")}, None, {"REST": [ast.keyword("x", literal(1))]}
     )
@@ -42,7 +42,7 @@ def test_holes_are_filled_with_trees_not_with_text():
     assert ast.dump(ast.parse(text)) == ast.dump(ast.parse("f(\"%B'); boom('\", x=1)"))
 
 
-def test_statements_stand_in_a_hole_of_their_own_and_nothing_becomes_pass():
+def test_statement_placeholder_is_replaced_by_body_or_pass():
     inner = statements("a()\nb()", {})
     text = ast.unparse(
         ast.Module(statements("while %A:\n    %BODY", {"A": literal(True)}, {"BODY": inner}), [])
@@ -54,12 +54,12 @@ def test_statements_stand_in_a_hole_of_their_own_and_nothing_becomes_pass():
     assert empty == "while True:\n    pass"
 
 
-def test_a_variable_is_read_and_set_by_the_same_hole():
+def test_variable_placeholder_is_used_for_reading_and_setting():
     made = statements("%X = %X", {"X": ast.Name("count", ast.Load())})
     exec(compile(ast.fix_missing_locations(ast.Module(made, [])), "", "exec"), {"count": 1})
 
 
-def test_a_hole_that_got_nothing_is_named():
+def test_missing_placeholder_value_is_named():
     with pytest.raises(KeyError, match="NOTHING"):
         expression("f(%NOTHING)", {})
     assert holes("f(%A, **%B_2)") == {"A", "B_2"}

@@ -275,7 +275,7 @@ def test_master_restart_under_traffic_loses_nothing(monkeypatch: pytest.MonkeyPa
                 eventually(lambda: adapter.ask("counts", sub=sub)["received"] == str(publisher.count))
 
 
-def test_foreign_program_at_the_masters_address_is_named_and_the_master_found_later(tmp_path: Path) -> None:
+def test_foreign_program_at_master_address_is_named_and_master_is_found_later(tmp_path: Path) -> None:
     """In the exception, and once in the log until a master has answered."""
     with Master("127.0.0.1:0") as free:
         address = free.address
@@ -303,7 +303,7 @@ def test_foreign_program_at_the_masters_address_is_named_and_the_master_found_la
     assert len(log.read_text().splitlines()) == 2
 
 
-def test_foreign_program_at_a_publishers_address_is_a_problem_in_the_graph(
+def test_foreign_program_at_publisher_address_is_a_problem_in_the_graph(
     adapter: Adapter, master: Master, node: Node
 ) -> None:
     adapter.ask("subscriber", topic="t", type="json")
@@ -368,7 +368,7 @@ def test_slow_subscriber_counts_its_losses_exactly(node: Node) -> None:
         assert slow.end() == 0
 
 
-def test_messages_of_new_publishers_that_cannot_be_reached_are_lost(adapter: Adapter, master: Master) -> None:
+def test_messages_of_unreachable_new_publishers_are_counted_as_lost(adapter: Adapter, master: Master) -> None:
     topics = (("t", False), ("*", True))
     subs = [
         adapter.ask("subscriber", topic=name, type="json", pattern=is_pattern)["sub"]
@@ -427,7 +427,7 @@ def test_latency_is_corrected_by_the_clock_of_another_computer() -> None:
         assert -message["latency_uncertainty_s"] <= message["latency_s"] < 20
 
 
-def test_message_of_this_computer_has_a_certain_latency(adapter: Adapter, node: Node) -> None:
+def test_latency_within_one_computer_has_zero_uncertainty(adapter: Adapter, node: Node) -> None:
     adapter.ask("subscriber", topic="near", type="json")
     node.new_pub("near").publish({})
     (message,) = adapter.heard(1)
@@ -471,7 +471,7 @@ def test_subscriber_with_wildcards_receives_all_matching_topics(adapter: Adapter
     assert heard == {("robots/one/state", 0), ("robots/two/state", 2)}
 
 
-def test_image_files_arrive_as_pictures(adapter: Adapter, node: Node) -> None:
+def test_image_files_are_received_as_pictures(adapter: Adapter, node: Node) -> None:
     subscriber = node.new_sub("camera", "image")
     pub = adapter.ask("publisher", topic="camera", type="image")["pub"]
     adapter.ask("publish", pub=pub, bytes=base64.b64encode(PICTURE).decode())
@@ -502,7 +502,7 @@ def test_conformance_tester_finds_no_broken_rule() -> None:
     assert done.returncode == 0, done.stdout + done.stderr
 
 
-def test_talker_and_listener_of_the_examples_exchange_messages(master: Master) -> None:
+def test_example_talker_and_listener_exchange_messages(master: Master) -> None:
     with running(example("Talker")) as talker, running(example("Listener")) as listener:
         assert listener.line().startswith("Press Enter")
         assert [listener.line().split(": ")[1].lstrip("-").isdigit() for _ in range(2)] == [True, True]

@@ -28,7 +28,7 @@ needs_mono = pytest.mark.skipif(not HAS_MONO, reason=WITHOUT)
 Numbers = Sequence[float]
 
 
-def test_package_has_every_source_once_and_a_meta_file_with_its_own_id(tmp_path: Path) -> None:
+def test_package_has_every_source_once_and_meta_files_with_unique_ids(tmp_path: Path) -> None:
     tarball = unity_package.build(tmp_path)
     assert tarball.read_bytes() == unity_package.build(tmp_path / "again").read_bytes()
     with tarfile.open(tarball) as archive:
@@ -47,7 +47,7 @@ def test_package_has_every_source_once_and_a_meta_file_with_its_own_id(tmp_path:
     assert len(set(ids)) == len(metas)
 
 
-def test_manifest_names_what_is_in_the_package() -> None:
+def test_manifest_matches_package_contents() -> None:
     files = unity_package.package_files()
     manifest = json.loads(files["package.json"])
     project = ET.parse(CSHARP / "Nep.csproj")

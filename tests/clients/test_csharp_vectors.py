@@ -45,7 +45,7 @@ def as_text(value: object) -> object:
     return str(value) if isinstance(value, int) else value
 
 
-def test_messages_are_read_and_written_as_in_the_vectors(wire: MonoProgram) -> None:
+def test_messages_are_decoded_and_encoded_as_in_the_vectors(wire: MonoProgram) -> None:
     for vector in vectors("messages"):
         answer = read(wire, vector["parts"])
         if "error" in vector:
@@ -64,7 +64,7 @@ def test_messages_are_read_and_written_as_in_the_vectors(wire: MonoProgram) -> N
             assert msgpack.unpackb(bytes.fromhex(message["extension"])) == means["extension"]
 
 
-def test_batches_are_read_as_in_the_vectors(wire: MonoProgram) -> None:
+def test_batches_are_decoded_as_in_the_vectors(wire: MonoProgram) -> None:
     for vector in vectors("batches"):
         answer = read(wire, [vector["part"]])
         if "error" in vector:
@@ -86,7 +86,7 @@ def test_ids_are_derived_from_the_key(wire: MonoProgram) -> None:
             assert json.loads(wire.ask(f"id {key} {number}")) == wanted
 
 
-def test_answers_of_the_master_survive_decoding_and_encoding(wire: MonoProgram) -> None:
+def test_master_replies_survive_decode_and_encode(wire: MonoProgram) -> None:
     for asked in vectors("master")["asked"]:
         for body in (asked["request"], asked["answer"]):
             again = bytes.fromhex(json.loads(wire.ask(f"pack {body}")))
@@ -95,7 +95,7 @@ def test_answers_of_the_master_survive_decoding_and_encoding(wire: MonoProgram) 
 
 
 @pytest.mark.skipif(not HAS_CODES, reason="these vectors are not there yet")
-def test_malformed_messages_are_refused_with_the_same_codes(wire: MonoProgram) -> None:
+def test_malformed_messages_are_rejected_with_the_same_codes(wire: MonoProgram) -> None:
     wrong = [
         (vector, answer)
         for vector in vectors("malformed")
@@ -105,7 +105,7 @@ def test_malformed_messages_are_refused_with_the_same_codes(wire: MonoProgram) -
 
 
 @pytest.mark.skipif(not HAS_CODES, reason="these vectors are not there yet")
-def test_filters_and_notices_are_read_and_written_as_in_the_vectors(wire: MonoProgram) -> None:
+def test_filters_and_notices_are_decoded_and_encoded_as_in_the_vectors(wire: MonoProgram) -> None:
     for vector in vectors("filters"):
         answer = json.loads(wire.ask(f"filter {vector['filter']}"))
         if "error" in vector:
@@ -225,12 +225,12 @@ def test_clocks_are_compared_as_in_python(wire: MonoProgram) -> None:
         assert json.loads(wire.ask(f"clock {asked}")) == clock_in_python(steps), asked
 
 
-def test_computer_has_the_same_id_as_in_python(wire: MonoProgram) -> None:
+def test_computer_id_is_the_same_as_in_python(wire: MonoProgram) -> None:
     assert json.loads(wire.ask("computer")) == computer_id()
 
 
 @pytest.mark.parametrize("order", [">", "<"])
-def test_shapes_of_pictures_are_those_that_python_tells(wire: MonoProgram, order: str) -> None:
+def test_image_shapes_match_those_of_python(wire: MonoProgram, order: str) -> None:
     picture = np.zeros((3, 5, 3), np.uint8)
     jpeg, png = (cv2.imencode(f".{kind}", picture)[1].tobytes() for kind in ("jpeg", "png"))
     for orientation in range(10):

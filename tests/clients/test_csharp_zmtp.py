@@ -152,7 +152,9 @@ def test_xpub_bounds_the_queue_of_a_slow_reader_and_keeps_serving_others(context
         assert slow.recv_multipart() == [TOPIC, b"end"]
 
 
-def test_burst_of_small_messages_arrives_whole_and_in_order(context: Context, stack: ExitStack) -> None:
+def test_burst_of_small_messages_is_received_complete_and_in_order(
+    context: Context, stack: ExitStack
+) -> None:
     xpub = started(stack, "xpub", "127.0.0.1")
     with context.socket(zmq.SUB) as sub:
         sub.rcvhwm, sub.rcvtimeo = 0, 20_000
@@ -166,7 +168,7 @@ def test_burst_of_small_messages_arrives_whole_and_in_order(context: Context, st
         assert xpub.line() == "sent 20000"
 
 
-def test_ipv6_works_where_the_computer_has_it(context, stack: ExitStack) -> None:
+def test_ipv6_works_where_available(context, stack: ExitStack) -> None:
     if not socket.has_ipv6:
         pytest.skip("no IPv6")
     xpub = started(stack, "xpub", "::1")
@@ -320,7 +322,7 @@ def foreign_programs(own: str) -> Iterator[tuple[str, Callable[[int], ForeignSer
 
 
 @pytest.mark.parametrize(("own", "real"), [("dealer", zmq.DEALER), ("sub", zmq.XPUB)])
-def test_client_names_foreign_programs_and_finds_the_real_one_later(
+def test_client_names_foreign_programs_and_later_connects_to_the_real_master(
     context: Context, stack: ExitStack, own: str, real: int
 ) -> None:
     with socket.create_server(("127.0.0.1", 0)) as free:
@@ -353,7 +355,7 @@ def test_client_names_foreign_programs_and_finds_the_real_one_later(
     [b"", GREETING + READY.replace(b"\x03SUB", b"\x03PUB")],
     ids=["at once", "after the handshake"],
 )
-def test_waits_grow_while_a_program_closes_each_connection(stack: ExitStack, answer: bytes) -> None:
+def test_backoff_grows_while_a_program_closes_each_connection(stack: ExitStack, answer: bytes) -> None:
     foreign = ForeignServer(0, answer, waits=False)
     stack.callback(foreign.close)
     sub = started(stack, "sub")

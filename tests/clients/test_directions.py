@@ -181,7 +181,7 @@ def test_listings_exchange_messages_in_all_nine_directions(
             assert "hello" in programs.lines(listener)[-1], (language, listener)
 
 
-def test_messages_arrive_whole_and_in_order_in_all_nine_directions(
+def test_messages_are_received_complete_and_in_order_in_all_nine_directions(
     commands: dict[str, list[str]], programs: Programs, python: nep.node
 ) -> None:
     topics = [f"from_{language}" for language in LANGUAGES]

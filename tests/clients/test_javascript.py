@@ -185,7 +185,7 @@ def test_callback_of_the_listing_receives_the_message(python, master, tmp_path):
         ("robot/description", {"name": "Pepper"}),
     ],
 )
-def test_payloads_arrive_unchanged_both_ways(program, python, msg_type, payload):
+def test_payloads_are_received_unchanged_in_both_directions(program, python, msg_type, payload):
     received = program.do("subscriber", topic="to_js", type=msg_type)["sub"]
     python.new_pub("to_js", msg_type).publish(payload)
     assert program.wait(lambda messages: len(messages) == 1)
@@ -204,7 +204,7 @@ def test_payloads_arrive_unchanged_both_ways(program, python, msg_type, payload)
     assert subscriber.listen(True) == (True, payload)
 
 
-def test_pictures_arrive_both_ways(program, python):
+def test_pictures_are_exchanged_in_both_directions(program, python):
     numpy, cv2 = pytest.importorskip("numpy"), pytest.importorskip("cv2")
     picture = numpy.arange(48, dtype="uint8").reshape(4, 4, 3)
     program.do("subscriber", topic="to_js", type="image")
@@ -220,7 +220,7 @@ def test_pictures_arrive_both_ways(program, python):
     assert numpy.array_equal(received, picture)
 
 
-def test_bursts_arrive_in_order_both_ways(program, python):
+def test_bursts_are_received_in_order_in_both_directions(program, python):
     program.do("subscriber", topic="to_js", type="json")
     publisher = python.new_pub("to_js", "json")
     for n in range(5000):
@@ -261,7 +261,7 @@ def test_patterns_match_later_topics(program, python):
     }  # fmt: skip
 
 
-def test_services_are_called_both_ways(program, python):
+def test_services_are_called_in_both_directions(program, python):
     program.do("serve", service="/echo")
     assert python.new_client("/echo").call({"a": [1, 2]}) == {"a": [1, 2]}
 
@@ -404,7 +404,7 @@ def answered(questions: nep.Publisher, answers: nep.Subscriber) -> bool:
     return is_there
 
 
-def test_declared_types_are_described_as_in_python(tmp_path):
+def test_declared_types_match_those_of_python(tmp_path):
     robot = parse(json.loads(run_script(ALL_TYPES, tmp_path).stdout))
     (go, _stop) = robot.actions
     assert [each.kind for each in go.parameters] == [
@@ -418,7 +418,7 @@ def test_declared_types_are_described_as_in_python(tmp_path):
     assert robot.events[0].filters == ("side",)
 
 
-def test_robot_passes_the_contract_of_drivers(tmp_path):
+def test_robot_passes_driver_contract(tmp_path):
     example = (PACKAGE / "examples" / "turntable.mjs").read_text(encoding="utf-8")
     command, program = prepared(example, tmp_path, "turntable.mjs")
     contract = [sys.executable, "-m", "pytest", "-q", "-n0", "-p", "no:cacheprovider"]
@@ -435,7 +435,7 @@ def test_robot_passes_the_contract_of_drivers(tmp_path):
     assert "skipped" not in done.stdout
 
 
-def test_library_conforms_to_the_wire():
+def test_library_conforms_to_wire_protocol():
     listed = nep_command("wire", "check", "--list", "--json")
     rules = [each["id"] for each in json.loads(listed) if each["id"] not in SLOW_RULES]
     chosen = [word for rule in rules for word in ("--rule", rule)]

@@ -16,19 +16,19 @@ from tests.robots.driver.test_rize_dialect import (
     SAY,
     Speaker,
     primitive,
-    test_commands_for_other_robots_are_left_alone,
-    test_rize_gets_its_own_object_back,
-    test_rize_is_told_of_a_stop_and_can_cancel,
-    test_several_primitives_are_one_answer_and_numbers_come_as_text_and_go_by_name,
-    test_what_rize_can_not_have_is_a_failure,
+    test_commands_for_other_robots_are_ignored,
+    test_rize_receives_its_command_back_with_the_result,
+    test_several_primitives_are_answered_once_with_text_numbers_and_named_inputs,
+    test_stop_is_reported_to_rize_and_rize_can_cancel,
+    test_unsupported_rize_command_is_answered_with_failure,
 )
 
 __all__ = [
-    "test_commands_for_other_robots_are_left_alone",
-    "test_rize_gets_its_own_object_back",
-    "test_rize_is_told_of_a_stop_and_can_cancel",
-    "test_several_primitives_are_one_answer_and_numbers_come_as_text_and_go_by_name",
-    "test_what_rize_can_not_have_is_a_failure",
+    "test_commands_for_other_robots_are_ignored",
+    "test_rize_receives_its_command_back_with_the_result",
+    "test_several_primitives_are_answered_once_with_text_numbers_and_named_inputs",
+    "test_stop_is_reported_to_rize_and_rize_can_cancel",
+    "test_unsupported_rize_command_is_answered_with_failure",
 ]
 pytestmark = NEEDS_NODE
 TURTLE = """\
@@ -171,7 +171,7 @@ def speaker(turtle: Turtle) -> Speaker:
     )
 
 
-def test_input_is_converted_by_the_action(speaker: Speaker, turtle: Turtle) -> None:
+def test_action_converts_its_input_and_rejects_invalid_values(speaker: Speaker, turtle: Turtle) -> None:
     good, bad = primitive("mode", "rest"), primitive("mode", "wake_up")
     answers = [speaker.command(good, id="1"), speaker.command(bad, id="2")]
     expected = [{**answers[0], "state": "success"}, {**answers[1], "state": "failure"}]
@@ -179,7 +179,7 @@ def test_input_is_converted_by_the_action(speaker: Speaker, turtle: Turtle) -> N
     assert turtle.done() == [["rest", "sitting"]]
 
 
-def test_wait_is_known_and_a_stop_is_answered(speaker: Speaker) -> None:
+def test_wait_primitive_runs_and_stop_is_answered(speaker: Speaker) -> None:
     wait = speaker.command(primitive("wait", "0.01"), id="1")
     assert speaker.answered() == [{**wait, "state": "success"}]
     long = speaker.command([SAY, primitive("wait", "600")], id="2")
@@ -189,7 +189,7 @@ def test_wait_is_known_and_a_stop_is_answered(speaker: Speaker) -> None:
     assert {**stop, "state": "success"} in answers
 
 
-def test_robot_is_announced_to_rize_and_fills_the_blackboard(turtle: Turtle) -> None:
+def test_robot_is_announced_to_rize_and_updates_the_blackboard(turtle: Turtle) -> None:
     eventually(lambda: turtle.events == [{"robot": "ready", "name": "Turtle"}])
     turtle.blackboard.clear()
     turtle.change(bump="left")

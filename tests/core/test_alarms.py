@@ -24,7 +24,7 @@ def alert(session: Session, rule: AlarmRule):
     return next((each for each in session.alerts.active if each.id == f"alarm:{rule.id}"), None)
 
 
-def test_a_value_brings_an_alarm_on_which_calls_and_sends(session: Session) -> None:
+def test_alarm_triggered_by_a_value_calls_a_service_and_publishes(session: Session) -> None:
     asked, answer = [], "fine"
 
     def restart(request: object) -> object:
@@ -67,7 +67,7 @@ def test_a_value_brings_an_alarm_on_which_calls_and_sends(session: Session) -> N
         assert record.lasted_s is not None
 
 
-def test_an_alarm_moves_a_real_robot_only_after_a_yes(session: Session, master) -> None:
+def test_alarm_moves_a_real_robot_only_after_confirmation(session: Session, master) -> None:
     moved: list[tuple[object, str]] = []
     session.alarms.on_moved = lambda robots, by: moved.append((robots, by))
     rule = AlarmRule("d", BELOW, (AlarmAction("send", TOPIC, {"op": "invoke"}),))
@@ -99,7 +99,7 @@ def test_an_alarm_moves_a_real_robot_only_after_a_yes(session: Session, master) 
         assert moved == [(("Rover",), "alarm")]
 
 
-def test_an_alarm_without_a_banner_is_among_the_alerts_only(session: Session) -> None:
+def test_alarm_without_banner_is_shown_only_in_the_alert_list(session: Session) -> None:
     with nep.node("robot") as node:
         publisher = node.new_pub("/distance", "json")
         rule = AlarmRule("d", BELOW, ())
@@ -135,7 +135,7 @@ def test_alarms_and_their_history_survive_a_restart(tmp_path: Path) -> None:
     second.close()
 
 
-def test_no_more_alarms_are_made_than_a_file_holds(tmp_path: Path, monkeypatch) -> None:
+def test_number_of_alarms_is_limited_to_the_file_capacity(tmp_path: Path, monkeypatch) -> None:
     monkeypatch.setattr("app.core.alarms.MOST_ALARMS", 5)
     session = at_rest(tmp_path)
     for _ in range(5):
@@ -155,7 +155,7 @@ def test_no_more_alarms_are_made_than_a_file_holds(tmp_path: Path, monkeypatch) 
     assert len(read_alarms(tmp_path / FILE).rules) == 5
 
 
-def test_an_alarm_that_is_on_is_told_though_the_history_has_forgotten_it(tmp_path: Path) -> None:
+def test_active_alarm_is_shown_even_if_its_history_record_was_evicted(tmp_path: Path) -> None:
     session = at_rest(tmp_path)
     rule = AlarmRule("d", BELOW, (AlarmAction("banner"),))
     session.alarms.put(rule)
@@ -170,7 +170,7 @@ def test_an_alarm_that_is_on_is_told_though_the_history_has_forgotten_it(tmp_pat
 
 
 @pytest.mark.parametrize("data", [b"{oops", b"\xff", b"[]", b""])
-def test_a_damaged_file_is_kept_beside_and_told(tmp_path: Path, data: bytes) -> None:
+def test_damaged_file_is_backed_up_and_reported(tmp_path: Path, data: bytes) -> None:
     (tmp_path / FILE).write_bytes(data)
     session = at_rest(tmp_path)
     assert session.alarms.rules == ()
@@ -182,7 +182,7 @@ def test_a_damaged_file_is_kept_beside_and_told(tmp_path: Path, data: bytes) -> 
     assert len(read_alarms(tmp_path / FILE).rules) == 1
 
 
-def test_of_a_file_with_one_wrong_alarm_the_others_are_watched(tmp_path: Path) -> None:
+def test_invalid_alarm_in_the_file_does_not_disable_the_others(tmp_path: Path) -> None:
     text = json.loads(alarms_text([AlarmRule("good", BELOW)]))
     text["alarms"].append({"when": {"topic": "/t", "is": "sielnt"}})
     (tmp_path / FILE).write_text(json.dumps(text), encoding="utf-8")
@@ -192,7 +192,7 @@ def test_of_a_file_with_one_wrong_alarm_the_others_are_watched(tmp_path: Path) -
     session.close()
 
 
-def test_the_file_of_a_newer_version_stays_as_it_is(tmp_path: Path) -> None:
+def test_file_of_a_newer_version_is_not_modified(tmp_path: Path) -> None:
     data = b'{"format": 2, "alarms": [], "more": true}'
     (tmp_path / FILE).write_bytes(data)
     session = at_rest(tmp_path)
@@ -202,7 +202,7 @@ def test_the_file_of_a_newer_version_stays_as_it_is(tmp_path: Path) -> None:
     assert not (tmp_path / "alarms.damaged.json").exists()
 
 
-def test_what_waited_too_long_for_a_master_is_not_sent(tmp_path: Path) -> None:
+def test_alarm_message_expires_if_no_master_is_found_in_time(tmp_path: Path) -> None:
     now = [0.0]
     session = Session(Settings(tmp_path), address="127.0.0.1:1", start_processes=False, clock=lambda: now[0])
     jobs = []

@@ -7,7 +7,7 @@ import pytest
 from app.core.alerts import Alerts
 
 
-def test_the_worst_is_first_then_the_oldest() -> None:
+def test_alerts_are_sorted_by_severity_then_age() -> None:
     times = iter([1.0, 2.0, 3.0, 4.0])
     alerts = Alerts(lambda: next(times))
     alerts.put("a", "info", "a")
@@ -17,7 +17,7 @@ def test_the_worst_is_first_then_the_oldest() -> None:
     assert [alert.id for alert in alerts.active] == ["c", "b", "d", "a"]
 
 
-def test_said_again_it_counts_and_keeps_its_age() -> None:
+def test_repeated_alert_updates_its_count_and_keeps_its_start_time() -> None:
     times = iter([1.0, 9.0])
     alerts = Alerts(lambda: next(times))
     alerts.put("a", "warn", "one message")
@@ -26,7 +26,7 @@ def test_said_again_it_counts_and_keeps_its_age() -> None:
     assert (alert.count, alert.title, alert.since_s) == (5, "five messages", 1.0)
 
 
-def test_saying_the_same_without_a_count_changes_nothing() -> None:
+def test_repeated_alert_with_zero_count_changes_nothing() -> None:
     alerts = Alerts(lambda: 1.0)
     alerts.put("a", "warn", "same")
     revision = alerts.revision
@@ -34,7 +34,7 @@ def test_saying_the_same_without_a_count_changes_nothing() -> None:
     assert alerts.revision == revision
 
 
-def test_a_cured_alert_is_gone_and_its_return_is_shown_again() -> None:
+def test_resolved_alert_is_removed_and_shown_again_when_it_recurs() -> None:
     alerts = Alerts(lambda: 1.0)
     alerts.put("a", "warn", "a")
     alerts.dismiss("a")
@@ -46,7 +46,7 @@ def test_a_cured_alert_is_gone_and_its_return_is_shown_again() -> None:
     assert not alerts.dismissed("a")
 
 
-def test_cure_all_takes_a_prefix() -> None:
+def test_cure_all_removes_alerts_by_prefix() -> None:
     alerts = Alerts(lambda: 1.0)
     for id in ("message:/a", "message:/b", "master"):
         alerts.put(id, "warn", id)
@@ -54,6 +54,6 @@ def test_cure_all_takes_a_prefix() -> None:
     assert [alert.id for alert in alerts.active] == ["master"]
 
 
-def test_an_unknown_severity_is_refused() -> None:
+def test_unknown_severity_is_rejected() -> None:
     with pytest.raises(ValueError, match="no severity 'bad'"):
         Alerts().put("a", "bad", "a")

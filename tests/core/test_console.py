@@ -9,7 +9,7 @@ from nep.messages.message import Message
 from nep.nodes.log_handler import LOG_TOPIC, LOG_TYPE
 
 
-def test_it_keeps_the_newest_records_in_order() -> None:
+def test_console_keeps_the_newest_records_in_order() -> None:
     console = Console(lambda: 5.0, capacity=3)
     for number in range(5):
         console.add("info", "test", str(number))
@@ -18,13 +18,13 @@ def test_it_keeps_the_newest_records_in_order() -> None:
     assert console.records[0].stamp_s == 5.0
 
 
-def test_a_very_long_text_is_cut_and_says_how_long_it_was() -> None:
+def test_long_text_is_truncated_and_shows_its_length() -> None:
     console = Console()
     console.add("info", "test", "x" * (TEXT_LIMIT + 10))
     assert console.records[0].text.endswith(f"… ({TEXT_LIMIT + 10} characters)")
 
 
-def test_clear_forgets_all() -> None:
+def test_clear_removes_all_records() -> None:
     console = Console()
     console.add("warn", "test", "a")
     console.clear()
@@ -46,7 +46,7 @@ def record(**given: object) -> Sent:
     return Sent(LOG_TOPIC, orjson.dumps(given), "json", LOG_TYPE, stamp_ns=7_000_000_000)
 
 
-def test_records_of_the_bus_are_decoded_when_somebody_reads_them() -> None:
+def test_log_records_are_decoded_lazily() -> None:
     console = Console(lambda: 5.0)
     console.add("info", "studio", "first")
     sent = record(
@@ -64,7 +64,7 @@ def test_records_of_the_bus_are_decoded_when_somebody_reads_them() -> None:
     assert (console.revision, sent.reads) == (3, 1)  # reading is no change, and done once
 
 
-def test_what_the_window_was_too_slow_for_is_counted() -> None:
+def test_dropped_records_are_counted() -> None:
     console = Console()
     console.add_messages([record(text="newest")], dropped=744)
     console.add_messages([], dropped=1)
@@ -76,7 +76,7 @@ def test_what_the_window_was_too_slow_for_is_counted() -> None:
     assert console.left_out == 745
 
 
-def test_a_program_that_runs_here_is_not_heard_twice() -> None:
+def test_records_of_a_local_program_are_not_duplicated() -> None:
     console = Console()
     console.leave_out(None)
     console.leave_out(77)
@@ -84,7 +84,7 @@ def test_a_program_that_runs_here_is_not_heard_twice() -> None:
     assert [line.text for line in console.records] == ["theirs", "unsaid"]
 
 
-def test_whatever_comes_on_the_topic_is_one_line_or_an_alert_elsewhere() -> None:
+def test_malformed_log_messages_are_shown_as_one_record_or_reported_as_alerts() -> None:
     console = Console(lambda: 5.0)
     console.add_messages([
         Message(LOG_TOPIC, b"{oops", "json", LOG_TYPE),
@@ -97,7 +97,7 @@ def test_whatever_comes_on_the_topic_is_one_line_or_an_alert_elsewhere() -> None
     assert long.text.endswith(f"… ({TEXT_LIMIT + 1} characters)")
 
 
-def test_a_ring_that_is_full_of_unread_records_keeps_the_newest() -> None:
+def test_full_ring_of_unread_records_keeps_the_newest() -> None:
     console = Console(capacity=3)
     console.add_messages([record(text=str(number)) for number in range(10)])
     console.add("info", "studio", "end")

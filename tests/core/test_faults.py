@@ -44,7 +44,9 @@ def written(folder: Path) -> str:
 # -- said once -------------------------------------------------------------------------------------
 
 
-def test_the_same_fault_is_said_once_then_with_its_count(log: logging.Logger, tmp_path: Path) -> None:
+def test_repeated_fault_is_logged_at_increasing_intervals_with_its_count(
+    log: logging.Logger, tmp_path: Path
+) -> None:
     for number in range(1000):
         try:
             int(f"x{number}")  # another text each time, raised at the same place
@@ -60,7 +62,7 @@ def test_the_same_fault_is_said_once_then_with_its_count(log: logging.Logger, tm
     ]
 
 
-def test_other_places_and_texts_are_other_faults() -> None:
+def test_faults_are_distinguished_by_place_and_text() -> None:
     once = RepeatFilter()
 
     def said(text: str) -> bool:
@@ -75,7 +77,7 @@ def test_other_places_and_texts_are_other_faults() -> None:
 # -- the file --------------------------------------------------------------------------------------
 
 
-def test_the_file_is_the_users_own_and_bounded(log: logging.Logger, tmp_path: Path) -> None:
+def test_log_file_is_private_and_rotated(log: logging.Logger, tmp_path: Path) -> None:
     for number in range(60):
         log.error("%d %s", number, "x" * 100_000)
     files = sorted(path.name for path in (tmp_path / "log").iterdir())
@@ -85,7 +87,7 @@ def test_the_file_is_the_users_own_and_bounded(log: logging.Logger, tmp_path: Pa
         assert {path.stat().st_mode & 0o777 for path in (tmp_path / "log").iterdir()} == {0o600}
 
 
-def test_an_update_writes_on_in_the_same_file_and_says_which_version_it_is(
+def test_log_file_is_appended_after_an_update_and_names_the_version(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     for version in ("0.0.9", "0.1.0"):
@@ -101,14 +103,14 @@ def test_an_update_writes_on_in_the_same_file_and_says_which_version_it_is(
     ]  # fmt: skip
 
 
-def test_each_file_says_the_version(log: logging.Logger, tmp_path: Path) -> None:
+def test_each_log_file_names_the_version(log: logging.Logger, tmp_path: Path) -> None:
     for number in range(12):
         log.error("%d %s", number, "x" * 100_000)
     for path in (tmp_path / "log").iterdir():
         assert f"NEP Studio {faults.__version__} writes" in path.read_text("utf-8").partition("\n")[0]
 
 
-def test_a_folder_that_can_not_be_made_ends_nothing(tmp_path: Path) -> None:
+def test_failure_to_create_the_log_folder_is_ignored(tmp_path: Path) -> None:
     (tmp_path / "log").write_text("a file", "utf-8")
     handler = LogFile(tmp_path / "log")
     record = logging.LogRecord("studio", logging.ERROR, "", 0, "a fault \ud800", (), None)
@@ -130,7 +132,7 @@ def heard(monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture) -> 
     return caplog
 
 
-def test_what_is_raised_anywhere_is_logged(heard: pytest.LogCaptureFixture) -> None:
+def test_unhandled_exceptions_are_logged(heard: pytest.LogCaptureFixture) -> None:
     class Ends:
         def __del__(self) -> None:
             raise OSError("while it ends")
@@ -151,7 +153,7 @@ def test_what_is_raised_anywhere_is_logged(heard: pytest.LogCaptureFixture) -> N
     ]
 
 
-def test_an_end_that_is_meant_is_no_fault(
+def test_system_exit_and_keyboard_interrupt_are_not_logged_as_faults(
     heard: pytest.LogCaptureFixture, capsys: pytest.CaptureFixture[str]
 ) -> None:
     thread = threading.Thread(target=sys.exit)
@@ -162,7 +164,7 @@ def test_an_end_that_is_meant_is_no_fault(
     assert "KeyboardInterrupt" in capsys.readouterr().err
 
 
-def test_an_exception_is_one_line() -> None:
+def test_exception_is_formatted_on_one_line() -> None:
     assert error_words(ValueError("two\nlines")) == "ValueError: two lines"
     assert error_words(KeyError()) == "KeyError"
 
@@ -180,7 +182,7 @@ def raising(*_given: object) -> object:
     return int("x")
 
 
-def test_an_event_that_raises_takes_no_other_with_it(
+def test_event_handler_that_raises_does_not_block_other_events(
     session: Session, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
 ) -> None:
     stopped: list[object] = []
@@ -221,7 +223,7 @@ def test_an_event_that_raises_takes_no_other_with_it(
         "console.add_messages",
     ],
 )
-def test_whatever_raises_in_a_tick_a_stop_and_messages_arrive(
+def test_stop_and_messages_are_processed_when_part_of_a_tick_raises(
     session: Session, monkeypatch: pytest.MonkeyPatch, place: str
 ) -> None:
     part, _, name = place.partition(".")
@@ -242,7 +244,7 @@ def test_whatever_raises_in_a_tick_a_stop_and_messages_arrive(
     watch.close()
 
 
-def test_the_alert_of_a_fault_is_cured_when_what_failed_goes_well(
+def test_fault_alert_is_resolved_after_the_operation_succeeds_for_some_seconds(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     now = [100.0]
@@ -275,7 +277,7 @@ def test_the_alert_of_a_fault_is_cured_when_what_failed_goes_well(
     assert not session.alerts.has("studio")
 
 
-def test_a_fault_that_nothing_can_repeat_is_over_after_a_while(session: Session) -> None:
+def test_fault_alert_expires_if_the_fault_cannot_recur(session: Session) -> None:
     now = [0.0]
     alerts = session.alerts
     faults = FaultAlerts(alerts, lambda: now[0])
@@ -289,7 +291,9 @@ def test_a_fault_that_nothing_can_repeat_is_over_after_a_while(session: Session)
     assert not alerts.has("studio")
 
 
-def test_closing_ends_everything_whatever_fails(session: Session, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_close_releases_every_part_even_if_some_raise(
+    session: Session, monkeypatch: pytest.MonkeyPatch
+) -> None:
     ended: list[str] = []
     for part in ("fleet", "images", "doctor", "launcher", "remote_access"):
         monkeypatch.setattr(getattr(session, part), "close", partial(ended.append, part))
@@ -299,7 +303,7 @@ def test_closing_ends_everything_whatever_fails(session: Session, monkeypatch: p
     assert ended == ["fleet", "images", "doctor", "launcher", "remote_access"]
 
 
-def test_the_source_outlives_what_its_jobs_and_sinks_raise(master: Master) -> None:
+def test_source_thread_survives_exceptions_in_jobs_and_sinks(master: Master) -> None:
     """A thread that ended would leave Studio deaf, and the robots without Stop."""
     events: list[object] = []
     came = threading.Event()
@@ -326,7 +330,7 @@ def test_the_source_outlives_what_its_jobs_and_sinks_raise(master: Master) -> No
         source.close()
 
 
-def test_the_source_outlives_a_graph_that_nobody_can_take(
+def test_source_thread_survives_an_exception_in_the_graph_handler(
     master: Master, caplog: pytest.LogCaptureFixture
 ) -> None:
     seen: list[object] = []
@@ -362,7 +366,7 @@ class Unsayable:
         (Unsayable(), None, "Unsayable (its arguments can't be formatted: ValueError)"),
     ],
 )
-def test_who_logs_what_can_not_be_said_goes_on_and_the_text_is_kept(
+def test_log_call_that_cannot_be_formatted_does_not_raise_and_keeps_its_text(
     tmp_path: Path, text: object, value: object, said: str
 ) -> None:
     """Any library may do so; Python's own handlers survive it, too."""

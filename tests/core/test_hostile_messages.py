@@ -87,7 +87,7 @@ def test_session_survives_every_hostile_message(session: Session, evil: nep.Node
         watch.close()
 
 
-def test_descriptions_are_read_or_refused_with_a_sentence():
+def test_descriptions_are_parsed_or_rejected_with_a_message():
     described = td_for(LAMP.thing_model, "Lamp")
     sentences: list[str] = []
     seen: set[type] = set()

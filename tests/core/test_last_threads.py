@@ -26,18 +26,18 @@ def ran(name: str, *, daemon: bool) -> subprocess.CompletedProcess[str]:
     )
 
 
-def test_the_process_ends_and_the_log_says_without_whom() -> None:
+def test_process_exits_and_logs_the_threads_still_running() -> None:
     done = ran("never ends", daemon=False)
     assert (done.returncode, done.stdout) == (3, "kept\n")
     assert "exiting while threads are still running: 'never ends'" in done.stderr
 
 
-def test_a_daemon_is_nobody_to_wait_for() -> None:
+def test_daemon_threads_are_not_waited_for() -> None:
     done = ran("a daemon", daemon=True)
     assert (done.returncode, done.stdout, done.stderr) == (3, "kept\n", "")
 
 
-def test_one_that_ends_in_time_is_waited_for() -> None:
+def test_thread_that_ends_in_time_is_joined() -> None:
     go, gone = threading.Event(), threading.Event()
 
     def last() -> None:

@@ -43,7 +43,7 @@ def on(monkeypatch: pytest.MonkeyPatch, system: type[platformdirs.api.PlatformDi
         ),
     ],
 )
-def test_they_are_where_each_system_has_them(
+def test_log_and_state_folders_follow_platform_conventions(
     monkeypatch: pytest.MonkeyPatch, system: type[platformdirs.api.PlatformDirsABC], log: str, state: str
 ) -> None:
     on(monkeypatch, system)
@@ -52,6 +52,8 @@ def test_they_are_where_each_system_has_them(
     assert home().name == data_home().name == "nep-studio"
 
 
-def test_one_folder_can_have_all_of_it(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+def test_environment_variable_puts_settings_state_and_logs_into_one_folder(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
     monkeypatch.setenv("NEP_STUDIO_HOME", str(tmp_path))
     assert (log_folder(), state_home(), home()) == (tmp_path / "log", tmp_path, tmp_path)

@@ -20,13 +20,13 @@ def program(tmp_path: Path) -> Path:
     return made
 
 
-def test_nothing_became_of_it(program: Path) -> None:
+def test_unchanged_program_is_reported_as_unchanged(program: Path) -> None:
     own = OwnProgram(program)
     program.read_bytes()
     assert own.fate() == ""
 
 
-def test_an_update_takes_its_place_with_the_same_size_and_time(program: Path) -> None:
+def test_update_with_same_size_and_time_is_detected_as_replaced(program: Path) -> None:
     own = OwnProgram(program)
     new = program.with_name("nep-studio.dpkg-new")
     new.write_bytes(b"new")
@@ -35,7 +35,7 @@ def test_an_update_takes_its_place_with_the_same_size_and_time(program: Path) ->
     assert own.fate() == "replaced"
 
 
-def test_it_is_gone_and_comes_back_as_another(program: Path) -> None:
+def test_removed_program_is_detected_and_a_new_one_counts_as_replaced(program: Path) -> None:
     own = OwnProgram(program)
     program.rename(program.with_name("kept, so that its number is not given again"))
     assert own.fate() == "gone"
@@ -43,11 +43,11 @@ def test_it_is_gone_and_comes_back_as_another(program: Path) -> None:
     assert own.fate() == "replaced"
 
 
-def test_from_source_there_is_no_program_to_watch() -> None:
+def test_running_from_source_has_no_program_to_watch() -> None:
     assert OwnProgram().fate() == ""
 
 
-def test_a_person_is_told_and_the_alert_goes_with_its_cause(
+def test_alert_about_a_changed_program_is_shown_and_resolved_with_its_cause(
     program: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr("sys.frozen", True, raising=False)
@@ -70,7 +70,7 @@ def test_a_person_is_told_and_the_alert_goes_with_its_cause(
         session.close()
 
 
-def test_what_became_of_a_behaviour_is_still_told_after_the_look_at_studios_own_program(
+def test_check_of_the_program_file_preserves_the_alert_of_a_behaviour(
     tmp_path: Path,
 ) -> None:
     session = Session(Settings(tmp_path / "home"), journal_folder=tmp_path / "j", start_processes=False)
@@ -84,7 +84,7 @@ def test_what_became_of_a_behaviour_is_still_told_after_the_look_at_studios_own_
         session.close()
 
 
-def test_studio_starts_again_in_the_language_of_the_settings() -> None:
+def test_restart_uses_the_language_of_the_settings() -> None:
     environ = {"NEP_LANG": "en", "LANGUAGE": "es", "NEP_MASTER": "127.0.0.1:7781"}
     assert fresh_environ(environ) == {"NEP_MASTER": "127.0.0.1:7781"}
     assert studio_command("dark") == [sys.executable, "-m", "app", "--theme", "dark"]

@@ -45,7 +45,7 @@ class Lamp:
 LAMP = Kind("lamp", "Lamp", Lamp)
 
 
-def test_topics_appear_with_their_figures_and_vanish(session: Session) -> None:
+def test_topics_appear_with_their_statistics_and_disappear(session: Session) -> None:
     with nep.node("talker") as node:
         publisher = node.new_pub("/hello", "json")
         tick_until(session, lambda: "/hello" in session.topics)
@@ -61,7 +61,7 @@ def test_topics_appear_with_their_figures_and_vanish(session: Session) -> None:
     tick_until(session, lambda: session.topics["/hello"].gone_s is not None)
 
 
-def test_nothing_is_subscribed_until_somebody_looks(session: Session) -> None:
+def test_topics_are_subscribed_only_while_watched(session: Session) -> None:
     with nep.node("talker") as node:
         publisher = node.new_pub("/hello", "json")
         tick_until(session, lambda: "/hello" in session.topics)
@@ -78,7 +78,7 @@ def test_nothing_is_subscribed_until_somebody_looks(session: Session) -> None:
         assert session.topics["/hello"].newest is None
 
 
-def test_a_topic_may_be_watched_before_it_is_there(session: Session) -> None:
+def test_topic_can_be_watched_before_it_exists(session: Session) -> None:
     with session.watch("/later"), nep.node("talker") as node:
         publisher = node.new_pub("/later", "json")
         tick_until(session, lambda: publisher.subscribers == 1)
@@ -86,7 +86,7 @@ def test_a_topic_may_be_watched_before_it_is_there(session: Session) -> None:
         tick_until(session, lambda: session.topics["/later"].received == 1)
 
 
-def test_bad_messages_are_one_alert_that_a_good_one_cures(session: Session) -> None:
+def test_undecodable_messages_raise_one_alert_that_a_valid_message_resolves(session: Session) -> None:
     with session.watch("/bad"), nep.node("talker") as node:
         publisher = node.new_pub("/bad", "json")
         tick_until(session, lambda: publisher.subscribers == 1)
@@ -101,7 +101,7 @@ def test_bad_messages_are_one_alert_that_a_good_one_cures(session: Session) -> N
         tick_until(session, lambda: not session.alerts.active)
 
 
-def test_the_virtual_robot_is_found_watched_tried_and_stopped(session: Session) -> None:
+def test_virtual_robot_is_found_watched_tried_and_stopped(session: Session) -> None:
     session.launcher.start_virtual_robot("Pepper")
     tick_until(session, lambda: session.fleet.connected)
     link = session.fleet.link("Pepper")
@@ -131,7 +131,7 @@ def test_the_virtual_robot_is_found_watched_tried_and_stopped(session: Session) 
         session.fleet.invoke("Pepper", "fly", {})
 
 
-def test_a_virtual_robot_that_died_is_told_with_its_next_step(session: Session) -> None:
+def test_alert_about_a_crashed_virtual_robot_offers_a_restart(session: Session) -> None:
     session.launcher.start_virtual_robot("Pepper")
     tick_until(session, lambda: session.fleet.connected)
     session.launcher._robots["Pepper"][0].kill()
@@ -143,7 +143,7 @@ def test_a_virtual_robot_that_died_is_told_with_its_next_step(session: Session) 
     tick_until(session, lambda: not session.alerts.has("companion:Pepper"))
 
 
-def test_a_virtual_robot_that_hangs_can_be_connected_again(session: Session) -> None:
+def test_hung_virtual_robot_can_be_reconnected(session: Session) -> None:
     session.launcher.start_virtual_robot("Pepper")
     tick_until(session, lambda: session.fleet.connected)
     hung = session.launcher._robots["Pepper"][0]
@@ -154,7 +154,7 @@ def test_a_virtual_robot_that_hangs_can_be_connected_again(session: Session) -> 
     tick_until(session, lambda: session.fleet.connected)
 
 
-def test_a_journal_that_cant_be_written_is_an_alert_until_it_can(session: Session, tmp_path: Path) -> None:
+def test_unwritable_journal_raises_an_alert_until_it_is_writable(session: Session, tmp_path: Path) -> None:
     folder = tmp_path / "journal"
     folder.write_text("a file is in its place")
     session.document.edited({"blocks": {"blocks": []}, "edit": 1})
@@ -164,7 +164,7 @@ def test_a_journal_that_cant_be_written_is_an_alert_until_it_can(session: Sessio
     tick_until(session, lambda: not session.alerts.has("journal"))
 
 
-def test_a_wrong_input_is_refused_before_it_is_sent(session: Session) -> None:
+def test_invalid_input_is_rejected_before_it_is_sent(session: Session) -> None:
     with nep.node("lamp") as node:
         driver = Driver(LAMP, "Lamp", node)
         driver.start()
@@ -178,7 +178,7 @@ def test_a_wrong_input_is_refused_before_it_is_sent(session: Session) -> None:
             driver.close()
 
 
-def test_an_example_runs_and_stop_is_proven(session: Session) -> None:
+def test_example_runs_and_its_stop_is_confirmed(session: Session) -> None:
     session.launcher.start_virtual_robot("Pepper")
     tick_until(session, lambda: session.fleet.connected and session.stopper and session.stopper.robots)
     session.document.example(EXAMPLES / "1-greeting.nepb")
@@ -203,7 +203,7 @@ def test_an_example_runs_and_stop_is_proven(session: Session) -> None:
     assert session.runs.view().state == "proven"
 
 
-def test_a_virtual_robot_whose_process_is_gone_needs_no_hand_to_switch_it_off(session: Session) -> None:
+def test_virtual_robot_whose_process_ended_needs_no_manual_switch_off(session: Session) -> None:
     session.launcher.start_virtual_robot("Pepper")
     tick_until(session, lambda: session.fleet.connected and session.stopper and session.stopper.robots)
     session.document.example(EXAMPLES / "1-greeting.nepb")
@@ -218,7 +218,7 @@ def test_a_virtual_robot_whose_process_is_gone_needs_no_hand_to_switch_it_off(se
     assert session.launcher.ended == frozenset()
 
 
-def test_a_program_with_an_error_marks_its_block_and_does_not_run(session: Session) -> None:
+def test_program_with_an_error_marks_its_block_and_does_not_run(session: Session) -> None:
     block = {"type": "control_wait", "id": "w", "inputs": {}}
     started = {"type": "events_started", "id": "s", "next": {"block": block}}
     session.document.edited({"blocks": {"languageVersion": 0, "blocks": [started]}})
@@ -227,7 +227,7 @@ def test_a_program_with_an_error_marks_its_block_and_does_not_run(session: Sessi
     assert session.runs.view().state == "ready"
 
 
-def test_a_killed_program_still_stops_its_robots(session: Session) -> None:
+def test_robots_of_a_killed_program_are_stopped(session: Session) -> None:
     with nep.node("lamp") as node:
         driver = Driver(LAMP, "Lamp", node)
         driver.start()
@@ -253,7 +253,7 @@ def test_a_killed_program_still_stops_its_robots(session: Session) -> None:
             driver.close()
 
 
-def test_the_end_of_a_program_stops_its_own_robots_only(session: Session) -> None:
+def test_end_of_a_program_stops_only_its_own_robots(session: Session) -> None:
     with nep.node("lamps") as node:
         drivers = [Driver(LAMP, name, node) for name in ("Lamp", "Other")]
         for driver in drivers:
@@ -278,7 +278,7 @@ def test_the_end_of_a_program_stops_its_own_robots_only(session: Session) -> Non
                 driver.close()
 
 
-def test_a_robot_that_does_not_answer_is_named_and_run_stays_locked(session: Session) -> None:
+def test_unresponsive_robot_is_named_and_run_stays_disabled(session: Session) -> None:
     with nep.node("mute") as node:
         description = node.new_pub("/Mute/description", "robot/description", latched=True)
         description.publish(td_for(LAMP.thing_model, "Mute"))
@@ -307,7 +307,7 @@ def _number(value: float) -> dict[str, object]:
     return {"type": "values_number", "id": f"n{value}", "fields": {"NUMBER": value}}
 
 
-def test_a_job_on_the_network_that_failed_is_told_in_one_sentence(session: Session) -> None:
+def test_failed_network_job_is_reported_in_one_sentence(session: Session) -> None:
     session._on_event(JobFailed(NO_WATCH, "the master has gone"), 0.0)
     session._on_event(JobFailed("", "nobody asked"), 0.0)
     texts = [record.text for record in session.console.records]

@@ -34,7 +34,7 @@ def listening(session: Session, node: nep.Node) -> None:
     tick_until(session, subscribed)
 
 
-def test_the_first_record_of_a_node_arrives_and_is_nobodys_new_topic(session: Session) -> None:
+def test_first_log_record_of_a_node_arrives_and_the_log_topic_is_not_announced(session: Session) -> None:
     with nep.node("driver") as node:
         listening(session, node)
         node.log.warning("low battery")
@@ -45,7 +45,7 @@ def test_the_first_record_of_a_node_arrives_and_is_nobodys_new_topic(session: Se
     tick_until(session, lambda: "driver left" in told(session, "master"))
 
 
-def test_a_studio_that_starts_late_shows_the_last_errors_once(
+def test_session_that_starts_late_shows_the_last_errors_once(
     master: nep.Master, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setenv("NEP_STUDIO_HOME", str(tmp_path))
@@ -67,7 +67,7 @@ def test_a_studio_that_starts_late_shows_the_last_errors_once(
             late.close()
 
 
-def test_a_storm_of_records_is_bounded_and_counted_exactly(session: Session) -> None:
+def test_flood_of_log_records_is_bounded_and_drops_are_counted_exactly(session: Session) -> None:
     with nep.node("storm") as node:
         listening(session, node)
         for count in range(10_000):
@@ -85,7 +85,7 @@ def test_a_storm_of_records_is_bounded_and_counted_exactly(session: Session) -> 
     assert 0 < len(shown) < 1000
 
 
-def test_what_a_program_prints_stands_there_once_though_it_is_on_the_bus(session: Session) -> None:
+def test_program_output_is_shown_once_even_if_it_is_also_published_as_log(session: Session) -> None:
     heard: list[object] = []
     waits = block("control_wait", SECONDS=number(600))  # who ends at once has a second for its records
 
@@ -111,7 +111,7 @@ def test_what_a_program_prints_stands_there_once_though_it_is_on_the_bus(session
     assert printed() == [(name, "hello"), (name, "7")]
 
 
-def test_alerts_of_the_connection_lead_to_the_doctor(session: Session) -> None:
+def test_connection_alerts_link_to_the_doctor(session: Session) -> None:
     def next_steps(alerts: Alerts) -> dict[str, str | None]:
         return {alert.id: alert.action for alert in alerts.active}
 
@@ -122,7 +122,7 @@ def test_alerts_of_the_connection_lead_to_the_doctor(session: Session) -> None:
     assert {alert.button for alert in session.alerts.active} == {"Open the connection doctor"}
 
 
-def test_the_doctor_ends_with_the_session(session: Session) -> None:
+def test_doctor_ends_with_the_session(session: Session) -> None:
     session.doctor.start()
     session.close()
     assert not any(thread.name == "studio-doctor" for thread in threading.enumerate())

@@ -68,7 +68,7 @@ def said(studio: Studio) -> str:
     return f"buttons {buttons}; the Console {lines}"
 
 
-def test_a_message_is_written_armed_and_sent_until_stop(studio: Studio, address: str) -> None:
+def test_message_composed_by_hand_is_armed_and_published_until_stop(studio: Studio, address: str) -> None:
     fingers = Fingers(studio)
     studio.find("Use the virtual robot", enabled=True)
     studio.screen.key("2", held=["Alt"])

@@ -50,7 +50,7 @@ def texts(studio: Studio) -> list[str]:
     return [each["text"] for each in studio.look() if each["text"]]
 
 
-def test_a_click_in_a_picture_is_heard_as_its_pixel_once_that_is_armed(studio: Studio, address: str) -> None:
+def test_click_in_a_picture_publishes_its_pixel_once_armed(studio: Studio, address: str) -> None:
     studio.find("Use the virtual robot", enabled=True)
     studio.screen.key("2", held=["Alt"])
     studio.says(f"Master {address}", 40)
@@ -97,7 +97,7 @@ def path(tmp_path: Path) -> Path:
     return path
 
 
-def test_a_recording_sends_what_was_chosen_and_a_robot_moves_only_after_asking(
+def test_replay_publishes_selected_topics_and_moves_a_robot_only_after_confirmation(
     start: Callable[..., Studio], address: str, path: Path
 ) -> None:
     studio = start(str(path))

@@ -15,7 +15,7 @@ from tests.e2e.x11 import RIGHT
 pytestmark = pytest.mark.timeout(240)
 
 
-def test_a_right_click_makes_an_alarm_which_tells_and_goes_off(studio: Studio) -> None:
+def test_alarm_created_by_right_click_shows_a_banner_and_clears_by_itself(studio: Studio) -> None:
     with nep.node("talker", wait_s=60.0) as node:
         publisher = node.new_pub("/distance", "json")
         studio.screen.key("2", ["Alt"])

@@ -91,7 +91,7 @@ def height_of_timeline(studio: Studio) -> float:
     return seen[-1]
 
 
-def test_alerts_cover_nothing_and_panels_keep_what_they_show(
+def test_alerts_cover_no_panel_and_panels_keep_their_size(
     start: Callable[..., Studio], master: Master, address: str, held: list[int], tmp_path: Path
 ) -> None:
     folder = tmp_path / "home" / "Recordings"

@@ -46,7 +46,7 @@ def asking(start: Callable[..., Studio], tmp_path: Path) -> Studio:
     return studio
 
 
-def test_who_is_asked_types_and_presses_enter(asking: Studio) -> None:
+def test_question_is_answered_by_typing_and_enter(asking: Studio) -> None:
     asking.screen.type("Ada")
     asking.screen.key("Return")
     asking.says(HELLO)
@@ -54,7 +54,7 @@ def test_who_is_asked_types_and_presses_enter(asking: Studio) -> None:
     assert not asking.all(kind="QuestionCard")
 
 
-def test_pause_holds_the_question_and_stop_takes_it_away(asking: Studio) -> None:
+def test_pause_keeps_the_question_and_stop_removes_it(asking: Studio) -> None:
     asking.screen.type("Ad")
     asking.click("Pause")
     asking.says("Paused at “")
@@ -66,7 +66,7 @@ def test_pause_holds_the_question_and_stop_takes_it_away(asking: Studio) -> None
     assert not asking.all(kind="QuestionCard")
 
 
-def test_who_has_choices_chooses_by_key_and_by_mouse_also_in_the_large_room(
+def test_choice_is_made_by_key_and_by_mouse_also_in_the_large_room(
     start: Callable[..., Studio], tmp_path: Path
 ) -> None:
     last = chooses("Which colour?", ["red", "green", "a blue like the sky"], says_the_answer())
@@ -90,7 +90,7 @@ def test_who_has_choices_chooses_by_key_and_by_mouse_also_in_the_large_room(
     until(lambda: not studio.all(kind="QuestionCard"), "the card goes")
 
 
-def test_stop_takes_choices_away(start: Callable[..., Studio], tmp_path: Path) -> None:
+def test_stop_removes_choices(start: Callable[..., Studio], tmp_path: Path) -> None:
     script = started(chooses("Play?", ["yes", "no"], says_the_answer()))
     studio = start(str(write(tmp_path / "Mine.nepb", script)))
     studio.spot("[data-id=started]")  # a menu that is open when the blocks come is closed by them

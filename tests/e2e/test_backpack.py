@@ -24,7 +24,7 @@ def on_the_backpack(studio: Studio) -> tuple[float, float]:
     return middle(studio.spot(".nepBackpack"))
 
 
-def test_blocks_go_from_one_file_to_another_and_are_there_at_the_next_start(
+def test_backpack_carries_blocks_between_files_and_persists_after_a_restart(
     start: Callable[..., Studio], tmp_path: Path
 ) -> None:
     greeting = write(tmp_path / "Greeting.nepb", started(say("One", say("Two", say("Three")))))

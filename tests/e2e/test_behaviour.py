@@ -30,7 +30,7 @@ def with_robot(start: Callable[..., Studio], tmp_path: Path) -> Callable[[dict],
     return open_script
 
 
-def test_an_error_stands_on_its_block_as_a_sentence(with_robot: Callable[[dict], Studio]) -> None:
+def test_runtime_error_is_shown_as_a_sentence_on_its_block(with_robot: Callable[[dict], Studio]) -> None:
     walk = block("robot_pepper_do_walk", fields={"ROBOT": "Pepper"}, DISTANCE=number(2))
     studio = with_robot(started(walk))
     studio.click("Run", kind="RunButton")
@@ -39,7 +39,7 @@ def test_an_error_stands_on_its_block_as_a_sentence(with_robot: Callable[[dict],
     studio.says("because of an error")
 
 
-def test_pause_step_and_go_on(with_robot: Callable[[dict], Studio], address: str) -> None:
+def test_pause_step_and_resume(with_robot: Callable[[dict], Studio], address: str) -> None:
     studio = with_robot(started(forever(say("One", say("Two")))))
     studio.click("Run", kind="RunButton")
     studio.says("Pepper says “")
@@ -54,7 +54,7 @@ def test_pause_step_and_go_on(with_robot: Callable[[dict], Studio], address: str
     studio.says("Pepper stopped (")
 
 
-def test_the_python_of_the_blocks_can_be_read_and_copied(with_robot: Callable[[dict], Studio]) -> None:
+def test_generated_python_can_be_viewed_and_copied(with_robot: Callable[[dict], Studio]) -> None:
     studio = with_robot(started(say("Good morning")))
     studio.click("Python")
     studio.says("Good morning")
@@ -65,7 +65,7 @@ def test_the_python_of_the_blocks_can_be_read_and_copied(with_robot: Callable[[d
     studio.spot("[data-id=started]")
 
 
-def test_an_example_of_the_start_page_runs_to_its_end(studio: Studio) -> None:
+def test_example_from_the_start_page_runs_to_completion(studio: Studio) -> None:
     studio.click("Use the virtual robot")
     studio.says("Pepper ready", 40)
     studio.choose("File", "Start page")
@@ -78,7 +78,7 @@ def test_an_example_of_the_start_page_runs_to_its_end(studio: Studio) -> None:
     studio.says("Pepper stopped (")
 
 
-def test_a_robot_that_dies_is_missed_and_comes_back(with_robot: Callable[[dict], Studio]) -> None:
+def test_crashed_robot_is_reported_missing_and_reconnects(with_robot: Callable[[dict], Studio]) -> None:
     studio = with_robot(started(forever(turn(30))))
     (robot,) = studio.children("app.robots.simulated")
     robot.kill()
@@ -98,7 +98,7 @@ def test_a_robot_that_dies_is_missed_and_comes_back(with_robot: Callable[[dict],
     studio.says("Pepper stopped (")
 
 
-def test_the_page_that_is_killed_comes_back_with_its_blocks(with_robot: Callable[[dict], Studio]) -> None:
+def test_killed_editor_page_is_restored_with_its_blocks(with_robot: Callable[[dict], Studio]) -> None:
     studio = with_robot(started(say("Good morning")))
     before = set(studio.blocks())
     page = studio.find(kind="QWebEngineView")["pid"]

@@ -15,7 +15,9 @@ from tests.e2e.waiting import until
 pytestmark = pytest.mark.timeout(120)
 
 
-def test_a_copy_is_pasted_after_a_click_on_another_tab(start: Callable[..., Studio], tmp_path: Path) -> None:
+def test_copied_blocks_are_pasted_after_a_click_on_another_tab(
+    start: Callable[..., Studio], tmp_path: Path
+) -> None:
     files = [write(tmp_path / f"{name}.nepb", started(say(name))) for name in ("One", "Two")]
     studio = start(str(files[0]), str(files[1]))
     until(lambda: tabs(studio) == ["One", "Two"], "both files are open", 30)

@@ -27,7 +27,9 @@ def bubbles(studio: Studio) -> list[str]:
 
 
 @pytest.mark.parametrize("theme", ["light"])  # the tries are looked at in the dark one
-def test_who_lost_is_told_and_mended(start: Callable[..., Studio], tmp_path: Path, theme: str) -> None:
+def test_conflicting_scripts_are_marked_and_fixed_from_problems(
+    start: Callable[..., Studio], tmp_path: Path, theme: str
+) -> None:
     walk = block("robot_pepper_do_walk", fields={"ROBOT": "Pepper"}, DISTANCE=number(2))
     path = write(tmp_path / "Fight.nepb", script(turn(300), "one", 56), script(walk, "other", 480))
     studio = start(str(path), "--theme", theme)

@@ -28,7 +28,7 @@ def step(studio: Studio, words: str) -> None:
     studio.find(f"{words}: the next step")
 
 
-def test_six_steps_lead_to_a_robot_that_speaks_turns_and_stops(studio: Studio) -> None:
+def test_first_steps_lead_to_a_robot_that_speaks_turns_and_stops(studio: Studio) -> None:
     studio.says("First steps (five minutes)")  # the very first start offers them
     studio.click("First steps")
     step(studio, "Use the virtual robot")
@@ -59,7 +59,7 @@ def test_six_steps_lead_to_a_robot_that_speaks_turns_and_stops(studio: Studio) -
     studio.says("6 of 6")
 
 
-def test_after_kill_9_the_second_start_does_not_offer_them_again(start: Callable[..., Studio]) -> None:
+def test_first_steps_are_not_offered_again_after_kill_9(start: Callable[..., Studio]) -> None:
     first = start()
     first.says("First steps (five minutes)")
     first.kill()

@@ -35,7 +35,7 @@ def said(studio: Studio) -> str:
     return str(studio.find("Graph of nodes")["description"])
 
 
-def test_a_person_follows_a_topic_from_who_tells_it_to_who_hears_it(
+def test_graph_leads_from_a_topic_publisher_to_its_subscribers(
     start: Callable[..., Studio], tmp_path: Path
 ) -> None:
     studio = start()

@@ -19,7 +19,7 @@ def chosen_first(studio: Studio, words: str) -> None:
     )
 
 
-def test_keys_lead_from_the_page_to_every_command(studio: Studio) -> None:
+def test_command_palette_opened_from_the_page_finds_and_runs_commands(studio: Studio) -> None:
     studio.click("New behaviour")
     studio.point(".blocklySvg", 300, 200)  # the keyboard is in the page now
     studio.screen.key("k", ["Ctrl"])
@@ -47,7 +47,7 @@ def test_keys_lead_from_the_page_to_every_command(studio: Studio) -> None:
     until(lambda: studio.find("Blocks")["rect"][2] == small[2], "the new key works inside the page")
 
 
-def test_stop_is_alive_under_the_palette(studio: Studio) -> None:
+def test_stop_key_works_while_the_palette_is_open(studio: Studio) -> None:
     studio.click("Use the virtual robot")
     studio.says("Pepper ready", 40)
     studio.screen.key("k", ["Ctrl"])

@@ -28,7 +28,7 @@ def run(file: Path, *arguments: str) -> Program:
     return Program("-m", "app", "run", str(file), *arguments)
 
 
-def test_ctrl_c_stops_program_and_robot(pepper: Program, tmp_path: Path) -> None:
+def test_ctrl_c_stops_the_program_and_the_robot(pepper: Program, tmp_path: Path) -> None:
     with run(write(tmp_path / "Turning.nepb", started(forever(turn(300)))), "--robot-wait", "30") as program:
         program.says("Pepper turns left by 300 °", 40)
         program.interrupt()
@@ -41,13 +41,13 @@ def test_ctrl_c_stops_program_and_robot(pepper: Program, tmp_path: Path) -> None
     assert len({state["theta_deg"] for state in heard}) == 1
 
 
-def test_without_its_robot_it_says_so(master: Master, tmp_path: Path) -> None:
+def test_missing_robot_is_reported_with_exit_code_3(master: Master, tmp_path: Path) -> None:
     with run(write(tmp_path / "Hello.nepb", started(say("Hello"))), "--robot-wait", "0.5") as program:
         assert program.wait(20) == 3, program.lines
         program.says("Pepper not found. Switch it on, or start the virtual robot.")
 
 
-def test_a_file_that_is_no_behaviour(master: Master, tmp_path: Path) -> None:
+def test_invalid_behaviour_file_exits_with_code_2_without_traceback(master: Master, tmp_path: Path) -> None:
     (tmp_path / "x.nepb").write_text("{", encoding="utf-8")
     with run(tmp_path / "x.nepb") as program:
         assert program.wait(20) == 2, program.lines

@@ -25,7 +25,9 @@ BIN = f"{TAB}.querySelector('.nepSheet .blocklyBlock') !== null"
 FIGHT = "both move Pepper at the same time"
 
 
-def test_the_hour_with_the_keyboard_alone(start: Callable[..., Studio], tmp_path: Path, address: str) -> None:
+def test_first_hour_of_a_teacher_by_keyboard(
+    start: Callable[..., Studio], tmp_path: Path, address: str
+) -> None:
     home = tmp_path / "person"
     home.mkdir()
     studio = start(HOME=str(home))

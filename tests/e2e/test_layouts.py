@@ -46,7 +46,7 @@ def close(one: tuple[int, ...], other: tuple[int, ...]) -> bool:
     return len(one) == len(other) and all(abs(a - b) <= 2 for a, b in zip(one, other, strict=True))
 
 
-def test_panels_come_back_as_they_were_left(start: Callable[..., Studio]) -> None:
+def test_panels_are_restored_after_a_restart(start: Callable[..., Studio]) -> None:
     studio = start()
     studio.click("Open the Developer layout")
     first = settled(studio, lambda now: set(now) == {"topics", "inspector", "image", "console"})
@@ -74,7 +74,7 @@ def test_panels_come_back_as_they_were_left(start: Callable[..., Studio]) -> Non
     )
 
 
-def test_both_layouts_and_the_last_topic_come_back(start: Callable[..., Studio]) -> None:
+def test_both_layouts_and_the_last_topic_are_restored(start: Callable[..., Studio]) -> None:
     studio = start()
     studio.click("Use the virtual robot")
     studio.says("Pepper ready", 40)

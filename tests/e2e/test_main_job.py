@@ -21,7 +21,7 @@ def use_the_virtual_robot(studio: Studio) -> None:
     studio.says("Pepper ready", 40)
 
 
-def test_from_the_start_page_to_a_robot(studio: Studio) -> None:
+def test_start_page_leads_to_a_connected_robot(studio: Studio) -> None:
     use_the_virtual_robot(studio)
     studio.says("virtual, ready")
     studio.find("Stop", kind="StopButton", enabled=True)
@@ -33,7 +33,7 @@ def test_from_the_start_page_to_a_robot(studio: Studio) -> None:
     until(lambda: not robot.is_running(), "the virtual robot ends with its window")
 
 
-def test_topics_inspector_and_pictures_are_live(studio: Studio, address: str) -> None:
+def test_topics_inspector_and_pictures_update_live(studio: Studio, address: str) -> None:
     use_the_virtual_robot(studio)
     studio.click("Developer")
     with nep.node("weather", master=address) as node:

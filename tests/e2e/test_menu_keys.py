@@ -28,21 +28,21 @@ def mine(start: Callable[..., Studio], tmp_path: Path) -> Studio:
     return studio
 
 
-def test_alt_and_a_letter_opens_a_menu_and_a_letter_does_it(mine: Studio) -> None:
+def test_alt_and_a_letter_open_a_menu_and_a_letter_runs_its_command(mine: Studio) -> None:
     mine.screen.key("f", ["Alt"])
     until(lambda: mine.menus("popup"), "File is open")
     mine.screen.key("n")
     until(lambda: len(tabs(mine)) == 2, lambda: f"a new behaviour: {tabs(mine)}")
 
 
-def test_the_edit_menu_copies_and_pastes_the_block_that_has_the_keyboard(mine: Studio) -> None:
+def test_edit_menu_copies_and_pastes_the_focused_block(mine: Studio) -> None:
     before = mine.page(BLOCKS)
     mine.choose("Edit", "Copy")
     mine.choose("Edit", "Paste")
     until(lambda: mine.page(BLOCKS) > before, "it is pasted")
 
 
-def test_the_edit_menu_works_in_a_field_of_the_page(mine: Studio) -> None:
+def test_edit_menu_works_in_a_field_of_the_page(mine: Studio) -> None:
     mine.screen.key("f", ["Ctrl"])
     until(lambda: mine.page("document.activeElement?.tagName") == "INPUT", "the field has the keyboard")
     mine.screen.type("one")

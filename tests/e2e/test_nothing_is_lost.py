@@ -46,7 +46,7 @@ def sleeping(process: psutil.Process) -> bool:
     return process.is_running() and process.status() != psutil.STATUS_ZOMBIE
 
 
-def test_work_is_offered_again_after_kill_9(start: Callable[..., Studio], tmp_path: Path) -> None:
+def test_unsaved_work_is_offered_after_kill_9(start: Callable[..., Studio], tmp_path: Path) -> None:
     path = write(tmp_path / "Mine.nepb", started(say("Hello")))
     saved = path.read_bytes()
     studio = start(str(path))
@@ -82,7 +82,7 @@ def test_work_is_offered_again_after_kill_9(start: Callable[..., Studio], tmp_pa
     fourth.find(kind="StartPage")
 
 
-def test_after_kill_9_the_tab_that_was_worked_on_shows_and_all_stand_in_their_order(
+def test_active_tab_and_tab_order_are_restored_after_kill_9(
     start: Callable[..., Studio], tmp_path: Path
 ) -> None:
     files = [write(tmp_path / f"{name}.nepb", started(say(name))) for name in ("One", "Two", "Three")]
@@ -115,7 +115,7 @@ def test_after_kill_9_the_tab_that_was_worked_on_shows_and_all_stand_in_their_or
     assert again.quit() == 0
 
 
-def test_what_is_thrown_away_is_not_offered_again(start: Callable[..., Studio], tmp_path: Path) -> None:
+def test_discarded_work_is_not_offered_again(start: Callable[..., Studio], tmp_path: Path) -> None:
     studio = start(str(write(tmp_path / "Mine.nepb", started(say("Hello")))))
     studio.point("[data-id=started] > .blocklyPath", dy=30)
     studio.screen.key("Delete")
@@ -127,7 +127,7 @@ def test_what_is_thrown_away_is_not_offered_again(start: Callable[..., Studio], 
     assert again.quit() == 0
 
 
-def test_the_robot_stops_and_ends_when_studio_is_killed(
+def test_robot_stops_and_exits_when_studio_is_killed(
     start: Callable[..., Studio], tmp_path: Path, address: str
 ) -> None:
     studio = start(str(write(tmp_path / "Turning.nepb", started(forever(turn(300))))))
@@ -148,7 +148,7 @@ def test_the_robot_stops_and_ends_when_studio_is_killed(
     until(lambda: not sleeping(master), "the master ends when nobody needs it", 15)
 
 
-def test_a_killed_publisher_is_gone_soon(
+def test_killed_publisher_is_removed_from_graph_and_topic_list(
     start: Callable[..., Studio], address: str, publisher: Program
 ) -> None:
     studio = start()
@@ -163,7 +163,7 @@ def test_a_killed_publisher_is_gone_soon(
     until(lambda: not [r for r in studio.rows("Topics") if r["texts"][0] == "/count"], "10 s later it leaves")
 
 
-def test_a_master_that_dies_loses_no_message(
+def test_no_message_is_lost_when_the_master_is_killed(
     start: Callable[..., Studio], address: str, publisher: Program
 ) -> None:
     studio = start()

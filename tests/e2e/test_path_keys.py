@@ -15,7 +15,9 @@ from tests.e2e.waiting import until
 pytestmark = pytest.mark.timeout(230)
 
 
-def test_a_persons_path_with_the_keyboard_alone(start: Callable[..., Studio], tmp_path: Path) -> None:
+def test_user_journey_from_start_page_to_saved_behaviour_by_keyboard(
+    start: Callable[..., Studio], tmp_path: Path
+) -> None:
     home = tmp_path / "person"
     home.mkdir()
     studio = start(HOME=str(home))

@@ -24,7 +24,9 @@ def colours_of(studio: Studio, block: str) -> str:
     return str(studio.page(f"{field}.outerHTML"))
 
 
-def test_a_persons_path_with_the_mouse_alone(start: Callable[..., Studio], tmp_path: Path) -> None:
+def test_user_journey_from_start_page_to_saved_behaviour_by_mouse(
+    start: Callable[..., Studio], tmp_path: Path
+) -> None:
     home = tmp_path / "person"
     home.mkdir()
     studio = start(HOME=str(home))

@@ -52,7 +52,9 @@ def coloured(studio: Studio) -> int:
     return int((np.ptp(picture, axis=2) > 60).sum())
 
 
-def test_a_value_is_dragged_from_the_inspector_and_another_typed(studio: Studio, address: str) -> None:
+def test_plot_shows_a_value_dragged_from_the_inspector_and_a_typed_field_path(
+    studio: Studio, address: str
+) -> None:
     studio.find("Use the virtual robot", enabled=True)
     studio.screen.key("2", held=["Alt"])
     studio.says(f"Master {address}", 40)

@@ -12,7 +12,7 @@ from tests.e2e.waiting import until
 pytestmark = pytest.mark.timeout(240)
 
 
-def test_what_was_published_while_it_recorded_is_in_the_file(studio: Studio) -> None:
+def test_recording_contains_every_message_published_meanwhile(studio: Studio) -> None:
     with nep.node("talker", wait_s=60.0) as node:
         publisher = node.new_pub("/distance", "json")
         studio.screen.key("2", ["Alt"])

@@ -43,7 +43,7 @@ def has_looked_back(studio: Studio) -> None:
     studio.screen.key("Escape")
 
 
-def test_a_native_crash_is_offered_once_and_its_report_is_written(
+def test_native_crash_is_offered_once_and_its_report_is_written(
     start: Callable[..., Studio], tmp_path: Path
 ) -> None:
     documents = tmp_path / "Documents"
@@ -79,7 +79,7 @@ def test_a_native_crash_is_offered_once_and_its_report_is_written(
 
 
 @pytest.mark.long
-def test_an_end_by_the_system_is_told_once_and_one_that_was_asked_for_is_not(
+def test_kill_by_the_system_is_reported_once_and_requested_exit_is_not(
     start: Callable[..., Studio],
 ) -> None:
     first = start()
@@ -99,7 +99,7 @@ def test_an_end_by_the_system_is_told_once_and_one_that_was_asked_for_is_not(
 
 
 @pytest.mark.long
-def test_a_robot_and_an_editor_that_crash_are_reported_and_the_next_start_offers_that(
+def test_crashes_of_a_robot_and_the_editor_are_reported_at_the_next_start(
     start: Callable[..., Studio],
 ) -> None:
     studio = start("--demo")

@@ -49,7 +49,7 @@ def heard(driver: Peer) -> None:
     )
 
 
-def test_blocks_drive_it_without_a_window(driver: Peer, tmp_path: Path) -> None:
+def test_blocks_drive_the_robot_without_a_window(driver: Peer, tmp_path: Path) -> None:
     words = ("-m", "app", "run", str(turtle(tmp_path)), "--robot-wait", "30", "--allow-moving")
     with Program(*words) as program:
         assert program.wait(60) == 0, program.lines
@@ -57,7 +57,7 @@ def test_blocks_drive_it_without_a_window(driver: Peer, tmp_path: Path) -> None:
     heard(driver)
 
 
-def test_the_window_finds_it_and_blocks_drive_it(
+def test_robot_is_found_in_the_window_and_driven_by_blocks(
     driver: Peer, start: Callable[..., Studio], tmp_path: Path
 ) -> None:
     studio = start(str(turtle(tmp_path)))

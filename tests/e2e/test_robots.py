@@ -45,7 +45,7 @@ def table(start: Callable[..., Studio], tmp_path: Path) -> Iterator[Studio]:
         yield studio
 
 
-def test_it_moves_only_after_let_it_move_and_asks_once(table: Studio) -> None:
+def test_real_robot_moves_only_after_permission_which_is_requested_once(table: Studio) -> None:
     press(table, "Try turn")
     table.says("Allow Table to move?")
     table.says("“turn” moves Table.")
@@ -65,7 +65,7 @@ def test_it_moves_only_after_let_it_move_and_asks_once(table: Studio) -> None:
     table.find("Try turn")
 
 
-def test_a_second_virtual_robot_comes_and_is_drawn(start: Callable[..., Studio]) -> None:
+def test_second_virtual_robot_connects_and_is_drawn(start: Callable[..., Studio]) -> None:
     studio = start()
     studio.choose("Robots", "Use the virtual Turtle")
     studio.says("Turtle ready", 40)

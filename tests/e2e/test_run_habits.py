@@ -55,7 +55,7 @@ def turning(start: Callable[..., Studio], tmp_path: Path) -> Studio:
     return studio
 
 
-def test_f5_and_the_button_restart(turning: Studio) -> None:
+def test_f5_and_the_run_button_restart_the_program(turning: Studio) -> None:
     (first,) = programs(turning)
     lasts(turning)
     turning.click("Restart", kind="RunButton")
@@ -69,7 +69,7 @@ def test_f5_and_the_button_restart(turning: Studio) -> None:
     turning.says("Pepper stopped (")
 
 
-def test_an_edit_while_it_runs_says_when_it_applies(turning: Studio) -> None:
+def test_edit_during_a_run_shows_when_it_applies(turning: Studio) -> None:
     (first,) = programs(turning)
     assert not turning.all(kind="Sentence", name=LATER)
     turning.point("[data-id='text Round and round'] .blocklyInputField", dx=10, dy=10)

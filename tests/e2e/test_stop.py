@@ -66,7 +66,7 @@ def test_f12_in_the_web_view_stops(turning: Studio) -> None:
     assert turning.outlined("stopped")
 
 
-def test_ctrl_period_while_a_text_in_a_block_is_edited_stops(turning: Studio) -> None:
+def test_ctrl_period_while_a_block_text_is_edited_stops(turning: Studio) -> None:
     turning.point("[data-id='text Round and round'] .blocklyInputField", dx=10, dy=10)
     typing = "document.activeElement && document.activeElement.classList.contains('blocklyHtmlInput')"
     until(lambda: turning.page(typing), "the text is edited")
@@ -85,7 +85,7 @@ def test_f12_in_a_field_of_the_developer_layout_stops(turning: Studio) -> None:
 
 
 @pytest.mark.timeout(300)  # three runs
-def test_stop_while_something_of_a_block_is_open_or_in_the_hand(turning: Studio) -> None:
+def test_stop_works_while_blocks_are_dragged_or_a_block_menu_is_open(turning: Studio) -> None:
     """It stops at once, and what was begun ends as it would have otherwise."""
     before = sorted(turning.blocks())
     left, top, _, _ = turning.spot("[data-id='say Round and round'] > .blocklyPath")
@@ -175,7 +175,7 @@ def a_name_that_is_typed(studio: Studio) -> None:
     studio.screen.type("Half")
 
 
-def test_one_press_on_stop_whatever_is_open(turning: Studio) -> None:
+def test_one_click_on_stop_works_while_any_menu_or_sheet_is_open(turning: Studio) -> None:
     """X gives the mouse to what pops up: the first press beside it must do more than close it."""
     answers: list[nep.Message] = []
     with nep.node("listener", master=turning.master) as node:
@@ -209,7 +209,7 @@ def stops_of(messages: list[nep.Message]) -> list[str]:
     return [each["id"] for each in told if each["op"] == "stop" and each["state"] == "succeeded"]
 
 
-def test_stop_ends_a_program_that_hangs(turning: Studio) -> None:
+def test_stop_ends_a_hung_program(turning: Studio) -> None:
     (program,) = turning.children("app.blocks.runtime.child")
     program.suspend()
     turning.screen.click(*middle(turning.find(kind="StopButton")["rect"]))
@@ -217,7 +217,7 @@ def test_stop_ends_a_program_that_hangs(turning: Studio) -> None:
     assert not program.is_running()
 
 
-def test_a_program_that_is_killed_leaves_no_robot_moving(turning: Studio) -> None:
+def test_killed_program_leaves_no_robot_moving(turning: Studio) -> None:
     (program,) = turning.children("app.blocks.runtime.child")
     program.kill()
     stands_still(turning)

@@ -16,7 +16,9 @@ from tests.e2e.waiting import until
 pytestmark = pytest.mark.timeout(170)
 
 
-def test_a_tab_is_renamed_with_its_file_and_back(start: Callable[..., Studio], tmp_path: Path) -> None:
+def test_renaming_a_tab_renames_its_file_and_can_be_reverted(
+    start: Callable[..., Studio], tmp_path: Path
+) -> None:
     old = write(tmp_path / "Greeting.nepb", started(say("One")))
     taken = write(tmp_path / "Quiz.nepb", started(say("Two")))
     content = taken.read_bytes()

@@ -39,7 +39,7 @@ def start_once_more(studio: Studio, path: Path) -> int:
     return done.returncode
 
 
-def test_tabs_from_the_first_start_to_the_next(start: Callable[..., Studio], tmp_path: Path) -> None:
+def test_tabs_are_restored_at_the_next_start(start: Callable[..., Studio], tmp_path: Path) -> None:
     files = [write(tmp_path / f"{name}.nepb", started(say(name))) for name in ("One", "Two", "Three")]
     studio = start(str(files[0]), str(files[1]))
     until(lambda: tabs(studio) == ["One", "Two"], "both files are open", 30)
@@ -71,7 +71,7 @@ def test_tabs_from_the_first_start_to_the_next(start: Callable[..., Studio], tmp
     until(lambda: "say Three" in shown(again), "the one that showed", 30)
 
 
-def test_an_earlier_version_opens_beside_the_file(start: Callable[..., Studio], tmp_path: Path) -> None:
+def test_earlier_version_opens_in_its_own_tab(start: Callable[..., Studio], tmp_path: Path) -> None:
     path = write(tmp_path / "Mine.nepb", started(say("Before")))
     studio = start(str(path))
     until(lambda: "say Before" in shown(studio), "the file is open", 30)

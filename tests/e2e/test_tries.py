@@ -19,7 +19,7 @@ ANSWER = "(e => e && !e.hidden && e.textContent)(document.querySelector('.nepTry
 
 
 @pytest.mark.parametrize("theme", ["dark"])  # the fights are looked at in the light one
-def test_a_person_tries_blocks_before_any_program(
+def test_single_blocks_can_be_tried_before_a_program_exists(
     start: Callable[..., Studio], tmp_path: Path, theme: str
 ) -> None:
     path = write(tmp_path / "Tries.nepb", started(say("First", {**turn(180), "id": "turn"})))

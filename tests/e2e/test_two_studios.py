@@ -22,7 +22,7 @@ def robots(studio: Studio) -> list[int]:
 
 
 @pytest.mark.parametrize("same_home", [True, False])
-def test_both_work_both_stop_and_the_second_outlives_the_first(
+def test_two_studios_share_a_robot_and_the_second_survives_the_first(
     start: Callable[..., Studio], tmp_path: Path, same_home: bool
 ) -> None:
     first = start(str(write(tmp_path / "Turning.nepb", started(forever(turn(300))))))

@@ -17,7 +17,7 @@ from tests.e2e.waiting import until
 pytestmark = pytest.mark.timeout(240)
 
 
-def test_the_robots_of_the_last_start_come_back_until_they_are_put_away(start: Callable[..., Studio]) -> None:
+def test_virtual_robots_are_restored_at_startup_until_removed(start: Callable[..., Studio]) -> None:
     studio = start()
     studio.click("Use the virtual robot")
     studio.says("Pepper ready", 40)
@@ -80,7 +80,7 @@ class RoomOnScreen:
         screen.release()
 
 
-def test_two_robots_share_a_room_that_a_person_changes(studio: Studio, address: str) -> None:
+def test_two_robots_share_a_room_that_the_user_edits(studio: Studio, address: str) -> None:
     studio.click("Use the virtual robot")
     studio.says("Pepper ready", 40)
     studio.choose("Robots", "Use the virtual Turtle")

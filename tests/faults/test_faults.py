@@ -55,7 +55,7 @@ def _tell(scenario: scenarios.Scenario, measured: scenarios.Measured) -> None:
 
 
 @pytest.mark.timeout(150)
-def test_whatever_happens_in_a_network_each_message_is_received_or_counted(today: Day) -> None:
+def test_every_message_is_received_or_counted_as_lost_under_network_faults(today: Day) -> None:
     with ThreadPoolExecutor(len(scenarios.SIDE_BY_SIDE)) as side_by_side:
         begun = {each: side_by_side.submit(each, today, _OUT_S) for each in scenarios.SIDE_BY_SIDE}
     failures = {_name(each): done.exception() for each, done in begun.items() if done.exception()}
@@ -67,7 +67,7 @@ def test_whatever_happens_in_a_network_each_message_is_received_or_counted(today
 
 @pytest.mark.timeout(150)
 @pytest.mark.parametrize("scenario", [scenarios.master_again, scenarios.master_moved])
-def test_another_master_is_found_and_no_message_is_lost_meanwhile(
+def test_failover_to_another_master_loses_no_message(
     today: Day, scenario: scenarios.Scenario, is_long: bool
 ) -> None:
     _tell(scenario, scenario(today, _OUT_LONG_S if is_long else _OUT_S))
@@ -76,5 +76,5 @@ def test_another_master_is_found_and_no_message_is_lost_meanwhile(
 @pytest.mark.timeout(300)
 @pytest.mark.usefixtures("_with_long")
 @pytest.mark.parametrize("scenario", [*scenarios.SIDE_BY_SIDE, *scenarios.ALONE])
-def test_a_fault_that_lasts(today: Day, scenario: scenarios.Scenario) -> None:
+def test_long_lasting_fault(today: Day, scenario: scenarios.Scenario) -> None:
     _tell(scenario, scenario(today, _OUT_LONG_S))

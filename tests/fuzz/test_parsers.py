@@ -51,7 +51,7 @@ def mutated(target: Target) -> st.SearchStrategy[bytes]:
 
 
 @pytest.mark.parametrize("name", sorted(TARGETS))
-def test_any_bytes(name: str) -> None:
+def test_parser_handles_mutated_bytes_within_the_time_limit(name: str) -> None:
     target = TARGETS[name]
 
     @FEW
@@ -65,7 +65,7 @@ def test_any_bytes(name: str) -> None:
 
 
 @pytest.mark.parametrize("name", sorted(TARGETS))
-def test_what_the_parser_takes_is_taken(name: str) -> None:
+def test_parser_accepts_a_seed_of_its_corpus(name: str) -> None:
     target, taken = TARGETS[name], 0
     for seed in target.seeds():
         target.try_bytes(seed)
@@ -78,7 +78,7 @@ def test_what_the_parser_takes_is_taken(name: str) -> None:
 
 
 @pytest.mark.parametrize(("name", "data"), [(name, data) for name, found in CASES.items() for data in found])
-def test_what_was_found_before(name: str, data: bytes) -> None:
+def test_fuzz_regression_inputs_are_handled_within_the_time_limit(name: str, data: bytes) -> None:
     if name not in TARGETS:
         pytest.skip("needs a package that is not here")
     began = time.thread_time()

@@ -91,7 +91,7 @@ UNWANTED = [
 
 
 @pytest.mark.parametrize("name", WANTED)
-def test_what_studio_uses_goes_in(name: str) -> None:
+def test_modules_used_by_studio_are_included(name: str) -> None:
     assert is_wanted(name)
 
 
@@ -112,7 +112,7 @@ print([name for name in opened if "colors" in str(name) and "maps" in str(name)]
 """
 
 
-def test_a_plot_needs_nothing_of_what_is_left_out() -> None:
+def test_plot_works_without_the_excluded_modules() -> None:
     left_out = [name for name in EXCLUDED_MODULES if name.startswith(("pyqtgraph.", "PySide6.QtTest"))]
     assert len(left_out) == len(UNUSED_OF_PYQTGRAPH) + 1
     command = [sys.executable, "-c", PLOT_WITHOUT_THEM, *left_out]
@@ -122,5 +122,5 @@ def test_a_plot_needs_nothing_of_what_is_left_out() -> None:
 
 
 @pytest.mark.parametrize("name", UNWANTED)
-def test_what_only_comes_with_it_stays_out(name: str) -> None:
+def test_unused_modules_are_excluded(name: str) -> None:
     assert not is_wanted(name)

@@ -9,7 +9,7 @@ from installers.context import Context
 from installers.freeze import add_licences
 
 
-def test_each_package_of_a_release_has_a_bill_of_materials_of_its_own(tmp_path: Path) -> None:
+def test_each_package_of_a_release_has_its_own_bill_of_materials(tmp_path: Path) -> None:
     names = []
     for system, machine in (
         ("windows", "x86_64"),

@@ -47,7 +47,7 @@ def context(tmp_path: Path) -> Context:
     return made
 
 
-def test_the_debian_package_says_what_it_is_and_needs(context: Context) -> None:
+def test_debian_package_has_its_version_and_dependencies(context: Context) -> None:
     made = packer.debian_package(context)
     fields = subprocess.run(["dpkg-deb", "--field", made], capture_output=True, text=True, check=True).stdout
     assert f"Version: {__version__}\n" in fields
@@ -73,7 +73,7 @@ def test_the_debian_package_says_what_it_is_and_needs(context: Context) -> None:
     assert owners == {"root/root"}
 
 
-def test_the_same_files_give_the_same_packages(context: Context) -> None:
+def test_packages_are_reproducible(context: Context) -> None:
     sums = []
     for moment in (None, (1e9, 1e9), (2e9, 2e9)):  # as they are; before the packages' time, and after it
         for path in context.frozen.rglob("*"):
@@ -83,7 +83,7 @@ def test_the_same_files_give_the_same_packages(context: Context) -> None:
     assert sums[0] == sums[1] == sums[2]
 
 
-def test_the_sums_are_those_that_sha256sum_checks(context: Context) -> None:
+def test_checksum_file_is_accepted_by_sha256sum(context: Context) -> None:
     packer.archive(context)
     write_sums(context.dist)
     write_sums(context.dist)  # its own file is not among them
@@ -108,7 +108,7 @@ def run(script: Path, home: Path, *words: str) -> str:
     return done.stdout
 
 
-def test_who_unpacks_it_has_a_menu_entry_and_can_take_it_back(unpacked: Path, tmp_path: Path) -> None:
+def test_install_script_adds_a_menu_entry_and_removes_it_again(unpacked: Path, tmp_path: Path) -> None:
     home = tmp_path / "home"
     home.mkdir()
     assert "in your menu" in run(unpacked / "install.sh", home, "--command")
@@ -124,7 +124,7 @@ def test_who_unpacks_it_has_a_menu_entry_and_can_take_it_back(unpacked: Path, tm
     assert [path for path in left if "nep" in path.name] == []
 
 
-def test_a_command_of_somebody_else_stays(unpacked: Path, tmp_path: Path) -> None:
+def test_removal_keeps_a_foreign_nep_command(unpacked: Path, tmp_path: Path) -> None:
     command = tmp_path / "home" / ".local/bin/nep"
     command.parent.mkdir(parents=True)
     command.write_text("mine", "utf-8")
@@ -132,7 +132,7 @@ def test_a_command_of_somebody_else_stays(unpacked: Path, tmp_path: Path) -> Non
     assert command.read_text("utf-8") == "mine"
 
 
-def test_the_oldest_c_library_that_will_do_is_found(context: Context) -> None:
+def test_minimum_glibc_version_is_determined(context: Context) -> None:
     (context.frozen / "words.txt").write_text("GLIBC_9.99", "utf-8")  # no library
     major, minor = map(int, libc_needed(context.frozen).split("."))
     assert (2, 2) <= (major, minor) < (2, 60)
@@ -152,7 +152,7 @@ def library(folder: Path, name: str, *needs: str) -> Path:
 
 
 @pytest.mark.skipif(shutil.which("gcc") is None, reason="needs gcc")
-def test_the_packages_are_those_of_the_libraries_that_are_not_inside(tmp_path: Path) -> None:
+def test_dependencies_cover_the_libraries_that_are_not_bundled(tmp_path: Path) -> None:
     folder = tmp_path / "frozen"
     library(folder, "a.so", "libasound.so.2", "libc.so.6", "libours.so.1")
     library(folder, "plugins/printsupport/b.so", "libcups.so.2", "libasound.so.2")

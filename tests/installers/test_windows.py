@@ -31,7 +31,7 @@ def context(tmp_path: Path) -> Context:
 # ---- what Windows gets of the pinned packages -----------------------------------------------------
 
 
-def test_pinned_packages_are_chosen_as_windows_would() -> None:
+def test_pinned_packages_are_selected_by_their_markers_for_windows() -> None:
     lines = [
         "# a comment",
         "colorama==0.4.6 ; sys_platform == 'win32' \\",
@@ -66,7 +66,7 @@ def test_every_package_for_windows_has_a_hash() -> None:
 @pytest.mark.parametrize(
     ("version", "numbers"), [("0.1.0", (0, 1, 0, 0)), ("1.2.3rc4", (1, 2, 3, 0)), ("2", (2, 0, 0, 0))]
 )
-def test_a_version_becomes_four_numbers(version: str, numbers: tuple[int, ...]) -> None:
+def test_version_is_padded_to_four_numbers(version: str, numbers: tuple[int, ...]) -> None:
     assert version_numbers(version) == numbers
 
 
@@ -78,7 +78,7 @@ class Written:
     named: dict[str, object]
 
 
-def test_the_version_file_is_an_expression_that_names_all() -> None:
+def test_version_resource_is_a_valid_expression_with_all_fields() -> None:
     def make(*args: object, **named: object) -> Written:
         return Written(args, named)
 
@@ -90,7 +90,7 @@ def test_the_version_file_is_an_expression_that_names_all() -> None:
     assert (texts["ProductName"], texts["ProductVersion"]) == ("NEP Studio", "1.2.3")
 
 
-def test_an_icon_holds_each_picture_at_its_place() -> None:
+def test_ico_file_holds_each_picture_at_its_offset() -> None:
     pictures = {side: b"\x89PNG" + bytes([side % 256]) * side for side in SIDES}
     made = ico(pictures)
     assert struct.unpack_from("<HHH", made) == (0, 1, len(SIDES))
@@ -103,7 +103,7 @@ def test_an_icon_holds_each_picture_at_its_place() -> None:
 # ---- what NSIS is told ----------------------------------------------------------------------------
 
 
-def test_every_file_is_unpacked_into_its_folder(context: Context) -> None:
+def test_installer_script_unpacks_every_file_into_its_folder(context: Context) -> None:
     told = entries(context.frozen)
     unpacked = [line.strip() for line in told.partition("!macroend")[0].splitlines()[1:]]
     frozen = context.frozen
@@ -120,7 +120,7 @@ def test_every_file_is_unpacked_into_its_folder(context: Context) -> None:
         assert f'!insertmacro ${{do}} "{name}"' in told
 
 
-def test_windows_is_told_who_opens_the_files_and_forgets_it_again() -> None:
+def test_file_association_is_registered_and_unregistered() -> None:
     put, take = association(REG_FILE.read_text("utf-8")).split("!macro Dissociate")
     command = '"Software\\Classes\\NEPStudio.Behaviour\\shell\\open\\command" ""'
     assert f'WriteRegStr HKCU {command} "$\\"$INSTDIR\\nep-studio.exe$\\" $\\"%1$\\""' in put
@@ -131,7 +131,7 @@ def test_windows_is_told_who_opens_the_files_and_forgets_it_again() -> None:
     assert "Program Files" not in put + take
 
 
-def test_what_the_setup_says_is_there_in_both_languages() -> None:
+def test_setup_texts_exist_in_both_languages() -> None:
     words = (REG_FILE.parent / "setup" / "words.nsh").read_text("utf-8")
     said = {
         language: {line.split()[1] for line in words.splitlines() if f"${{LANG_{language}}}" in line}
@@ -143,7 +143,7 @@ def test_what_the_setup_says_is_there_in_both_languages() -> None:
 
 
 @pytest.mark.skipif(shutil.which("makensis") is None, reason="needs nsis")
-def test_the_same_files_give_the_same_setup(context: Context) -> None:
+def test_setup_is_reproducible(context: Context) -> None:
     give_one_time(context.frozen, context.epoch)
     made = setup_of(context)
     assert made.name == "NEP-Studio-1.2.3-setup.exe"
@@ -156,7 +156,7 @@ def test_the_same_files_give_the_same_setup(context: Context) -> None:
 # ---- the zip, and what may not be in a package ----------------------------------------------------
 
 
-def test_the_zip_is_sorted_and_the_same_whenever_it_is_made(context: Context) -> None:
+def test_zip_is_sorted_and_reproducible(context: Context) -> None:
     made = make_zip(context)
     first = made.read_bytes()
     with zipfile.ZipFile(made) as archive:
@@ -170,7 +170,7 @@ def test_the_zip_is_sorted_and_the_same_whenever_it_is_made(context: Context) ->
     assert make_zip(context).read_bytes() == first
 
 
-def test_a_library_of_wine_is_refused(context: Context) -> None:
+def test_dll_of_wine_is_rejected(context: Context) -> None:
     refuse_files_of_wine(context.frozen)
     (context.frozen / "_internal" / "version.dll").write_bytes(b"MZ" + bytes(62) + b"Wine builtin DLL\0")
     with pytest.raises(PackageError, match=r"files of Wine: version\.dll"):

@@ -127,7 +127,7 @@ def windows(computer: Windows) -> Iterator[Windows]:
     shutil.rmtree(computer.local / "Programs", ignore_errors=True)
 
 
-def test_installed_it_is_known_and_removed_it_is_forgotten_but_for_the_work(windows: Windows) -> None:
+def test_install_registers_studio_and_uninstall_removes_all_but_user_files(windows: Windows) -> None:
     work = windows.local / "nep-studio" / "kept" / "mine.nepb"
     work.parent.mkdir(parents=True)
     work.write_text("{}", "utf-8")
@@ -149,14 +149,14 @@ def test_installed_it_is_known_and_removed_it_is_forgotten_but_for_the_work(wind
     assert "nep-studio" not in (windows.prefix / "user.reg").read_text("utf-8")
 
 
-def test_another_program_s_claim_on_the_suffix_stays(windows: Windows) -> None:
+def test_uninstall_keeps_a_foreign_file_association(windows: Windows) -> None:
     windows.run("reg", "add", rf"{CLASSES}\.nepb", "/ve", "/d", "Other.Program", "/f")
     windows.uninstall()
     assert windows.registry(rf"{CLASSES}\.nepb") == "Other.Program"
     windows.run("reg", "delete", rf"{CLASSES}\.nepb", "/f")
 
 
-def test_an_update_takes_the_place_of_the_old_version_and_leaves_what_is_not_ours(windows: Windows) -> None:
+def test_update_replaces_the_old_version_and_keeps_foreign_files(windows: Windows) -> None:
     (windows.folder / "mine.txt").write_text("mine", "utf-8")
     assert windows.run(windows.setups["1.3.0"], "/S") == (0, "")
     assert windows.registry(UNINSTALL, "DisplayVersion") == "1.3.0"
@@ -166,7 +166,7 @@ def test_an_update_takes_the_place_of_the_old_version_and_leaves_what_is_not_our
     assert [path.name for path in windows.folder.iterdir()] == ["mine.txt"]
 
 
-def test_while_studio_is_open_nothing_is_updated_or_removed(windows: Windows) -> None:
+def test_update_and_uninstall_are_rejected_while_studio_is_open(windows: Windows) -> None:
     with windows.running(windows.folder / "nep-studio.exe"):
         code, said = windows.run(windows.setups["1.3.0"], "/S")
         assert code == OPEN
@@ -176,7 +176,7 @@ def test_while_studio_is_open_nothing_is_updated_or_removed(windows: Windows) ->
     assert windows.registry(UNINSTALL, "DisplayVersion") == "1.2.3"
 
 
-def test_a_file_that_can_not_be_moved_leaves_the_old_version_whole(windows: Windows) -> None:
+def test_failed_update_keeps_the_old_version_intact(windows: Windows) -> None:
     before = {path.name: path.read_bytes() for path in windows.folder.glob("*.*")}
     last = windows.folder / "uninstall.exe"  # the others have been moved out of the way when its turn comes
     if subprocess.run(["chattr", "+i", last], check=False).returncode != 0:
@@ -193,7 +193,7 @@ def test_a_file_that_can_not_be_moved_leaves_the_old_version_whole(windows: Wind
     assert windows.registry(UNINSTALL, "DisplayVersion") == "1.2.3"
 
 
-def test_an_update_that_was_cut_off_is_put_right_first(windows: Windows) -> None:
+def test_interrupted_update_is_repaired_first(windows: Windows) -> None:
     (windows.folder / "old~").mkdir()
     (windows.folder / "new~").mkdir()
     for name in ("_internal", "nep.exe"):  # the computer was switched off while these were moved
@@ -205,14 +205,14 @@ def test_an_update_that_was_cut_off_is_put_right_first(windows: Windows) -> None
     assert (windows.folder / "_internal/a.dll").read_text("utf-8") == "_internal/a.dll 1.3.0"
 
 
-def test_a_folder_that_may_not_be_written_is_said(computer: Windows) -> None:
+def test_unwritable_install_folder_is_reported(computer: Windows) -> None:
     code, said = computer.run(computer.setups["1.2.3"], "/S", r"/D=Z:\proc\studio")
     assert code == IMPOSSIBLE
     assert r"You may not write into this folder: Z:\proc\studio" in said
     assert computer.registry(UNINSTALL, "DisplayVersion") == ""
 
 
-def test_a_long_path_gets_the_command_whole_and_loses_it_again(computer: Windows) -> None:
+def test_command_folder_is_added_to_a_long_path_and_removed_again(computer: Windows) -> None:
     computer.run(
         "reg", "add", r"HKCU\Environment", "/v", "Path", "/t", "REG_EXPAND_SZ", "/d", LONG_PATH, "/f"
     )

@@ -13,7 +13,7 @@ from nep.programs.gateway.attachment import GatewayAttachment
 pytestmark = [pytest.mark.ports]
 
 
-def test_a_taken_port_is_an_alert_in_the_graph_until_it_is_free(fixed_ports, tmp_path):
+def test_taken_port_is_an_alert_in_the_graph_until_it_is_free(fixed_ports, tmp_path):
     waited = threading.Event()
     with socket.socket() as airplay:
         airplay.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)

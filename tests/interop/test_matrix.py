@@ -72,14 +72,14 @@ class Room:
                 assert times == [1] * count, f"{kind} to {to}"
 
 
-def test_json_in_every_direction(peers, master):
+def test_json_is_exchanged_in_every_direction(peers, master):
     room = Room(peers, KINDS, "matrix", "json", master)
     room.warm_up(datum)
     room.publish(datum)
     room.assert_each_once(datum)
 
 
-def test_strings_in_every_direction(peers, master):
+def test_strings_are_exchanged_in_every_direction(peers, master):
     room = Room(peers, KINDS[:4], "words", "string", master)
     room.warm_up(text)
     room.publish(text)

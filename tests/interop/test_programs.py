@@ -46,9 +46,7 @@ def tell_until_heard(publisher, value, *subscribers):
 
 
 @pytest.mark.parametrize("kind", ["0.5.3.5", "0.5.4.5", "0.5.4.8", "nep-js"])
-def test_an_original_is_in_the_lists_with_its_rate_and_leaves_with_its_process(
-    peers, node, graph_shows, kind
-):
+def test_original_is_listed_with_its_rate_and_removed_when_its_process_ends(peers, node, graph_shows, kind):
     publisher = peers.start(kind, "publisher", "t", name="sender").wait_ready()
     subscriber = peers.start(kind, "subscriber", "t", name="receiver").wait_ready()
     tell_until_heard(publisher, {"n": -1}, subscriber)
@@ -78,7 +76,9 @@ def test_an_original_is_in_the_lists_with_its_rate_and_leaves_with_its_process(
     graph_shows(lambda view: "t" not in view.topics, 3.0)
 
 
-def test_the_master_is_killed_and_originals_go_on(peers, nep_home, master, start_again):
+def test_originals_exchange_messages_again_after_the_master_is_killed_and_restarted(
+    peers, nep_home, master, start_again
+):
     kinds = ("0.5.3.5", "0.5.4.8", "nep-js", "native")
     subscribers = [
         peers.start(kind, "subscriber", "t", name=f"to_{at}").wait_ready() for at, kind in enumerate(kinds)
@@ -104,7 +104,7 @@ def test_the_master_is_killed_and_originals_go_on(peers, nep_home, master, start
     assert "Traceback" not in again.printed
 
 
-def test_a_payload_that_names_its_topic_does_not_end_nep_js(peers, master):
+def test_payload_that_contains_its_topic_name_does_not_crash_nep_js(peers, master):
     subscriber = peers.start("nep-js", "subscriber", "camera").wait_ready()
     for kind in ("native", "0.5.3.5", "0.5.4.8"):
         publisher = peers.start(kind, "publisher", "camera").wait_ready()
@@ -112,7 +112,7 @@ def test_a_payload_that_names_its_topic_does_not_end_nep_js(peers, master):
     assert subscriber.process.poll() is None
 
 
-def test_dictionary_of_0548_speaks_with_everybody(peers, master):
+def test_dictionary_type_of_0548_is_exchanged_with_every_peer(peers, master):
     kinds = ("0.5.3.5", "nep-js", "native")
     others = [peers.start(kind, "subscriber", "t").wait_ready() for kind in kinds]
     mine = peers.start("0.5.4.8", "subscriber", "t", "dictionary").wait_ready()
@@ -125,7 +125,7 @@ def test_dictionary_of_0548_speaks_with_everybody(peers, master):
 
 @pytest.mark.parametrize("mode", ["one2many", "many2one"])
 @pytest.mark.parametrize("kind", ["0.5.3.5", "0.5.4.5", "0.5.4.8"])
-def test_one_sided_modes_reach_native_programs_and_come_from_them(peers, master, kind, mode):
+def test_one_sided_modes_exchange_messages_with_native_programs(peers, master, kind, mode):
     native = peers.start("native", "subscriber", "t").wait_ready()
     subscriber = peers.start(kind, "subscriber", "t", mode=mode).wait_ready()
     tell_until_heard(
@@ -137,14 +137,14 @@ def test_one_sided_modes_reach_native_programs_and_come_from_them(peers, master,
 @pytest.mark.parametrize(
     ("asks", "answers"), [("0.5.3.5", "0.5.3.5"), ("0.5.4.8", "0.5.4.8"), ("0.5.3.5", "0.5.4.8")]
 )
-def test_clients_and_servers_of_originals_find_each_other(peers, master, asks, answers):
+def test_clients_and_servers_of_originals_connect_to_each_other(peers, master, asks, answers):
     peers.start(answers, "server", "sum").wait_ready()
     client = peers.start(asks, "client", "sum").wait_ready()
     client.tell({"a": 1})
     assert client.hears({"echo": {"a": 1}})
 
 
-def test_nep_0546_and_0547_are_named_with_their_nodes_and_disturb_nobody(peers, master, node, graph_shows):
+def test_nep_0546_and_0547_are_named_with_their_nodes_and_affect_nobody(peers, master, node, graph_shows):
     heard = peers.start("0.5.4.8", "subscriber", "t", name="served").wait_ready()
     peers.start("0.5.4.6", "subscriber", "t", name="viewer").wait_ready()
     sender = peers.start("0.5.4.7", "publisher", "t", name="sender").wait_ready()
@@ -176,7 +176,7 @@ def test_nep_0546_and_0547_are_named_with_their_nodes_and_disturb_nobody(peers, 
     tell_until_heard(peers.start("native", "publisher", "t").wait_ready(), {"n": 2}, served)
 
 
-def test_the_register_on_7777_names_programs_of_every_kind(peers, master):
+def test_broadcast_on_7777_lists_programs_of_every_kind(peers, master):
     context = zmq.Context()
     try:
         with context.socket(zmq.SUB) as tool:
@@ -199,7 +199,7 @@ def test_the_register_on_7777_names_programs_of_every_kind(peers, master):
         context.destroy(linger=0)
 
 
-def test_bad_requests_do_not_disturb_a_running_master(peers, master, node):
+def test_invalid_requests_do_not_affect_a_running_master(peers, master, node):
     context = zmq.Context()
     try:
         for bad in (b"", b"\x00\xff", b"[1]", b'{"node":1}', b"{" * 9000):
@@ -215,7 +215,7 @@ def test_bad_requests_do_not_disturb_a_running_master(peers, master, node):
     tell_until_heard(peers.start("native", "publisher", "t").wait_ready(), {"n": 1}, subscriber)
 
 
-def test_native_programs_do_not_pay_while_no_original_asks(peers, master, node):
+def test_native_topics_are_not_subscribed_while_no_original_requests_them(peers, master, node):
     pub = node.new_pub("busy")
     pub.publish({"n": 1})
     assert pub.subscribers == 0
@@ -224,7 +224,7 @@ def test_native_programs_do_not_pay_while_no_original_asks(peers, master, node):
     assert pub.subscribers == 0
 
 
-def test_a_pub_of_the_command_line_reaches_an_original(peers, master):
+def test_topic_pub_command_reaches_an_original(peers, master):
     subscriber = peers.start("0.5.4.8", "subscriber", "t").wait_ready()
     for _ in range(30):
         done = peers.run_native(["-m", "nep", "topic", "pub", "t", '{"by": "hand"}'])

@@ -120,7 +120,7 @@ def deaf_subscriber_of(port: int, context: zmq.Context[zmq.Socket[bytes]]) -> Ca
 
 
 @pytest.mark.parametrize("kind", ["0.5.3.5", "0.5.4.8", "nep-js"])
-def test_originals_and_native_programs_hear_each_other_under_attack(
+def test_originals_and_native_programs_exchange_messages_under_attack(
     master, peers, flood: Flood, kind: str
 ) -> None:
     publisher = peers.start(kind, "publisher", "t", name="sender").wait_ready()

@@ -54,7 +54,7 @@ def started(clients: Peers, client: str, server: WebServer) -> Program:
 
 
 @pytest.mark.parametrize("client", CLIENTS)
-def test_client_runs_like_its_examples(
+def test_client_subscribes_publishes_calls_and_serves_like_its_examples(
     clients: Peers, server: WebServer, node: nep.Node, client: str
 ) -> None:
     heard = node.new_sub("/listener", "string")
@@ -89,7 +89,7 @@ def test_client_runs_like_its_examples(
     assert page.printed == ""
 
 
-def test_roslib_reads_every_compression(clients: Peers, server: WebServer, node: nep.Node) -> None:
+def test_roslib_decodes_every_compression(clients: Peers, server: WebServer, node: nep.Node) -> None:
     scan = LaserScan(ranges=[1.0, 2.5], angle_min=-1.0)
     node.new_pub("/scan", LaserScan, latched=True).publish(scan)
     node.new_pub("/text", "string", latched=True).publish("\u65e5" * 300)
@@ -117,7 +117,7 @@ def test_roslib_receives_the_close_of_the_server(clients: Peers, master: Master,
     eventually(lambda: not node.graph().topics)
 
 
-def test_foxglove_client_reads_publishes_and_calls_services(
+def test_foxglove_client_receives_publishes_and_calls_services(
     clients: Peers, server: WebServer, node: nep.Node
 ) -> None:
     heard = node.new_sub("/cmd", Twist)

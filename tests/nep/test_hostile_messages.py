@@ -73,7 +73,7 @@ def test_echo_shows_every_hostile_message(master, type_in, words):
         assert len([json.loads(line) for line in done.stdout.splitlines()]) == len(PAYLOADS)
 
 
-def test_log_shows_every_hostile_record_and_the_next_one(master, type_in, capfd):
+def test_log_command_shows_every_hostile_record_and_the_next_one(master, type_in, capfd):
     honest = json.dumps({"level": "info", "text": "honest", "node": "honest"}).encode()
     payloads = (*hostile.payloads(RECORD), honest)
     with (
@@ -116,7 +116,7 @@ def test_alarms_survive_hostile_values():
     }
 
 
-def test_bridge_carries_the_message_after_hostile_ones():
+def test_bridge_forwards_the_message_after_hostile_ones():
     with nets("memory", "memory") as (a, b), bridged(a, b, topic("/pose", direction="both")) as bridge:
         publisher, subscriber = a.node("evil").new_pub("/pose"), b.node("ears").new_sub("/pose")
         for payload in PAYLOADS:

@@ -30,7 +30,7 @@ def _programs() -> dict[str, tuple[str, list[str]]]:
 
 
 @pytest.mark.parametrize("head", sorted(_programs()))
-def test_the_program_prints_what_is_said(master: Master, head: str) -> None:
+def test_guide_program_prints_the_documented_output(master: Master, head: str) -> None:
     program, said = _programs()[head]
     with running(program, NEP_MASTER=master.address) as example:
         printed, errors = example.end()

@@ -64,12 +64,12 @@ class Endless(dict[str, object]):
     ],
     ids=lambda value: str(type(value)),
 )
-def test_text_of_any_value(value: object, text: str) -> None:
+def test_bounded_text_of_any_value(value: object, text: str) -> None:
     assert bounded_str(value) == text
     bounded_str(value).encode()
 
 
-def test_only_what_is_shown_of_a_value_is_read() -> None:
+def test_only_the_shown_part_of_a_value_is_read() -> None:
     endless = Endless()
     assert len(bounded_str(endless)) <= 201
     assert endless.read < 1_000
@@ -77,7 +77,7 @@ def test_only_what_is_shown_of_a_value_is_read() -> None:
     assert len(bounded_str([["x" * 5_000_000] * 1_000] * 1_000)) <= 201
 
 
-def test_text_of_a_value_is_had_with_hardly_any_stack_left() -> None:
+def test_bounded_text_works_near_the_recursion_limit() -> None:
     def fall(levels: int) -> str:
         return fall(levels - 1) if levels else bounded_str(nested(60))
 

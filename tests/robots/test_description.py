@@ -23,7 +23,7 @@ def model(name: str) -> dict[str, object]:
 
 
 @pytest.mark.parametrize("path", MODELS, ids=lambda path: path.stem)
-def test_our_models_are_good_and_so_are_their_descriptions(path):
+def test_shipped_thing_models_and_their_descriptions_are_valid(path):
     document = json.loads(path.read_text(encoding="utf-8"))
     assert validate(document) == ()
     described = td_for(document, "My robot")
@@ -35,7 +35,7 @@ def test_our_models_are_good_and_so_are_their_descriptions(path):
     assert json.loads(json.dumps(described)) == described
 
 
-def test_a_description_has_the_topics_of_the_name():
+def test_description_has_topics_derived_from_the_robot_name():
     robot = parse(td_for(model("pepper"), "Miss Pepper"))
     assert robot.topics.command == "/Miss_Pepper/command"
     assert robot.topics.answer == "/Miss_Pepper/answer"
@@ -46,7 +46,7 @@ def test_a_description_has_the_topics_of_the_name():
     assert topic_of("a/b {c}", "x") == "/a_b__c_/x"
 
 
-def test_topics_are_taken_from_the_forms():
+def test_topics_are_read_from_the_forms():
     document = td_for(model("pepper"), "Pepper")
     document["properties"]["camera"]["forms"] = [{"href": "nep:/elsewhere/eye"}]
     document["actions"]["say"]["forms"] = [{"href": "nep:/x/do", "rb:answer": "nep:/x/did"}]
@@ -55,7 +55,7 @@ def test_topics_are_taken_from_the_forms():
     assert (robot.action("say").topic, robot.action("say").answer_topic) == ("/x/do", "/x/did")
 
 
-def test_the_blocks_read_as_in_the_design():
+def test_block_texts_match_the_design():
     robot = parse(td_for(model("pepper"), "Pepper"))
     texts = {action.name: action.text for action in robot.actions}
     assert texts["say"] == "%robot say %text"
@@ -71,7 +71,7 @@ def test_the_blocks_read_as_in_the_design():
     assert {action.category for action in robot.actions} == {"Speech", "Movement", "Face and lights"}
 
 
-def test_every_icon_is_one_that_studio_ships():
+def test_every_icon_is_shipped_with_studio():
     text = resources.path("icons", "lucide.txt").read_text("utf-8")
     icons = {line.partition("\t")[0] for line in text.splitlines()}
     for path in MODELS:
@@ -80,7 +80,7 @@ def test_every_icon_is_one_that_studio_ships():
             assert part.icon in icons, f"{path.stem}: {part.name}"
 
 
-def test_the_robot_knows_how_it_is_stopped():
+def test_safe_stop_is_read_from_the_description():
     robot = parse(model("pepper"))
     assert robot.safe_stop.action == "stop"
     assert (robot.safe_stop.watchdog_s, robot.safe_stop.within_s) == (1.0, 0.2)
@@ -88,7 +88,7 @@ def test_the_robot_knows_how_it_is_stopped():
     assert robot.virtual
 
 
-def test_inputs_are_checked_with_sentences_for_people():
+def test_invalid_inputs_are_reported_with_readable_messages():
     robot = parse(model("pepper"))
     turn, say, light = robot.action("turn"), robot.action("say"), robot.action("light")
     assert turn.check({"angle": 400}) == ("turn: angle must be between -360 and 360 °",)
@@ -106,7 +106,7 @@ def test_inputs_are_checked_with_sentences_for_people():
 
 
 @pytest.mark.parametrize("wrong", [float("nan"), float("inf"), True, None, 10**400, [1]])
-def test_what_is_no_number_is_refused(wrong):
+def test_value_that_is_not_a_number_is_rejected(wrong):
     assert parse(model("pepper")).action("turn").check({"angle": wrong}) == ("turn: angle must be a number",)
 
 
@@ -146,11 +146,11 @@ def broken(change) -> tuple[str, ...]:
          "'state' is used for two things of one robot; their topics would be the same"),
     ],
 )  # fmt: skip
-def test_what_is_wrong_is_said_in_a_sentence(change, sentence):
+def test_invalid_description_is_reported_with_a_message(change, sentence):
     assert sentence in broken(change)
 
 
-def test_a_bad_description_is_an_error_with_all_sentences():
+def test_invalid_description_raises_an_error_with_all_problems():
     document = model("pepper")
     del document["rb:profile"], document["rb:safeStop"]
     with pytest.raises(DescriptionError) as caught:
@@ -159,7 +159,7 @@ def test_a_bad_description_is_an_error_with_all_sentences():
     assert "the description of 'Pepper' can't be used" in str(caught.value)
 
 
-def test_a_word_that_is_nothing_but_a_control_character_is_told_at_once():
+def test_text_of_only_control_characters_is_reported_as_empty():
     document = copy.deepcopy(model("pepper"))
     document["properties"]["sees_ball"]["rb:block"]["category"] = "\x08"
     assert validate(document) == ("properties.sees_ball.rb:block.category must not be empty",)
@@ -190,7 +190,7 @@ PLACES = places(model("pepper"))
 
 @settings(max_examples=300, deadline=None, suppress_health_check=[HealthCheck.too_slow])
 @given(st.lists(st.tuples(st.sampled_from(PLACES), json_values), min_size=1, max_size=3))
-def test_a_damaged_description_never_crashes(changes):
+def test_corrupt_description_never_crashes(changes):
     document = copy.deepcopy(model("pepper"))
     for path, value in changes:
         target = document
@@ -214,13 +214,13 @@ def test_a_damaged_description_never_crashes(changes):
 
 @settings(max_examples=200, deadline=None)
 @given(json_values)
-def test_any_json_is_no_crash(value):
+def test_arbitrary_json_is_reported_as_invalid_description(value):
     assert validate(value) != ()
 
 
 @settings(max_examples=100, deadline=None)
 @given(st.dictionaries(st.text(max_size=8), json_values, max_size=4))
-def test_any_input_gets_sentences(value):
+def test_arbitrary_input_is_checked_without_crash(value):
     for action in parse(model("pepper")).actions:
         assert all(sentence.startswith(action.name) for sentence in action.check(value))
 
@@ -257,14 +257,14 @@ NUMBERS = {"type": "array", "items": {"type": "number"}}
         ({"type": "object"}, "[" * 100_000, "[" * 100_000),
     ],
 )
-def test_words_of_a_person_become_a_list_or_an_object(described, words, value):
+def test_typed_text_is_parsed_to_a_list_or_object(described, words, value):
     made = from_words(parameter(**described), words)
     assert made == value
     assert repr(made) == repr(value)  # 1 is not 1.0, and not True
 
 
 @pytest.mark.parametrize("value", [["a", "b"], [1, 2.5], [["x"], []], {"a": {"b": 1}}, ["a, b"], [" "]])
-def test_what_is_shown_of_it_is_read_again(value):
+def test_formatted_list_or_object_parses_back_to_the_same_value(value):
     strings = isinstance(value, list) and all(isinstance(item, str) for item in value)
     described = {"type": "object" if isinstance(value, dict) else "array"}
     if isinstance(value, list) and not strings:
@@ -285,7 +285,7 @@ def test_what_is_shown_of_it_is_read_again(value):
         ({"type": "number", "rb:nullable": True}, None, None),
     ],
 )  # fmt: skip
-def test_what_is_inside_a_list_or_an_object_is_checked(described, value, wrong):
+def test_list_items_and_object_fields_are_validated(described, value, wrong):
     sentences = check_input("go", (parameter(**described),), {"values": value})
     assert sentences == (() if wrong is None else (f"go: values {wrong}",))
 
@@ -297,7 +297,7 @@ def message_of(data: bytes, codec: str = "json") -> Message:
     return Message("/Pepper/description", data, codec, "robot/description")
 
 
-def test_an_announced_robot_is_read():
+def test_announced_description_is_parsed():
     described = json.dumps(td_for(model("pepper"), "Pepper")).encode()
     assert announced(message_of(described)).name == "Pepper"
 
@@ -308,12 +308,12 @@ def test_an_announced_robot_is_read():
      b'{"title": "x"}', b'{"x": ' + b'{"a":' * 900 + b"1" + b"}" * 901],
     ids=["list", "object", "number", "half", "nothing", "no robot", "deep"],
 )  # fmt: skip
-def test_what_is_no_description_is_an_error(data):
+def test_invalid_announcement_raises_an_error(data):
     with pytest.raises((DescriptionError, NepError)):
         announced(message_of(data))
 
 
-def test_a_huge_description_is_refused_before_it_is_decoded():
+def test_huge_description_is_rejected_before_decoding():
     described = td_for(model("pepper"), "Pepper")
     described["description"] = "x" * 1_000_000
     message = message_of(json.dumps(described).encode())
@@ -322,7 +322,7 @@ def test_a_huge_description_is_refused_before_it_is_decoded():
     assert message.decoded is UNDECODED
 
 
-def test_of_a_description_with_more_values_than_any_robot_has_nothing_is_checked():
+def test_description_with_too_many_values_is_rejected_without_validation():
     """Checking all of it took the window six seconds, and its Stop with it."""
     described = td_for(model("pepper"), "Pepper")
     described["actions"] = {f"do {number}": {"title": number} for number in range(25_000)}
@@ -330,21 +330,21 @@ def test_of_a_description_with_more_values_than_any_robot_has_nothing_is_checked
         announced(message_of(json.dumps(described).encode()))
 
 
-def test_only_so_many_problems_are_looked_for():
+def test_number_of_reported_problems_is_limited():
     described = td_for(model("pepper"), "Pepper")
     described["actions"] = {f"do {number}": {} for number in range(3000)}
     assert len(validate(described)) <= 20
 
 
 @pytest.mark.parametrize("name", ["Arm\n", "Arm\u202e", "A\u200brm", "\x1b[2J"])
-def test_a_name_that_looks_like_another_one_is_refused_in_words_that_harm_nobody(name):
+def test_confusable_robot_name_is_rejected_with_an_escaped_message(name):
     described = {**td_for(model("pepper"), "Pepper"), "title": name}
     with pytest.raises(DescriptionError, match=r"title: '.*' can't be used in a name") as refused:
         parse(described)
     assert control_in(str(refused.value)) == ""
 
 
-def test_words_of_a_description_do_nothing_but_say_something():
+def test_control_characters_are_removed_from_texts_of_a_description():
     """A letter that turns the direction of writing would turn the question that has it in its middle, too."""
     described = td_for(model("pepper"), "Pepper")
     say = described["actions"]["say"]
@@ -359,7 +359,7 @@ def test_words_of_a_description_do_nothing_but_say_something():
     assert action.parameters[0].default == "a\n\u202eb"
 
 
-def test_the_sentence_about_a_description_is_short_and_harmless():
+def test_description_error_message_is_short_and_escaped():
     described = {**td_for(model("pepper"), "Pepper"), "title": "\x1b" + "A" * 100_000}
     described["actions"] = {"B" * 100_000: {"rb:block": 7}}
     with pytest.raises(DescriptionError) as refused:

@@ -10,7 +10,7 @@ def message(publisher: int, seq: int = 1) -> nep.Message:
     return nep.Message("/Pepper/answer", b"{}", "json", "robot/answer", publisher=publisher, seq=seq)
 
 
-def test_a_flood_of_one_publisher_displaces_its_own_messages_only() -> None:
+def test_many_messages_of_one_publisher_displace_only_its_own() -> None:
     held = HeldMessages(per_publisher=2)
     held.put(message(1))
     for seq in range(1000):
@@ -19,7 +19,7 @@ def test_a_flood_of_one_publisher_displaces_its_own_messages_only() -> None:
     assert not held
 
 
-def test_a_flood_of_publishers_displaces_no_earlier_one() -> None:
+def test_many_publishers_displace_no_earlier_one() -> None:
     held = HeldMessages(publishers=8)
     for publisher in range(1000):
         held.put(message(publisher))

@@ -115,7 +115,7 @@ class WhoseWordsCount:
         with nep.node("evil", master=master.address) as made:
             yield made
 
-    def test_an_answer_of_a_stranger_ends_no_action(
+    def test_answer_of_another_publisher_does_not_end_an_action(
         self, pepper: WireRobot, evil: nep.Node, side: Side
     ) -> None:
         side.meet(pepper.described, pepper._node.id)
@@ -132,7 +132,7 @@ class WhoseWordsCount:
         pepper._say(pepper.heard("invoke")[0], "succeeded")
         side.until(lambda: call.state == "succeeded")
 
-    def test_a_value_of_a_stranger_is_not_the_robots(
+    def test_sensor_value_of_another_publisher_is_ignored(
         self, pepper: WireRobot, evil: nep.Node, side: Side
     ) -> None:
         side.meet(pepper.described, pepper._node.id)
@@ -148,7 +148,9 @@ class WhoseWordsCount:
             side.until(told)
             assert side.value("battery") == 84
 
-    def test_a_stranger_proves_no_stop(self, pepper: WireRobot, evil: nep.Node, side: Side) -> None:
+    def test_answer_of_another_publisher_does_not_confirm_a_stop(
+        self, pepper: WireRobot, evil: nep.Node, side: Side
+    ) -> None:
         side.meet(pepper.described, pepper._node.id)
         pepper.silent = {"stop"}
         forged = evil.new_pub("/Pepper/answer", "robot/answer")
@@ -168,7 +170,7 @@ class WhoseWordsCount:
         assert side.stop_says() == "Pepper did not reply"
 
     @pytest.mark.parametrize("silent", [False, True])
-    def test_a_twin_must_answer_too(
+    def test_stop_needs_an_answer_of_every_program_with_the_robot_name(
         self, pepper: WireRobot, master: Master, side: Side, silent: bool
     ) -> None:
         side.meet(pepper.described, pepper._node.id)
@@ -183,7 +185,7 @@ class WhoseWordsCount:
             twin.close()
 
     @pytest.mark.parametrize("states", [("succeeded",), ("accepted", "running", "succeeded")], ids=len)
-    def test_an_answer_of_a_publisher_that_is_not_known_yet_waits_for_the_master(
+    def test_answer_of_an_unlisted_publisher_is_held_until_the_master_lists_it(
         self, master: Master, side: Side, states: tuple[str, ...]
     ) -> None:
         """The robot makes its answer topic only when it has something to say."""
@@ -200,7 +202,7 @@ class WhoseWordsCount:
             side.until(lambda: call.state == "succeeded")
             side.check_ended(call, states)
 
-    def test_a_description_on_another_topic_does_not_replace_the_robot(
+    def test_description_on_another_topic_does_not_replace_the_robot(
         self, pepper: WireRobot, evil: nep.Node, side: Side
     ) -> None:
         side.meet(pepper.described, pepper._node.id)
@@ -211,7 +213,7 @@ class WhoseWordsCount:
         assert side.stop()
         assert len(pepper.heard("stop")) == 1
 
-    def test_the_first_program_of_a_name_is_the_robot_and_both_are_named(
+    def test_first_program_of_a_name_stays_the_robot_and_the_conflict_is_reported(
         self, pepper: WireRobot, evil: nep.Node, side: Side
     ) -> None:
         side.meet(pepper.described, pepper._node.id)
@@ -223,7 +225,7 @@ class WhoseWordsCount:
         assert side.robots() == {"Pepper": ("/Pepper/command", pepper._node.id)}
 
     @pytest.mark.parametrize("leaf", ["command", "answer", "world"])
-    def test_a_robot_may_not_name_the_topics_of_another_its_own(
+    def test_robot_cannot_claim_topics_of_another_robot(
         self, pepper: WireRobot, evil: nep.Node, side: Side, leaf: str
     ) -> None:
         side.meet(pepper.described, pepper._node.id)

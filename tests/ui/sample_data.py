@@ -110,10 +110,14 @@ FOUND = (
         "master:foreign",
         "error",
         "“python3 server.py” (process 77) uses port 7780 but is not a master.",
-        "Close that program, or start the master on port 7781 and set NEP_MASTER=127.0.0.1:7781 for all programs.", "nep master --port 7781",
+        "Close that program, or start the master on port 7781 and set NEP_MASTER=127.0.0.1:7781 for all "
+        "programs.", "nep master --port 7781",
     ),
     Finding(
-        "port:7000", "warning", "The AirPlay Receiver uses port 7000, where programs of nep up to 0.5.4.5, nep-js and C# ask.", "Turn it off in System Settings, under General > AirDrop & Handoff.",
+        "port:7000",
+        "warning",
+        "The AirPlay Receiver uses port 7000, where programs of nep up to 0.5.4.5, nep-js and C# ask.",
+        "Turn it off in System Settings, under General > AirDrop & Handoff.",
     ),
     Finding("versions", "info", "NEP Studio 0.1.0, Python 3.11.7, pyzmq 27.3.0, libzmq 4.3.5, Linux 6.18."),
     Finding("loopback", "ok", "Programs on this computer can reach each other (127.0.0.1)."),

@@ -61,14 +61,16 @@ def _above(widget: QWidget) -> str:
 
 @pytest.mark.parametrize("name", [name for name in SIZES if name != "behaviour"])
 @pytest.mark.parametrize("full", [True, False], ids=["full", "empty"])
-def test_everything_in_a_panel_has_a_name(qtbot, theme: Theme, name: str, full: bool) -> None:
+def test_every_control_in_a_panel_has_an_accessible_name(qtbot, theme: Theme, name: str, full: bool) -> None:
     session = FakeSession.full() if full else FakeSession()
     with shown_panel(qtbot, theme, name, session) as (dock, _widget):
         assert list(stops(dock))
         assert unsaid(dock) == []
 
 
-def test_everything_in_the_window_has_a_name(qtbot, window: MainWindow, commands: Commands) -> None:
+def test_every_control_in_the_window_has_an_accessible_name(
+    qtbot, window: MainWindow, commands: Commands
+) -> None:
     window.theme.set_motion("on")
     window.show()
     window.tick()
@@ -102,7 +104,7 @@ def reached(window: MainWindow, forward: bool = True) -> list[QWidget]:
 
 
 @pytest.mark.parametrize("layout", ["behaviour", "developer"])
-def test_tab_reaches_everything_and_comes_back(
+def test_tab_reaches_every_control_and_returns_to_the_first(
     qtbot, window: MainWindow, commands: Commands, layout: str
 ) -> None:
     window.show()
@@ -122,9 +124,7 @@ def test_tab_reaches_everything_and_comes_back(
     assert set(reached(window, forward=False)) == set(seen)
 
 
-def test_panels_are_in_the_order_in_which_they_are_read(
-    qtbot, window: MainWindow, commands: Commands
-) -> None:
+def test_panels_have_focus_in_reading_order(qtbot, window: MainWindow, commands: Commands) -> None:
     window.show()
     window.activateWindow()
     qtbot.waitUntil(window.isActiveWindow)
@@ -153,7 +153,7 @@ def said(monkeypatch: pytest.MonkeyPatch) -> list[str]:
     return heard
 
 
-def test_alerts_are_said_once(qtbot, window: MainWindow, commands: Commands, said: list[str]) -> None:
+def test_alert_is_announced_once(qtbot, window: MainWindow, commands: Commands, said: list[str]) -> None:
     window.show()
     commands.run("layout.behaviour")
     window.session.alerts.put("camera", "error", "The camera is silent.", "No pictures come.")
@@ -162,7 +162,9 @@ def test_alerts_are_said_once(qtbot, window: MainWindow, commands: Commands, sai
     assert said == ["The camera is silent. No pictures come."]
 
 
-def test_an_alert_that_counts_on_is_no_news(qtbot, window, commands: Commands, said: list[str]) -> None:
+def test_alert_with_an_increased_count_is_not_announced_again(
+    qtbot, window, commands: Commands, said: list[str]
+) -> None:
     alerts = window.session.alerts
     window.show()
     commands.run("layout.behaviour")
@@ -176,7 +178,7 @@ def test_an_alert_that_counts_on_is_no_news(qtbot, window, commands: Commands, s
     assert said[1:] == ["The camera has been silent for 4 s."]
 
 
-def test_the_end_of_a_stop_is_said_and_no_figure(qtbot, theme: Theme, said: list[str]) -> None:
+def test_result_of_a_stop_is_announced_without_run_times(qtbot, theme: Theme, said: list[str]) -> None:
     bar = RunBar(theme)
     qtbot.addWidget(bar)
     bar.show()
@@ -189,7 +191,7 @@ def test_the_end_of_a_stop_is_said_and_no_figure(qtbot, theme: Theme, said: list
     assert said == ["all 2 robots stopped (41 ms)"]
 
 
-def test_a_toast_is_said(qtbot, window: MainWindow, said: list[str]) -> None:
+def test_toast_is_announced(qtbot, window: MainWindow, said: list[str]) -> None:
     window.show()
     window.toast.show_toast("Copied robots.Pepper.pose.y")
     assert said == ["Copied robots.Pepper.pose.y"]

@@ -58,14 +58,14 @@ def report(tmp_path_factory: pytest.TempPathFactory) -> str:
     return done.stdout
 
 
-def test_a_warning_fails_the_test_that_caused_it(report: str) -> None:
+def test_qt_warning_fails_the_test_that_caused_it(report: str) -> None:
     assert "FAILED test_inner.py::test_warns -" in report or "FAILED test_inner.py::test_warns\n" in report
 
 
-def test_a_warning_at_the_end_fails_it_too(report: str) -> None:
+def test_qt_warning_at_teardown_fails_the_test_too(report: str) -> None:
     assert "ERROR test_inner.py::test_warns_when_closed" in report
     assert "closing hurts" in report
 
 
-def test_known_noise_and_silence_pass(report: str) -> None:
+def test_tests_with_known_noise_or_no_warning_pass(report: str) -> None:
     assert "1 failed, 3 passed, 1 error" in report

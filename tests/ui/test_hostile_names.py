@@ -32,7 +32,7 @@ NAME = '<img src="/etc/passwd"> & <b>R</b>'
 @pytest.mark.parametrize(
     "words", [NAME, "<b>x", "<!doctype html>", "<?xml?>", "a\n<i>b</i>", "x < y", "&amp;", "", "a  b"]
 )
-def test_a_tooltip_shows_exactly_the_words(qapp, words: str) -> None:
+def test_tooltip_shows_exactly_the_text(qapp, words: str) -> None:
     tip = plain.tip(words)
     if not Guessing.mightBeRichText(tip):
         assert tip == words
@@ -43,14 +43,14 @@ def test_a_tooltip_shows_exactly_the_words(qapp, words: str) -> None:
     assert "<img" not in tip
 
 
-def test_a_menu_shows_exactly_the_name(qtbot) -> None:
+def test_menu_shows_exactly_the_name(qtbot) -> None:
     menu = QMenu()
     qtbot.addWidget(menu)
     action = menu.addAction(plain.entry("R&D\t<b>Ctrl+Q</b>"))
     assert action.text() == "R&&D <b>Ctrl+Q</b>"
 
 
-def test_every_tooltip_that_is_not_a_constant_goes_through_the_one_seam() -> None:
+def test_every_dynamic_tooltip_uses_the_escaping_function() -> None:
     found = []
     for path in Path(app.ui.__file__).parent.rglob("*.py"):
         for line in path.read_text("utf-8").splitlines():
@@ -93,7 +93,7 @@ def shown(view: QAbstractItemView) -> Iterator[str]:
 
 
 @pytest.mark.parametrize("name", [name for name in PanelRegistry() if name != "behaviour"])
-def test_no_panel_takes_a_name_for_markup(qtbot, name: str) -> None:
+def test_no_panel_interprets_a_name_as_markup(qtbot, name: str) -> None:
     window = hostile()
     panel = PanelRegistry()[name].make(window.context())
     assert isinstance(panel, PanelWidget)
@@ -116,7 +116,7 @@ def test_no_panel_takes_a_name_for_markup(qtbot, name: str) -> None:
     panel.shut()
 
 
-def test_the_banner_shows_names_as_they_are(qtbot, theme: Theme) -> None:
+def test_banner_shows_names_literally(qtbot, theme: Theme) -> None:
     window = hostile()
     banner = AlertBanner(theme)
     qtbot.addWidget(banner)

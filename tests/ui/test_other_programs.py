@@ -13,7 +13,9 @@ OURS = {"LD_LIBRARY_PATH": "/opt/nep-studio/_internal", "_PYI_ARCHIVE_FILE": "/o
     ("original", "inherited"),
     [({}, {}), ({"LD_LIBRARY_PATH_ORIG": "/usr/games"}, {"LD_LIBRARY_PATH": "/usr/games"})],
 )
-def test_they_get_what_was_there_before(original: dict[str, str], inherited: dict[str, str]) -> None:
+def test_child_process_gets_the_original_library_paths(
+    original: dict[str, str], inherited: dict[str, str]
+) -> None:
     environ = {"HOME": "/home/ana", **OURS, **original}
     before = dict(environ)
     with outside(environ, is_frozen=True):
@@ -21,14 +23,14 @@ def test_they_get_what_was_there_before(original: dict[str, str], inherited: dic
     assert environ == before
 
 
-def test_it_is_ours_again_whatever_happened() -> None:
+def test_library_paths_are_restored_after_an_exception() -> None:
     environ = dict(OURS)
     with pytest.raises(OSError, match="gone"), outside(environ, is_frozen=True):
         raise OSError("gone")
     assert environ == OURS
 
 
-def test_a_checkout_changes_nothing() -> None:
+def test_source_checkout_leaves_the_environment_unchanged() -> None:
     environ = {"LD_LIBRARY_PATH": "/opt/ros/lib"}
     with outside(environ, is_frozen=False):
         assert environ == {"LD_LIBRARY_PATH": "/opt/ros/lib"}

@@ -23,7 +23,7 @@ def drive(qtbot, window: MainWindow, commands: Commands, folder: Path, steps: li
     return driver
 
 
-def test_every_station_is_seen_before_its_picture(
+def test_every_tour_step_waits_for_its_condition_before_the_screenshot(
     qtbot, window: MainWindow, commands: Commands, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     looks: list[int] = []
@@ -53,7 +53,7 @@ def test_every_station_is_seen_before_its_picture(
     assert "2 pictures are in" in capsys.readouterr().out
 
 
-def test_what_is_not_seen_is_said(
+def test_unmet_tour_condition_is_reported(
     qtbot, window: MainWindow, commands: Commands, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     steps = [

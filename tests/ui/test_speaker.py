@@ -64,7 +64,7 @@ def speaker(qapp, engine) -> Iterator[QtSpeaker]:
     assert "robots' voice" not in [thread.name for thread in threading.enumerate()]
 
 
-def test_nothing_begins_before_the_first_word(speaker, engine) -> None:
+def test_no_engine_is_created_before_the_first_speech(speaker, engine) -> None:
     speaker.stop()
     speaker.stop_voice()
     speaker.play((), 0.0)
@@ -72,7 +72,7 @@ def test_nothing_begins_before_the_first_word(speaker, engine) -> None:
     assert "robots' voice" not in [thread.name for thread in threading.enumerate()]
 
 
-def test_a_voice_is_busy_until_its_engine_has_said_it(qtbot, speaker, engine) -> None:
+def test_voice_is_busy_until_its_engine_has_finished(qtbot, speaker, engine) -> None:
     speaker.speak("Hello", "en", 0.5)
     assert speaker.busy
     qtbot.waitUntil(lambda: engine.end is not None)
@@ -84,7 +84,7 @@ def test_a_voice_is_busy_until_its_engine_has_said_it(qtbot, speaker, engine) ->
     assert speaker.problem == ""
 
 
-def test_an_engine_that_takes_long_holds_nobody_up_and_a_stop_overtakes_it(qtbot, speaker, engine) -> None:
+def test_slow_engine_does_not_block_the_caller_and_stop_overtakes_it(qtbot, speaker, engine) -> None:
     engine.may_begin.clear()
     speaker.speak("Hello", "en", 0.5)
     speaker.play(((440.0, 0.1),), 0.5)
@@ -98,7 +98,7 @@ def test_an_engine_that_takes_long_holds_nobody_up_and_a_stop_overtakes_it(qtbot
     assert [each for each in engine.did if isinstance(each, tuple)] == [("Again", 0.5)]
 
 
-def test_the_end_of_what_was_stopped_does_not_end_the_next(qtbot, speaker, engine) -> None:
+def test_late_end_of_a_stopped_speech_does_not_end_the_next_one(qtbot, speaker, engine) -> None:
     speaker.speak("Hello", "en", 0.5)
     qtbot.waitUntil(lambda: engine.end is not None)
     first, engine.end = engine.end, None
@@ -111,7 +111,7 @@ def test_the_end_of_what_was_stopped_does_not_end_the_next(qtbot, speaker, engin
     assert [each for each in engine.did if isinstance(each, tuple)] == [("Hello", 0.5), ("Again", 0.5)]
 
 
-def test_a_language_without_a_voice_ends_at_once_and_says_why(qtbot, speaker) -> None:
+def test_language_without_a_voice_ends_at_once_with_a_reason(qtbot, speaker) -> None:
     speaker.speak("Bonjour", "fr", 0.5)
     qtbot.waitUntil(lambda: not speaker.busy)
     assert speaker.problem == "This computer has no voice for French."
@@ -119,7 +119,7 @@ def test_a_language_without_a_voice_ends_at_once_and_says_why(qtbot, speaker) ->
     qtbot.waitUntil(lambda: speaker.problem == "")
 
 
-def test_an_engine_that_breaks_off_leaves_silence(qtbot, caplog) -> None:
+def test_failing_engine_leaves_the_speaker_silent_with_a_reason(qtbot, caplog) -> None:
     def broken() -> FakeEngine:
         raise RuntimeError("no sound server")
 
@@ -131,7 +131,7 @@ def test_an_engine_that_breaks_off_leaves_silence(qtbot, caplog) -> None:
     assert "no sound server" in caplog.text
 
 
-def test_without_the_libraries_of_sound_it_is_silent_and_says_why(qtbot) -> None:
+def test_speaker_without_audio_libraries_is_silent_with_a_reason(qtbot) -> None:
     speaker = QtSpeaker(QtEngine)
     speaker.speak("Hello", "en", 0.5)
     qtbot.waitUntil(lambda: not speaker.busy)
@@ -142,7 +142,7 @@ def test_without_the_libraries_of_sound_it_is_silent_and_says_why(qtbot) -> None
     speaker.close()
 
 
-def test_a_voice_that_ends_the_process_that_tries_it_is_not_made_here(qtbot, monkeypatch, caplog) -> None:
+def test_voice_engine_that_crashes_in_its_trial_process_is_not_created(qtbot, monkeypatch, caplog) -> None:
     crash = [sys.executable, "-c", "import os; os.kill(os.getpid(), 11)"]
     assert not outlives_trial(crash)
     assert "the test process exited with" in caplog.text
@@ -153,7 +153,7 @@ def test_a_voice_that_ends_the_process_that_tries_it_is_not_made_here(qtbot, mon
     assert QtEngine().speak("Hello", "en", 0.5, lambda: None) == no_voice("en")
 
 
-def test_a_voice_that_hangs_ends_with_the_process_that_tries_it(monkeypatch) -> None:
+def test_voice_engine_trial_that_hangs_is_terminated(monkeypatch) -> None:
     monkeypatch.setattr("app.ui.speaker.TRIAL_S", 0.2)
     assert not outlives_trial([sys.executable, "-c", "import threading; threading.Event().wait()"])
     hangs = "import threading; from app.ui import speaker; speaker.TRIAL_S = 0.2; "
@@ -161,7 +161,7 @@ def test_a_voice_that_hangs_ends_with_the_process_that_tries_it(monkeypatch) -> 
     assert subprocess.run([sys.executable, "-c", hangs], check=False).returncode == 1
 
 
-def test_a_tone_is_as_high_as_long_and_as_loud_as_asked_and_does_not_click() -> None:
+def test_tone_has_the_requested_pitch_duration_and_volume_without_clicks() -> None:
     made = array("h", samples(((441.0, 0.5), (0.0, 0.25)), 1.0))
     assert len(made) == round(44_100 * 0.75)
     rises = sum(1 for one, two in pairwise(made) if one < 0 <= two)
@@ -173,7 +173,7 @@ def test_a_tone_is_as_high_as_long_and_as_loud_as_asked_and_does_not_click() -> 
     assert samples((), 1.0) == b""
 
 
-def test_why_robots_are_silent_is_said_with_what_to_install() -> None:
+def test_reason_for_silent_robots_names_what_to_install() -> None:
     assert voice_words("", has_engine=True) == "Robots speak with the voice of this computer."
     silent = voice_words("", has_engine=False, platform="linux")
     assert silent.startswith(

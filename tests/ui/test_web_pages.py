@@ -62,7 +62,7 @@ def page(qtbot: QtBot) -> Iterator[QWebEnginePage]:
     profile.deleteLater()
 
 
-def test_page_of_this_computer_connects_and_page_of_another_site_is_refused(
+def test_page_of_this_computer_connects_and_page_of_another_origin_is_rejected(
     qtbot: QtBot, page: QWebEnginePage, node: nep.Node, master: Master, roslib: str
 ) -> None:
     heard = node.new_sub("/talker", "string")
@@ -91,7 +91,7 @@ def test_page_of_this_computer_connects_and_page_of_another_site_is_refused(
         qtbot.waitUntil(lambda: not server.page_names)
 
 
-def test_page_of_the_guide_shows_messages_and_sends_clicks(
+def test_example_page_of_the_guide_shows_messages_and_publishes_clicks(
     qtbot: QtBot, page: QWebEnginePage, node: nep.Node, master: Master, roslib: str
 ) -> None:
     found = re.search(r"```html\n(.*?)```", GUIDE.read_text("utf-8"), re.DOTALL)

@@ -27,7 +27,7 @@ def lines(made: dict[str, object]) -> list[str]:
     return [line.strip() for line in source[start:]]
 
 
-def test_else_if_becomes_elif_and_else_comes_last() -> None:
+def test_else_if_compiles_to_elif_and_else_comes_last() -> None:
     made = chosen(
         {"elseIfs": 2, "else": True},
         CONDITION1=condition(True),
@@ -62,7 +62,7 @@ def test_else_if_becomes_elif_and_else_comes_last() -> None:
         ("control_if_else", {"elseIfs": 0, "else": False}, False),
     ],
 )
-def test_a_block_of_an_old_file_and_one_that_says_nonsense_is_as_its_kind(
+def test_old_or_invalid_branch_state_falls_back_to_block_kind(
     kind: str, extra: object, has_else: bool
 ) -> None:
     found = lines(chosen(extra, kind, ELSE=[write(text("none"))]))
@@ -70,7 +70,7 @@ def test_a_block_of_an_old_file_and_one_that_says_nonsense_is_as_its_kind(
     assert not any(line.startswith("elif") for line in found)
 
 
-def test_a_million_branches_are_no_million() -> None:
+def test_number_of_else_if_branches_is_limited() -> None:
     assert Branches.of({"elseIfs": 10**6}, has_else=False) == Branches(20)
     empty = compile_behaviour(workspace(started(chosen({"elseIfs": 1}))), [])
     assert [each.sentence for each in empty.problems] == ["if needs a condition. Drag one into its slot."]

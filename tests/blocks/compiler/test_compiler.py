@@ -65,7 +65,7 @@ def picture() -> dict[str, object]:
     )
 
 
-def test_the_program_reads_well():
+def test_generated_program_is_readable():
     program = compile_behaviour(picture(), [robot()], absent=[nao()], name="Greeting")
     imports, _, rest = program.source.partition("\n\n\n")
     rest = rest.replace("lambda :", "lambda:")  # as Python 3.10 writes it
@@ -110,7 +110,7 @@ run('Greeting')
     assert program.readings["t"] == "Pepper turn left by 30 °"
 
 
-def test_the_problems_of_the_picture():
+def test_absent_robot_and_missing_time_limit_are_reported_as_problems():
     program = compile_behaviour(picture(), [robot()], absent=[nao()])
     first, second = program.problems
     assert (first.severity, first.block_id, first.category, first.icon) == ("warning", "n", "robot", "hand")
@@ -127,13 +127,13 @@ def sentences(saved, robots=None) -> list[tuple[str, str]]:
     return [(problem.severity, problem.sentence) for problem in program.problems]
 
 
-def test_a_robot_that_was_never_seen_is_named_too():
+def test_robot_never_seen_before_is_named_in_problem():
     saved = workspace(started(block("robot_nao_do_wave", ROBOT="NAO", HAND="left"), say("Hi")))
     assert sentences(saved) == [("warning", "NAO is not connected, so wave will be skipped.")]
     assert play(saved).link.invoked == [("Pepper", "say", {"text": "Hi"})]
 
 
-def test_an_unknown_block_is_kept_and_skipped():
+def test_unknown_block_is_kept_and_skipped():
     saved = workspace(started(block("magic_wave_wand"), say("Hi")))
     assert sentences(saved) == [
         (
@@ -144,14 +144,14 @@ def test_an_unknown_block_is_kept_and_skipped():
     assert play(saved).link.invoked == [("Pepper", "say", {"text": "Hi"})]
 
 
-def test_a_block_with_an_absent_sensor_is_skipped_whole():
+def test_block_with_sensor_of_absent_robot_is_skipped_entirely():
     condition = block("robot_nao_get_battery", ROBOT="NAO")
     saved = workspace(started(block("control_if", CONDITION=condition, BODY=[say("no")]), say("Hi")))
     assert sentences(saved) == [("warning", "NAO is not connected, so if with battery will be skipped.")]
     assert play(saved).link.invoked == [("Pepper", "say", {"text": "Hi"})]
 
 
-def test_every_block_of_an_absent_robot_is_told_also_where_nothing_runs():
+def test_all_blocks_of_absent_robot_are_listed_even_outside_scripts():
     inside = block("control_if", CONDITION=block("robot_nao_get_battery", ROBOT="NAO"),
                    BODY=[say("hidden", "NAO"), say("here")])  # fmt: skip
     loose = say("loose", "NAO")
@@ -162,14 +162,14 @@ def test_every_block_of_an_absent_robot_is_told_also_where_nothing_runs():
     assert not compile_behaviour(workspace(started(say("here"))), [robot()]).absent
 
 
-def test_a_script_of_an_absent_robot_does_not_start():
+def test_script_of_absent_robot_does_not_start():
     saved = workspace(stack(block("robot_nao_when_touched", ROBOT="NAO"), say("Hi")))
     found = sentences(saved)
     assert ("warning", "NAO is not connected, so touched will be skipped.") in found
     assert compile_behaviour(saved, [robot()]).starts == 0
 
 
-def test_a_connected_robot_that_cannot_do_it():
+def test_action_missing_on_connected_robot_is_skipped_with_warning():
     saved = workspace(started(block("robot_pepper_do_say", ROBOT="NAO", TEXT=text("Hi"))))
     assert sentences(saved, [robot(), nao()]) == [("warning", "NAO can't do this, so say will be skipped.")]
 
@@ -187,7 +187,7 @@ def test_a_connected_robot_that_cannot_do_it():
         (write(block("values_not")), "not needs a condition. Drag one into its slot."),
     ],
 )
-def test_an_empty_gap_is_an_error_and_the_program_stops_there(it, sentence):
+def test_empty_slot_is_an_error_and_ends_the_program_at_that_block(it, sentence):
     saved = workspace(started(say("before"), it, say("after")))
     assert sentences(saved) == [("error", sentence)]
     run = play(saved)
@@ -197,13 +197,13 @@ def test_an_empty_gap_is_an_error_and_the_program_stops_there(it, sentence):
     assert run.runtime.error.block == compile_behaviour(saved, [robot()]).problems[0].block_id
 
 
-def test_a_hat_with_an_empty_gap_does_not_start():
+def test_event_block_with_empty_slot_does_not_start():
     saved = workspace(stack(block("events_becomes_true"), say("Hi")), started())
     assert sentences(saved) == [("error", "when needs a condition. Drag one into its slot.")]
     assert compile_behaviour(saved, [robot()]).starts == 1
 
 
-def test_what_the_robot_would_refuse_is_told_before_run():
+def test_input_outside_action_schema_is_an_error_before_run():
     turn = block("robot_pepper_do_turn", ROBOT="Pepper", DIRECTION="left", ANGLE=number(900))
     assert sentences(workspace(started(turn))) == [("error", "turn: angle must be between 0 and 360 °.")]
     assert sentences(workspace(started(say("")))) == [("error", "say: text must not be empty.")]
@@ -222,13 +222,13 @@ def test_what_the_robot_would_refuse_is_told_before_run():
         (block("variables_set", VALUE=number(1)), "needs a variable"),
     ],
 )
-def test_a_field_that_holds_nonsense_skips_its_block(it, end):
+def test_block_with_invalid_field_value_is_skipped(it, end):
     (problem,) = compile_behaviour(workspace(started(it)), [robot()]).problems
     assert problem.severity == "error"
     assert end in problem.sentence
 
 
-def test_blocks_without_a_start():
+def test_blocks_without_event_block_are_reported():
     saved = workspace(say("Hi"))
     assert sentences(saved) == [
         ("warning", "These blocks have no start. Put “when started” above them."),
@@ -238,20 +238,20 @@ def test_blocks_without_a_start():
     assert [severity for severity, _ in sentences(workspace(started(), say("Hi")))] == ["info"]
 
 
-def test_a_loose_value_is_told_to_go_into_a_gap():
+def test_loose_value_block_is_reported():
     for value in (number(1), boolean(True), block("values_join", A=text("a"), B=text("b"))):
         ((severity, sentence),) = sentences(workspace(started(), value))
         assert severity == "info"
         assert sentence.endswith("isn't used. Drag it into an empty slot of another block.")
 
 
-def test_the_message_outside_of_its_script():
+def test_message_block_outside_message_script_is_a_warning():
     saved = workspace(started(write(block("messages_message"))))
     assert sentences(saved) == [("warning", "message only works below “when a message arrives”.")]
     assert play(saved).lines == [""]
 
 
-def test_a_disabled_block_is_left_out_but_an_absence_mark_of_the_editor_is_not_believed():
+def test_disabled_block_is_skipped_but_editor_absence_mark_is_ignored():
     off = say("off") | {"enabled": False}
     manual = say("manual") | {"disabledReasons": ["MANUALLY_DISABLED"]}
     absent = say("on") | {"disabledReasons": ["robot absent"]}
@@ -260,7 +260,7 @@ def test_a_disabled_block_is_left_out_but_an_absence_mark_of_the_editor_is_not_b
     ]
 
 
-def test_a_shadow_counts_until_a_block_is_in_its_place():
+def test_shadow_block_is_used_until_replaced():
     shadow = {"shadow": number(7)}
     wait = block("control_wait") | {"inputs": {"SECONDS": shadow}}
     assert "wait(7)" in compile_behaviour(workspace(started(wait)), []).source
@@ -268,7 +268,7 @@ def test_a_shadow_counts_until_a_block_is_in_its_place():
     assert "wait(8)" in compile_behaviour(workspace(started(both)), []).source
 
 
-def test_variables_keep_their_names_as_far_as_python_takes_them():
+def test_variable_names_are_kept_where_valid_in_python():
     names = ("score", "my score", "class", "wait", "点数", "ﬁt", "fit", "2nd", "")
     saved = workspace(
         started(*(block("variables_set", VAR={"id": name or "x"}, VALUE=number(1)) for name in names)),
@@ -285,7 +285,7 @@ def test_variables_keep_their_names_as_far_as_python_takes_them():
     assert not {"class", "wait"} & set(assigned)
 
 
-def test_scripts_share_their_variables():
+def test_scripts_share_variables():
     run = play(
         workspace(
             started(
@@ -299,7 +299,7 @@ def test_scripts_share_their_variables():
     assert run.lines == ["7"]
 
 
-def test_a_long_script_and_a_deep_one():
+def test_long_script_and_deep_nesting_compile():
     long_ = compile_behaviour(workspace(started(*(say(f"{n}") for n in range(3000)))), [robot()])
     assert not long_.problems
     assert long_.source.count("'say'") == 3000
@@ -322,7 +322,7 @@ def test_a_long_script_and_a_deep_one():
     assert play(workspace(started(loops))).lines == ["x"]
 
 
-def test_a_program_survives_the_way_to_its_process():
+def test_program_survives_json_round_trip():
     import json
 
     program = compile_behaviour(picture(), [robot()], name="Greeting")
@@ -337,7 +337,7 @@ def test_a_program_survives_the_way_to_its_process():
         Program.from_json({"name": "x"})
 
 
-def test_what_is_no_workspace_is_an_empty_program():
+def test_invalid_workspace_compiles_to_empty_program():
     for nonsense in ({}, {"blocks": 3}, {"blocks": {"blocks": [1, {"type": 2}, None]}}, {"variables": "x"}):
         program = compile_behaviour(nonsense, [robot()])
         assert (program.starts, program.problems) == (0, ())

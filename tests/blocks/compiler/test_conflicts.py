@@ -32,7 +32,7 @@ def when(*body: Saved) -> Saved:
     return block("control_if", CONDITION=boolean(True), BODY=list(body))
 
 
-def test_two_started_scripts_that_move_the_base() -> None:
+def test_two_started_scripts_that_move_the_base_conflict() -> None:
     (problem,) = conflicts(started(turn("t")), started(home("h")))
     assert (problem.block_id, problem.subject, problem.mend) == ("h", "go home", "Run one after the other")
     assert problem.sentence == (
@@ -40,7 +40,7 @@ def test_two_started_scripts_that_move_the_base() -> None:
     )
 
 
-def test_another_part_is_named() -> None:
+def test_conflict_names_another_part() -> None:
     (problem,) = conflicts(started(look("a")), started(look("b")))
     assert "“look” both use the face of Pepper" in problem.sentence
 
@@ -63,7 +63,7 @@ def set_variable() -> Saved:
     ],
     ids=["for ever and once", "for ever and later", "both for ever", "after what takes no time", "in a loop"],
 )
-def test_what_surely_comes_at_the_same_time(scripts) -> None:
+def test_simultaneous_commands_are_a_conflict(scripts) -> None:
     assert len(conflicts(*(make() for make in scripts))) == 1
 
 
@@ -88,19 +88,19 @@ def test_what_surely_comes_at_the_same_time(scripts) -> None:
     ids=["one script", "speech", "another part", "queued", "another robot", "after a wait", "later",
          "perhaps", "after a condition", "not started", "switched off", "of an event"],
 )  # fmt: skip
-def test_no_false_warning(scripts) -> None:
+def test_scripts_without_overlap_do_not_conflict(scripts) -> None:
     found = conflicts(*(make() for make in scripts), robots=("Pepper", "Other"))
     assert [each for each in found if "same time" in each.sentence] == []
 
 
-def test_a_function_that_a_script_calls_counts() -> None:
+def test_conflict_inside_called_function_is_found() -> None:
     moves = define("f", "dance", (), turn("in f"))
     (problem,) = conflicts(moves, started(call("f")), started(home("h")))
     assert problem.block_id == "h"
     assert "“turn” and “go home”" in problem.sentence
 
 
-def test_a_function_that_calls_itself_is_walked_once() -> None:
+def test_recursive_function_is_visited_once() -> None:
     moves = define("f", "dance", (), turn("in f"), call("f"))
     assert len(conflicts(moves, started(call("f")), started(home("h")))) == 1
 
@@ -129,24 +129,24 @@ def named(script: Saved, id: str) -> Saved:
     return {**script, "id": id}
 
 
-def test_the_mend_hangs_the_second_script_below_the_first_ones_end() -> None:
+def test_conflict_fix_appends_second_script_to_the_first() -> None:
     first, second = named(started(turn("a"), say("x") | {"id": "x"}), "s1"), named(started(home("b")), "s2")
     assert mended(first, second) == [["s1", "a", "x", "b"]]
     assert conflicts(named(started(turn("a"), home("b")), "s1")) == []
 
 
-def test_ids_of_hats_may_have_colons_as_the_editor_makes_them() -> None:
+def test_conflict_fix_handles_event_block_ids_with_colons() -> None:
     first, second = named(started(turn("a")), ":s:1"), named(started(home("b")), "s::2:")
     assert mended(first, second) == [[":s:1", "a", "b"]]
 
 
-def test_below_one_that_goes_on_for_ever_nothing_can_hang() -> None:
+def test_conflict_fix_does_not_append_below_forever_loop() -> None:
     first, second = named(started(forever(turn("a")) | {"id": "e"}), "s1"), named(started(home("b")), "s2")
     assert mended(first, second) == [["s2", "b", "e"]]
     (problem,) = conflicts(started(forever(turn("a"))), started(forever(turn("b"))))
     assert (problem.mend, problem.mend_action) == (None, None)
 
 
-def test_the_mend_of_what_is_gone_does_nothing() -> None:
+def test_conflict_fix_for_missing_script_does_nothing() -> None:
     assert mend(workspace(named(started(turn("a")), "s1")), "after:s2:s1") is None
     assert mend(workspace(named(started(turn("a")), "s1")), "after:s1:s1") is None

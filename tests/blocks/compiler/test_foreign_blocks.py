@@ -13,7 +13,7 @@ def compiled(*blocks: dict[str, object], **others: object) -> Program:
     return compile_behaviour(workspace(started(*blocks)) | others, [robot()])
 
 
-def test_unknown_blocks_are_named_as_on_the_canvas_also_inside_others() -> None:
+def test_unknown_blocks_including_nested_ones_are_named_as_on_the_canvas() -> None:
     inner = block("logic_boolean", "z", BOOL="TRUE")
     foreign = block("controls_if", "q") | {"inputs": {"IF0": {"block": inner}}}
     program = compiled(
@@ -39,18 +39,18 @@ def test_unknown_blocks_are_named_as_on_the_canvas_also_inside_others() -> None:
     assert (told["q"].mend_action, told["p"].mend_action) == ("point.block:control_if", None)
 
 
-def test_unknown_blocks_that_are_switched_off_are_not_told_of() -> None:
+def test_disabled_unknown_blocks_are_not_reported() -> None:
     program = compiled(block("lamp_toggle_now", "p") | {"enabled": False})
     assert program.problems == ()
 
 
-def test_proposed_blocks_exist_and_stand_for_blocks_that_do_not() -> None:
+def test_suggested_replacements_exist_and_replace_only_unknown_blocks() -> None:
     ours = {each.type for category in categories() for each in category.blocks}
     assert set(OURS.values()) <= ours
     assert not ours & OURS.keys()
 
 
-def test_variable_whose_name_the_file_lacks_is_a_problem_that_names_it() -> None:
+def test_variable_without_name_is_reported_with_rename_fix() -> None:
     program = compiled(
         block("variables_set", "s") | {"fields": {"VAR": {"id": "gone"}}},
         block("variables_change", "c") | {"fields": {"VAR": {"id": "gone"}}},
@@ -65,7 +65,7 @@ def test_variable_whose_name_the_file_lacks_is_a_problem_that_names_it() -> None
     assert "speed" in program.readings["t"]
 
 
-def test_renaming_finds_the_variable() -> None:
+def test_rename_fix_finds_the_variable() -> None:
     saved = workspace(started(block("variables_set", "s") | {"fields": {"VAR": {"id": "gone"}}}))
     parsed = parse_workspace(saved)
     assert parsed.nameless == {"gone"}

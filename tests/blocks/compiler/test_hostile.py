@@ -91,7 +91,7 @@ def filled(draw, described, depth: int) -> dict[str, object]:
     max_examples=200, deadline=None, suppress_health_check=[HealthCheck.too_slow, HealthCheck.data_too_large]
 )
 @given(st.lists(blocks(), max_size=4), texts, st.lists(texts, max_size=3))
-def test_only_our_own_names_are_ever_called(tops, name, variables):
+def test_program_calls_only_known_names(tops, name, variables):
     saved = workspace(started(*copy.deepcopy(tops)), *tops, variables=tuple(variables))
     program = compile_behaviour(saved, [robot()], name=name)
     check(program.source)
@@ -124,7 +124,7 @@ def check(text: str) -> None:
 
 @settings(max_examples=150, deadline=None)
 @given(texts, texts, texts, texts)
-def test_a_hostile_robot_description_stays_words(action, parameter, words, robot_name):
+def test_hostile_robot_description_is_never_executed(action, parameter, words, robot_name):
     wave = {
         "title": words,
         "input": {

@@ -63,14 +63,14 @@ def strangers(count: int) -> Saved:
 
 
 @pytest.mark.parametrize("make", [scripts, variables, functions, strangers])
-def test_four_times_the_blocks_are_four_times_the_work(make: Callable[[int], Saved]) -> None:
+def test_compile_time_is_linear_in_number_of_blocks(make: Callable[[int], Saved]) -> None:
     robots = (robot(),)
     compile_behaviour(make(2), robots)  # what is made once is made
     few, many = (steps(partial(compile_behaviour, make(count), robots)) for count in (FEW, 4 * FEW))
     assert many < 5 * few
 
 
-def test_names_and_ids_that_are_all_the_same_are_no_more_work() -> None:
+def test_duplicate_names_and_ids_keep_compile_time_linear() -> None:
     def name(count: int) -> None:
         names = Names(frozenset())
         assert len({names.new("when started", "script") for _ in range(count)}) == count
@@ -85,7 +85,7 @@ def test_names_and_ids_that_are_all_the_same_are_no_more_work() -> None:
         assert many < 5 * few
 
 
-def test_a_line_for_each_missing_robot_is_no_more_work() -> None:
+def test_problems_of_many_missing_robots_keep_compile_time_linear() -> None:
     here = robot()
 
     def work(count: int) -> int:

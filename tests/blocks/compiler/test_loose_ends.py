@@ -31,7 +31,7 @@ def add() -> dict[str, object]:
 NEVER = "“scores” is used but never set."
 
 
-def test_a_list_that_is_never_set_is_named_and_the_button_sets_it_where_the_behaviour_starts():
+def test_list_never_set_is_reported_and_fix_sets_it_at_program_start():
     saved = workspace(
         started(add(), write(get("scores"))),
         stack(block("events_message", TOPIC="/x"), add()),
@@ -49,7 +49,7 @@ def test_a_list_that_is_never_set_is_named_and_the_button_sets_it_where_the_beha
     assert (first["type"], first["next"]["block"]["id"]) == ("variables_set", "add")
 
 
-def test_the_mended_program_runs():
+def test_fixed_program_runs():
     saved = workspace(started(add(), write(block("lists_length", LIST=get("scores")))), variables=("scores",))
     assert play(saved).runtime.error is not None
     mended = mend(saved, compile_behaviour(saved, []).problems[0].mend_action or "")
@@ -57,7 +57,7 @@ def test_the_mended_program_runs():
     assert play(mended).lines == ["1"]
 
 
-def test_a_number_that_is_never_set():
+def test_number_never_set_is_reported():
     saved = workspace(stack(block("events_message", TOPIC="/x"), write(get("n"))), variables=("n",))
     (problem,) = compile_behaviour(saved, []).problems
     assert (problem.sentence, problem.mend) == ("“n” is used but never set.", "Set it to 0 at the start")
@@ -77,24 +77,24 @@ def test_a_number_that_is_never_set():
         ),
     ],
 )
-def test_whatever_sets_it_wherever_is_enough(sets):
+def test_variable_set_in_any_script_is_not_reported(sets):
     assert told(started(add()), stack(block("events_message", TOPIC="/x"), sets())) == []
 
 
-def test_a_number_that_is_counted_up_begins_with_0_but_a_list_does_not():
+def test_changed_number_starts_at_zero_but_list_must_be_set():
     change = block("variables_change", VAR={"id": "scores"}, BY=number(1))
     assert told(started(change, write(get("scores")))) == []
     assert told(started(change, add())) == [NEVER]
 
 
-def test_what_does_not_run_neither_sets_nor_reads():
+def test_disabled_blocks_neither_set_nor_read_variables():
     off = put("scores", list_of()) | {"disabledReasons": ["MANUALLY_DISABLED"]}
     assert told(started(off, add())) == [NEVER]
     assert told(started(add() | {"disabledReasons": ["MANUALLY_DISABLED"]})) == []
 
 
 @pytest.mark.parametrize("name", ["", "👍", "x" * 300, "%VAR {x}"])
-def test_any_name(name):
+def test_unset_variable_with_any_name_is_reported(name):
     saved = workspace(started(write(get("v"))))
     saved["variables"] = [{"name": name, "id": "v"}]
     (problem,) = compile_behaviour(saved, []).problems
@@ -104,6 +104,6 @@ def test_any_name(name):
 @pytest.mark.parametrize(
     "blocks", [None, 7, {}, {"blocks": None}, {"blocks": [None, {"type": "events_started", "next": 3}]}]
 )
-def test_nothing_raises_for_what_is_no_workspace(blocks):
+def test_fixes_on_invalid_workspace_do_not_raise(blocks):
     assert mend({"blocks": blocks}, "begin:list:v") is not None
     assert mend({"blocks": blocks}, "receive:x") is not None

@@ -26,7 +26,7 @@ def publish(topic: str) -> dict[str, object]:
 
 @pytest.mark.parametrize("topic", ["/Rover/command", "robot_action"])
 @pytest.mark.parametrize("kind", ["messages_publish", "messages_publish_field"])
-def test_a_program_that_publishes_on_a_robots_topic_uses_and_moves_it(topic: str, kind: str) -> None:
+def test_program_that_publishes_on_robot_topic_uses_and_moves_that_robot(topic: str, kind: str) -> None:
     content = workspace(started(block(kind, "p", TOPIC=topic, VALUE=text("hello"))))
     program = compile_behaviour(content, [ROVER])
     assert (program.robots, program.moves) == (("Rover",), ("Rover",))
@@ -36,18 +36,18 @@ def test_a_program_that_publishes_on_a_robots_topic_uses_and_moves_it(topic: str
     assert Program.from_json(program.to_json()).moves == ("Rover",)
 
 
-def test_other_topics_move_nobody() -> None:
+def test_publishing_on_other_topics_moves_no_robot() -> None:
     program = compile_behaviour(workspace(started(publish("/weather"))), [ROVER])
     assert (program.robots, program.moves, program.problems) == ((), (), ())
 
 
-def test_nobody_is_asked_about_a_virtual_robot() -> None:
+def test_publishing_on_topic_of_virtual_robot_is_not_a_problem() -> None:
     virtual = replace(ROVER, virtual=True)
     program = compile_behaviour(workspace(started(publish("/Rover/command"))), [virtual])
     assert (program.moves, program.problems) == (("Rover",), ())
 
 
-def test_who_is_moved_by_which_topic() -> None:
+def test_topics_map_to_the_robots_they_move() -> None:
     far = replace(ROVER, topics=replace(ROVER.topics, command="/far", world="/far/world"))
     assert moved_by("/far", [PEPPER, far]) == ("Rover",)
     assert moved_by("/far/world", [PEPPER, far]) == ("Rover",)
@@ -57,7 +57,7 @@ def test_who_is_moved_by_which_topic() -> None:
     assert (topics["/Pepper/command"], topics["/far"]) == (("Pepper",), ("Rover",))
 
 
-def test_a_computed_topic_is_refused_when_the_program_runs(master: Master) -> None:
+def test_publish_on_computed_robot_topic_is_rejected_at_run_time(master: Master) -> None:
     """The compiler did not see it: a program's process looks again, also at robots that came later."""
     rover = WireRobot(master.address, "Rover")
     try:

@@ -43,7 +43,7 @@ def program(tried: Stack) -> Program:
     ],
     ids=["and all below", "the first", "a function", "inside another", "of the toolbox"],
 )
-def test_a_block_and_all_below_it_run(tried: Stack, says: list[str]) -> None:
+def test_tried_block_and_all_blocks_below_it_run(tried: Stack, says: list[str]) -> None:
     made = tried.workspace(behaviour())
     assert made is not None
     link = play(made).link
@@ -51,19 +51,19 @@ def test_a_block_and_all_below_it_run(tried: Stack, says: list[str]) -> None:
     assert program(tried).starts == 1
 
 
-def test_of_a_hat_the_blocks_below_it_run() -> None:
+def test_tried_event_block_runs_the_blocks_below_it() -> None:
     made = program(Stack("hat", "hat"))
     assert "when_touched" not in made.source
     assert "on_start" in made.source
     assert Stack("hat", "hat", started() | {"id": "hat"}).workspace(behaviour()) is None, "nothing is below"
 
 
-def test_the_blocks_keep_their_ids_for_the_glow_and_errors() -> None:
+def test_tried_blocks_keep_their_ids_for_highlight_and_errors() -> None:
     assert "step('2')" in program(Stack("2")).runnable
     assert "step('1')" not in program(Stack("2")).runnable
 
 
-def test_a_value_is_written() -> None:
+def test_tried_value_block_is_printed() -> None:
     made = Stack("bat", "value", BATTERY).workspace(behaviour())
     assert made is not None
     assert SHOW in compile_behaviour(made, [robot()]).runnable
@@ -73,12 +73,12 @@ def test_a_value_is_written() -> None:
     assert play(made).lines == ["2"]
 
 
-def test_a_block_that_has_gone_is_no_program() -> None:
+def test_deleted_block_yields_no_program() -> None:
     assert Stack("nowhere").workspace(behaviour()) is None
     assert Stack("nowhere").workspace({}) is None
 
 
-def test_what_the_page_tells() -> None:
+def test_stack_is_parsed_from_editor_json() -> None:
     assert Stack.from_json({"id": "a", "kind": "value"}) == Stack("a", "value")
     assert Stack.from_json({"id": "a", "kind": "stack", "state": text("x")}).state is not None
     assert Stack.from_json("nonsense").workspace(behaviour()) is None

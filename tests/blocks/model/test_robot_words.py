@@ -26,25 +26,25 @@ def spanish():
         (["sayText"], "talk"),
     ],
 )
-def test_an_action_is_found_by_what_its_name_title_or_type_means(names, word):
+def test_action_is_found_by_synonyms_of_its_name_title_or_type(names, word):
     assert word in words_of_action(names).words.split(", ")
 
 
-def test_what_an_action_uses_says_what_it_does_when_its_name_says_nothing():
+def test_used_resources_add_search_words_when_action_name_is_unknown():
     assert "talk" in words_of_action(["hola"], ["speech"]).words.split(", ")
     assert "talk" not in words_of_action(["volume"], ["speech"]).words.split(", ")
 
 
-def test_a_sensor_is_found_by_other_words_than_an_action():
+def test_sensors_and_actions_have_different_search_words():
     assert "sonar" in words_of_sensor(["front_distance"]).words.split(", ")
     assert words_of_sensor(["walk"]).words == ""
 
 
-def test_names_are_found_in_their_parts():
+def test_compound_names_are_matched_by_their_parts():
     assert "wink twice" in words_of_action(["wink_twice"]).english
 
 
-def test_there_are_words_of_the_language_and_english_ones(spanish):
+def test_search_words_include_current_language_and_english(spanish):
     told = words_of_action(["walk"])
     assert "caminar" in told.words.split(", ")
     assert "drive" in told.english.split(", ")

@@ -46,7 +46,7 @@ def begin(saved: dict[str, object], link: FakeLink | None = None) -> Play:
     return Play(compile_behaviour(saved, [robot()]), (robot(),), link).start()
 
 
-def test_several_scripts_receive_and_the_program_ends_when_all_have_run():
+def test_several_scripts_receive_broadcast_and_program_ends_after_all():
     run = play(
         workspace(
             started(broadcast("quiz"), write(text("sent"))),
@@ -60,7 +60,7 @@ def test_several_scripts_receive_and_the_program_ends_when_all_have_run():
     assert run.lines == ["sent", "one", "two"]
 
 
-def test_broadcast_and_wait_waits_for_all_of_them():
+def test_broadcast_and_wait_waits_for_all_receivers():
     run = play(
         workspace(
             started(broadcast("quiz", wait=True), broadcast("nobody", wait=True), write(text("after"))),
@@ -71,7 +71,7 @@ def test_broadcast_and_wait_waits_for_all_of_them():
     assert run.lines == ["one", "two", "after"]
 
 
-def test_a_message_that_comes_again_begins_its_script_anew():
+def test_repeated_broadcast_restarts_its_script():
     again = received("go", write(text("begin")), until_so("ready"), write(text("end")))
     run = play(
         workspace(
@@ -83,12 +83,12 @@ def test_a_message_that_comes_again_begins_its_script_anew():
     assert run.lines == ["begin", "begin", "end"]
 
 
-def test_two_messages_at_once_run_the_script_once():
+def test_two_simultaneous_broadcasts_run_script_once():
     run = play(workspace(started(broadcast("go"), broadcast("go")), received("go", write(text("ran")))))
     assert run.lines == ["ran"]
 
 
-def test_a_script_that_sends_to_itself_begins_anew_until_the_program_is_stopped():
+def test_script_that_broadcasts_to_itself_restarts_until_stopped():
     run = begin(workspace(started(broadcast("go")), received("go", write(text("x")), broadcast("go"))))
     until(lambda: len(run.lines) > 3)
     assert not run.runtime.finished.is_set()
@@ -96,7 +96,7 @@ def test_a_script_that_sends_to_itself_begins_anew_until_the_program_is_stopped(
     run.end()
 
 
-def test_who_waits_for_a_script_that_begins_anew_waits_no_longer_for_its_first_run():
+def test_broadcast_and_wait_ends_when_awaited_script_restarts():
     run = play(
         workspace(
             started(broadcast("go", wait=True), write(text("first is over")), put("ready", boolean(True))),
@@ -108,7 +108,7 @@ def test_who_waits_for_a_script_that_begins_anew_waits_no_longer_for_its_first_r
     assert run.lines == ["first is over", "second is over"]
 
 
-def test_the_robot_does_not_go_on_for_a_script_that_begins_anew():
+def test_restarted_script_cancels_its_robot_task():
     link = FakeLink()
     link.held = {"say"}
     run = begin(
@@ -124,7 +124,7 @@ def test_the_robot_does_not_go_on_for_a_script_that_begins_anew():
     assert run.runtime.error is None
 
 
-def test_stop_the_other_scripts_ends_what_they_do_and_takes_the_robots_task_back():
+def test_stop_other_scripts_ends_them_and_cancels_robot_tasks():
     link = FakeLink()
     link.held = {"say"}
     run = begin(
@@ -142,7 +142,7 @@ def test_stop_the_other_scripts_ends_what_they_do_and_takes_the_robots_task_back
     assert (run.lines, link.canceled, run.runtime.error) == (["alone"], link.calls, None)
 
 
-def test_a_script_that_has_not_begun_is_ended_too():
+def test_stop_other_scripts_ends_script_not_yet_started():
     for _ in range(20):  # whichever of the two gets the turn first, nothing of the other is left
         run = play(
             workspace(
@@ -153,7 +153,7 @@ def test_a_script_that_has_not_begun_is_ended_too():
         assert run.lines in (["one"], ["two"])
 
 
-def test_an_event_starts_a_script_again_that_was_ended():
+def test_event_restarts_stopped_script():
     link = FakeLink()
     run = begin(
         workspace(
@@ -178,7 +178,7 @@ def test_an_event_starts_a_script_again_that_was_ended():
     run.end()
 
 
-def test_pause_holds_a_script_that_waits_for_others():
+def test_script_that_waits_for_receivers_can_be_paused():
     run = begin(
         workspace(
             started(broadcast("go", wait=True), write(text("after"))), received("go", until_so("ready")),
@@ -195,7 +195,7 @@ def test_pause_holds_a_script_that_waits_for_others():
 
 
 @pytest.mark.parametrize("name", ["", "  ", "\n"])
-def test_a_message_needs_a_name(name):
+def test_broadcast_needs_a_name(name):
     (problem,) = [
         p
         for p in compile_behaviour(workspace(started(broadcast(name))), []).problems
@@ -207,12 +207,12 @@ def test_a_message_needs_a_name(name):
 @pytest.mark.parametrize(
     "name", ["start quiz", "👍", "Olé “x”", "-1", str(2**64 - 1), "x" * 500, "{name}", "%NAME"]
 )
-def test_any_other_name_is_one_and_spaces_around_do_not_count(name):
+def test_broadcast_name_may_be_any_text_and_outer_spaces_are_ignored(name):
     run = play(workspace(started(broadcast(f" {name} ")), received(name, write(text("ran")))))
     assert (run.program.problems, run.lines) == ((), ["ran"])
 
 
-def test_what_nothing_receives_is_a_problem_with_a_button_that_receives_it():
+def test_broadcast_without_receiver_is_reported_with_fix():
     saved = workspace(started(broadcast("start quiz") | {"id": "b"}) | {"x": 10, "y": 30})
     (problem,) = compile_behaviour(saved, []).problems
     assert (problem.severity, problem.block_id) == ("warning", "b")
@@ -224,7 +224,7 @@ def test_what_nothing_receives_is_a_problem_with_a_button_that_receives_it():
     assert mended["blocks"]["blocks"][1]["x"] > 400
 
 
-def test_what_nothing_sends_is_told():
+def test_receiver_without_broadcast_is_reported():
     (problem,) = compile_behaviour(workspace(started(), received("quiz", write(text("x")))), []).problems
     assert problem.sentence == "Nothing broadcasts “quiz”, so this script doesn't run."
     assert problem.severity == "info"

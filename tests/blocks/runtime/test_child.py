@@ -95,7 +95,7 @@ def pepper(master):
     made.close()
 
 
-def test_a_program_runs_to_its_end_and_its_robot_is_told(running, pepper, master):
+def test_program_runs_to_end_and_stops_its_robot(running, pepper, master):
     running.until("ready")
     running.start(workspace(started(say("Hi"), write(text("done")))), [pepper.described], master.address)
     ended = running.until("ended")
@@ -106,7 +106,7 @@ def test_a_program_runs_to_its_end_and_its_robot_is_told(running, pepper, master
     assert len(pepper.heard("stop")) == 1
 
 
-def test_a_running_block_is_told_with_its_words(running, pepper, master):
+def test_running_block_is_reported_with_its_text(running, pepper, master):
     pepper.slow = {"say"}
     running.start(workspace(started(say("Touch my head.") | {"id": "s"})), [pepper.described], master.address)
     assert running.until("running", says="Pepper says “Touch my head.”")["blocks"] == ["s"]
@@ -114,7 +114,7 @@ def test_a_running_block_is_told_with_its_words(running, pepper, master):
     assert running.until("ended")["ok"] is True
 
 
-def test_an_error_names_its_block(running, pepper, master):
+def test_error_names_its_block(running, pepper, master):
     pepper.refuses = {"say": "no voice"}
     running.start(workspace(started(say("Hi") | {"id": "s"})), [pepper.described], master.address)
     assert running.until("error") == {"is": "error", "block": "s", "sentence": "Pepper: no voice."}
@@ -123,7 +123,7 @@ def test_an_error_names_its_block(running, pepper, master):
     assert len(pepper.heard("stop")) == 1
 
 
-def test_pause_step_go(running, master):
+def test_pause_step_and_resume(running, master):
     first, second = write(text("1")) | {"id": "a"}, write(text("2")) | {"id": "b"}
     running.start(workspace(started(first, second)), master=master.address, paused=True)
     paused = running.until("paused")
@@ -135,7 +135,7 @@ def test_pause_step_go(running, master):
     assert running.until("ended")["ok"] is True
 
 
-def test_a_breakpoint_pauses_before_its_block_and_going_on_passes_it(running, master):
+def test_breakpoint_pauses_before_its_block_and_resume_passes_it(running, master):
     marked = write(text("two")) | {"id": "two", "data": '{"pause": true}'}
     saved = workspace(started(write(text("one")), marked, write(text("three"))))
     running.start(saved, master=master.address)
@@ -152,7 +152,7 @@ def test_a_breakpoint_pauses_before_its_block_and_going_on_passes_it(running, ma
     ("shown", "written"),
     [(block("values_compare", A=number(2), B=number(1)), "no"), (text("true"), "true"), (number(2), "2")],
 )
-def test_a_value_that_is_tried_is_said_as_people_say_it(running, master, shown, written):
+def test_tried_value_is_formatted_for_people(running, master, shown, written):
     saved = workspace(started(write(shown)))
     program = replace(compile_behaviour(saved, []), shows_value=True)
     running.order(do="start", program=program.to_json(), robots=[], master=master.address)
@@ -160,7 +160,7 @@ def test_a_value_that_is_tried_is_said_as_people_say_it(running, master, shown, 
     running.until("ended")
 
 
-def test_a_breakpoint_that_is_set_or_cleared_while_it_runs_counts_at_once(running, master):
+def test_breakpoint_changed_during_run_takes_effect_at_once(running, master):
     wait, rest = (
         block("control_wait", "one", SECONDS=number(0.01)),
         block("control_wait", "rest", SECONDS=number(0.01)),
@@ -179,13 +179,13 @@ def test_a_breakpoint_that_is_set_or_cleared_while_it_runs_counts_at_once(runnin
 
 
 @pytest.mark.parametrize("data", ['{"pause": false}', '{"pause": true', "[]", '["pause"]', "pause", 7, None])
-def test_other_data_of_a_block_are_no_breakpoint(data):
+def test_other_block_data_is_not_a_breakpoint(data):
     made = compile_behaviour(workspace(started(write(text("one")) | {"data": data})), [])
     assert made.breakpoints == ()
     assert not made.problems
 
 
-def test_the_heartbeat_goes_on_while_paused(running, pepper, master):
+def test_heartbeat_continues_while_paused(running, pepper, master):
     saved = workspace(started(say("Hi")))
     running.start(saved, [pepper.described], master.address, paused=True)
     running.until("paused")
@@ -195,7 +195,7 @@ def test_the_heartbeat_goes_on_while_paused(running, pepper, master):
     assert pepper.heard("invoke") == []
 
 
-def test_when_its_input_ends_the_program_ends_and_the_robot_is_told(running, pepper, master):
+def test_program_ends_and_stops_robot_when_its_stdin_closes(running, pepper, master):
     hat = block("robot_pepper_when_touched", ROBOT="Pepper", PLACE="head")
     running.start(workspace(stack(hat, say("ouch"))), [pepper.described], master.address)
     with pepper.changed:
@@ -207,13 +207,13 @@ def test_when_its_input_ends_the_program_ends_and_the_robot_is_told(running, pep
         assert pepper.changed.wait_for(lambda: bool(pepper.heard("stop")), LONG_S)
 
 
-def test_a_robot_that_does_not_answer_the_end_is_named(running, pepper, master):
+def test_robot_that_does_not_confirm_final_stop_is_named(running, pepper, master):
     pepper.silent = {"stop"}
     running.start(workspace(started(say("Hi"))), [pepper.described], master.address)
     assert running.until("ended")["silent"] == ["Pepper"]
 
 
-def test_an_event_reaches_its_script_through_the_network(running, pepper, master):
+def test_network_event_starts_its_script(running, pepper, master):
     hat = block("robot_pepper_when_touched", ROBOT="Pepper", PLACE="head")
     running.start(
         workspace(stack(hat, write(text("ouch")), block("control_stop_program"))),
@@ -245,7 +245,7 @@ def test_output_is_bounded(running, master):
         {"do": "start", "program": 1, "robots": 2},
     ],
 )
-def test_a_start_that_is_none_is_refused_in_words(running, order):
+def test_invalid_start_order_is_rejected_with_explanation(running, order):
     running.stdin.write("no json\n")
     running.order(do="pause")
     running.order(**order)
@@ -254,7 +254,7 @@ def test_a_start_that_is_none_is_refused_in_words(running, order):
     assert running.end() == 1
 
 
-def test_without_a_master_it_says_so(running):
+def test_missing_master_is_reported(running):
     running.start(
         workspace(started(block("messages_publish", VALUE=text("x"), TOPIC="/x"))), master="127.0.0.1:1"
     )
@@ -272,14 +272,14 @@ def values_of(said):
     return [(value["id"], value["text"]) for values in lines for value in values]
 
 
-def test_what_variables_hold_is_told_and_at_the_end_once_more(running, master):
+def test_variable_values_are_reported_including_final_ones(running, master):
     saved = workspace(started(set_score(number(7)), set_score(number(8))), variables=("score",))
     running.start(saved, master=master.address)
     running.until("ended")
     assert values_of(running.said)[-1] == ("score", "8")
 
 
-def test_a_person_gives_a_variable_another_value(running, master):
+def test_user_can_set_variable_of_running_program(running, master):
     saved = workspace(
         started(
             set_score(number(7)),

@@ -43,7 +43,7 @@ FACTORIAL = define(
 )  # fmt: skip
 
 
-def test_a_function_with_inputs_and_a_result() -> None:
+def test_function_with_inputs_and_result() -> None:
     run = play(workspace(started(write(call("f", value=True, n=number(6)))), FACTORIAL))
     assert run.lines == ["720"]
     assert run.program.source.startswith(
@@ -54,7 +54,7 @@ def test_a_function_with_inputs_and_a_result() -> None:
     assert not run.program.problems
 
 
-def test_inputs_are_of_the_call_and_variables_of_all() -> None:
+def test_inputs_are_local_to_call_and_variables_are_global() -> None:
     greet = define(
         "g", "greet", ("who",),
         block("variables_change", VAR={"id": "count"}, BY=number(1)),
@@ -70,7 +70,7 @@ def test_inputs_are_of_the_call_and_variables_of_all() -> None:
     assert run.lines == ["Ada", "Bob", "2"]
 
 
-def test_a_function_that_never_ends_calling_itself_is_stopped_with_a_sentence() -> None:
+def test_infinite_recursion_is_stopped_with_explanation() -> None:
     loop = define("g", "loop", (), call("g", id="inner"))
     run = play(workspace(started(call("g", id="outer")), loop))
     error = run.runtime.error
@@ -79,7 +79,7 @@ def test_a_function_that_never_ends_calling_itself_is_stopped_with_a_sentence() 
     assert error.block == "inner"
 
 
-def test_two_hundred_deep_is_fine_also_with_long_sums() -> None:
+def test_recursion_depth_of_200_works_with_long_arithmetic() -> None:
     deep = call("f", value=True, n=number(199))
     run = play(
         workspace(started(write(block("lists_length", LIST=block("lists_empty"))), write(deep)), FACTORIAL)
@@ -88,7 +88,7 @@ def test_two_hundred_deep_is_fine_also_with_long_sums() -> None:
     assert run.lines[1].startswith("3943")
 
 
-def test_an_error_in_a_function_is_on_its_block_and_one_after_it_on_the_caller() -> None:
+def test_error_in_function_names_its_block_and_later_error_names_caller() -> None:
     bad = define("g", "bad", (), write(block("values_arithmetic", "sum", A=number(1), SIGN="/", B=number(0))))
     assert play(workspace(started(call("g")), bad)).runtime.error.block == "sum"
     five = define("g", "five", (), write(text("in")), result=number(5))
@@ -100,7 +100,7 @@ def test_an_error_in_a_function_is_on_its_block_and_one_after_it_on_the_caller()
     assert run.link.invoked[-1] == ("Pepper", "say", {"text": "5yes"})
 
 
-def test_the_caller_is_where_the_script_is_after_the_function() -> None:
+def test_error_after_function_returns_names_calling_block() -> None:
     five = define("g", "five", (), write(text("in")), result=text("not a number"))
     run = play(workspace(started(block("control_wait", "w", SECONDS=call("g", value=True))), five))
     assert run.runtime.error is not None
@@ -108,7 +108,7 @@ def test_the_caller_is_where_the_script_is_after_the_function() -> None:
     assert run.runtime.error.sentence == "“wait” needs a number, not a text."
 
 
-def test_pause_and_step_go_into_a_function() -> None:
+def test_pause_and_step_enter_function() -> None:
     greet = define("g", "greet", (), write(text("one")), write(text("two")))
     program = compile_behaviour(workspace(started(call("g", id="c"), write(text("three"))), greet), [])
     run = Play(program).start(paused=True)
@@ -124,14 +124,14 @@ def test_pause_and_step_go_into_a_function() -> None:
     assert run.lines == ["one", "two", "three"]
 
 
-def test_stop_this_script_in_a_function_ends_the_script() -> None:
+def test_stop_script_in_function_ends_the_script() -> None:
     leave = define("g", "leave", (), block("control_stop_script"))
     run = play(workspace(started(call("g"), write(text("not"))), started(write(text("other"))), leave))
     assert run.lines == ["other"]
     assert run.runtime.error is None
 
 
-def test_leaving_a_function_goes_on_after_it() -> None:
+def test_early_return_continues_after_the_call() -> None:
     maybe = define(
         "g", "maybe", ("so",), block("functions_leave_if", CONDITION=given("so")), write(text("in"))
     )
@@ -143,7 +143,7 @@ def test_leaving_a_function_goes_on_after_it() -> None:
     assert run.lines == ["in", "after"]
 
 
-def test_a_function_may_be_a_condition() -> None:
+def test_function_can_be_used_as_condition() -> None:
     ready = define("g", "ready", (), result=boolean(True))
     run = play(
         workspace(
@@ -159,7 +159,7 @@ def test_robots_used_in_functions_are_found() -> None:
     assert program.robots == ("Pepper",)
 
 
-def test_a_call_follows_its_function_by_id_and_else_by_name() -> None:
+def test_call_resolves_function_by_id_then_by_name() -> None:
     renamed = define("g", "say hello", ("who",), write(given("who")))
     assert play(workspace(started(call("g", who=text("Ada"))), renamed)).lines == ["Ada"]
     pasted = call("elsewhere", who=text("Bob"))
@@ -167,7 +167,7 @@ def test_a_call_follows_its_function_by_id_and_else_by_name() -> None:
     assert play(workspace(started(pasted), renamed)).lines == ["Bob"]
 
 
-def test_a_call_of_nothing_is_an_error_with_its_mend() -> None:
+def test_call_of_missing_function_is_an_error_with_fix() -> None:
     saved = workspace(started(call("greet", id="c", who=text("Ada"))))
     run = play(saved)
     (problem,) = run.program.errors
@@ -182,7 +182,7 @@ def test_a_call_of_nothing_is_an_error_with_its_mend() -> None:
     assert "def greet(who):\n    pass" in again.source
 
 
-def test_inputs_and_returns_outside_their_function_are_skipped_and_said() -> None:
+def test_inputs_and_returns_outside_their_function_are_skipped_and_reported() -> None:
     program = compile_behaviour(
         workspace(
             started(
@@ -211,7 +211,7 @@ def test_inputs_and_returns_outside_their_function_are_skipped_and_said() -> Non
         {"items": -5}, {"items": 10**12}, {"items": True}, {"items": "3"},
     ],
 )  # fmt: skip
-def test_whatever_a_file_says_of_shapes_is_a_program(extra) -> None:
+def test_any_extra_state_in_file_still_compiles(extra) -> None:
     tops = []
     for each in ("functions_define", "functions_define_result", "functions_call", "lists_create"):
         tops.append(block(each, NAME="x") | {"extraState": extra})

@@ -48,7 +48,7 @@ def bench() -> Bench:
     return Bench()
 
 
-def test_a_pause_stops_it_and_go_on_asks_again(bench) -> None:
+def test_pause_stops_continuous_motion_and_resume_restarts_it(bench) -> None:
     bench.do("drive", speed=0.2, turn=0)
     bench.do("light")
     assert bench.going.rest() == ("Turtle",)
@@ -60,12 +60,12 @@ def test_a_pause_stops_it_and_go_on_asks_again(bench) -> None:
 
 
 @pytest.mark.parametrize("state", ["failed", "canceled"])
-def test_what_did_not_begin_does_not_go_on(bench, state) -> None:
+def test_motion_that_never_started_is_not_resumed(bench, state) -> None:
     bench.do("drive", state, speed=0.2)
     assert bench.going.rest() == ()
 
 
-def test_what_something_else_uses_now_is_forgotten(bench) -> None:
+def test_replaced_motion_is_not_resumed(bench) -> None:
     bench.do("drive", speed=0.2)
     bench.do("move", distance=0.1)
     assert bench.going.rest() == ()
@@ -73,7 +73,7 @@ def test_what_something_else_uses_now_is_forgotten(bench) -> None:
     assert bench.invoked == []
 
 
-def test_what_a_single_step_begins_is_held_at_once(bench) -> None:
+def test_motion_started_by_single_step_is_paused_at_once(bench) -> None:
     bench.going.rest()
     bench.do("drive", speed=0.2)
     assert bench.stopped == ["Turtle"]
@@ -81,7 +81,7 @@ def test_what_a_single_step_begins_is_held_at_once(bench) -> None:
     assert [action for _, action, _ in bench.invoked] == ["drive"]
 
 
-def test_in_slow_motion_it_stands_while_its_script_stays_and_goes_on_then(bench) -> None:
+def test_motion_is_suspended_during_slow_motion_delay_and_then_resumed(bench) -> None:
     with bench.going.slow():
         pass
     assert bench.stood == []
@@ -93,7 +93,7 @@ def test_in_slow_motion_it_stands_while_its_script_stays_and_goes_on_then(bench)
     assert bench.stopped == []
 
 
-def test_another_script_that_stays_holds_nobody_up(bench) -> None:
+def test_slow_motion_delay_of_another_script_does_not_suspend_motion(bench) -> None:
     bench.do("drive", speed=0.2)
     thread = threading.Thread(target=lambda: bench.going.slow().__enter__())
     thread.start()
@@ -102,7 +102,7 @@ def test_another_script_that_stays_holds_nobody_up(bench) -> None:
 
 
 @pytest.mark.parametrize("state", ["succeeded", "canceled"])
-def test_what_is_answered_while_its_script_stays_stands_and_is_not_forgotten(bench, state) -> None:
+def test_motion_accepted_during_slow_motion_delay_is_suspended_and_resumed(bench, state) -> None:
     call = RobotCall("c", "Turtle", "drive")
     bench.going.asked(call, TURTLE, {"speed": 0.2})
     with bench.going.slow():
@@ -113,7 +113,7 @@ def test_what_is_answered_while_its_script_stays_stands_and_is_not_forgotten(ben
     assert len(bench.invoked) == 1
 
 
-def test_a_pause_and_go_on_while_a_script_stays_do_not_let_it_drive_before(bench) -> None:
+def test_resume_during_slow_motion_delay_does_not_restart_motion_early(bench) -> None:
     bench.do("drive", speed=0.2)
     with bench.going.slow():
         bench.going.rest()
@@ -127,7 +127,7 @@ def test_a_pause_and_go_on_while_a_script_stays_do_not_let_it_drive_before(bench
     assert len(bench.invoked) == 2
 
 
-def test_what_go_on_asked_for_again_still_belongs_to_its_script(bench) -> None:
+def test_resumed_motion_still_belongs_to_its_script(bench) -> None:
     bench.do("drive", speed=0.2)
     bench.going.rest()
     there = threading.Thread(target=bench.going.go_on)
@@ -138,7 +138,7 @@ def test_what_go_on_asked_for_again_still_belongs_to_its_script(bench) -> None:
         assert bench.stood == ["Turtle"]
 
 
-def test_nothing_drives_again_after_a_stop(bench) -> None:
+def test_motion_is_not_resumed_after_stop(bench) -> None:
     bench.do("drive", speed=0.2)
     with pytest.raises(Stopped), bench.going.slow():
         raise Stopped

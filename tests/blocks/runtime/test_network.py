@@ -39,7 +39,7 @@ def network(node, pepper):
     made.close()
 
 
-def test_an_invoke_is_answered(network, pepper):
+def test_invoke_is_answered(network, pepper):
     pokes: list[int] = []
     network.listen(lambda: pokes.append(1), lambda _: None)
     call = network.invoke("Pepper", "say", {"text": "Hi"})
@@ -52,7 +52,7 @@ def test_an_invoke_is_answered(network, pepper):
     assert pokes
 
 
-def test_answers_of_another_robot_and_words_of_no_robot_change_nothing(network, pepper, node):
+def test_replies_from_other_robots_and_invalid_replies_are_ignored(network, pepper, node):
     pepper.slow = {"say"}
     call = network.invoke("Pepper", "say", {"text": "Hi"})
     until(lambda: call.state == "accepted")
@@ -72,7 +72,7 @@ def test_answers_of_another_robot_and_words_of_no_robot_change_nothing(network, 
     assert (call.state, call.error) == ("succeeded", "")
 
 
-def test_a_refusal_and_a_cancel(network, pepper):
+def test_rejected_action_fails_and_cancel_is_sent(network, pepper):
     pepper.refuses = {"say": "no voice"}
     pepper.slow = {"turn"}
     refused = network.invoke("Pepper", "say", {"text": "Hi"})
@@ -84,12 +84,12 @@ def test_a_refusal_and_a_cancel(network, pepper):
     assert pepper.heard("cancel")[0]["id"] == turning.id
 
 
-def test_the_heartbeat_goes_on_by_itself(network, pepper):
+def test_heartbeat_is_sent_automatically(network, pepper):
     until(lambda: len(pepper.heard("alive")) >= 3)
     assert {command["from"] for command in pepper.heard("alive")} == {"program-1"}
 
 
-def test_sensors_events_topics(network, pepper, node):
+def test_sensors_events_and_topics_are_received(network, pepper, node):
     events: list[object] = []
     network.on_event("Pepper", "touched", events.append)
     assert network.sensor("Pepper", "battery") is None
@@ -114,7 +114,7 @@ def test_sensors_events_topics(network, pepper, node):
         until(lambda: network.newest("/in") == {"name": "Ada"})
 
 
-def test_stopping_waits_for_the_answers_and_names_who_is_silent(network, pepper):
+def test_stop_waits_for_replies_and_names_silent_robots(network, pepper):
     outside: list[str] = []
     network.listen(lambda: None, outside.append)
     assert network.stop_robots(2.0) == ()
@@ -123,7 +123,7 @@ def test_stopping_waits_for_the_answers_and_names_who_is_silent(network, pepper)
     assert outside == []
 
 
-def test_a_stop_of_a_pause_that_is_answered_twice_is_still_ours(network, pepper, node):
+def test_duplicate_replies_to_own_pause_stop_are_not_foreign_stops(network, pepper, node):
     pepper.slow = {"say"}
     outside: list[str] = []
     network.listen(lambda: None, outside.append)
@@ -139,7 +139,7 @@ def test_a_stop_of_a_pause_that_is_answered_twice_is_still_ours(network, pepper,
     assert outside == []
 
 
-def test_a_robot_that_answers_a_stop_for_another_proves_nothing(network, pepper):
+def test_stop_reply_on_topic_of_another_robot_is_ignored(network, pepper):
     pepper.silent = {"stop"}
     heard = network._send
 
@@ -152,14 +152,14 @@ def test_a_robot_that_answers_a_stop_for_another_proves_nothing(network, pepper)
     assert network.stop_robots(0.3) == ("Pepper",)
 
 
-def test_a_stop_by_somebody_else_is_noticed(network, pepper, node):
+def test_stop_by_another_program_is_detected(network, pepper, node):
     outside: list[str] = []
     network.listen(lambda: None, outside.append)
     node.new_pub("/Pepper/command", "robot/command").publish({"id": "s", "op": "stop", "from": "person"})
     until(lambda: outside == ["Pepper"])
 
 
-def test_a_robot_of_rize_gets_its_own_words(master, node):
+def test_rize_robot_receives_commands_in_rize_format(master, node):
     rosie = RizeRobot(master.address)
     network = Network(node, "program-1", [rosie.described])
     try:
@@ -176,7 +176,7 @@ def test_a_robot_of_rize_gets_its_own_words(master, node):
         rosie.close()
 
 
-def test_robots_are_found_by_their_type(master, node, pepper):
+def test_robots_are_found_by_topic_type(master, node, pepper):
     turtle = WireRobot(master.address, "Turtle 2")
     try:
         found = find_robots(node, 5.0, wanted=["Pepper", "Turtle 2"])
@@ -189,7 +189,7 @@ def test_robots_are_found_by_their_type(master, node, pepper):
         turtle.close()
 
 
-def test_program_survives_every_hostile_answer_and_value(network, pepper, node):
+def test_program_survives_hostile_replies_and_values(network, pepper, node):
     heard: list[object] = []
 
     def told(payload: object) -> None:

@@ -55,7 +55,7 @@ def answer() -> dict[str, object]:
     return block("asking_answer")
 
 
-def test_the_script_waits_for_the_answer_and_the_others_go_on():
+def test_script_waits_for_answer_while_others_continue():
     them = Person(
         workspace(started(write(answer()), ask("Name?"), write(answer())), started(write(text("other"))))
     )
@@ -67,7 +67,7 @@ def test_the_script_waits_for_the_answer_and_the_others_go_on():
     assert them.shown[-1] is None
 
 
-def test_two_scripts_that_ask_are_asked_one_after_the_other():
+def test_questions_of_two_scripts_are_asked_one_after_another():
     one = started(ask("one"), write(answer()))
     them = Person(workspace(one, started(ask("two"), write(answer()))))
     until(lambda: len(them.run.runtime.scheduler.snapshot().blocks) == 2)
@@ -81,7 +81,7 @@ def test_two_scripts_that_ask_are_asked_one_after_the_other():
     assert them.run.lines == ["A", "B"]
 
 
-def test_a_script_that_is_ended_takes_its_question_back():
+def test_question_of_stopped_script_is_withdrawn():
     them = Person(
         workspace(
             started(ask("first"), write(text("never"))),
@@ -98,14 +98,14 @@ def test_a_script_that_is_ended_takes_its_question_back():
     assert (them.run.lines, them.run.runtime.error) == ([], None)
 
 
-def test_the_end_of_the_program_takes_the_question_back():
+def test_question_is_withdrawn_when_program_stops():
     them = Person(workspace(started(ask("Name?"))))
     them.sees("Name?")
     them.run.stop()
     them.sees(None)
 
 
-def test_pause_stands_while_a_question_is_asked():
+def test_program_can_be_paused_while_question_is_shown():
     them = Person(workspace(started(ask("Name?"), write(answer()))))
     them.sees("Name?")
     them.run.runtime.scheduler.pause()
@@ -116,7 +116,7 @@ def test_pause_stands_while_a_question_is_asked():
     assert them.run.lines == ["Ada"]
 
 
-def test_where_nobody_can_answer_a_sentence_says_so():
+def test_question_without_anyone_to_answer_is_an_error():
     run = play(workspace(started(ask("Name?") | {"id": "q"})))
     assert run.runtime.error is not None
     assert run.runtime.error.block == "q"
@@ -135,7 +135,7 @@ def test_where_nobody_can_answer_a_sentence_says_so():
         (text("x" * 9999), "x" * LONGEST_QUESTION),
     ],
 )
-def test_anything_can_be_asked(asked, shown):
+def test_any_value_can_be_asked_as_question(asked, shown):
     them = Person(workspace(started(ask(asked))))
     them.answers(shown, "")
     them.run.end()
@@ -163,11 +163,11 @@ def test_anything_can_be_asked(asked, shown):
         ("٣", "٣"),
     ],
 )
-def test_what_is_typed_as_a_number_is_one(typed, value):
+def test_typed_number_is_converted_to_number(typed, value):
     assert (type(as_value(typed)), as_value(typed)) == (type(value), value)
 
 
-def test_an_answer_can_be_compared_and_counted_with():
+def test_answer_can_be_compared_and_used_as_count():
     twice = block("control_repeat", TIMES=answer(), BODY=[write(text("hop"))])
     same = block("values_compare", A=answer(), RELATION="==", B=number(2))
     them = Person(workspace(stack(block("events_started"), ask("How often?"), twice, write(same))))
@@ -176,7 +176,7 @@ def test_an_answer_can_be_compared_and_counted_with():
     assert them.run.lines == ["hop", "hop", "yes"]
 
 
-def test_a_choice_is_the_answer_and_what_is_typed_next_has_no_choices():
+def test_chosen_option_is_the_answer_and_next_question_has_no_choices():
     them = Person(
         workspace(started(choose(list_of(text("cat"), text("dog"))), write(answer()), ask("Name?")))
     )
@@ -198,7 +198,7 @@ def test_a_choice_is_the_answer_and_what_is_typed_next_has_no_choices():
         (text("x" * 9999), "x" * LONGEST_CHOICE, text("x" * 9999)),
     ],
 )
-def test_the_answer_is_the_item_itself(item, shown, same_as):
+def test_chosen_answer_is_the_list_item_itself(item, shown, same_as):
     same = block("values_compare", A=answer(), RELATION="==", B=same_as)
     them = Person(workspace(started(choose(list_of(item)), write(same))))
     assert them.sees("Which?").choices == (shown,)
@@ -207,7 +207,7 @@ def test_the_answer_is_the_item_itself(item, shown, same_as):
     assert them.run.lines == ["yes"]
 
 
-def test_any_list_fits_and_escape_answers_nothing():
+def test_choices_are_deduplicated_and_escape_gives_empty_answer():
     split = block("lists_split", TEXT=text("a,b,,a,c"), BETWEEN=text(","))
     them = Person(workspace(started(choose(split), write(block("texts_empty", TEXT=answer())))))
     assert them.sees("Which?").choices == ("a", "b", "c")
@@ -216,7 +216,7 @@ def test_any_list_fits_and_escape_answers_nothing():
     assert them.run.lines == ["yes"]
 
 
-def test_questions_of_both_kinds_wait_for_each_other():
+def test_text_and_choice_questions_wait_for_each_other():
     them = Person(workspace(started(ask("one")), started(choose(list_of(text("a")), "two"), write(answer()))))
     until(lambda: len(them.run.runtime.scheduler.snapshot().blocks) == 2)
     first = them.shown[-1]
@@ -239,7 +239,7 @@ def test_questions_of_both_kinds_wait_for_each_other():
         (get("pets"), "A question with choices needs a list of them, not a number."),
     ],
 )
-def test_what_nobody_can_choose_from_is_a_sentence_on_the_block(choices, sentence):
+def test_invalid_choices_are_an_error_on_the_block(choices, sentence):
     them = Person(workspace(started(choose(choices)), variables=("pets",)))
     until(lambda: them.run.runtime.error is not None)
     error = them.run.runtime.error
@@ -248,7 +248,7 @@ def test_what_nobody_can_choose_from_is_a_sentence_on_the_block(choices, sentenc
     them.run.stop()
 
 
-def test_choices_too_need_somebody_who_answers():
+def test_choice_question_without_anyone_to_answer_is_an_error():
     run = play(workspace(started(choose(list_of(text("a"))))))
     assert run.runtime.error is not None
     assert run.runtime.error.sentence == "No one can answer: the behaviour runs outside Studio."

@@ -40,7 +40,7 @@ def fight() -> Iterator[Fight]:
         play.stop()
 
 
-def test_the_loser_is_told_at_its_block_and_goes_on(fight: Fight) -> None:
+def test_replaced_command_is_reported_at_its_block_and_script_continues(fight: Fight) -> None:
     play = fight.begin(started(turn("t"), say("on")), started(turn("t2"), say("on")))
     fight.asked(2)
     loser, winner = fight.link.calls
@@ -57,7 +57,7 @@ def test_the_loser_is_told_at_its_block_and_goes_on(fight: Fight) -> None:
     assert play.runtime.replaced.take_news() == ()
 
 
-def test_what_happens_again_is_counted(fight: Fight) -> None:
+def test_repeated_replacements_are_counted(fight: Fight) -> None:
     play = fight.begin(started(turn("t", again=True)), started(turn("t2", again=True)))
     for round_ in range(1, 4):
         fight.asked(round_ + 1)
@@ -68,7 +68,7 @@ def test_what_happens_again_is_counted(fight: Fight) -> None:
     assert set(news) == {"t", "t2"}
 
 
-def test_with_several_robots_the_sentence_names_the_one(fight: Fight) -> None:
+def test_replacement_names_robot_when_several_are_used(fight: Fight) -> None:
     play = fight.begin(
         started(turn("t", "Ada")),
         started(turn("t2", "Ada")),
@@ -83,7 +83,7 @@ def test_with_several_robots_the_sentence_names_the_one(fight: Fight) -> None:
     assert found[0].sentence == "Ada: “turn” was replaced by “turn”"
 
 
-def test_other_robots_other_parts_and_other_ends_are_no_fight(fight: Fight) -> None:
+def test_canceled_commands_of_other_robots_or_parts_are_not_replacements(fight: Fight) -> None:
     play = fight.begin(
         started(turn("t", "Ada")),
         started(look("l", "Ada")),
@@ -97,7 +97,7 @@ def test_other_robots_other_parts_and_other_ends_are_no_fight(fight: Fight) -> N
     assert play.runtime.replaced.take_news() == ()
 
 
-def test_a_script_of_an_event_does_not_fight_with_itself(fight: Fight) -> None:
+def test_restarted_event_script_does_not_replace_itself(fight: Fight) -> None:
     hat = {"type": "robot_pepper_when_touched", "id": "h", "fields": {"ROBOT": "Pepper", "PLACE": "head"}}
     play = fight.begin({**hat, "next": {"block": turn("t")}})
     fight.link.happen(("Pepper", "touched"), {"place": "head", "down": True})
@@ -109,7 +109,7 @@ def test_a_script_of_an_event_does_not_fight_with_itself(fight: Fight) -> None:
     assert play.runtime.replaced.take_news() == ()
 
 
-def test_one_that_waits_its_turn_is_not_replaced(fight: Fight) -> None:
+def test_queued_command_is_not_reported_as_replaced(fight: Fight) -> None:
     robot = fighter("Pepper")
     queues = replace(robot, actions=tuple(replace(action, on_busy="queue") for action in robot.actions))
     program = compile_behaviour(workspace(started(turn("t")), started(turn("t2"))), [queues])

@@ -41,16 +41,16 @@ def held(name: str, **feedback: object) -> RobotCall:
         ("say", {"text": "hello"}, {"word": "hello"}, {"text": "hello"}),
     ],
 )
-def test_the_rest_is_done_and_never_more(name, given, feedback, rest) -> None:
+def test_resumed_action_does_only_the_remainder(name, given, feedback, rest) -> None:
     assert rest_of(action(name), given, held(name, **feedback)) == rest
 
 
-def test_what_had_not_begun_is_done_as_a_whole() -> None:
+def test_action_not_started_before_pause_is_done_in_full() -> None:
     call = replace(held("walk"), began=False)
     assert rest_of(action("walk"), {"distance": 1.0}, call) == {"distance": 1.0}
 
 
-def test_driving_without_telling_what_is_left_is_left_out() -> None:
+def test_driving_action_without_progress_feedback_is_not_resumed() -> None:
     drives = replace(action("walk"), feedback=())
     assert measured_by(drives, {"distance": 1.0}) is None
     assert rest_of(drives, {"distance": 1.0}, held("walk", to_go=0.5)) is None
@@ -66,7 +66,7 @@ def test_driving_without_telling_what_is_left_is_left_out() -> None:
         ("wave", {"hand": "left"}, {}, False),  # it begins again
     ],
 )
-def test_it_is_known_when_nobody_can_tell_what_is_left(name, given, feedback, unknown) -> None:
+def test_unknown_remainder_is_detected(name, given, feedback, unknown) -> None:
     call = held(name, **feedback)
     assert is_unknown(action(name), given, call) is unknown
     assert not is_unknown(action(name), given, replace(call, began=False))
@@ -85,7 +85,7 @@ class Blind(FakeLink):
         self.answer(call, "canceled")
 
 
-def test_a_person_reads_that_the_rest_will_be_left_out_and_that_it_was() -> None:
+def test_warning_before_and_message_after_skipping_unknown_remainder() -> None:
     walk = block("robot_pepper_do_walk", "w", ROBOT="Pepper", DISTANCE=number(1))
     blocks = workspace(started(walk | {"next": {"block": write(text("after"))}}))
     link = Blind()
@@ -102,7 +102,7 @@ def test_a_person_reads_that_the_rest_will_be_left_out_and_that_it_was() -> None
     assert len(link.calls) == 1
 
 
-def test_nothing_is_said_of_what_is_done_afterwards() -> None:
+def test_no_message_when_remainder_is_resumed() -> None:
     walk = block("robot_pepper_do_walk", "w", ROBOT="Pepper", DISTANCE=number(1))
     link = Blind()
     link.held = {"walk"}
@@ -118,7 +118,7 @@ def test_nothing_is_said_of_what_is_done_afterwards() -> None:
     assert run.end().lines == []
 
 
-def test_the_unit_says_which_value_is_meant() -> None:
+def test_measured_value_is_found_by_unit() -> None:
     assert measured_by(action("walk"), {"distance": 1.0, "speed": 0.3}) == "distance"
     assert measured_by(action("turn"), {"angle": 90, "speed": 40}) == "angle"
     assert measured_by(action("say"), {"text": "hello"}) is None

@@ -41,7 +41,7 @@ def running():
 # ---- robots
 
 
-def test_a_block_waits_for_its_robot(running):
+def test_block_waits_for_its_robot(running):
     link = FakeLink()
     link.held = {"turn"}
     turn = block("robot_pepper_do_turn", "t", ROBOT="Pepper", DIRECTION="left", ANGLE=number(30))
@@ -55,7 +55,7 @@ def test_a_block_waits_for_its_robot(running):
     assert link.invoked[1] == ("Pepper", "say", {"text": "done"})
 
 
-def test_what_the_robot_says_appears_in_words_until_it_is_done(running):
+def test_running_robot_action_is_described_until_done(running):
     link = FakeLink()
     link.held = {"say"}
     words = block("values_join", A=text("Touch my "), B=text("head."))
@@ -70,7 +70,7 @@ def test_what_the_robot_says_appears_in_words_until_it_is_done(running):
     assert run.runtime.saying.says(["l"]) == "Pepper light eyes #37b6ff"
 
 
-def test_a_refused_action_is_an_error_on_its_block_with_the_robots_sentence():
+def test_rejected_action_is_an_error_on_its_block_with_robot_message():
     link = FakeLink()
     link.answers = {"say": ("failed", {}, "the speaker is off")}
     run = play(workspace(started(say("Hi") | {"id": "x"}, write(text("never")))), link)
@@ -79,14 +79,14 @@ def test_a_refused_action_is_an_error_on_its_block_with_the_robots_sentence():
     assert run.lines == []
 
 
-def test_a_canceled_action_is_no_error():
+def test_canceled_action_is_not_an_error():
     link = FakeLink()
     link.answers = {"say": ("canceled", {}, "")}
     run = play(workspace(started(say("Hi"), write(text("after")))), link)
     assert (run.runtime.error, run.lines) == (None, ["after"])
 
 
-def test_a_robot_that_does_not_answer_is_named(monkeypatch):
+def test_robot_that_does_not_answer_is_named(monkeypatch):
     monkeypatch.setattr("app.blocks.runtime.robot_handle.FIRST_ANSWER_S", 0.05)
     link = FakeLink()
     link.answers = {"say": ("sent", {}, "")}
@@ -96,7 +96,7 @@ def test_a_robot_that_does_not_answer_is_named(monkeypatch):
     assert run.runtime.error.sentence == "Pepper is not responding. Start the virtual robot again."
 
 
-def test_an_action_that_never_ends_is_canceled(monkeypatch):
+def test_action_that_never_ends_is_canceled(monkeypatch):
     monkeypatch.setattr("app.blocks.runtime.robot_handle.MARGIN_S", -29.95)
     link = FakeLink()
     link.held = {"say"}
@@ -106,7 +106,7 @@ def test_an_action_that_never_ends_is_canceled(monkeypatch):
     assert link.canceled == link.calls
 
 
-def test_values_become_what_the_parameter_wants():
+def test_values_are_converted_to_parameter_type():
     score = block(
         "variables_set", VAR={"id": "n"}, VALUE=block("values_arithmetic", A=number(1), SIGN="/", B=number(2))
     )
@@ -124,7 +124,7 @@ def test_values_become_what_the_parameter_wants():
     assert run.lines == ["no"]
 
 
-def test_what_only_the_running_program_knows_is_checked_before_the_robot_is_asked():
+def test_computed_input_is_validated_before_invoking_robot():
     far = block("values_arithmetic", A=number(400), SIGN="*", B=number(2))
     link = FakeLink()
     run = play(workspace(started(block("robot_pepper_do_turn", ROBOT="Pepper", ANGLE=far))), link)
@@ -133,13 +133,13 @@ def test_what_only_the_running_program_knows_is_checked_before_the_robot_is_aske
     assert link.invoked == []
 
 
-def test_saying_what_is_not_known_yet_is_told():
+def test_unknown_value_as_action_input_is_an_error():
     run = play(workspace(started(say(block("messages_newest", FIELD="name", TOPIC="/faces")))))
     assert run.runtime.error is not None
     assert run.runtime.error.sentence == "“say” needs a value for “text” that is not known yet."
 
 
-def test_sensors(running):
+def test_sensor_values_and_fields_are_read(running):
     link = FakeLink()
     link.sensors = {("Pepper", "battery"): 84, ("Pepper", "pose"): {"x": 0.5, "y": 2.0}}
     run = play(
@@ -154,7 +154,7 @@ def test_sensors(running):
     assert run.lines == ["84", "2"]
 
 
-def test_the_first_value_of_a_sensor_is_waited_for(running):
+def test_script_waits_for_first_sensor_value(running):
     link = FakeLink()
     run = running(workspace(started(write(block("robot_pepper_get_battery", ROBOT="Pepper")))), link)
     until(lambda: run.runtime.scheduler.snapshot().blocks != ())
@@ -164,7 +164,7 @@ def test_the_first_value_of_a_sensor_is_waited_for(running):
     assert run.lines == ["50"]
 
 
-def test_a_robot_that_is_stopped_by_somebody_else_ends_the_program(running):
+def test_program_ends_when_another_program_stops_the_robot(running):
     link = FakeLink()
     link.held = {"say"}
     run = running(workspace(started(say("Hi"), say("again"))), link)
@@ -179,7 +179,7 @@ def test_a_robot_that_is_stopped_by_somebody_else_ends_the_program(running):
 # ---- what starts scripts
 
 
-def test_an_event_starts_its_script_each_time_it_fits(running):
+def test_matching_event_starts_its_script_each_time(running):
     hat = block("robot_pepper_when_touched", ROBOT="Pepper", PLACE="head")
     run = running(workspace(stack(hat, write(text("ouch")))))
     for data in ({"place": "head", "down": True}, {"place": "head", "down": False}, {"place": "left_hand"}):
@@ -190,7 +190,7 @@ def test_an_event_starts_its_script_each_time_it_fits(running):
     assert not run.runtime.finished.is_set()
 
 
-def test_messages_start_their_script_in_order_and_bring_themselves(running):
+def test_messages_start_their_script_in_order_with_payload(running):
     hat = block("events_message", TOPIC="/x")
     name = block("messages_field", FIELD="name")
     run = running(workspace(stack(hat, write(name), write(block("messages_message")))))
@@ -200,7 +200,7 @@ def test_messages_start_their_script_in_order_and_bring_themselves(running):
     assert run.lines == ["Ada", '{"name": "Ada"}', "Bo", '{"name": "Bo"}']
 
 
-def test_a_script_that_is_too_slow_for_its_messages_says_how_many_it_left_out(running):
+def test_skipped_events_of_slow_script_are_counted(running):
     link = FakeLink()
     link.held = {"say"}
     run = running(workspace(stack(block("events_message", TOPIC="/x"), say("Hi"))), link)
@@ -219,7 +219,7 @@ def test_a_script_that_is_too_slow_for_its_messages_says_how_many_it_left_out(ru
     )
 
 
-def test_a_condition_starts_its_script_when_it_becomes_true_not_when_it_was_from_the_beginning(running):
+def test_condition_starts_script_only_on_change_to_true(running):
     low = block(
         "values_compare",
         A=block("messages_newest", FIELD="value", TOPIC="/level"),
@@ -238,7 +238,7 @@ def test_a_condition_starts_its_script_when_it_becomes_true_not_when_it_was_from
         assert len(run.lines) == seen == lines
 
 
-def test_a_sensor_that_changes_and_one_that_passes_a_limit(running):
+def test_sensor_change_and_sensor_threshold_start_scripts(running):
     changes = block("robot_pepper_changes", ROBOT="Pepper", SENSOR="battery")
     passes = block("robot_pepper_passes", ROBOT="Pepper", SENSOR="battery", SIDE="below", LIMIT=20)
     run = running(workspace(stack(changes, write(text("new"))), stack(passes, write(text("low")))))
@@ -256,7 +256,7 @@ def test_a_sensor_that_changes_and_one_that_passes_a_limit(running):
         until(lambda expected=tuple(expected): sorted(run.lines) == sorted(expected))
 
 
-def test_scripts_run_side_by_side(running):
+def test_scripts_run_concurrently(running):
     link = FakeLink()
     link.held = {"say"}
     run = running(workspace(started(say("slow")), started(write(text("1")), write(text("2")))), link)
@@ -267,7 +267,7 @@ def test_scripts_run_side_by_side(running):
     run.end()
 
 
-def test_changing_a_variable_from_two_scripts_loses_nothing():
+def test_concurrent_variable_changes_are_not_lost():
     change = block("variables_change", VAR={"id": "n"}, BY=number(1))
     loops = [started(block("control_repeat", TIMES=number(300), BODY=[dict(change)])) for _ in range(3)]
     run = play(workspace(*loops, variables=("n",)))
@@ -289,20 +289,20 @@ def test_repeat_while_if_else_and_stop():
     assert run.lines == ["3"]
 
 
-def test_stop_the_behaviour_ends_all_scripts():
+def test_stop_behaviour_ends_all_scripts():
     forever = block("control_forever", BODY=[])
     run = play(workspace(started(forever), started(block("control_stop_program"))))
     assert run.runtime.error is None
 
 
-def test_an_endless_loop_of_nothing_can_be_stopped(running):
+def test_empty_endless_loop_can_be_stopped(running):
     run = running(workspace(started(block("control_forever", "loop", BODY=[]))))
     until(lambda: run.runtime.scheduler.snapshot().blocks == ("loop",))
     run.stop()
     run.end()
 
 
-def test_wait_until_takes_the_unknown_for_not_so(running):
+def test_wait_until_treats_unknown_value_as_false(running):
     value = block("messages_newest", FIELD="value", TOPIC="/level")
     above = block("values_compare", A=value, RELATION=">", B=number(3))
     run = running(workspace(started(block("control_wait_until", CONDITION=above), write(text("there")))))
@@ -345,14 +345,14 @@ def test_wait_until_takes_the_unknown_for_not_so(running):
         (block("values_round", "v", HOW="round", NUMBER=text("x")), "“round” needs a number, not a text."),
     ],
 )
-def test_an_error_inside_a_value_belongs_to_the_value(value, sentence):
+def test_error_in_value_block_names_value_block(value, sentence):
     outer = block("values_join", A=text("is "), B=value)
     run = play(workspace(started(write(outer))))
     assert run.runtime.error is not None
     assert (run.runtime.error.block, run.runtime.error.sentence) == ("v", sentence)
 
 
-def test_an_error_in_a_statement_belongs_to_it():
+def test_error_in_statement_names_statement_block():
     wait = block("control_wait", "w", SECONDS=text("long"))
     run = play(workspace(started(block("control_repeat", TIMES=number(1), BODY=[wait]))))
     assert run.runtime.error is not None
@@ -362,7 +362,7 @@ def test_an_error_in_a_statement_belongs_to_it():
     )
 
 
-def test_a_pause_and_single_steps(running):
+def test_pause_and_single_steps(running):
     run = running(workspace(started(*(write(text(f"{n}")) | {"id": f"w{n}"} for n in range(3)))), paused=True)
     scheduler = run.runtime.scheduler
     for n in range(3):

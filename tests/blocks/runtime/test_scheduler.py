@@ -57,7 +57,7 @@ def test_scripts_take_turns_block_by_block(stage):
     assert stage.did == ["a1", "b1", "a2", "b2", "a3", "b3"]
 
 
-def test_only_the_script_with_the_turn_runs(stage):
+def test_only_script_with_the_turn_runs(stage):
     inside, most = [0], [0]
 
     def work(_name: str) -> None:
@@ -74,7 +74,7 @@ def test_only_the_script_with_the_turn_runs(stage):
     assert most == [1]
 
 
-def test_a_pause_holds_each_script_before_its_next_block(stage):
+def test_pause_holds_each_script_before_its_next_block(stage):
     stage.scheduler.pause()
     stage.script("a", stage.steps("a1", "a2"))
     until(lambda: stage.scheduler.snapshot().paused)
@@ -88,7 +88,7 @@ def test_a_pause_holds_each_script_before_its_next_block(stage):
     assert stage.did == ["a1", "a2"]
 
 
-def test_a_step_runs_one_block_of_the_script_that_waited_longest(stage):
+def test_step_runs_one_block_of_longest_waiting_script(stage):
     stage.scheduler.pause()
     stage.script("a", stage.steps("a1", "a2"))
     until(lambda: "a1" in stage.scheduler.snapshot().blocks and stage.scheduler.snapshot().paused)
@@ -99,7 +99,7 @@ def test_a_step_runs_one_block_of_the_script_that_waited_longest(stage):
         until(lambda expected=expected: stage.did == expected and stage.scheduler.snapshot().paused)
 
 
-def test_the_clock_of_a_wait_stands_while_paused(stage):
+def test_wait_clock_stops_while_paused(stage):
     def work(_name: str) -> None:
         stage.scheduler.step("wait")
         stage.scheduler.wait(1.0)
@@ -118,7 +118,7 @@ def test_the_clock_of_a_wait_stands_while_paused(stage):
     assert stage.did == ["waited"]
 
 
-def test_a_step_lets_a_wait_go_to_its_end(stage):
+def test_step_runs_wait_to_its_end(stage):
     def work(_name: str) -> None:
         stage.scheduler.step("wait")
         stage.scheduler.wait(0.03)
@@ -134,7 +134,7 @@ def test_a_step_lets_a_wait_go_to_its_end(stage):
     assert stage.did == ["waited"]
 
 
-def test_a_step_in_the_middle_of_a_wait_ends_the_wait(stage):
+def test_step_during_wait_ends_the_wait(stage):
     def work(_name: str) -> None:
         stage.scheduler.step("wait")
         stage.scheduler.wait(1.0)
@@ -151,7 +151,7 @@ def test_a_step_in_the_middle_of_a_wait_ends_the_wait(stage):
     assert stage.did == ["waited"]
 
 
-def test_others_run_while_one_waits(stage):
+def test_other_scripts_run_while_one_waits(stage):
     done = threading.Event()
 
     def work(_name: str) -> None:
@@ -166,14 +166,14 @@ def test_others_run_while_one_waits(stage):
     assert stage.did == ["b1", "b2", "waited"]
 
 
-def test_a_wait_with_a_limit_gives_up(stage):
+def test_wait_with_timeout_gives_up(stage):
     found = []
     stage.script("a", lambda _: found.append(stage.scheduler.wait_until(lambda: False, 0.03)))
     stage.join()
     assert found == [False]
 
 
-def test_another_thread_ends_a_wait_with_a_poke(stage):
+def test_poke_from_another_thread_ends_wait(stage):
     arrived = []
 
     def work(_name: str) -> None:
@@ -188,7 +188,7 @@ def test_another_thread_ends_a_wait_with_a_poke(stage):
     assert stage.did == ["got it"]
 
 
-def test_a_pause_is_not_reached_while_a_robot_still_moves(stage):
+def test_pause_takes_effect_only_after_running_robot_action(stage):
     answered = []
 
     def work(_name: str) -> None:
@@ -207,7 +207,7 @@ def test_a_pause_is_not_reached_while_a_robot_still_moves(stage):
 
 
 @pytest.mark.parametrize("where", ["step", "wait", "wait_until", "wait_for", "idle"])
-def test_stop_ends_a_script_wherever_it_is(stage, where):
+def test_stop_ends_script_at_any_point(stage, where):
     def work(_name: str) -> None:
         while True:
             stage.did.append("here")
@@ -226,7 +226,7 @@ def test_stop_ends_a_script_wherever_it_is(stage, where):
     stage.join()
 
 
-def test_a_script_ends_in_a_pause_too(stage):
+def test_stop_ends_paused_script(stage):
     stage.scheduler.pause()
     stage.script("a", stage.steps("a1"))
     until(lambda: stage.scheduler.snapshot().paused)
@@ -235,7 +235,7 @@ def test_a_script_ends_in_a_pause_too(stage):
     assert stage.did == []
 
 
-def test_nobody_looks_at_conditions_while_paused(stage):
+def test_conditions_are_not_checked_while_paused(stage):
     looked = []
 
     def body() -> None:
@@ -253,12 +253,12 @@ def test_nobody_looks_at_conditions_while_paused(stage):
     until(lambda: len(looked) > 3)
 
 
-def test_who_is_no_script_is_told(stage):
+def test_step_outside_script_raises(stage):
     with pytest.raises(RuntimeError, match="only works in a script"):
         stage.scheduler.step("x")
 
 
-def test_slow_motion_stays_at_each_block_and_others_run_meanwhile(stage):
+def test_slow_motion_delays_each_block_while_other_scripts_run(stage):
     stage.scheduler.set_pace(0.05)
     began = time.monotonic()
     stage.script("a", stage.steps("a1", "a2"))
@@ -269,7 +269,7 @@ def test_slow_motion_stays_at_each_block_and_others_run_meanwhile(stage):
     assert 0.1 <= time.monotonic() - began < 5.0
 
 
-def test_slow_motion_ends_when_it_is_told(stage):
+def test_slow_motion_ends_at_once_when_turned_off(stage):
     stage.scheduler.set_pace(60.0)
     stage.script("a", stage.steps("a1", "a2", "a3"))
     until(lambda: stage.scheduler.snapshot().blocks == ("a1",))
@@ -284,7 +284,7 @@ def test_slow_motion_ends_when_it_is_told(stage):
     assert stage.did == ["a1", "a2", "a3"]
 
 
-def test_what_a_pause_interrupts_stands_still_until_go_on_or_its_step(stage):
+def test_interrupted_action_is_held_until_resume_or_its_step(stage):
     def work(_name: str) -> None:
         stage.scheduler.step("drive")
         stage.scheduler.wait_for(stage.scheduler.holds)

@@ -40,13 +40,13 @@ from tests.blocks.samples import block, get, number, started, workspace, write
         ({"x": 1, "y": [2]}, "other", "{x: 1, y: [2]}"),
     ],
 )
-def test_a_value_in_short(value: object, kind: str, text: str) -> None:
+def test_value_summary(value: object, kind: str, text: str) -> None:
     told = brief("v", value)
     assert (told.kind, told.text) == (kind, text)
     assert VariableValue.from_json(json.loads(json.dumps(told.to_json()))) == told
 
 
-def test_nothing_is_read_that_is_not_shown() -> None:
+def test_summary_reads_only_what_is_shown() -> None:
     class Counted(dict[str, object]):
         asked = 0
 
@@ -61,7 +61,7 @@ def test_nothing_is_read_that_is_not_shown() -> None:
     assert len(brief("v", "x" * 10**6).text) == LONGEST_TEXT
 
 
-def test_a_list_that_holds_itself_and_one_nested_deep_have_an_end() -> None:
+def test_self_containing_and_deeply_nested_lists_are_truncated() -> None:
     itself: list[object] = [1]
     itself.append(itself)
     assert brief("v", itself).text.startswith("[1, [1, [1,")
@@ -71,7 +71,7 @@ def test_a_list_that_holds_itself_and_one_nested_deep_have_an_end() -> None:
     assert "…" in brief("v", deep).text
 
 
-def test_of_a_long_list_its_first_items_and_its_length_are_told() -> None:
+def test_long_list_reports_first_items_and_length() -> None:
     told = brief("v", list(range(5000)))
     assert (len(told.items), told.length, told.items[-1]) == (MOST_ITEMS, 5000, "99")
 
@@ -80,7 +80,7 @@ def watch(**names: object) -> tuple[VariableWatch, dict[str, object]]:
     return VariableWatch(names, [Variable(f"id {name}", name, name) for name in names]), names
 
 
-def test_only_what_changed_is_told() -> None:
+def test_only_changed_variables_are_reported() -> None:
     watched, names = watch(score=0, words=["a"], inner=[[1]], unused=None)
     assert [each.id for each in watched.changes()] == ["id score", "id words", "id inner", "id unused"]
     assert watched.changes() == []
@@ -97,7 +97,7 @@ def test_only_what_changed_is_told() -> None:
     assert watched.changes() == []
 
 
-def test_much_at_once_comes_in_parts_and_all_of_it_comes() -> None:
+def test_large_changes_are_reported_in_parts_without_loss() -> None:
     many = {f"v{each}": ["x" * 80] * 100 for each in range(60)}
     watched, _names = watch(**many)
     first, rest = watched.changes(), list[VariableValue]()
@@ -108,7 +108,7 @@ def test_much_at_once_comes_in_parts_and_all_of_it_comes() -> None:
     assert {each.id for each in (*first, *rest)} == {f"id v{each}" for each in range(60)}
 
 
-def test_a_list_that_is_changed_meanwhile_does_no_harm() -> None:
+def test_list_modified_during_read_is_harmless() -> None:
     watched, names = watch(table={"0": 0}, row=[0])
     over = threading.Event()
 
@@ -129,7 +129,7 @@ def test_a_list_that_is_changed_meanwhile_does_no_harm() -> None:
     thread.join()
 
 
-def test_a_person_gives_only_variables_of_the_program_another_value() -> None:
+def test_user_can_set_only_program_variables() -> None:
     watched, names = watch(score=0)
     names["wait"] = wait = object()
     watched.put("score", "ten")
@@ -138,7 +138,7 @@ def test_a_person_gives_only_variables_of_the_program_another_value() -> None:
     assert names["wait"] is wait
 
 
-def test_a_strange_line_is_no_value() -> None:
+def test_invalid_variable_line_is_not_a_value() -> None:
     assert VariableValue.from_json([1]) is None
     told = VariableValue.from_json(
         {"id": 5, "kind": "dance", "items": "x", "length": "y", "text": "z" * 10**6}
@@ -146,7 +146,7 @@ def test_a_strange_line_is_no_value() -> None:
     assert told == VariableValue("5", "other", "z" * (LONGEST_TEXT + 1))
 
 
-def test_a_program_knows_the_variables_of_its_behaviour_those_that_nothing_uses_too() -> None:
+def test_program_lists_all_behaviour_variables_including_unused() -> None:
     saved = workspace(
         started(block("variables_set", VAR={"id": "score"}, VALUE=number(3)), write(get("score"))),
         variables=("score", "unused"),

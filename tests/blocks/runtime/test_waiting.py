@@ -26,7 +26,7 @@ class Queued(FakeLink):
         return call
 
 
-def test_what_waits_says_for_what_and_then_what_it_does(monkeypatch) -> None:
+def test_queued_action_shows_awaited_action_then_its_activity(monkeypatch) -> None:
     monkeypatch.setattr("app.blocks.runtime.robot_handle.MARGIN_S", -29.5)  # the limit: half a second
     link = Queued()
     run = begin(link)
@@ -43,7 +43,7 @@ def test_what_waits_says_for_what_and_then_what_it_does(monkeypatch) -> None:
     assert run.end().lines == ["after"]
 
 
-def test_a_robot_that_stops_telling_that_it_lives_is_an_error_at_the_block(monkeypatch) -> None:
+def test_robot_without_heartbeat_is_an_error_at_the_block(monkeypatch) -> None:
     monkeypatch.setattr("app.blocks.runtime.robot_handle.SHORTEST_SILENCE_S", 0.3)
     link = FakeLink()
     link.held = {"say"}

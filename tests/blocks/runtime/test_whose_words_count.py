@@ -131,7 +131,9 @@ def network(node: nep.Node, pepper: WireRobot) -> Iterator[Network]:
     made.close()
 
 
-def test_a_stranger_says_no_stop_of_others(network: Network, pepper: WireRobot, evil: nep.Node) -> None:
+def test_forged_stop_reply_from_foreign_node_is_ignored(
+    network: Network, pepper: WireRobot, evil: nep.Node
+) -> None:
     outside: list[str] = []
     network.listen(lambda: None, outside.append)
     forged = evil.new_pub("/Pepper/answer", "robot/answer")
@@ -144,14 +146,14 @@ def test_a_stranger_says_no_stop_of_others(network: Network, pepper: WireRobot, 
     assert outside == []
 
 
-def test_a_refusal_is_told_in_the_robots_words(network: Network, pepper: WireRobot) -> None:
+def test_rejected_stop_is_reported_with_robot_message(network: Network, pepper: WireRobot) -> None:
     say_ = pepper._say
     pepper._say = lambda command, state, error="": say_(command, "failed", "the brake is stuck")  # type: ignore[method-assign]
     assert network.stop_robots(30.0) == ("Pepper",)
     assert network.stop_words("Pepper") == "Pepper may still move: the brake is stuck"
 
 
-def test_a_stranger_starts_no_script_but_another_program_may_be_a_robots_eye(
+def test_events_from_foreign_nodes_are_ignored_but_sensor_values_are_accepted(
     network: Network, pepper: WireRobot, evil: nep.Node
 ) -> None:
     told: list[object] = []
@@ -178,7 +180,7 @@ def test_a_stranger_starts_no_script_but_another_program_may_be_a_robots_eye(
     until(told_by_another)
 
 
-def test_a_robot_that_is_started_anew_is_believed_when_the_runner_says_so(
+def test_restarted_robot_is_trusted_after_runner_confirms_it(
     network: Network, pepper: WireRobot, master: Master
 ) -> None:
     pepper.close()

@@ -13,7 +13,7 @@ ALL = sorted(CATALOGUE.blocks.values(), key=lambda each: each.type)
 
 
 @pytest.mark.parametrize("described", ALL, ids=lambda each: each.type)
-def test_every_block_has_its_help(described) -> None:
+def test_every_block_has_help(described) -> None:
     told = help_of(described)
     assert str(told["does"]).endswith(".")
     assert str(told["example"]).startswith("For example: ")
@@ -26,12 +26,12 @@ def test_every_block_has_its_help(described) -> None:
     assert len(told["gaps"]) >= len(shown)  # type: ignore[arg-type]
 
 
-def test_every_block_of_ours_has_an_example_of_its_own() -> None:
+def test_every_built_in_block_has_its_own_example() -> None:
     ours = {described.type for category in categories() for described in category.blocks}
     assert set(EXAMPLES) == ours
 
 
-def test_the_help_of_a_robots_block_comes_from_its_description() -> None:
+def test_help_of_robot_block_comes_from_its_description() -> None:
     told = help_of(CATALOGUE.blocks["robot_pepper_do_turn"])
     assert told["title"] == "(robot) turn (direction) by (angle) °"
     assert told["example"] == "For example: Pepper turn left by 90 °."
@@ -39,7 +39,7 @@ def test_the_help_of_a_robots_block_comes_from_its_description() -> None:
     assert ["direction", "“left” or “right”"] in told["gaps"]  # type: ignore[operator]
 
 
-def test_gaps_are_named_in_words() -> None:
+def test_slots_are_described_in_help() -> None:
     told = help_of(CATALOGUE.blocks["lists_get"])
     assert told["title"] == "(where) (number) of (list)"
     assert told["gaps"][1] == [  # type: ignore[index]

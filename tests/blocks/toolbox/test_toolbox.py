@@ -49,11 +49,11 @@ def words(block_type: str) -> str:
         ("values_text", "[TEXT]"),
     ],
 )
-def test_blocks_read_as_in_the_design(block_type, expected):
+def test_block_texts_match_the_design(block_type, expected):
     assert words(block_type) == expected
 
 
-def test_the_icon_of_each_block_is_a_picture_and_its_arguments_are_numbered():
+def test_block_icons_are_pictures_and_arguments_are_numbered():
     for definition in BLOCKS.values():
         for number in range(4):
             arguments = definition.get(f"args{number}", [])
@@ -65,7 +65,7 @@ def test_the_icon_of_each_block_is_a_picture_and_its_arguments_are_numbered():
     assert icon == {"type": "field_icon", "name": "ICON", "icon": "message-circle"}
 
 
-def test_shapes_become_connections():
+def test_block_shapes_become_connections():
     hat, statement, cap = BLOCKS["events_started"], BLOCKS["control_wait"], BLOCKS["control_forever"]
     assert ("previousStatement" in hat, "nextStatement" in hat) == (False, True)
     assert ("previousStatement" in statement, "nextStatement" in statement) == (True, True)
@@ -75,7 +75,7 @@ def test_shapes_become_connections():
     assert BLOCKS["messages_newest"]["output"] is None
 
 
-def test_fields_of_ours():
+def test_custom_fields_are_defined():
     fields = {argument["name"]: argument for argument in BLOCKS["robot_pepper_do_light"]["args0"]}
     assert fields["ROBOT"] == {
         "type": "field_choice", "name": "ROBOT", "options": [["Pepper", "Pepper"]], "source": "robots:pepper",
@@ -88,7 +88,7 @@ def test_fields_of_ours():
     assert home["WITH_SONG"]["options"] == [["song: no", "false"], ["song: yes", "true"]]
 
 
-def test_the_toolbox():
+def test_toolbox_has_categories_of_built_in_and_robot_blocks():
     contents = DEFINITIONS["toolbox"]["contents"]  # type: ignore[index]
     shape = [(item["kind"], item["name"]) for item in contents]
     assert shape == [
@@ -121,14 +121,14 @@ def test_the_toolbox():
     }  # fmt: skip
 
 
-def test_a_long_category_has_headings_between_its_blocks():
+def test_long_category_has_headings_between_its_blocks():
     (lists,) = [item for item in DEFINITIONS["toolbox"]["contents"] if item["name"] == "Lists"]  # type: ignore[index]
     shown = [entry.get("text") or entry["type"] for entry in lists["contents"]]
     assert shown[:3] == ["New list", "Make a list", "lists_empty"]
     assert shown[shown.index("Change a list") + 1] == "lists_add"
 
 
-def test_a_category_may_stand_within_another_under_its_title():
+def test_category_can_be_nested_under_its_title():
     (numbers,) = [item for item in DEFINITIONS["toolbox"]["contents"] if item["name"] == "Numbers and logic"]  # type: ignore[index]
     shown = [entry.get("text") or entry["type"] for entry in numbers["contents"]]
     assert shown[:2] == ["Logic", "values_compare"]
@@ -136,7 +136,7 @@ def test_a_category_may_stand_within_another_under_its_title():
     assert shown[shown.index("Time") + 1] == "sensing_timer"
 
 
-def test_every_entry_of_the_toolbox_is_defined_and_every_style_is_known():
+def test_every_toolbox_entry_is_defined_and_every_style_exists():
     for item in DEFINITIONS["toolbox"]["contents"]:  # type: ignore[index]
         for entry in item.get("contents", []):
             if entry["kind"] == "block":
@@ -147,7 +147,7 @@ def test_every_entry_of_the_toolbox_is_defined_and_every_style_is_known():
     assert {definition["style"] for definition in BLOCKS.values()} <= set(DEFINITIONS["styles"])  # type: ignore[arg-type]
 
 
-def test_the_hats_of_each_robot_are_under_events_too_below_its_name():
+def test_robot_event_blocks_are_also_listed_under_events_below_robot_name():
     two = editor_definitions([robot("Pepper"), nao()])["toolbox"]["contents"]  # type: ignore[index]
     (events,) = (item["contents"] for item in two if item.get("name") == "Events")
     told = [entry.get("text") or entry["type"] for entry in events]
@@ -179,12 +179,12 @@ def test_robots_of_one_model_share_their_blocks():
     assert presets == ["Pepper", "Salt"]
 
 
-def test_everything_is_json():
+def test_editor_definitions_are_json_serializable():
     json.dumps(DEFINITIONS)
     assert editor_definitions([])["toolbox"]["contents"][-1]["name"] == "Messages"  # type: ignore[index]
 
 
-def test_the_page_about_blocks_is_made_of_their_descriptions():
+def test_block_reference_page_is_generated_from_descriptions():
     """If not: python tools/blocks_page.py."""
     text = Path("docs/blocks.md").read_text("utf-8")
     assert page(text) == text

@@ -17,7 +17,7 @@ from tests.core.waiting import tick_until
 STILL = KeptMessage("a", "Stand still", "/cmd_vel", "json", '{"x": 0, "id": {new id}}', (), 20.0)
 
 
-def test_messages_and_calls_go_to_the_network_and_stop_ends_them(session: Session) -> None:
+def test_messages_and_calls_are_sent_and_stop_disarms(session: Session) -> None:
     acting = session.acting
     acting.shelf.put(STILL)
     with nep.node("robot") as node:
@@ -68,7 +68,7 @@ def test_messages_and_calls_go_to_the_network_and_stop_ends_them(session: Sessio
     assert "no longer armed" in said
 
 
-def test_what_is_wrong_is_a_sentence_and_arms_nothing(session: Session) -> None:
+def test_invalid_message_is_rejected_with_reason_and_arms_nothing(session: Session) -> None:
     acting = session.acting
     for message, sentence in (
         (KeptMessage("b", "No topic", " "), "Choose a topic first."),
@@ -84,7 +84,7 @@ def test_what_is_wrong_is_a_sentence_and_arms_nothing(session: Session) -> None:
     assert not acting.arming.is_on
 
 
-def test_the_shelf_is_kept_in_its_file_and_damage_is_told(tmp_path: Path) -> None:
+def test_shelf_is_saved_to_file_and_damage_is_reported(tmp_path: Path) -> None:
     first = Session(Settings(tmp_path), address="127.0.0.1:1", start_processes=False)
     first.acting.shelf.put(STILL)
     first.acting.check()
@@ -103,7 +103,7 @@ def test_the_shelf_is_kept_in_its_file_and_damage_is_told(tmp_path: Path) -> Non
     third.close()
 
 
-def test_a_file_of_a_newer_studio_is_left_as_it_is(tmp_path: Path) -> None:
+def test_shelf_file_of_newer_version_is_not_overwritten(tmp_path: Path) -> None:
     path = tmp_path / FILE
     data = json.dumps({"format": 99, "messages": []})
     path.write_text(data, "utf-8")
@@ -114,7 +114,7 @@ def test_a_file_of_a_newer_studio_is_left_as_it_is(tmp_path: Path) -> None:
     assert path.read_text("utf-8") == data
 
 
-def test_how_it_ended_in_words() -> None:
+def test_send_results_are_described() -> None:
     order = SendOrder("a", "Drive", "/cmd_vel", "json", dict)
     for result, words in (
         (SendResult(order, "sent", heard=2), "received by 2"),

@@ -12,7 +12,7 @@ def made() -> tuple[Arming, list[float]]:
     return Arming(lambda: now[0]), now
 
 
-def test_nothing_is_allowed_before_it_is_armed_and_named() -> None:
+def test_nothing_is_allowed_before_arming_and_naming_a_target() -> None:
     arming, _now = made()
     done: list[int] = []
     assert not arming.allow(TOPIC)
@@ -25,7 +25,7 @@ def test_nothing_is_allowed_before_it_is_armed_and_named() -> None:
     assert done == [2]
 
 
-def test_its_time_goes_by_and_sending_does_not_lengthen_it() -> None:
+def test_arming_expires_and_sending_does_not_extend_it() -> None:
     arming, now = made()
     arming.arm(60)
     arming.allow(TOPIC)
@@ -37,7 +37,7 @@ def test_its_time_goes_by_and_sending_does_not_lengthen_it() -> None:
     assert not arming.if_armed(arming.turn, TOPIC, lambda: None)
 
 
-def test_what_was_asked_in_one_turn_is_not_done_in_the_next() -> None:
+def test_request_of_previous_arming_is_rejected_after_rearming() -> None:
     arming, _now = made()
     arming.arm()
     arming.allow(TOPIC)
@@ -50,7 +50,7 @@ def test_what_was_asked_in_one_turn_is_not_done_in_the_next() -> None:
     assert arming.if_armed(arming.turn, TOPIC, lambda: None)
 
 
-def test_names_and_minutes_are_bounded_and_names_can_be_taken_away() -> None:
+def test_target_count_and_duration_are_limited_and_targets_can_be_removed() -> None:
     arming, _now = made()
     for seconds, left in ((-1, MIN_S), (1e9, MAX_S), (300, 300)):
         arming.arm(seconds)
@@ -62,7 +62,7 @@ def test_names_and_minutes_are_bounded_and_names_can_be_taken_away() -> None:
     assert arming.allow(names[-1])
 
 
-def test_that_a_person_knows_what_moves_ends_with_the_turn() -> None:
+def test_motion_confirmation_ends_with_disarming() -> None:
     arming, _now = made()
     arming.arm()
     arming.allow(TOPIC, is_confirmed=True)

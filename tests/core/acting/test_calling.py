@@ -50,7 +50,7 @@ def bench(request) -> Iterator[Bench]:
         made.calls.close()
 
 
-def test_an_answer_with_its_time_and_as_json(bench) -> None:
+def test_reply_is_recorded_with_duration_and_json(bench) -> None:
     bench.node.new_server("/sum", lambda asked: {"sum": asked["a"] + 1, "raw": [1.5]}, threads=1)
     bench.call({"a": 2})
     waiting = bench.calls.waiting
@@ -62,7 +62,7 @@ def test_an_answer_with_its_time_and_as_json(bench) -> None:
     assert bench.calls.waiting is None
 
 
-def test_what_the_server_raises_is_a_refusal_with_its_words(bench) -> None:
+def test_server_exception_is_recorded_as_rejection(bench) -> None:
     def refuse(_asked: object) -> object:
         raise ValueError("no face in sight")
 
@@ -72,12 +72,12 @@ def test_what_the_server_raises_is_a_refusal_with_its_words(bench) -> None:
     assert (record.state, record.sentence) == ("failed", "rejected: no face in sight")
 
 
-def test_nobody_serves_it(bench) -> None:
+def test_call_without_server_fails(bench) -> None:
     bench.call(timeout_s=0.1)
     assert bench.end().sentence == "no server"
 
 
-def test_no_answer_in_time_and_giving_up(bench) -> None:
+def test_call_times_out_and_can_be_canceled(bench) -> None:
     go_on = threading.Event()
     bench.node.new_server("/sum", lambda _asked: go_on.wait(30), threads=2)
     bench.call(timeout_s=0.2)
@@ -94,7 +94,7 @@ def test_no_answer_in_time_and_giving_up(bench) -> None:
     go_on.set()
 
 
-def test_what_is_not_armed_is_not_called(bench) -> None:
+def test_call_is_not_made_when_disarmed(bench) -> None:
     asked: list[object] = []
     bench.node.new_server("/sum", asked.append, threads=1)
     bench.arming.disarm()
@@ -103,7 +103,7 @@ def test_what_is_not_armed_is_not_called(bench) -> None:
     assert asked == []
 
 
-def test_without_a_master_it_ends_and_is_not_called_later(bench) -> None:
+def test_call_without_master_times_out_and_is_not_made_later(bench) -> None:
     asked: list[object] = []
     bench.node.new_server("/sum", asked.append, threads=1)
     bench.waiting = []
@@ -118,14 +118,14 @@ def test_without_a_master_it_ends_and_is_not_called_later(bench) -> None:
     assert asked == []
 
 
-def test_what_cannot_be_sent_says_why(bench) -> None:
+def test_unencodable_request_fails_with_reason(bench) -> None:
     bench.call({"a": object()})
     record = bench.end()
     assert record.state == "failed"
     assert record.sentence
 
 
-def test_history_and_answers_are_bounded(bench) -> None:
+def test_call_history_and_stored_replies_are_bounded(bench) -> None:
     bench.node.new_server("/sum", lambda _asked: {"a": 1}, threads=1)
     bench.call()
     first = bench.end()

@@ -28,7 +28,7 @@ def mended(text: str) -> str:
     return text
 
 
-def test_a_fault_is_a_sentence_with_its_position() -> None:
+def test_json_error_is_reported_with_its_position() -> None:
     fault = JsonText(LINES).fault
     assert fault is not None
     assert (fault.line, fault.column) == (4, 17)
@@ -46,11 +46,11 @@ def test_a_fault_is_a_sentence_with_its_position() -> None:
         ('{"a": {yaw}\n"b": 1}', {"a": 2, "b": 1}),
     ],
 )
-def test_what_can_be_mended_is_json_afterwards(text, value) -> None:
+def test_repaired_text_is_valid_json(text, value) -> None:
     assert JsonText(mended(text)).filled({"yaw": 2}) == value
 
 
-def test_places_are_filled_outside_of_texts_alone() -> None:
+def test_placeholders_are_filled_only_outside_strings() -> None:
     read = JsonText('{"say": "a {name}", "to": {name}, "yaw": { yaw }, "again": [{name}]}')
     assert read.fault is None
     assert read.to_fill == ("name", "yaw")
@@ -60,7 +60,7 @@ def test_places_are_filled_outside_of_texts_alone() -> None:
         read.filled({"name": "Aiko"})
 
 
-def test_ids_and_times_fill_themselves_anew() -> None:
+def test_id_and_time_placeholders_get_new_values_each_time() -> None:
     read = JsonText('{"id": {new id}, "at": {now}}')
     assert read.to_fill == ()
     one, other = read.filled({}), read.filled({})
@@ -70,7 +70,7 @@ def test_ids_and_times_fill_themselves_anew() -> None:
     assert 1e9 < one["at"] <= other["at"]
 
 
-def test_a_number_is_no_name_of_a_field() -> None:
+def test_number_is_rejected_as_object_key() -> None:
     read = JsonText("{{name}: 1}")
     assert read.filled({"name": "x"}) == {"x": 1}
     with pytest.raises(NepError, match="column 2"):
@@ -82,11 +82,11 @@ def test_a_number_is_no_name_of_a_field() -> None:
     [("12.5", 12.5), ("Aiko", "Aiko"), ('"12"', "12"), (" true ", True), ("[1, 2]", [1, 2]), ("NaN", "NaN"),
      ("0,2", 0.2), ('"0,2"', "0,2"), ("[1,2]", [1, 2]), ("1.234,5", "1.234,5"), ("007", "007"), ("+3", "+3")],
 )  # fmt: skip
-def test_a_value_is_json_or_else_a_text(text, value) -> None:
+def test_typed_value_is_json_or_falls_back_to_text(text, value) -> None:
     assert value_typed(text) == value
 
 
-def test_a_cut_anywhere_has_its_line_and_column() -> None:
+def test_truncated_json_is_reported_with_line_and_column() -> None:
     value = {"a": [1, -2.5e-3, True, None], "b": {"c": 'x "y" \\ {z}', "ü": "\n"}, "d": [], "e": {}}
     text = pretty(value)
     assert JsonText(text).filled({}) == json.loads(text) == value

@@ -10,7 +10,7 @@ from nep.messages.codecs import codec_for
 POINT = PicturePoint(16, 8, 320, 240, 1_795_164_093_000_000_007, "middle")
 
 
-def test_json_has_all_that_is_known() -> None:
+def test_json_point_has_all_known_fields() -> None:
     assert POINT.payload("/camera", "json") == {
         "x": 16,
         "y": 8,
@@ -26,7 +26,7 @@ def test_json_has_all_that_is_known() -> None:
     assert PicturePoint(319, 239, 320, 240, None).share == pytest.approx((0.99844, 0.99792), abs=1e-5)
 
 
-def test_types_of_ros_have_their_fields() -> None:
+def test_ros_point_types_have_their_fields() -> None:
     place = {"x": 16.0, "y": 8.0, "z": 0.0}
     assert POINT.payload("/camera", "geometry_msgs/Point") == place
     assert POINT.payload("/camera", "geometry_msgs/PointStamped") == {
@@ -38,6 +38,6 @@ def test_types_of_ros_have_their_fields() -> None:
         assert codec_for(msg_type).decode(made.data, {}) == POINT.payload("/camera", msg_type)
 
 
-def test_the_topic_is_below_that_of_the_pictures() -> None:
+def test_point_topic_is_below_picture_topic() -> None:
     assert topic_of("/robot/camera") == "/robot/camera/point"
     assert topic_of("camera/") == "camera/point"

@@ -54,7 +54,7 @@ def kinds(bench: Bench) -> list[str]:
     return [each.kind for each in bench.outbox.pop_results()]
 
 
-def test_it_is_sent_once_and_says_how_many_hear_it(bench) -> None:
+def test_message_is_sent_once_and_receivers_are_counted(bench) -> None:
     heard = bench.node.new_sub("/cmd_vel", "json")
     bench.arm("/cmd_vel")
     bench.outbox.send(order())
@@ -63,7 +63,7 @@ def test_it_is_sent_once_and_says_how_many_hear_it(bench) -> None:
     assert (result.kind, result.heard) == ("sent", 1)
 
 
-def test_what_is_not_armed_is_not_sent(bench) -> None:
+def test_message_is_not_sent_when_disarmed(bench) -> None:
     heard = bench.node.new_sub("/cmd_vel", "json")
     bench.outbox.send(order())
     bench.arm("/other")
@@ -74,7 +74,7 @@ def test_what_is_not_armed_is_not_sent(bench) -> None:
     assert heard.receive(0.0) is None
 
 
-def test_what_waited_for_a_master_is_not_sent_when_it_is_late_or_no_longer_armed(bench) -> None:
+def test_message_delayed_by_missing_master_is_not_sent_when_expired_or_disarmed(bench) -> None:
     heard = bench.node.new_sub("/cmd_vel", "json")
     bench.arm("/cmd_vel")
     bench.waiting = []
@@ -94,7 +94,7 @@ def test_what_waited_for_a_master_is_not_sent_when_it_is_late_or_no_longer_armed
 @pytest.mark.parametrize(
     ("topic", "msg_type", "payload"), [("/cmd_vel", "bytes", {"x": 1}), ("bad topic", "json", 1)]
 )
-def test_what_cannot_be_sent_says_why(bench, topic, msg_type, payload) -> None:
+def test_invalid_message_fails_with_reason(bench, topic, msg_type, payload) -> None:
     bench.arm(topic)
     bench.outbox.send(order(topic, msg_type, payload))
     bench.outbox.begin(order(topic, msg_type, payload), 10)
@@ -104,7 +104,7 @@ def test_what_cannot_be_sent_says_why(bench, topic, msg_type, payload) -> None:
     assert bench.outbox.all_repeated == ()
 
 
-def test_again_and_again_until_it_is_ended_and_not_once_more(bench) -> None:
+def test_message_repeats_until_ended(bench) -> None:
     heard = bench.node.new_sub("/cmd_vel", "json")
     bench.arm("/cmd_vel")
     assert bench.outbox.begin(order(), 50)
@@ -121,7 +121,7 @@ def test_again_and_again_until_it_is_ended_and_not_once_more(bench) -> None:
     assert heard.receive(0.1) is None
 
 
-def test_the_switch_ends_it_also_while_nobody_looks(bench) -> None:
+def test_disarming_ends_repetition_without_polling(bench) -> None:
     bench.arm("/cmd_vel")
     bench.outbox.begin(order(), 50)
     bench.arming.disarm()
@@ -129,7 +129,7 @@ def test_the_switch_ends_it_also_while_nobody_looks(bench) -> None:
     assert kinds(bench) == ["began", "ended"]
 
 
-def test_one_that_raises_ends_and_the_others_go_on(bench) -> None:
+def test_repeated_message_that_raises_ends_and_others_continue(bench) -> None:
     heard = bench.node.new_sub("/good", "json")
     bench.arm("/good", "/bad")
     made = iter([1, 2])
@@ -150,7 +150,7 @@ def test_one_that_raises_ends_and_the_others_go_on(bench) -> None:
     assert (failed.sentence, failed.count) == ("Fill in “yaw” first.", 1)
 
 
-def test_many_at_once_are_refused_and_rates_are_bounded(bench) -> None:
+def test_number_and_rate_of_repeated_messages_are_limited(bench) -> None:
     names = [f"/t{number}" for number in range(MAX_CONCURRENT + 1)]
     bench.arm(*names)
     begun = [bench.outbox.begin(order(name, id=name), 1e-9) for name in names]
@@ -158,7 +158,7 @@ def test_many_at_once_are_refused_and_rates_are_bounded(bench) -> None:
     assert {each.rate_hz for each in bench.outbox.all_repeated} == {0.1}
 
 
-def test_who_is_late_leaves_out_what_has_gone_by_and_never_hurries(bench, monkeypatch) -> None:
+def test_late_repetition_skips_missed_sends_without_a_burst(bench, monkeypatch) -> None:
     now = [100.0]
     monkeypatch.setattr(sending.time, "monotonic", lambda: now[0])
     each = Repeated(order(), 10.0, 1, None, None, 100.0, since_s=100.0)  # type: ignore[arg-type]

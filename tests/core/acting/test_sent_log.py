@@ -9,7 +9,7 @@ def entry(at_s: float, words: str = "Still, heard by 1", text: str = "{}", sourc
     return SentRecord(at_s, "publish", "/cmd_vel", words, text=text, source=source, again=lambda: "")
 
 
-def test_the_same_again_is_one_entry_with_a_count_and_the_newest_message() -> None:
+def test_repeated_message_is_one_entry_with_count_and_newest_text() -> None:
     log = SentLog()
     for at_s, text in ((1.0, '{"id": "a"}'), (2.0, '{"id": "b"}')):
         log.put(entry(at_s, text=text, source='{"id": {new id}}'), 1)
@@ -22,7 +22,7 @@ def test_the_same_again_is_one_entry_with_a_count_and_the_newest_message() -> No
     assert (log.total, log.since_s) == (5, 1.0)
 
 
-def test_switching_is_never_counted_together_nor_as_sent() -> None:
+def test_arming_changes_are_neither_merged_nor_counted_as_sent() -> None:
     log = SentLog()
     for _ in range(2):
         log.put(SentRecord(1.0, "switch", "", "no longer armed"), 0)
@@ -30,7 +30,7 @@ def test_switching_is_never_counted_together_nor_as_sent() -> None:
     assert (log.total, log.since_s) == (0, None)
 
 
-def test_it_keeps_the_last_and_still_knows_how_many_there_were() -> None:
+def test_log_keeps_newest_entries_and_the_total_count() -> None:
     log = SentLog()
     for number in range(MAX_ENTRIES + 50):
         log.put(entry(float(number), f"{number}"), 1)
@@ -47,7 +47,7 @@ def test_it_keeps_the_last_and_still_knows_how_many_there_were() -> None:
     assert log.records[0].number == MAX_ENTRIES + 51, "a number is never used again"
 
 
-def test_a_large_message_is_listed_but_not_kept() -> None:
+def test_large_message_is_listed_without_its_content() -> None:
     log = SentLog()
     at_the_limit, over_it = "x" * KEPT_BYTES, "\N{EURO SIGN}" * (KEPT_BYTES // 2)
     for text in (at_the_limit, over_it, over_it + "x"):

@@ -21,7 +21,7 @@ from nep.errors import NepError
 LOOK = KeptMessage("a", "Look at Aiko", "/robot_action", "json", '{"yaw": {yaw}}', (("yaw", "-12.5"),), 10.0)
 
 
-def test_a_message_is_made_with_its_values() -> None:
+def test_kept_message_payload_is_built_from_its_values() -> None:
     assert LOOK.payload() == {"yaw": -12.5}
     assert LOOK.with_value("yaw", "left").payload() == {"yaw": "left"}
     with pytest.raises(NepError, match="Fill in “yaw” first"):
@@ -29,7 +29,7 @@ def test_a_message_is_made_with_its_values() -> None:
     assert KeptMessage("b", "Word", "/words", "string", "{yes").payload() == "{yes"
 
 
-def test_what_is_written_is_read_back() -> None:
+def test_shelf_survives_save_and_load() -> None:
     shelf = Shelf([LOOK, KeptMessage("b", "Wörter\ud800", "/words", "string", "a\nb")])
     shelf.remember("/sum", '{"a": 1}')
     data = shelf_text(shelf)
@@ -40,7 +40,7 @@ def test_what_is_written_is_read_back() -> None:
     assert dict(read.requests) == {"/sum": '{"a": 1}'}
 
 
-def test_copies_stand_below_and_what_was_deleted_comes_back() -> None:
+def test_copies_are_inserted_below_and_deleted_message_is_restored() -> None:
     other = KeptMessage("b", "Stand still", "/cmd_vel")
     shelf = Shelf([LOOK, other])
     made = shelf.copy("a")
@@ -53,7 +53,7 @@ def test_copies_stand_below_and_what_was_deleted_comes_back() -> None:
     assert shelf.remove("nobody") is None
 
 
-def test_it_is_bounded() -> None:
+def test_shelf_is_bounded() -> None:
     shelf = Shelf()
     kept = [shelf.put(KeptMessage(str(number), "", "/t")) for number in range(MOST_MESSAGES + 1)]
     assert kept == [True] * MOST_MESSAGES + [False]
@@ -66,17 +66,17 @@ def test_it_is_bounded() -> None:
 
 
 @pytest.mark.parametrize("data", [b"", b"{", b"[]", b"\xff\xfe", b'{"messages": 3}', b"[" * 100_000])
-def test_what_is_no_shelf_is_refused(data) -> None:
+def test_invalid_shelf_file_is_rejected(data) -> None:
     with pytest.raises(NepError):
         read_shelf(data)
 
 
-def test_one_of_a_newer_studio_is_told_apart() -> None:
+def test_shelf_of_newer_version_raises_its_own_error() -> None:
     with pytest.raises(NewerShelfError):
         read_shelf(json.dumps({"format": 2, "messages": []}).encode())
 
 
-def test_damaged_messages_are_left_out_and_counted() -> None:
+def test_damaged_messages_are_skipped_and_counted() -> None:
     good = {"id": "a", "name": "Stop", "topic": "/cmd_vel", "type": "json", "text": "{}", "values": {"x": 1}}
     told = [good, None, 3, {}, {**good, "id": 7}, {**good, "id": "b", "rate_hz": 1e308}, {**good, "id": ""}]
     shelf, unread = read_shelf(json.dumps({"messages": told, "requests": {"/sum": 3}}).encode())

@@ -18,7 +18,7 @@ def beside() -> Iterator[BackgroundWorker[str]]:
     made.close()
 
 
-def test_what_was_asked_is_taken_once(beside) -> None:
+def test_result_is_taken_once(beside) -> None:
     found: list[str | None] = []
     beside.ask("a", lambda: threading.current_thread().name)
     until(lambda: bool(found.append(beside.pop_result("a")) or found[-1]))
@@ -26,7 +26,7 @@ def test_what_was_asked_is_taken_once(beside) -> None:
     assert beside.pop_result("a") is None
 
 
-def test_only_the_newest_waits(beside) -> None:
+def test_only_newest_pending_job_runs(beside) -> None:
     go, did = threading.Event(), []
 
     def slow() -> str:
@@ -43,7 +43,7 @@ def test_only_the_newest_waits(beside) -> None:
     assert beside.pop_result("a") == "slow"
 
 
-def test_a_failure_is_raised_where_it_was_asked_and_the_next_work_is_done(beside) -> None:
+def test_job_failure_is_raised_on_take_and_next_job_runs(beside) -> None:
     def fail() -> str:
         raise ValueError("no such luck")
 
@@ -55,7 +55,7 @@ def test_a_failure_is_raised_where_it_was_asked_and_the_next_work_is_done(beside
     until(lambda: beside.pop_result("a") == "well")
 
 
-def test_closing_ends_the_thread_and_drops_what_waits(beside) -> None:
+def test_close_ends_thread_and_drops_pending_jobs(beside) -> None:
     beside.ask("a", lambda: "x")
     until(lambda: beside.pop_result("a") == "x")
     beside.close()
@@ -64,14 +64,14 @@ def test_closing_ends_the_thread_and_drops_what_waits(beside) -> None:
     assert not any(thread.name == "test beside" for thread in threading.enumerate())
 
 
-def test_nothing_asked_makes_no_thread() -> None:
+def test_no_thread_is_started_without_jobs() -> None:
     beside: BackgroundWorker[str] = BackgroundWorker("never")
     beside.forget("a")
     beside.close()
     assert beside._thread is None
 
 
-def test_finishing_waits_for_what_is_asked_and_what_is_done_just_now(beside, monkeypatch) -> None:
+def test_finish_waits_for_pending_and_running_jobs_of_owner(beside, monkeypatch) -> None:
     go, did = threading.Event(), []
     beside.ask("a", lambda: (go.wait(60) and did.append("first")) or "first")
     until(lambda: beside._current_owner == "a")
@@ -86,7 +86,7 @@ def test_finishing_waits_for_what_is_asked_and_what_is_done_just_now(beside, mon
     assert beside.pop_result("a") == "second"
 
 
-def test_a_failure_is_outdated_by_the_next_success(beside) -> None:
+def test_failure_is_cleared_by_next_success(beside) -> None:
     def fail() -> str:
         raise ValueError("no such luck")
 

@@ -28,7 +28,7 @@ def deep(levels: int) -> dict[str, object]:
     return block
 
 
-def test_what_was_put_in_is_there_at_the_next_start_the_newest_first(tmp_path: Path) -> None:
+def test_backpack_is_restored_at_next_start_newest_first(tmp_path: Path) -> None:
     first = Backpack(tmp_path)
     first.put([WAIT])
     first.put([SAY, deep(600)])
@@ -39,7 +39,7 @@ def test_what_was_put_in_is_there_at_the_next_start_the_newest_first(tmp_path: P
     assert [item.id for item in again.items] == [item.id for item in first.items]
 
 
-def test_two_studios_do_not_lose_each_others(tmp_path: Path) -> None:
+def test_two_studios_share_backpack_without_loss(tmp_path: Path) -> None:
     one, other = Backpack(tmp_path), Backpack(tmp_path)
     one.put([WAIT])
     other.put([SAY])  # has not looked since
@@ -56,7 +56,7 @@ def test_two_studios_do_not_lose_each_others(tmp_path: Path) -> None:
     assert one.remove(["nobody"]) == []
 
 
-def test_emptied_and_brought_back(tmp_path: Path) -> None:
+def test_emptied_backpack_can_be_restored(tmp_path: Path) -> None:
     backpack = Backpack(tmp_path)
     backpack.put([WAIT, SAY])
     gone = backpack.empty()
@@ -69,7 +69,7 @@ def test_emptied_and_brought_back(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     "content", [b"{", b"\xff\xfe", b"[]", b'{"backpack": 0, "items": []}', b'{"backpack": 1}']
 )
-def test_a_file_that_is_no_backpack_is_kept_aside_and_said_once(tmp_path: Path, content: bytes) -> None:
+def test_invalid_backpack_file_is_set_aside_and_reported_once(tmp_path: Path, content: bytes) -> None:
     (tmp_path / "backpack.json").write_bytes(content)
     (tmp_path / "backpack.damaged.json").write_text("an earlier one")
     backpack = Backpack(tmp_path)
@@ -83,7 +83,7 @@ def test_a_file_that_is_no_backpack_is_kept_aside_and_said_once(tmp_path: Path, 
     assert types(backpack) == ["control_wait"]
 
 
-def test_what_is_not_understood_in_it_is_counted_and_stays(tmp_path: Path) -> None:
+def test_unknown_backpack_items_are_counted_and_preserved(tmp_path: Path) -> None:
     strange: list[object] = [
         7,
         {"id": "x"},
@@ -102,7 +102,9 @@ def test_what_is_not_understood_in_it_is_counted_and_stays(tmp_path: Path) -> No
     assert backpack.take_trouble() == ""
 
 
-def test_it_has_bounds_that_lose_nothing(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_backpack_limits_reject_new_items_without_loss(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     monkeypatch.setattr(module, "MAX_STACKS", 3)
     monkeypatch.setattr(module, "MAX_BYTES", 2000)
     backpack = Backpack(tmp_path)
@@ -120,7 +122,7 @@ def test_it_has_bounds_that_lose_nothing(tmp_path: Path, monkeypatch: pytest.Mon
     assert len(backpack.items) == 1
 
 
-def test_one_that_cannot_be_read_or_written_is_left_as_it_is(tmp_path: Path) -> None:
+def test_unreadable_or_unwritable_backpack_is_left_unchanged(tmp_path: Path) -> None:
     (tmp_path / "backpack.json").mkdir()
     backpack = Backpack(tmp_path)
     backpack.reload_if_changed()
@@ -134,13 +136,13 @@ def test_one_that_cannot_be_read_or_written_is_left_as_it_is(tmp_path: Path) -> 
 
 
 @pytest.mark.skipif(os.name != "posix", reason="modes are POSIX's")
-def test_it_is_for_its_owner_alone(tmp_path: Path) -> None:
+def test_backpack_file_is_private_to_its_owner(tmp_path: Path) -> None:
     backpack = Backpack(tmp_path)
     backpack.put([WAIT])
     assert backpack.path.stat().st_mode & 0o077 == 0
 
 
-def test_a_lock_that_somebody_holds_for_long_stops_nobody(tmp_path: Path) -> None:
+def test_long_held_lock_does_not_block_backpack(tmp_path: Path) -> None:
     lock = FileLock(tmp_path / "backpack.json")
     assert lock.acquire()
     backpack = Backpack(tmp_path)

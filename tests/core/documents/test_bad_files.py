@@ -48,7 +48,7 @@ def behaviour(path: Path, *blocks: dict[str, object], **others: object) -> Path:
 
 
 @posix
-def test_without_room_the_old_file_is_whole_and_the_work_is_kept(tmp_path: Path) -> None:
+def test_full_disk_keeps_old_file_and_unsaved_work(tmp_path: Path) -> None:
     path = behaviour(tmp_path / "Mine.nepb", {"type": "events_started", "id": "old"})
     before = path.read_bytes()
     done = subprocess.run(
@@ -65,7 +65,7 @@ def test_without_room_the_old_file_is_whole_and_the_work_is_kept(tmp_path: Path)
     assert "x" * 200000 in json.dumps(left.workspace), "the journal has the work of before the limit"
 
 
-def test_a_file_cut_at_every_byte_is_a_sentence(tmp_path: Path) -> None:
+def test_truncated_file_is_rejected_with_reason(tmp_path: Path) -> None:
     example = json.loads((resources.path("examples") / "1-greeting.nepb").read_bytes())
     example["robots"] = {"Päpper": {"title": "long"}}  # a long one would be JSON like the rest
     whole = json.dumps(example, ensure_ascii=False).encode()
@@ -77,7 +77,7 @@ def test_a_file_cut_at_every_byte_is_a_sentence(tmp_path: Path) -> None:
         assert told.value.advice == "open an earlier copy"
 
 
-def test_bytes_that_were_changed_are_a_sentence_or_open(tmp_path: Path) -> None:
+def test_corrupted_file_opens_or_is_rejected_with_reason(tmp_path: Path) -> None:
     whole = (resources.path("examples") / "1-greeting.nepb").read_bytes()
     dice = random.Random(3)
     path = tmp_path / "x.nepb"
@@ -107,7 +107,7 @@ def test_behaviour_in_another_unicode_encoding_opens(tmp_path: Path, encoding: s
     (99, "newer NEP Studio"), (0, "has no format version"), (-1, "has no format version"),
     (True, "has no format version"), ("1", "has no format version"), (None, "has no format version"),
 ])  # fmt: skip
-def test_another_version_is_refused_with_the_next_step_and_left_alone(tmp_path, version, reason) -> None:
+def test_file_of_another_version_is_rejected_with_advice_and_not_changed(tmp_path, version, reason) -> None:
     path = tmp_path / "x.nepb"
     path.write_text(json.dumps({"format": "nep-behaviour", "version": version, "workspace": {}}))
     before = path.read_bytes()
@@ -117,7 +117,7 @@ def test_another_version_is_refused_with_the_next_step_and_left_alone(tmp_path, 
     assert path.read_bytes() == before
 
 
-def test_what_studio_does_not_know_is_written_again_as_it_was(tmp_path: Path) -> None:
+def test_unknown_file_content_is_preserved_on_save(tmp_path: Path) -> None:
     strange = {
         "type": "later_block", "id": "s", "x": 1.5, "y": -2, "extraState": {"a": [None, {"ü": "\ud83d"}]},
         "fields": {"F": {"deep": [1, 2.0, "x"]}}, "inputs": {"I": {"block": {"type": "other", "id": "o"}}},
@@ -139,7 +139,7 @@ def test_what_studio_does_not_know_is_written_again_as_it_was(tmp_path: Path) ->
 
 @posix
 @pytest.mark.timeout(240)
-def test_killed_100_times_while_saving_the_file_is_whole_every_time(tmp_path: Path) -> None:
+def test_file_is_intact_after_100_kills_while_saving(tmp_path: Path) -> None:
     path = tmp_path / "Mine.nepb"
     behaviour(path, {"type": "events_started", "id": "first"})
     dice = random.Random(9)

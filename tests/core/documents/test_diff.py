@@ -21,30 +21,30 @@ def stack(*blocks: Block) -> dict[str, object]:
     return {"blocks": {"languageVersion": 0, "blocks": list(blocks)}}
 
 
-def test_nothing_changed() -> None:
+def test_unchanged_behaviour_has_no_difference() -> None:
     assert difference(stack(block("a", "x")), stack(block("a", "x"))) == Difference(1)
 
 
-def test_blocks_came_went_and_changed() -> None:
+def test_added_removed_and_changed_blocks_are_counted() -> None:
     then = stack(block("a", "x", block("b", "y")), block("c"))
     now = stack(block("a", "other", block("d")), block("c"), block("e"))
     assert difference(then, now) == Difference(3, added=2, removed=1, changed=1)
 
 
-def test_words_inside_a_block_are_no_blocks_of_their_own() -> None:
+def test_shadow_text_change_counts_as_changed_block() -> None:
     assert difference(stack(block("a", "x")), stack(block("a"))) == Difference(1, changed=1)
 
 
-def test_the_same_blocks_in_another_order() -> None:
+def test_reordered_blocks_are_reported_as_moved() -> None:
     then, now = stack(block("a", "", block("b"))), stack(block("b", "", block("a")))
     assert difference(then, now) == Difference(2, moved=True)
 
 
-def test_anything_may_be_in_a_file() -> None:
+def test_invalid_workspace_can_be_compared() -> None:
     assert difference({}, {"blocks": 7}) == Difference(0, moved=True)
 
 
-def test_a_very_long_stack() -> None:
+def test_very_long_stack_can_be_compared() -> None:
     long = block("last")
     for number in range(3000):
         long = block(str(number), "", long)

@@ -73,7 +73,7 @@ def on_a_slow_disk(slow: SlowJournal, journal_writer: BackgroundWorker[bool]) ->
     slow.goes.set()
 
 
-def test_nobody_waits_for_a_slow_disk_and_the_newest_edit_is_kept(
+def test_slow_disk_does_not_block_and_newest_edit_is_journalled(
     on_a_slow_disk: Document, slow: SlowJournal, journals: Path
 ) -> None:
     document = on_a_slow_disk
@@ -91,7 +91,7 @@ def test_nobody_waits_for_a_slow_disk_and_the_newest_edit_is_kept(
 
 
 @pytest.mark.parametrize("end", [Document.new, Document.close, lambda document: document.save()])
-def test_what_is_discarded_while_it_is_written_does_not_come_back(
+def test_work_discarded_during_journal_write_does_not_reappear(
     on_a_slow_disk: Document,
     slow: SlowJournal,
     journal_writer: BackgroundWorker[bool],
@@ -112,7 +112,7 @@ def test_what_is_discarded_while_it_is_written_does_not_come_back(
     assert list(journals.glob("*")) == []
 
 
-def test_a_disk_that_hangs_is_told_when_the_window_closes(
+def test_hanging_disk_is_reported_when_the_window_closes(
     on_a_slow_disk: Document, slow: SlowJournal, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr("app.core.documents.background_worker.JOIN_TIMEOUT_S", 0.01)
@@ -123,9 +123,7 @@ def test_a_disk_that_hangs_is_told_when_the_window_closes(
     assert on_a_slow_disk.keep_again()
 
 
-def test_the_old_journal_stays_while_the_new_one_can_not_be_written(
-    document: Document, journals: Path
-) -> None:
+def test_old_journal_is_kept_while_new_one_cannot_be_written(document: Document, journals: Path) -> None:
     document.edited(STARTED)
     assert document.is_kept
     _as_if_dead(journals)
@@ -145,7 +143,7 @@ def _as_if_dead(journals: Path) -> None:
     file.write_text(json.dumps(entry))
 
 
-def test_an_edit_is_in_the_journal(document: Document, journals: Path) -> None:
+def test_edit_is_journalled(document: Document, journals: Path) -> None:
     document.edited(STARTED)
     assert document.is_kept
     (file,) = journals.glob("*.json")
@@ -153,14 +151,14 @@ def test_an_edit_is_in_the_journal(document: Document, journals: Path) -> None:
     assert document.dirty
 
 
-def test_the_same_blocks_again_are_no_edit(document: Document) -> None:
+def test_identical_blocks_are_not_an_edit(document: Document) -> None:
     document.edited(STARTED)
     edits = document.edits
     document.edited(json.loads(json.dumps(STARTED)))
     assert document.edits == edits
 
 
-def test_a_saved_behaviour_opens_as_it_was_and_its_journal_is_gone(
+def test_saved_behaviour_reopens_unchanged_and_its_journal_is_deleted(
     document: Document, journals: Path, tmp_path: Path
 ) -> None:
     document.edited(STARTED)
@@ -173,12 +171,12 @@ def test_a_saved_behaviour_opens_as_it_was_and_its_journal_is_gone(
     assert (other.name, other.workspace, other.dirty) == ("Grüße", STARTED, False)
 
 
-def test_saving_without_a_file_says_what_to_do(document: Document) -> None:
+def test_save_without_file_explains_what_to_do(document: Document) -> None:
     with pytest.raises(DocumentError, match="choose one"):
         document.save()
 
 
-def test_a_failed_save_keeps_the_work_unsaved_and_journalled(
+def test_failed_save_keeps_document_dirty_and_journalled(
     document: Document, journals: Path, tmp_path: Path
 ) -> None:
     document.edited(STARTED)
@@ -202,7 +200,7 @@ def test_a_failed_save_keeps_the_work_unsaved_and_journalled(
         (b"[" * 100_000, "damaged"),
     ],
 )
-def test_a_bad_file_is_a_sentence_and_changes_nothing(
+def test_invalid_file_is_rejected_with_reason_and_changes_nothing(
     document: Document, tmp_path: Path, data: bytes, reason: str
 ) -> None:
     document.edited(STARTED)
@@ -213,7 +211,7 @@ def test_a_bad_file_is_a_sentence_and_changes_nothing(
     assert document.workspace == STARTED
 
 
-def test_a_file_cut_at_any_byte_opens_whole_or_not_at_all(document: Document, tmp_path: Path) -> None:
+def test_truncated_file_opens_completely_or_not_at_all(document: Document, tmp_path: Path) -> None:
     document.edited(STARTED)
     path = tmp_path / "a.nepb"
     document.save(path)
@@ -224,7 +222,7 @@ def test_a_file_cut_at_any_byte_opens_whole_or_not_at_all(document: Document, tm
             read(path)
 
 
-def test_a_huge_file_is_refused_unread(document: Document, tmp_path: Path) -> None:
+def test_oversized_file_is_rejected_without_reading(document: Document, tmp_path: Path) -> None:
     path = tmp_path / "huge.nepb"
     with path.open("wb") as file:
         file.truncate(LARGEST_BYTES + 1)
@@ -232,7 +230,7 @@ def test_a_huge_file_is_refused_unread(document: Document, tmp_path: Path) -> No
         document.open(path)
 
 
-def test_one_that_would_be_too_large_to_read_again_is_not_written(document: Document, tmp_path: Path) -> None:
+def test_behaviour_too_large_to_reopen_is_not_saved(document: Document, tmp_path: Path) -> None:
     path = tmp_path / "large.nepb"
     document.edited({"blocks": {"x": "y" * LARGEST_BYTES}})
     with pytest.raises(DocumentError, match="at most 10 MB can be read; use smaller images"):
@@ -240,7 +238,9 @@ def test_one_that_would_be_too_large_to_read_again_is_not_written(document: Docu
     assert not path.exists()
 
 
-def test_a_stack_too_long_for_json_is_a_sentence_and_stays_open(document: Document, tmp_path: Path) -> None:
+def test_stack_too_long_for_json_is_rejected_with_reason_and_stays_open(
+    document: Document, tmp_path: Path
+) -> None:
     block: dict[str, object] = {"type": "control_wait", "id": "x"}
     for number in range(6000):
         block = {"type": "control_wait", "id": str(number), "next": {"block": block}}
@@ -258,12 +258,12 @@ def test_a_stack_too_long_for_json_is_a_sentence_and_stays_open(document: Docume
     assert document.journal_error is None
 
 
-def test_a_missing_file_is_a_sentence(document: Document, tmp_path: Path) -> None:
+def test_missing_file_is_rejected_with_reason(document: Document, tmp_path: Path) -> None:
     with pytest.raises(DocumentError, match="can't read "):
         document.open(tmp_path / "none.nepb")
 
 
-def test_an_example_is_opened_without_its_file(document: Document, tmp_path: Path) -> None:
+def test_example_opens_without_its_file_path(document: Document, tmp_path: Path) -> None:
     document.edited(STARTED)
     path = tmp_path / "Example.nepb"
     document.save(path)
@@ -274,7 +274,7 @@ def test_an_example_is_opened_without_its_file(document: Document, tmp_path: Pat
     assert not document.dirty
 
 
-def test_work_left_behind_is_put_back_and_stays_journalled(document: Document, journals: Path) -> None:
+def test_recovered_work_stays_journalled(document: Document, journals: Path) -> None:
     document.others = {"description": "what it does"}
     document.edited(STARTED)
     assert document.is_kept
@@ -289,7 +289,7 @@ def test_work_left_behind_is_put_back_and_stays_journalled(document: Document, j
     assert len(list(journals.glob("*.json"))) == 1
 
 
-def test_closing_keeps_the_journal_of_unsaved_work_only(document: Document, journals: Path) -> None:
+def test_close_keeps_journal_of_unsaved_work_only(document: Document, journals: Path) -> None:
     document.close()
     assert list(journals.glob("*")) == []
     document.edited(STARTED)
@@ -297,7 +297,7 @@ def test_closing_keeps_the_journal_of_unsaved_work_only(document: Document, jour
     assert len(list(journals.glob("*.json"))) == 1
 
 
-def test_a_journal_that_cant_be_written_is_told(tmp_path: Path) -> None:
+def test_unwritable_journal_is_reported(tmp_path: Path) -> None:
     (tmp_path / "file").write_text("no folder")
     document = Document(lambda: Journal(tmp_path / "file"))
     document.edited(STARTED)
@@ -305,7 +305,7 @@ def test_a_journal_that_cant_be_written_is_told(tmp_path: Path) -> None:
     assert "save the file now" in document.journal_error
 
 
-def test_work_that_could_not_be_kept_is_kept_as_soon_as_it_can_be(tmp_path: Path) -> None:
+def test_failed_journal_write_is_retried_successfully(tmp_path: Path) -> None:
     folder = tmp_path / "full"
     folder.write_text("no folder")
     document = Document(lambda: Journal(folder))
@@ -318,7 +318,7 @@ def test_work_that_could_not_be_kept_is_kept_as_soon_as_it_can_be(tmp_path: Path
     assert json.loads(file.read_bytes())["workspace"] == STARTED
 
 
-def test_work_that_was_saved_is_no_longer_told_as_lost(tmp_path: Path) -> None:
+def test_journal_error_is_cleared_after_save(tmp_path: Path) -> None:
     (tmp_path / "full").write_text("no folder")
     document = Document(lambda: Journal(tmp_path / "full"))
     document.edited(STARTED)
@@ -340,7 +340,7 @@ def test_work_that_was_saved_is_no_longer_told_as_lost(tmp_path: Path) -> None:
         (errno.EACCES, "; save it in another folder"),
     ],
 )
-def test_only_on_a_full_disk_room_is_asked_for(
+def test_free_space_advice_appears_only_for_full_disk(
     document: Document, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, number: int, then: str
 ) -> None:
     def refuse(*_given: object, **_named: object) -> None:
@@ -353,7 +353,7 @@ def test_only_on_a_full_disk_room_is_asked_for(
     assert str(raised.value).endswith(f"can't write Mine.nepb ({os.strerror(number)}){then}")
 
 
-def test_the_file_carries_the_robots_that_its_blocks_name(document: Document, tmp_path: Path) -> None:
+def test_file_includes_descriptions_of_robots_used_by_its_blocks(document: Document, tmp_path: Path) -> None:
     pepper, other = rize.robot("Pepper"), rize.robot("Other")
     block = {"type": "robot_rize_do_say", "id": "b", "fields": {"ROBOT": "Pepper"}}
     document.set_connected([pepper, other])
@@ -367,7 +367,7 @@ def test_the_file_carries_the_robots_that_its_blocks_name(document: Document, tm
     assert [robot.name for robot in later.absent] == ["Pepper"]
 
 
-def test_a_robots_description_is_read_once_until_it_changes(
+def test_robot_description_is_parsed_once_until_it_changes(
     document: Document, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     pepper = rize.robot("Pepper")
@@ -393,7 +393,7 @@ def test_a_robots_description_is_read_once_until_it_changes(
         deep = deep.popitem()[1]  # type: ignore[assignment]
 
 
-def test_the_program_is_compiled_once_for_each_edit_and_change_of_robots(document: Document) -> None:
+def test_program_is_compiled_once_per_edit_and_robot_change(document: Document) -> None:
     document.edited(STARTED)
     first = document.program()
     assert document.program() is first
@@ -404,7 +404,7 @@ def test_the_program_is_compiled_once_for_each_edit_and_change_of_robots(documen
     assert document.program() is not second
 
 
-def test_definitions_follow_the_robots(document: Document) -> None:
+def test_editor_definitions_follow_connected_robots(document: Document) -> None:
     before = document.definitions()
     revision = document.definitions_revision
     assert document.definitions() is before
@@ -418,7 +418,7 @@ def _many(count: int) -> dict[str, object]:
     return {"blocks": {"languageVersion": 0, "blocks": tops}}
 
 
-def test_a_long_behaviour_is_compiled_beside_the_window(document: Document) -> None:
+def test_long_behaviour_is_compiled_in_background(document: Document) -> None:
     compiler: BackgroundWorker[Compiled] = BackgroundWorker("test compiler")
     document.compiler = compiler
     document.edited(_many(800))
@@ -433,7 +433,7 @@ def test_a_long_behaviour_is_compiled_beside_the_window(document: Document) -> N
     compiler.close()
 
 
-def test_a_short_behaviour_is_compiled_at_once(document: Document) -> None:
+def test_short_behaviour_is_compiled_at_once(document: Document) -> None:
     compiler: BackgroundWorker[Compiled] = BackgroundWorker("test compiler")
     document.compiler = compiler
     document.edited(STARTED)
@@ -441,7 +441,7 @@ def test_a_short_behaviour_is_compiled_at_once(document: Document) -> None:
     assert compiler._thread is None
 
 
-def test_a_long_file_opened_in_an_untouched_tab_does_not_hold_the_window_up(
+def test_long_file_opened_in_untouched_tab_does_not_block_the_window(
     document: Document, tmp_path: Path
 ) -> None:
     other = Document(lambda: Journal(tmp_path / "other"))

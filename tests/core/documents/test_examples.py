@@ -73,7 +73,7 @@ def names(example: BehaviourFile) -> list[str]:
 
 @pytest.mark.parametrize("language", ["es", i18n.PSEUDO], indirect=True)
 @pytest.mark.parametrize("path", EXAMPLES, ids=lambda path: path.stem)
-def test_an_example_compiles_in_another_language(path: Path, language: str) -> None:
+def test_example_compiles_in_another_language(path: Path, language: str) -> None:
     english = read_file(path)
     example = translated(english)
     pepper = parse(example.robots["Pepper"])
@@ -90,7 +90,7 @@ def test_an_example_compiles_in_another_language(path: Path, language: str) -> N
 
 
 @pytest.mark.parametrize("path", EXAMPLES, ids=lambda path: path.stem)
-def test_no_text_of_an_example_is_what_programs_or_robots_say(path: Path) -> None:
+def test_translatable_example_texts_are_not_published_or_compared_with_data(path: Path) -> None:
     """It would be translated, and they would not."""
     for block, above in blocks(read_file(path).workspace):
         if block["type"] == "values_text":
@@ -121,7 +121,7 @@ def _home(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     monkeypatch.setenv("NEP_STUDIO_HOME", str(tmp_path))
 
 
-def test_the_robot_speaks_spanish(language: str) -> None:
+def test_robot_speaks_spanish_in_translated_example(language: str) -> None:
     link = FakeLink()
     link.sensors = {("Pepper", "sees_face"): True, ("Pepper", "distance"): 2.0}
     play = run("1-greeting", link)
@@ -132,7 +132,7 @@ def test_the_robot_speaks_spanish(language: str) -> None:
 
 @pytest.mark.parametrize(("language", "last"), [("es", "Respuestas correctas: 2 de 3"), ("qps", "2")],
                          indirect=["language"])  # fmt: skip
-def test_what_a_quiz_compares_is_equal_in_every_language(language: str, last: str) -> None:
+def test_quiz_comparison_works_in_every_language(language: str, last: str) -> None:
     link = FakeLink()
     link.sensors[("Pepper", "head_touched")] = True  # always yes
     play = run("4-a-quiz", link)
@@ -147,7 +147,7 @@ def test_what_a_quiz_compares_is_equal_in_every_language(language: str, last: st
         ]
 
 
-def test_topics_and_fields_of_messages_stay(language: str) -> None:
+def test_topics_and_message_fields_are_not_translated(language: str) -> None:
     link = FakeLink()
     play = run("8-weather-station", link)
     until(lambda: bool(link.published))
@@ -159,7 +159,7 @@ def test_topics_and_fields_of_messages_stay(language: str) -> None:
     play.end()
 
 
-def test_a_persons_own_file_is_never_translated(language: str, tmp_path: Path) -> None:
+def test_user_file_is_never_translated(language: str, tmp_path: Path) -> None:
     own = Path(shutil.copy(EXAMPLES[0], tmp_path / "Greeting.nepb"))
     documents = Documents(lambda: Document(lambda: Journal(tmp_path / "journal")))
     for opened in (documents.open(own), documents.copy(own, "Greeting, before")):
@@ -169,7 +169,7 @@ def test_a_persons_own_file_is_never_translated(language: str, tmp_path: Path) -
     documents.end()
 
 
-def test_two_names_never_become_one() -> None:
+def test_translation_keeps_distinct_names_distinct() -> None:
     variables = [{"id": "a", "name": "steps"}, {"id": "b", "name": "moves"}, {"id": "c", "name": "steps"}]
     told = translated(BehaviourFile("x", {"variables": variables}, {}), lambda _context, _english: "pasos")
     assert [each["name"] for each in told.workspace["variables"]] == ["pasos", "moves", "pasos"]  # type: ignore[attr-defined]

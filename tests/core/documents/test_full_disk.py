@@ -88,7 +88,7 @@ def told(tmp_path_factory: pytest.TempPathFactory) -> dict[str, object]:
     return SmallDisk(tmp_path_factory.mktemp("disk")).run(FULL)
 
 
-def test_nothing_is_lost_on_a_full_disk_and_all_of_it_is_said(told: dict[str, object]) -> None:
+def test_full_disk_loses_nothing_and_every_failure_is_reported(told: dict[str, object]) -> None:
     full = told["full"]
     assert told["edit"] == f"can't back up unsaved work ({full}); save the file now"
     assert told["save"] == (
@@ -105,7 +105,7 @@ def test_nothing_is_lost_on_a_full_disk_and_all_of_it_is_said(told: dict[str, ob
     assert told["pictures"] == [], "half a picture is none"
 
 
-def test_once_there_is_room_again_everything_goes_on(told: dict[str, object]) -> None:
+def test_all_writes_succeed_after_space_is_freed(told: dict[str, object]) -> None:
     assert told["edit then"] is None
     assert told["save then"] == told["setting then"] == told["snapshot then"] == "done"
     assert told["read then"] is True

@@ -28,7 +28,7 @@ def _killed_writer(folder: Path) -> None:
     subprocess.run([sys.executable, "-c", code, str(folder)], check=False)
 
 
-def test_work_of_a_living_process_is_not_offered(tmp_path: Path) -> None:
+def test_unsaved_work_of_running_process_is_not_offered(tmp_path: Path) -> None:
     journal = Journal(tmp_path)
     journal.write("Greeting", None, TEXT, {})
     assert left_behind(tmp_path) == []
@@ -36,7 +36,7 @@ def test_work_of_a_living_process_is_not_offered(tmp_path: Path) -> None:
     assert list(tmp_path.iterdir()) == []
 
 
-def test_work_of_a_killed_process_is_offered(tmp_path: Path) -> None:
+def test_unsaved_work_of_killed_process_is_offered(tmp_path: Path) -> None:
     _killed_writer(tmp_path)
     (unsaved,) = left_behind(tmp_path)
     assert unsaved.name == "Greeting"
@@ -47,7 +47,7 @@ def test_work_of_a_killed_process_is_offered(tmp_path: Path) -> None:
 
 
 @pytest.mark.skipif(os.name != "posix", reason="Windows does not replace a file that is open")
-def test_a_journal_is_replaced_whole(tmp_path: Path) -> None:
+def test_journal_is_replaced_atomically(tmp_path: Path) -> None:
     journal = Journal(tmp_path)
     journal.write("first", None, TEXT, {})
     (file,) = tmp_path.iterdir()
@@ -58,7 +58,7 @@ def test_a_journal_is_replaced_whole(tmp_path: Path) -> None:
     journal.discard()
 
 
-def test_a_pid_that_another_program_got_does_not_hide_the_work(tmp_path: Path) -> None:
+def test_unsaved_work_is_offered_when_its_pid_was_reused(tmp_path: Path) -> None:
     journal = Journal(tmp_path)
     journal.write("Greeting", None, TEXT, {})
     (file,) = tmp_path.glob("*.json")
@@ -69,7 +69,7 @@ def test_a_pid_that_another_program_got_does_not_hide_the_work(tmp_path: Path) -
     assert unsaved.workspace == WORKSPACE
 
 
-def test_a_damaged_journal_is_skipped_and_kept(tmp_path: Path) -> None:
+def test_damaged_journal_is_skipped_and_kept(tmp_path: Path) -> None:
     _killed_writer(tmp_path)
     (good,) = tmp_path.glob("*.json")
     (tmp_path / "bad.json").write_bytes(good.read_bytes()[:40])
@@ -77,11 +77,11 @@ def test_a_damaged_journal_is_skipped_and_kept(tmp_path: Path) -> None:
     assert (tmp_path / "bad.json").exists()
 
 
-def test_no_folder_is_no_work(tmp_path: Path) -> None:
+def test_missing_journal_folder_has_no_unsaved_work(tmp_path: Path) -> None:
     assert left_behind(tmp_path / "none") == []
 
 
-def test_a_folder_that_takes_no_files_ends_nothing(tmp_path: Path) -> None:
+def test_unwritable_journal_folder_raises_on_write_only(tmp_path: Path) -> None:
     (tmp_path / "file").touch()
     journal = Journal(tmp_path / "file" / "journal")
     with pytest.raises(OSError, match=r"[Nn]ot a directory|cannot find|exists"):

@@ -76,7 +76,7 @@ def as_if_dead(journals: Path) -> None:
         journal.write_text(json.dumps(entry))
 
 
-def test_a_file_takes_the_place_of_an_untouched_behaviour_and_then_a_tab_each(documents, tmp_path) -> None:
+def test_opened_file_replaces_untouched_behaviour_then_opens_new_tabs(documents, tmp_path) -> None:
     documents.open(file(tmp_path, "A"))
     documents.open(file(tmp_path, "B"))
     assert names(documents) == ["A", "B"]
@@ -86,7 +86,7 @@ def test_a_file_takes_the_place_of_an_untouched_behaviour_and_then_a_tab_each(do
     assert names(documents) == ["A", "C", "B"], "beside the tab that shows"
 
 
-def test_a_file_that_is_open_shows_its_tab(documents, tmp_path) -> None:
+def test_opening_an_open_file_shows_its_tab(documents, tmp_path) -> None:
     path = file(tmp_path, "A")
     first = documents.open(path)
     documents.open(file(tmp_path, "B"))
@@ -95,7 +95,7 @@ def test_a_file_that_is_open_shows_its_tab(documents, tmp_path) -> None:
     assert len(documents) == 2
 
 
-def test_a_bad_file_changes_no_tab(documents, tmp_path) -> None:
+def test_invalid_file_changes_no_tab(documents, tmp_path) -> None:
     documents.open(file(tmp_path, "A"))
     (tmp_path / "bad.nepb").write_text("{")
     revision = documents.revision
@@ -104,7 +104,7 @@ def test_a_bad_file_changes_no_tab(documents, tmp_path) -> None:
     assert (names(documents), documents.revision) == (["A"], revision)
 
 
-def test_new_behaviours_have_names_of_their_own(documents) -> None:
+def test_new_behaviours_have_unique_names(documents) -> None:
     first = documents.new()
     assert documents.new() is first, "an untouched one is taken as it is"
     documents.current.edited(STARTED)
@@ -115,7 +115,7 @@ def test_new_behaviours_have_names_of_their_own(documents) -> None:
     assert len({document.key for document in documents}) == 3
 
 
-def test_each_tab_has_its_own_blocks_journal_and_mark(documents, journals, tmp_path) -> None:
+def test_each_tab_has_its_own_blocks_journal_and_dirty_state(documents, journals, tmp_path) -> None:
     documents.open(file(tmp_path, "A"))
     documents.open(file(tmp_path, "B"))
     first, second = documents
@@ -126,7 +126,7 @@ def test_each_tab_has_its_own_blocks_journal_and_mark(documents, journals, tmp_p
     assert [journal.name for journal in journals.glob("*.json")] == [first.journal]
 
 
-def test_tabs_are_reached_round_the_ends_and_moved(documents, tmp_path) -> None:
+def test_tab_navigation_wraps_around_and_tabs_can_be_moved(documents, tmp_path) -> None:
     for name in "ABC":
         documents.open(file(tmp_path, name))
     assert documents.neighbour(1).name == "A"
@@ -136,7 +136,7 @@ def test_tabs_are_reached_round_the_ends_and_moved(documents, tmp_path) -> None:
     assert documents.current.name == "C"
 
 
-def test_closing_shows_the_neighbour_and_the_last_leaves_an_empty_one(documents, tmp_path) -> None:
+def test_close_shows_next_tab_and_last_close_opens_empty_behaviour(documents, tmp_path) -> None:
     for name in "ABC":
         documents.open(file(tmp_path, name))
     documents.show(documents.with_path(tmp_path / "B.nepb"))
@@ -148,7 +148,7 @@ def test_closing_shows_the_neighbour_and_the_last_leaves_an_empty_one(documents,
     assert documents.current.blank
 
 
-def test_closed_tabs_open_again_the_last_first(documents, tmp_path) -> None:
+def test_closed_tabs_reopen_newest_first(documents, tmp_path) -> None:
     for name in "AB":
         documents.open(file(tmp_path, name))
     for document in tuple(documents):
@@ -159,7 +159,7 @@ def test_closed_tabs_open_again_the_last_first(documents, tmp_path) -> None:
     assert not documents.can_reopen
 
 
-def test_saving_over_the_file_of_another_tab_keeps_its_blocks(documents, journals, tmp_path) -> None:
+def test_save_over_file_of_another_tab_keeps_that_tab_as_unsaved(documents, journals, tmp_path) -> None:
     path = file(tmp_path, "A")
     first = documents.open(path)
     documents.open(file(tmp_path, "B", OTHER))
@@ -170,7 +170,7 @@ def test_saving_over_the_file_of_another_tab_keeps_its_blocks(documents, journal
     assert (journals / first.journal).is_file()
 
 
-def test_every_tab_knows_the_robots_also_one_that_opens_later(documents, tmp_path) -> None:
+def test_every_tab_knows_connected_robots_including_later_tabs(documents, tmp_path) -> None:
     documents.open(file(tmp_path, "A"))
     documents.set_connected([rize.robot("Pepper")])
     documents.set_topics(["/faces"])
@@ -181,7 +181,7 @@ def test_every_tab_knows_the_robots_also_one_that_opens_later(documents, tmp_pat
         assert "/faces" in text
 
 
-def test_tabs_come_back_with_what_was_not_saved(opened, documents, journals, tmp_path) -> None:
+def test_tabs_are_restored_with_unsaved_work(opened, documents, journals, tmp_path) -> None:
     for name in "AB":
         documents.open(file(tmp_path, name))
     documents.show(next(iter(documents)))
@@ -202,7 +202,7 @@ def test_tabs_come_back_with_what_was_not_saved(opened, documents, journals, tmp
     assert len(list(journals.glob("*.json"))) == 2, "journalled anew"
 
 
-def test_after_a_crash_files_come_back_as_saved_and_unsaved_work_waits_for_an_answer(
+def test_after_crash_files_reopen_as_saved_and_unsaved_work_awaits_recovery(
     opened, documents, journals, tmp_path
 ) -> None:
     documents.open(file(tmp_path, "A"))
@@ -226,12 +226,12 @@ def test_after_a_crash_files_come_back_as_saved_and_unsaved_work_waits_for_an_an
         {"tabs": [None, {"path": 3}, {"path": "/no/such.nepb", "journal": []}, {}], "current": 7},
     ],
 )
-def test_settings_that_make_no_sense_open_nothing(documents, kept) -> None:
+def test_invalid_tab_settings_open_nothing(documents, kept) -> None:
     documents.put_back(kept, [], ended_well=True)
     assert names(documents) == ["New behaviour"]
 
 
-def test_a_file_that_was_damaged_meanwhile_does_not_come_back(opened, documents, tmp_path) -> None:
+def test_damaged_file_is_not_reopened(opened, documents, tmp_path) -> None:
     path = file(tmp_path, "A")
     documents.open(path)
     kept = documents.kept()
@@ -241,7 +241,7 @@ def test_a_file_that_was_damaged_meanwhile_does_not_come_back(opened, documents,
     assert after.current.blank
 
 
-def test_closing_leaves_no_journal_of_what_is_saved(documents, journals, tmp_path) -> None:
+def test_close_leaves_no_journal_of_saved_work(documents, journals, tmp_path) -> None:
     documents.open(file(tmp_path, "A"))
     documents.current.edited(OTHER)
     documents.current.save()
@@ -250,7 +250,7 @@ def test_closing_leaves_no_journal_of_what_is_saved(documents, journals, tmp_pat
     assert list(journals.glob("*")) == []
 
 
-def test_unsaved_work_put_back_beside_newer_work_replaces_none(opened, documents, journals, tmp_path) -> None:
+def test_recovered_work_does_not_replace_newer_work(opened, documents, journals, tmp_path) -> None:
     path = file(tmp_path, "A")
     documents.open(path)
     documents.current.edited(OTHER)
@@ -266,7 +266,7 @@ def test_unsaved_work_put_back_beside_newer_work_replaces_none(opened, documents
     assert all(document.dirty for document in after)
 
 
-def test_only_so_many_closed_tabs_are_remembered(documents, tmp_path) -> None:
+def test_number_of_remembered_closed_tabs_is_limited(documents, tmp_path) -> None:
     for number in range(CLOSED_KEPT + 2):
         documents.open(file(tmp_path, f"F{number}"))
         documents.close(documents.current)

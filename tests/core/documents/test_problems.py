@@ -29,7 +29,7 @@ def lines(saved, missing: list[Robot], connected: list[Robot]):
     return listed(program.problems, saved, missing, connected, MODELS, program.absent)
 
 
-def test_all_blocks_of_a_missing_robot_are_one_line() -> None:
+def test_all_blocks_of_missing_robot_are_one_problem() -> None:
     (line,) = lines(speaks("Pepper"), [pepper("Pepper")], [])
     assert line.problem.sentence == "Pepper is not connected, so 3 blocks will be skipped."
     assert line.problem.subject == "3 blocks"
@@ -37,7 +37,7 @@ def test_all_blocks_of_a_missing_robot_are_one_line() -> None:
     assert line.mends == (Mend("Start a virtual Pepper", "robot.virtual:Pepper"),)
 
 
-def test_what_is_counted_is_what_is_grey_also_values_inside_and_scripts_that_nothing_starts() -> None:
+def test_missing_robot_problem_counts_nested_and_unstarted_blocks() -> None:
     asks = block("robot_pepper_get_heard_word", ROBOT="Nao 3")
     says = block("robot_pepper_do_say", ROBOT="Nao 3", TEXT=asks)
     alone = block("robot_pepper_do_wave", ROBOT="Nao 3")
@@ -50,7 +50,7 @@ def test_what_is_counted_is_what_is_grey_also_values_inside_and_scripts_that_not
     assert line.problem.sentence == "Nao 3 is not connected, so 3 blocks will be skipped."
 
 
-def test_a_button_says_what_it_does() -> None:
+def test_problem_button_describes_its_action() -> None:
     """Nobody is told that a real robot is connected when a virtual one starts."""
     (line,) = lines(speaks("Nao 3"), [pepper("Nao 3")], [])
     assert line.mends == (Mend("Start a virtual Nao 3", "robot.virtual:Nao 3"),)
@@ -58,23 +58,23 @@ def test_a_button_says_what_it_does() -> None:
     assert line.mends == (Mend("Show the robots", "connect:Nao 3"),)
 
 
-def test_one_block_is_named() -> None:
+def test_problem_with_one_block_names_it() -> None:
     (line,) = lines(speaks("Pepper", 1), [pepper("Pepper")], [])
     assert line.problem.sentence == "Pepper is not connected, so say will be skipped."
 
 
-def test_a_connected_robot_that_can_do_the_same_comes_first() -> None:
+def test_connected_robot_with_same_abilities_is_suggested_first() -> None:
     (line,) = lines(speaks("Pepper"), [pepper("Pepper")], [pepper("Pepper 2")])
     assert [mend.words for mend in line.mends] == ["Use Pepper 2", "Start a virtual Pepper"]
     assert line.mends[0].action == "robot.use:Pepper:Pepper 2"
 
 
-def test_a_robot_of_an_unknown_model_can_only_be_connected() -> None:
+def test_robot_of_unknown_model_can_only_be_connected() -> None:
     (line,) = lines(workspace(started(say("Hi"))), [sample("Pepper")], [])
     assert [mend.words for mend in line.mends] in (["Show the robots"], ["Start a virtual Pepper"])
 
 
-def test_the_blocks_of_two_missing_robots_are_two_lines() -> None:
+def test_two_missing_robots_are_two_problems() -> None:
     both = workspace(
         started(*(block("robot_pepper_do_say", ROBOT=name, TEXT=text("x")) for name in ("A", "B", "A")))
     )
@@ -85,7 +85,7 @@ def test_the_blocks_of_two_missing_robots_are_two_lines() -> None:
     ]
 
 
-def test_using_another_robot_cures_the_problem_and_can_be_taken_back(tmp_path) -> None:
+def test_using_another_robot_fixes_the_problem_and_can_be_undone(tmp_path) -> None:
     document = Document(lambda: Journal(tmp_path))
     document.set_connected([pepper("Pepper")])
     document.edited(speaks("Pepper"))
@@ -112,7 +112,7 @@ def said_and_walks() -> list[dict[str, object]]:
     ]
 
 
-def test_another_model_does_it_when_it_knows_every_block() -> None:
+def test_robot_of_another_model_is_suggested_only_if_it_supports_every_block() -> None:
     other = sample("Rosie")
     said = workspace(started(block("robot_pepper_do_say", ROBOT="Pepper", TEXT=text("x"))))
     walks = workspace(started(block("robot_pepper_do_walk", ROBOT="Pepper")))

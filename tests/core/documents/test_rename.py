@@ -38,7 +38,7 @@ def file(path: Path) -> Path:
     return path
 
 
-def test_the_file_has_the_new_name_and_the_same_content(opened: Documents, tmp_path: Path) -> None:
+def test_renamed_file_keeps_its_content(opened: Documents, tmp_path: Path) -> None:
     old = file(tmp_path / "Greeting.nepb")
     content = old.read_bytes()
     document = opened.open(old)
@@ -52,7 +52,7 @@ def test_the_file_has_the_new_name_and_the_same_content(opened: Documents, tmp_p
     assert json.loads((tmp_path / "Quiz.nepb").read_text("utf-8"))["name"] == "Quiz"
 
 
-def test_unsaved_work_and_earlier_versions_follow(opened: Documents, tmp_path: Path) -> None:
+def test_unsaved_work_and_earlier_versions_follow_rename(opened: Documents, tmp_path: Path) -> None:
     old = file(tmp_path / "Greeting.nepb")
     document = opened.open(old)
     keep_earlier(old)
@@ -66,14 +66,14 @@ def test_unsaved_work_and_earlier_versions_follow(opened: Documents, tmp_path: P
     assert versions_of(old) == []
 
 
-def test_one_without_a_file_only_gets_the_name(opened: Documents) -> None:
+def test_rename_of_unsaved_behaviour_changes_only_its_name(opened: Documents) -> None:
     document = opened.new()
     document.edited(OTHER)
     opened.rename(document, "Quiz: what?")
     assert (document.name, document.path) == ("Quiz: what?", None)
 
 
-def test_another_file_is_never_written_over(opened: Documents, tmp_path: Path) -> None:
+def test_rename_never_overwrites_another_file(opened: Documents, tmp_path: Path) -> None:
     document = opened.open(file(tmp_path / "Greeting.nepb"))
     other = file(tmp_path / "Quiz.nepb")
     content = other.read_bytes()
@@ -87,7 +87,7 @@ def test_another_file_is_never_written_over(opened: Documents, tmp_path: Path) -
     assert document.name == "Greeting"
 
 
-def test_a_file_that_is_gone_can_not_be_renamed_and_leaves_nothing(opened: Documents, tmp_path: Path) -> None:
+def test_missing_file_cannot_be_renamed_and_no_file_is_created(opened: Documents, tmp_path: Path) -> None:
     document = opened.open(file(tmp_path / "Greeting.nepb"))
     (tmp_path / "Greeting.nepb").unlink()
     with pytest.raises(DocumentError, match="no longer exists"):
@@ -109,12 +109,12 @@ def test_a_file_that_is_gone_can_not_be_renamed_and_leaves_nothing(opened: Docum
         ("ä" * 101, "too long"),
     ],
 )
-def test_names_that_some_system_does_not_take(name: str, words: str, tmp_path: Path) -> None:
+def test_names_invalid_on_some_system_are_rejected(name: str, words: str, tmp_path: Path) -> None:
     assert re.search(words, why_not(name, tmp_path / "A.nepb"))
     assert bool(why_not(name, None)) == (not name.strip()), "without a file any name will do"
 
 
-def test_the_list_of_recent_files_follows_in_its_place(tmp_path: Path) -> None:
+def test_recent_files_entry_is_renamed_in_place(tmp_path: Path) -> None:
     settings = Settings(tmp_path / "home")
     first, second = file(tmp_path / "A.nepb"), file(tmp_path / "B.nepb")
     settings.add_recent(first)
@@ -124,7 +124,7 @@ def test_the_list_of_recent_files_follows_in_its_place(tmp_path: Path) -> None:
     assert [each.name for each in settings.recent] == ["B", "C"]
 
 
-def test_a_copy_stands_beside_what_it_was_made_of(opened: Documents, tmp_path: Path) -> None:
+def test_duplicate_opens_next_to_its_original(opened: Documents, tmp_path: Path) -> None:
     document = opened.open(file(tmp_path / "Quiz.nepb"))
     copy = opened.duplicate(document)
     again = opened.duplicate(document)

@@ -54,7 +54,7 @@ def start(tmp_path: Path) -> Iterator[Callable[[], Start]]:
         each.documents.end()
 
 
-def test_after_an_end_in_order_unsaved_work_is_there_again_and_nobody_is_asked(start) -> None:
+def test_after_clean_exit_unsaved_work_is_restored_without_asking(start) -> None:
     first = start()
     first.work()
     first.tabs.keep(ended_well=True)
@@ -66,7 +66,7 @@ def test_after_an_end_in_order_unsaved_work_is_there_again_and_nobody_is_asked(s
     assert after.documents.current.workspace == OTHER
 
 
-def test_after_a_crash_a_person_is_asked_for_unsaved_work(start) -> None:
+def test_after_crash_user_is_asked_about_unsaved_work(start) -> None:
     first = start()
     first.work()
     as_if_dead(first.journals)
@@ -76,7 +76,7 @@ def test_after_a_crash_a_person_is_asked_for_unsaved_work(start) -> None:
     assert after.documents.current.workspace == STARTED, "as it was saved"
 
 
-def test_an_end_in_order_counts_for_one_start_only(start, tmp_path: Path) -> None:
+def test_clean_exit_flag_applies_to_one_start_only(start, tmp_path: Path) -> None:
     first = start()
     first.work()
     first.tabs.keep(ended_well=True)
@@ -84,7 +84,7 @@ def test_an_end_in_order_counts_for_one_start_only(start, tmp_path: Path) -> Non
     assert Settings(tmp_path).get("tabs", {})["ended_well"] is False
 
 
-def test_the_tabs_of_a_second_window_do_not_come_back(start, tmp_path: Path) -> None:
+def test_tabs_of_second_window_are_not_restored(start, tmp_path: Path) -> None:
     start().work()
     second = start()
     second.documents.new()
@@ -95,7 +95,7 @@ def test_the_tabs_of_a_second_window_do_not_come_back(start, tmp_path: Path) -> 
     assert kept["ended_well"] is False
 
 
-def test_settings_that_take_nothing_are_told_in_a_sentence(start, tmp_path: Path) -> None:
+def test_unwritable_settings_are_reported(start, tmp_path: Path) -> None:
     first = start()
     first.work()
     (tmp_path / "settings.json").unlink()
@@ -105,7 +105,7 @@ def test_settings_that_take_nothing_are_told_in_a_sentence(start, tmp_path: Path
     assert first.complaints[0].startswith("can't save settings in ")
 
 
-def test_after_a_crash_all_tabs_stand_in_their_order_and_the_one_that_was_worked_on_shows(start) -> None:
+def test_after_crash_tabs_keep_their_order_and_the_current_tab(start) -> None:
     first = start()
     for name in "AB":
         write_file(first.folder / f"{name}.nepb", BehaviourFile(name, STARTED, {}))
@@ -129,7 +129,7 @@ def test_after_a_crash_all_tabs_stand_in_their_order_and_the_one_that_was_worked
     assert second.documents.current.name == "New behaviour"
 
 
-def test_the_tab_of_a_new_behaviour_comes_back_from_its_first_block_on(start) -> None:
+def test_tab_of_new_behaviour_is_saved_from_first_edit(start) -> None:
     first = start()
     assert first.come_back() == []
     blank = first.documents.current
@@ -140,7 +140,7 @@ def test_the_tab_of_a_new_behaviour_comes_back_from_its_first_block_on(start) ->
     assert [tab["journal"] for tab in kept["tabs"]] == [blank.journal]
 
 
-def test_who_only_looks_at_another_tab_does_not_wait_for_the_disk(start) -> None:
+def test_switching_tabs_does_not_write_settings_at_once(start) -> None:
     first = start()
     first.work()
     made = first.documents.new()

@@ -31,7 +31,7 @@ def documents(tmp_path: Path) -> Documents:
     return Documents(lambda: Document(lambda: Journal(tmp_path / "journal")))
 
 
-def test_a_copy_of_a_file_is_called_as_it_is_called_and_not_as_what_it_was_copied_from(tmp_path) -> None:
+def test_copied_file_is_titled_by_its_file_name(tmp_path) -> None:
     opened = documents(tmp_path)
     first = opened.open(file(tmp_path / "Greeting.nepb"))
     copy = opened.open(file(tmp_path / "Greeting for class 3.nepb"))
@@ -42,7 +42,7 @@ def test_a_copy_of_a_file_is_called_as_it_is_called_and_not_as_what_it_was_copie
     opened.end()
 
 
-def test_files_of_the_same_name_have_their_folder_behind_it(tmp_path) -> None:
+def test_files_of_same_name_show_their_folder(tmp_path) -> None:
     opened = documents(tmp_path)
     here = opened.open(file(tmp_path / "class 3" / "Greeting.nepb"))
     assert opened.title(here) == "Greeting"
@@ -53,7 +53,7 @@ def test_files_of_the_same_name_have_their_folder_behind_it(tmp_path) -> None:
     opened.end()
 
 
-def test_as_many_folders_as_it_takes() -> None:
+def test_titles_include_as_many_folders_as_needed() -> None:
     paths = [Path("/a/2025/tasks/Quiz.nepb"), Path("/a/2026/tasks/Quiz.nepb"), Path("/b/Quiz.nepb")]
     assert told_apart([("Quiz", each) for each in paths] + [("quiz", None), ("Other", Path("/b/Other"))]) == [
         "Quiz — 2025/tasks",
@@ -65,14 +65,14 @@ def test_as_many_folders_as_it_takes() -> None:
     assert told_apart([("Quiz", Path("/Quiz.nepb")), ("Quiz", Path("/x/Quiz.nepb"))])[1] == "Quiz — x"
 
 
-def test_an_example_that_is_opened_again_gets_a_name_of_its_own(tmp_path) -> None:
+def test_example_opened_again_gets_a_unique_name(tmp_path) -> None:
     opened = documents(tmp_path)
     path = file(tmp_path / "example.nepb", "Tour guide")
     assert [opened.example(path).name for _ in range(3)] == ["Tour guide", "Tour guide 2", "Tour guide 3"]
     opened.end()
 
 
-def test_recent_files_are_called_as_their_tabs(tmp_path) -> None:
+def test_recent_files_have_the_same_titles_as_tabs(tmp_path) -> None:
     settings = Settings(tmp_path / "home")
     for folder in ("class 3", "class 4"):
         settings.add_recent(file(tmp_path / folder / "Greeting.nepb"), "An old name from inside")
@@ -83,7 +83,7 @@ def test_recent_files_are_called_as_their_tabs(tmp_path) -> None:
     assert [each.name for each in settings.recent] == ["Greeting", "Greeting"]
 
 
-def test_work_that_was_closed_without_a_file_keeps_its_name(tmp_path) -> None:
+def test_work_closed_without_file_keeps_its_name(tmp_path) -> None:
     document = Document(lambda: Journal(tmp_path / "journal"))
     document.new("Quiz")
     document.save(kept_folder() / "Quiz 2026-11-23 08.00.nepb")

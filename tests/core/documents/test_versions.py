@@ -26,7 +26,7 @@ def folder(tmp_path: Path) -> Path:
     return tmp_path / "earlier"
 
 
-def test_a_file_comes_back_as_it_was(tmp_path: Path, folder: Path) -> None:
+def test_earlier_version_is_restored(tmp_path: Path, folder: Path) -> None:
     path = tmp_path / "Round.nepb"
     path.write_bytes(b"one")
     kept = keep_earlier(path, folder)
@@ -37,7 +37,7 @@ def test_a_file_comes_back_as_it_was(tmp_path: Path, folder: Path) -> None:
     assert path.read_bytes() == b"one"
 
 
-def test_a_copy_of_the_same_second_replaces_none(tmp_path: Path, folder: Path) -> None:
+def test_versions_of_the_same_second_do_not_overwrite_each_other(tmp_path: Path, folder: Path) -> None:
     path = tmp_path / "Round.nepb"
     for text in (b"one", b"two"):
         path.write_bytes(text)
@@ -46,7 +46,7 @@ def test_a_copy_of_the_same_second_replaces_none(tmp_path: Path, folder: Path) -
 
 
 @pytest.mark.parametrize("content", [None, b""])
-def test_there_may_be_nothing_to_keep(tmp_path: Path, folder: Path, content: bytes | None) -> None:
+def test_empty_or_missing_file_has_no_version(tmp_path: Path, folder: Path, content: bytes | None) -> None:
     path = tmp_path / "Round.nepb"
     if content is not None:
         path.write_bytes(content)
@@ -54,7 +54,7 @@ def test_there_may_be_nothing_to_keep(tmp_path: Path, folder: Path, content: byt
     assert not folder.exists()
 
 
-def test_what_can_not_be_kept_is_said(tmp_path: Path, folder: Path) -> None:
+def test_save_is_rejected_when_previous_version_cannot_be_kept(tmp_path: Path, folder: Path) -> None:
     path = tmp_path / "Round.nepb"
     path.write_bytes(b"one")
     folder.write_bytes(b"in the way")
@@ -62,7 +62,7 @@ def test_what_can_not_be_kept_is_said(tmp_path: Path, folder: Path) -> None:
         keep_earlier(path, folder)
 
 
-def test_a_copy_that_is_gone_leaves_the_file(tmp_path: Path, folder: Path) -> None:
+def test_restoring_deleted_version_raises_and_keeps_the_file(tmp_path: Path, folder: Path) -> None:
     path = tmp_path / "Round.nepb"
     path.write_bytes(b"one")
     kept = keep_earlier(path, folder)
@@ -74,7 +74,7 @@ def test_a_copy_that_is_gone_leaves_the_file(tmp_path: Path, folder: Path) -> No
     assert path.read_bytes() == b"two"
 
 
-def test_only_the_newest_copies_stay(tmp_path: Path, folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_only_newest_versions_are_kept(tmp_path: Path, folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(versions, "COPIES_KEPT", 2)
     path = tmp_path / "Round.nepb"
     for number in range(4):
@@ -85,7 +85,7 @@ def test_only_the_newest_copies_stay(tmp_path: Path, folder: Path, monkeypatch: 
     assert {copy.read_bytes() for copy in folder.iterdir()} == {b"2", b"3"}
 
 
-def test_a_name_becomes_a_file_name(tmp_path: Path) -> None:
+def test_document_name_becomes_valid_file_name(tmp_path: Path) -> None:
     path = free_path(tmp_path, "a/b: c", 0)
     assert path.parent == tmp_path
     assert path.name.startswith("a_b_ c ")
@@ -107,7 +107,7 @@ def kept(path: Path, folder: Path, text: bytes, written_s: float, replaced_s: fl
     assert keep_earlier(path, folder, lambda: replaced_s) is not None
 
 
-def test_versions_are_told_newest_first_with_their_times(tmp_path: Path, folder: Path) -> None:
+def test_versions_are_listed_newest_first_with_their_times(tmp_path: Path, folder: Path) -> None:
     path = tmp_path / "Round.nepb"
     kept(path, folder, b"one", 1000, 2000)
     kept(path, folder, b"two", 2000, 3000)
@@ -117,14 +117,14 @@ def test_versions_are_told_newest_first_with_their_times(tmp_path: Path, folder:
     assert [each.name for each in found] == ["Round", "Round"]
 
 
-def test_what_is_kept_already_is_not_kept_twice(tmp_path: Path, folder: Path) -> None:
+def test_identical_version_is_not_kept_twice(tmp_path: Path, folder: Path) -> None:
     path = tmp_path / "Round.nepb"
     kept(path, folder, b"one", 1000, 2000)
     kept(path, folder, b"one", 1000, 3000)
     assert len(list(folder.iterdir())) == 1
 
 
-def test_files_of_one_name_in_two_places_are_told_apart(tmp_path: Path, folder: Path) -> None:
+def test_versions_of_same_file_name_in_two_folders_are_separate(tmp_path: Path, folder: Path) -> None:
     here, there = tmp_path / "here" / "a b.nepb", tmp_path / "there" / "a b.nepb"
     for path in (here, there):
         path.parent.mkdir()
@@ -136,7 +136,7 @@ def test_files_of_one_name_in_two_places_are_told_apart(tmp_path: Path, folder: 
     assert others == {b"there", b"of an older Studio"}
 
 
-def test_of_many_versions_the_newest_and_some_of_each_time_stay(tmp_path: Path, folder: Path) -> None:
+def test_newest_versions_and_a_sample_of_older_ones_are_kept(tmp_path: Path, folder: Path) -> None:
     path = tmp_path / "Round.nepb"
     hour, day = 3600.0, 86400.0
     times = [*(number * day for number in range(1, 21)), *(30 * day + number * 60 for number in range(40))]
@@ -148,7 +148,9 @@ def test_of_many_versions_the_newest_and_some_of_each_time_stay(tmp_path: Path, 
     assert len(set(times[:20]) & set(found)) >= 19, "one of nearly each day"
 
 
-def test_versions_do_not_fill_the_disk(tmp_path: Path, folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_total_size_of_versions_is_limited(
+    tmp_path: Path, folder: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     monkeypatch.setattr(versions, "BYTES_KEPT", 25)
     path = tmp_path / "Round.nepb"
     for number in range(4):
@@ -159,7 +161,7 @@ def test_versions_do_not_fill_the_disk(tmp_path: Path, folder: Path, monkeypatch
 # ---- where they are --------------------------------------------------------------------------------
 
 
-def test_versions_move_once_to_the_folder_for_data(tmp_path: Path) -> None:
+def test_versions_are_migrated_once_to_data_folder(tmp_path: Path) -> None:
     old, new = tmp_path / "config" / "earlier", tmp_path / "data" / "earlier"
     document = tmp_path / "mine.nepb"
     document.write_bytes(b"first")
@@ -174,7 +176,7 @@ def test_versions_move_once_to_the_folder_for_data(tmp_path: Path) -> None:
     assert len(versions_of(document, new)) == 1
 
 
-def test_versions_that_can_not_be_moved_stay(tmp_path: Path) -> None:
+def test_versions_that_cannot_be_migrated_are_kept(tmp_path: Path) -> None:
     old, new = tmp_path / "config" / "earlier", tmp_path / "data"
     document = tmp_path / "mine.nepb"
     document.write_bytes(b"first")
@@ -185,7 +187,7 @@ def test_versions_that_can_not_be_moved_stay(tmp_path: Path) -> None:
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="these variables are those of Linux")
-def test_a_version_is_kept_among_data_not_among_settings(
+def test_versions_are_stored_in_data_folder_not_in_settings_folder(
     monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
     monkeypatch.delenv("NEP_STUDIO_HOME", raising=False)
@@ -198,7 +200,7 @@ def test_a_version_is_kept_among_data_not_among_settings(
     assert not (tmp_path / "config").exists()
 
 
-def test_they_are_in_the_system_s_folder_for_data(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+def test_data_folder_follows_system_conventions(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     monkeypatch.delenv("NEP_STUDIO_HOME", raising=False)
     monkeypatch.setenv("XDG_DATA_HOME", str(tmp_path / "data"))
     monkeypatch.setenv("XDG_CONFIG_HOME", str(tmp_path / "config"))

@@ -26,7 +26,7 @@ def parsed(monkeypatch: pytest.MonkeyPatch) -> list[str]:
     return seen
 
 
-def test_text_is_kept_as_it_came_and_parsed_once(parsed: list[str]) -> None:
+def test_text_is_kept_unchanged_and_parsed_once(parsed: list[str]) -> None:
     text = json.dumps(ONE, separators=(",", ":"))
     told = WorkspaceJson(text)
     assert told.text is text
@@ -36,7 +36,7 @@ def test_text_is_kept_as_it_came_and_parsed_once(parsed: list[str]) -> None:
     assert parsed == [text]
 
 
-def test_texts_of_the_page_are_compared_as_they_are(parsed: list[str]) -> None:
+def test_texts_are_compared_without_parsing(parsed: list[str]) -> None:
     text = json.dumps(ONE)
     one, same, other = WorkspaceJson(text), WorkspaceJson(text), WorkspaceJson("{}")
     assert one.blocks  # the compiler has looked into it
@@ -46,12 +46,12 @@ def test_texts_of_the_page_are_compared_as_they_are(parsed: list[str]) -> None:
     assert parsed == []
 
 
-def test_the_page_writes_what_a_file_says_another_way() -> None:
+def test_differently_formatted_json_is_equal() -> None:
     assert WorkspaceJson(json.dumps(ONE, indent=2)).same_as(WorkspaceJson.of(ONE))
     assert not WorkspaceJson.of({}).same_as(WorkspaceJson(json.dumps(ONE)))
 
 
-def test_whether_there_is_any_block_costs_nothing_for_a_long_text(parsed: list[str]) -> None:
+def test_has_blocks_does_not_parse_long_text(parsed: list[str]) -> None:
     assert not WorkspaceJson("{}").has_blocks
     assert not WorkspaceJson('{"blocks": {"blocks": []}}').has_blocks
     assert WorkspaceJson.of(ONE).has_blocks
@@ -60,11 +60,11 @@ def test_whether_there_is_any_block_costs_nothing_for_a_long_text(parsed: list[s
     assert parsed == []
 
 
-def test_what_holds_no_object_has_no_blocks() -> None:
+def test_json_without_object_has_no_blocks() -> None:
     assert WorkspaceJson("[]").blocks == {}
 
 
-def test_what_is_nested_too_deep_is_refused_when_it_comes() -> None:
+def test_too_deeply_nested_json_is_rejected_on_creation() -> None:
     text = "[" * 200_000 + "]" * 200_000
     with pytest.raises(RecursionError):
         WorkspaceJson(text)

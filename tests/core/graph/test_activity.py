@@ -33,7 +33,7 @@ def facts(*topics: Topic, calls: int = 0, generation: str = "native", network: s
     return GraphFacts(entries, topics, {"s": service}, (), "here")
 
 
-def test_who_tells_and_hears_nothing_for_a_minute_is_quiet() -> None:
+def test_node_without_traffic_for_a_minute_is_quiet() -> None:
     quiet = QuietNodes()
     quiet.update(facts(heard(1, 1)), 0.0)
     assert quiet.quiet(QUIET_S - 1) == frozenset()
@@ -43,14 +43,14 @@ def test_who_tells_and_hears_nothing_for_a_minute_is_quiet() -> None:
     assert quiet.quiet(30.0 + QUIET_S) == {"1", "2", "3", "4"}
 
 
-def test_a_count_that_begins_anew_has_moved() -> None:
+def test_restarted_counter_counts_as_traffic() -> None:
     quiet = QuietNodes()
     quiet.update(facts(heard(2**64 - 1, 5)), 0.0)
     quiet.update(facts(heard(0, 5)), 50.0)
     assert quiet.quiet(70.0) == {"2", "3", "4"}
 
 
-def test_what_nobody_counts_is_not_quiet() -> None:
+def test_node_without_counters_is_not_quiet() -> None:
     quiet = QuietNodes()
     quiet.update(facts(heard(1, None), generation="B"), 0.0)
     assert quiet.quiet(QUIET_S) == {"1", "3"}
@@ -59,21 +59,21 @@ def test_what_nobody_counts_is_not_quiet() -> None:
     assert other.quiet(QUIET_S) == frozenset()
 
 
-def test_neps_own_messages_keep_nobody_awake() -> None:
+def test_internal_nep_messages_do_not_count_as_traffic() -> None:
     quiet = QuietNodes()
     quiet.update(facts(heard(1, 1, "/nep/log")), 0.0)
     quiet.update(facts(heard(9, 9, "/nep/log")), 50.0)
     assert "1" in quiet.quiet(QUIET_S)
 
 
-def test_who_has_left_is_forgotten() -> None:
+def test_node_that_left_is_forgotten() -> None:
     quiet = QuietNodes()
     quiet.update(facts(), 0.0)
     quiet.update(GraphFacts(), 1.0)
     assert quiet.quiet(1000.0) == frozenset()
 
 
-def test_calls_over_a_minute() -> None:
+def test_call_rate_is_averaged_over_a_minute() -> None:
     rates = CallRates()
     assert rates.rates_hz() == {}
     rates.update(facts(calls=0), 0.0)

@@ -22,7 +22,7 @@ GRAPH = NodeGraph(
 )
 
 
-def test_groups_nodes_and_lines() -> None:
+def test_dot_export_has_groups_nodes_and_lines() -> None:
     made = dot_of(GRAPH, {"host:a": "This computer", "host:b": "b"}, lambda line: f"{line.topics[0]} 2/s")
     assert made.splitlines() == [
         "digraph nodes {",
@@ -52,5 +52,5 @@ def test_groups_nodes_and_lines() -> None:
         ("\N{GRINNING FACE}", '"\N{GRINNING FACE}"'),
     ],
 )
-def test_no_name_breaks_out_of_its_marks(text: str, wanted: str) -> None:
+def test_names_are_escaped_in_dot(text: str, wanted: str) -> None:
     assert quoted(text) == wanted

@@ -38,7 +38,7 @@ def overlapping(found: GraphLayout) -> list[tuple[str, str]]:
 LAB = graph({"g": "abcd", "h": "ef", "i": "x"}, "ab bc cd de ef fa xa ax")
 
 
-def test_everything_has_a_place_groups_hold_their_nodes_and_do_not_overlap() -> None:
+def test_all_nodes_are_placed_inside_their_groups_without_overlap() -> None:
     found = arrange(LAB)
     assert found.places.keys() == set("abcdefx")
     assert overlapping(found) == []
@@ -51,7 +51,7 @@ def test_everything_has_a_place_groups_hold_their_nodes_and_do_not_overlap() -> 
     assert len({*found.places.values()}) == 7
 
 
-def test_lines_begin_and_end_at_the_edges_of_their_nodes() -> None:
+def test_lines_start_and_end_at_node_edges() -> None:
     found = arrange(LAB)
     assert found.routes.keys() == {(line.key, *line.key[1], *line.key[2]) for line in LAB.lines}
     for (_line, source, target), points in found.routes.items():
@@ -60,11 +60,11 @@ def test_lines_begin_and_end_at_the_edges_of_their_nodes() -> None:
             assert across == pytest.approx(76, abs=1) or down == pytest.approx(24, abs=1)
 
 
-def test_the_same_graph_has_the_same_places() -> None:
+def test_layout_is_deterministic() -> None:
     assert arrange(LAB) == arrange(LAB)
 
 
-def test_places_stay_when_nodes_come_and_go_and_come_back() -> None:
+def test_node_positions_are_stable_when_nodes_join_and_leave() -> None:
     first = arrange(LAB)
     more = graph({"g": "abcdkm", "h": "ef", "i": "x", "j": "n"}, "ab bc cd de ef fa xa ax ak km na")
     second = arrange(more, first)
@@ -78,7 +78,7 @@ def test_places_stay_when_nodes_come_and_go_and_come_back() -> None:
     assert all(back.places[key] == second.places[key] for key in "abcdefx")
 
 
-def test_no_two_nodes_of_a_crowd_that_comes_one_by_one_lie_on_each_other() -> None:
+def test_nodes_that_join_one_by_one_do_not_overlap() -> None:
     names = "abcdefghijklmnop"
     found = None
     for count in range(1, len(names) + 1):
@@ -93,7 +93,7 @@ def test_no_two_nodes_of_a_crowd_that_comes_one_by_one_lie_on_each_other() -> No
     )
 
 
-def test_most_of_it_new_is_arranged_anew() -> None:
+def test_mostly_new_graph_gets_a_new_layout() -> None:
     first = arrange(graph({"g": "a"}))
     second = arrange(graph({"g": "abcdef"}, "ab bc cd de ef"), first)
     xs = [second.places[key][0] for key in "abcdef"]
@@ -101,18 +101,18 @@ def test_most_of_it_new_is_arranged_anew() -> None:
     assert len({*xs}) == 6
 
 
-def test_a_group_with_quiet_nodes_has_room_to_say_so() -> None:
+def test_group_with_quiet_nodes_has_a_footer() -> None:
     plain, told = arrange(graph({"g": "a"})), arrange(graph({"g": "a"}, quiet=2))
     assert told.groups["g"][3] == plain.groups["g"][3] + LayoutSizes().foot
 
 
-def test_nothing_and_one() -> None:
+def test_empty_graph_and_single_node_have_a_layout() -> None:
     assert arrange(NodeGraph()) == GraphLayout()
     assert arrange(NodeGraph()).bounds(LayoutSizes()) == (0.0, 0.0, 0.0, 0.0)
     assert arrange(graph({"": "a"})).places.keys() == {"a"}
 
 
-def test_too_many_lines_are_left_out_and_counted() -> None:
+def test_excess_lines_are_omitted_and_counted() -> None:
     keys = [f"n{number}" for number in range(120)]
     nodes = tuple(DrawnNode(key, key, "", "program") for key in keys)
     all_to_all = GraphLine("topic", tuple(keys), tuple(keys), ("/clock",))
@@ -124,7 +124,7 @@ def test_too_many_lines_are_left_out_and_counted() -> None:
 
 
 @pytest.mark.parametrize("error", [graphlay.GraphlayError("no"), BaseException("a panic")])
-def test_when_the_library_fails_nodes_stand_in_rows_and_lines_run_straight(
+def test_failed_layout_falls_back_to_rows_and_straight_lines(
     monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture, error: BaseException
 ) -> None:
     def fails(*_arguments: object, **_options: object) -> None:
@@ -145,7 +145,7 @@ def test_when_the_library_fails_nodes_stand_in_rows_and_lines_run_straight(
     assert straight.routes.keys() == placed.routes.keys()
 
 
-def test_larger_text_takes_larger_room() -> None:
+def test_larger_text_enlarges_the_layout() -> None:
     large = arrange(LAB, None, LayoutSizes().scaled(2.0))
     assert large.groups["i"][2] == pytest.approx(2 * arrange(LAB).groups["i"][2])
     assert overlapping(large) == []
@@ -154,7 +154,7 @@ def test_larger_text_takes_larger_room() -> None:
 # -- the thread ----------------------------------------------------------------------------------------------
 
 
-def test_the_thread_arranges_the_newest_graph_only() -> None:
+def test_layout_thread_processes_only_the_newest_graph() -> None:
     began, go_on = threading.Event(), threading.Event()
     asked: list[int] = []
 
@@ -183,7 +183,7 @@ def test_the_thread_arranges_the_newest_graph_only() -> None:
         thread.close()
 
 
-def test_the_thread_goes_on_after_an_error_and_ends_at_once(caplog: pytest.LogCaptureFixture) -> None:
+def test_layout_thread_continues_after_error_and_closes_at_once(caplog: pytest.LogCaptureFixture) -> None:
     def fails(wanted: NodeGraph, before: GraphLayout | None, sizes: LayoutSizes) -> GraphLayout:
         if not wanted.nodes:
             raise ValueError("nothing")

@@ -20,30 +20,30 @@ LARGE = NodeGraph(
 )
 
 
-def test_large_is_what_takes_longer_than_a_process_needs_to_start() -> None:
+def test_graph_size_decides_whether_layout_runs_in_a_process() -> None:
     assert is_large(LARGE)
     assert not is_large(replace(LARGE, nodes=LARGE.nodes[1:]))
     assert is_large(NodeGraph(lines=(GraphLine("topic", tuple(KEYS[:8]), tuple(KEYS[:8]), ("/all",)),)))
     assert not is_large(NodeGraph())
 
 
-def test_a_process_finds_the_same_places() -> None:
+def test_layout_process_gives_the_same_positions() -> None:
     made = LayoutProcess().arrange(LARGE, None, LayoutSizes())
     assert made == arrange(LARGE)
 
 
-def test_a_process_that_was_ended_gives_nothing() -> None:
+def test_killed_layout_process_returns_none() -> None:
     process = LayoutProcess()
     process.kill()
     assert process.arrange(LARGE, None, LayoutSizes()) is None
 
 
-def test_one_that_takes_too_long_is_ended(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_layout_process_times_out(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(layout_process, "TIMEOUT_S", 0.0)
     assert LayoutProcess().arrange(LARGE, None, LayoutSizes()) is None
 
 
-def test_the_thread_places_in_rows_what_no_process_could_place(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_layout_thread_falls_back_to_rows_when_process_fails(monkeypatch: pytest.MonkeyPatch) -> None:
     class Broken:
         def arrange(self, *_arguments: object) -> None:
             return None
@@ -59,7 +59,7 @@ def test_the_thread_places_in_rows_what_no_process_could_place(monkeypatch: pyte
     assert made[1].places.keys() == {*KEYS}
 
 
-def test_closing_ends_a_process_that_is_at_work(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_close_kills_running_layout_process(monkeypatch: pytest.MonkeyPatch) -> None:
     works, ended = threading.Event(), threading.Event()
 
     class Endless:

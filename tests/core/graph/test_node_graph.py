@@ -102,7 +102,7 @@ def lines(graph: NodeGraph) -> dict[tuple[str, ...], tuple[str, str]]:
     }
 
 
-def test_who_tells_whom() -> None:
+def test_lines_connect_publishers_with_subscribers_and_clients_with_servers() -> None:
     graph = node_graph(facts(), GraphChoices())
     assert lines(graph) == {
         ("/Pepper/odom", "/Pepper/touch"): ("pepper_driver", "blackboard"),
@@ -113,7 +113,7 @@ def test_who_tells_whom() -> None:
     assert (graph.nodes_there, graph.topics_there, graph.services_there) == (6, 4, 1)
 
 
-def test_kinds_and_names() -> None:
+def test_node_kinds_and_names() -> None:
     graph = node_graph(facts(), GraphChoices())
     assert {each.name: (each.kind, each.joins) for each in graph.nodes} == {
         "pepper_driver": ("program", ""),
@@ -125,7 +125,7 @@ def test_kinds_and_names() -> None:
     }
 
 
-def test_groups_by_computer_with_its_address_by_robot_or_none() -> None:
+def test_nodes_are_grouped_by_computer_with_address_or_by_robot_or_not() -> None:
     found = facts()
     by_computer = node_graph(found, GraphChoices()).groups
     assert [(each.key, each.address, each.members) for each in by_computer] == [
@@ -144,12 +144,12 @@ def test_groups_by_computer_with_its_address_by_robot_or_none() -> None:
     "endpoint",
     ["", "tcp://127.0.0.1:4", "ipc:///tmp/x", "tcp://[::1", "rubbish", "tcp://0.0.0.0:1", "tcp://:1"],
 )
-def test_what_is_no_address_for_others_is_none(endpoint: str) -> None:
+def test_unreachable_endpoint_is_not_shown_as_address(endpoint: str) -> None:
     graph = node_graph(facts(topics=(topic("/a", "1", "2", endpoint=endpoint),)), GraphChoices())
     assert {each.address for each in graph.groups} == {""}
 
 
-def test_neps_own_topics_and_services_are_drawn_when_wanted() -> None:
+def test_internal_topics_and_services_are_drawn_on_request() -> None:
     choices = GraphChoices(shows_own=True)
     found = lines(node_graph(facts(), choices))
     assert ("/nep/log",) in found
@@ -157,7 +157,7 @@ def test_neps_own_topics_and_services_are_drawn_when_wanted() -> None:
     assert ("remember_face",) not in lines(node_graph(facts(), replace(choices, shows_services=False)))
 
 
-def test_a_closed_group_is_one_box_with_the_lines_of_all_in_it() -> None:
+def test_collapsed_group_is_one_box_with_all_lines_of_its_nodes() -> None:
     graph = node_graph(facts(), GraphChoices(toggled=frozenset({"host:lab-pc"})))
     assert {(each.kind, each.key, each.members) for each in graph.nodes} == {
         ("group", "host:lab-pc", 5),
@@ -181,14 +181,14 @@ def test_quiet_nodes_are_hidden_and_counted_until_their_group_shows_them() -> No
     assert node_graph(facts(), replace(choices, hides_quiet=False)).quiet_hidden == 0
 
 
-def test_a_group_of_which_everybody_is_quiet_stays_in_sight() -> None:
+def test_group_of_only_quiet_nodes_stays_visible() -> None:
     graph = node_graph(facts(), GraphChoices(quiet=frozenset({"1"})))
     box = graph.node("host:pepper")
     assert box is not None
     assert (box.kind, box.members, box.quiet) == ("group", 1, 1)
 
 
-def test_a_program_that_is_started_again_keeps_its_key_and_a_twin_has_another() -> None:
+def test_restarted_node_keeps_its_key_and_duplicate_name_gets_another_key() -> None:
     first = node_graph(facts(), GraphChoices())
     restarted = tuple(replace(each, id="99") if each.name == "blackboard" else each for each in NODES)
     second = node_graph(facts(restarted, ()), GraphChoices())
@@ -198,14 +198,14 @@ def test_a_program_that_is_started_again_keeps_its_key_and_a_twin_has_another() 
     assert sorted(keys) == ["|lab-pc|blackboard", "|lab-pc|blackboard|2"]
 
 
-def test_who_hears_all_topics_that_match_is_at_their_lines() -> None:
+def test_wildcard_subscriber_is_connected_to_all_matching_topics() -> None:
     wide = PatternInfo("/Pepper/*", "json", (SubscriberInfo(9, "5", 1, 0),))
     found = lines(node_graph(facts(patterns=(wide,)), GraphChoices()))
     assert found["/Pepper/odom", "/Pepper/touch"] == ("pepper_driver", "RIZE+blackboard")
 
 
 @pytest.mark.parametrize("group_by", ["computer", "robot"])
-def test_web_pages_have_a_group_and_the_titles_that_the_server_knows(group_by: GroupBy) -> None:
+def test_web_pages_have_a_group_and_titles_known_to_the_server(group_by: GroupBy) -> None:
     pages = (
         replace(node("7", "web_lab:8080_50001"), language="web"),
         replace(node("8", "web_lab:8080_50002"), language="web"),
@@ -218,10 +218,10 @@ def test_web_pages_have_a_group_and_the_titles_that_the_server_knows(group_by: G
     assert (group.icon, group.members, graph.pages_there) == ("globe", 2, 2)
 
 
-def test_nothing_is_nothing() -> None:
+def test_empty_facts_give_empty_graph() -> None:
     assert node_graph(GraphFacts(), GraphChoices()) == NodeGraph()
 
 
-def test_a_topic_of_nodes_that_nobody_knows_has_no_line() -> None:
+def test_topic_of_unknown_node_has_no_line() -> None:
     graph = node_graph(facts(topics=(topic("/ghost", "89", "2"),)), GraphChoices())
     assert graph.topics_there == 0

@@ -27,14 +27,14 @@ def walked(begin: GraphChoice | None, *arrows: Arrow) -> list[str]:
     return found
 
 
-def test_the_first_arrow_goes_to_the_node_at_the_left() -> None:
+def test_first_arrow_key_selects_the_leftmost_node() -> None:
     assert walked(None, "down") == ["a"]
     assert walked(GraphChoice("node", "gone"), "right") == ["a"]
     assert walked(GraphChoice("topic", "/gone", "a"), "right") == ["a"]
     assert step(NodeGraph(), GraphLayout(), None, "right") is None
 
 
-def test_right_goes_along_a_line_and_left_back() -> None:
+def test_right_key_follows_a_line_and_left_key_goes_back() -> None:
     assert walked(GraphChoice("node", "a"), "right", "right") == ["/two", "c"]
     assert walked(GraphChoice("node", "a"), "right", "left") == ["/two", "a"]
     assert walked(GraphChoice("node", "b"), "left", "left") == ["/two", "a"]
@@ -42,28 +42,28 @@ def test_right_goes_along_a_line_and_left_back() -> None:
     assert walked(GraphChoice("node", "c"), "right", "right") == ["ask", "a"]
 
 
-def test_up_and_down_go_from_line_to_line_of_a_node_each_of_its_topics_once() -> None:
+def test_up_and_down_keys_select_each_topic_of_a_node_once() -> None:
     at = GraphChoice("topic", "/two", "a")
     assert walked(at, "down", "down", "down", "down") == ["/with", "/both", "/three", "/three"]
     assert walked(at, "up") == ["/two"]
 
 
-def test_up_and_down_go_from_node_to_node() -> None:
+def test_up_and_down_keys_move_between_nodes() -> None:
     assert walked(GraphChoice("node", "b"), "down", "down", "down", "up") == ["c", "d", "d", "c"]
 
 
-def test_a_node_without_lines_stays_chosen() -> None:
+def test_node_without_lines_stays_selected() -> None:
     assert walked(GraphChoice("node", "b"), "right") == ["b"]
 
 
-def test_a_line_of_those_who_hear_each_other_leads_to_the_other() -> None:
+def test_bidirectional_line_leads_to_the_other_node() -> None:
     at = GraphChoice("topic", "/both", "a")
     assert walked(at, "right") == ["d"]
     assert walked(at, "left") == ["a"]
 
 
 @pytest.mark.parametrize("arrow", ["left", "right", "up", "down"])
-def test_every_arrow_leads_to_something_that_is_there(arrow: Arrow) -> None:
+def test_arrow_keys_always_select_an_existing_element(arrow: Arrow) -> None:
     choices = [GraphChoice("node", key) for key in "abcd"]
     choices += [
         GraphChoice("topic", topic, origin, outward)

@@ -15,7 +15,7 @@ def points(kind: object, count: int = 4, **more: object) -> dict[str, object]:
     return {"points": [{**made, "outline_color": RED, **more}]}
 
 
-def test_circles_points_and_texts_are_drawn_where_they_are() -> None:
+def test_circles_points_and_texts_are_drawn_at_their_positions() -> None:
     payload = {
         "circles": [
             {"position": {"x": 160, "y": 120}, "diameter": 64, "thickness": 2, "outline_color": RED,
@@ -46,11 +46,11 @@ def test_circles_points_and_texts_are_drawn_where_they_are() -> None:
         (None, []),
     ],
 )
-def test_points_are_points_or_lines_by_their_type(kind, kinds) -> None:
+def test_points_are_drawn_as_points_or_lines_by_type(kind, kinds) -> None:
     assert [each.kind for each in drawn_by(points(kind), 320, 240)] == kinds
 
 
-def test_points_and_pieces_of_lines_have_colours_of_their_own() -> None:
+def test_points_and_line_segments_have_individual_colours() -> None:
     colours = [{**RED, "g": n / 4} for n in range(4)]
     greens = [each.outline[1] for each in drawn_by(points(1, outline_colors=colours), 320, 240)]  # type: ignore[index]
     assert greens == [0, 0.25, 0.5, 0.75]
@@ -58,7 +58,7 @@ def test_points_and_pieces_of_lines_have_colours_of_their_own() -> None:
     assert greens == [0.25, 0.5]
 
 
-def test_rizes_face_is_a_box_in_its_own_frame() -> None:
+def test_rize_face_is_drawn_as_box_in_its_own_frame() -> None:
     payload = {"face": {"center": {"x": 320, "y": 120}, "size": {"w": 64, "h": 48}, "box": {}}}
     (face,) = drawn_by(payload, 1280, 960)
     assert face.points == ((0.5, 0.25), (0.6, 0.25), (0.6, 0.35), (0.5, 0.35))
@@ -87,11 +87,11 @@ def test_rizes_face_is_a_box_in_its_own_frame() -> None:
         {"face": [1, 2]},
     ],
 )
-def test_what_is_no_drawing_draws_nothing(payload) -> None:
+def test_message_without_valid_annotations_draws_nothing(payload) -> None:
     assert drawn_by(payload, 320, 240) == ()
 
 
-def test_no_message_draws_without_end() -> None:
+def test_number_of_drawn_shapes_and_points_is_limited() -> None:
     many = [{"position": {"x": 1, "y": 1}, "diameter": 2, "outline_color": RED}] * (MAX_SHAPES + 50)
     assert len(drawn_by({"circles": many}, 320, 240)) == MAX_SHAPES
     (line,) = drawn_by(points(3, MAX_POINTS + 50), 320, 240)

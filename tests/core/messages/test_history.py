@@ -16,7 +16,7 @@ def numbers(history: MessageHistory) -> list[int | None]:
     return [kept.seq for kept in history]
 
 
-def test_the_oldest_leave_when_there_are_too_many_and_numbers_stay() -> None:
+def test_oldest_messages_are_evicted_and_numbers_stay() -> None:
     history = MessageHistory(most_messages=3)
     for number in range(5):
         history.add(message(number))
@@ -27,7 +27,7 @@ def test_the_oldest_leave_when_there_are_too_many_and_numbers_stay() -> None:
     assert [history.nearest(number) for number in (-5, 0, 3, 99)] == [2, 2, 3, 4]
 
 
-def test_bytes_bound_it_too_and_the_newest_stays_however_large() -> None:
+def test_history_is_limited_in_bytes_but_keeps_newest_message_of_any_size() -> None:
     history = MessageHistory(most_bytes=100)
     for number in range(20):
         history.add(message(number, 30))
@@ -38,7 +38,7 @@ def test_bytes_bound_it_too_and_the_newest_stays_however_large() -> None:
     assert (numbers(history), history.size_bytes) == ([100], 30)
 
 
-def test_nothing_is_kept_decoded_or_of_somebody_elses_bytes() -> None:
+def test_history_copies_borrowed_bytes_and_keeps_messages_undecoded() -> None:
     history = MessageHistory()
     ground = bytearray(b'{"a": 1}')
     lent = Message("/a", memoryview(ground), "json", "json")
@@ -51,7 +51,7 @@ def test_nothing_is_kept_decoded_or_of_somebody_elses_bytes() -> None:
     assert [kept.decoded for kept in history] == [UNDECODED]
 
 
-def test_how_long_it_took_is_what_it_was_when_it_came() -> None:
+def test_latency_is_fixed_at_arrival() -> None:
     history = MessageHistory()
     sent = message(1)
     history.add(sent)
@@ -61,7 +61,7 @@ def test_how_long_it_took_is_what_it_was_when_it_came() -> None:
     assert first.latency_s == again.latency_s == sent.latency_s
 
 
-def test_what_came_too_fast_is_counted_and_another_time_begins_anew() -> None:
+def test_missed_messages_are_counted_and_rewind_clears_history() -> None:
     history = MessageHistory()
     history.process(Batch([message(1), message(2)], dropped=7), 0)
     assert (numbers(history), history.missed) == ([1, 2], 7)
@@ -89,7 +89,7 @@ class Watching:
         self.log.append("closed")
 
 
-def test_who_is_not_deep_wants_no_more_room_than_there_is_and_no_past() -> None:
+def test_shallow_history_needs_no_extra_room_and_no_past_messages() -> None:
     log: list[str] = []
     feed = SeriesFeed(
         lambda _topic: Watching(log), lambda: 0, lambda topic, room: log.append(f"{topic} {room}")

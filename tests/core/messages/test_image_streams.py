@@ -53,7 +53,7 @@ def images(kind: type[Images], watched: list[str]):
     images.close()
 
 
-def test_the_same_bytes_again_are_the_same_pixels_of_a_new_message(images: Images) -> None:
+def test_identical_bytes_reuse_pixels_for_new_message(images: Images) -> None:
     stream = images.stream("/camera")
     images.offer([jpeg((10, 20, 30), seq=7)])
     until(lambda: stream.picture is not None)
@@ -72,7 +72,7 @@ def test_the_same_bytes_again_are_the_same_pixels_of_a_new_message(images: Image
 @pytest.mark.parametrize("size", [(320, 240), (33, 25), (1, 1), (17, 400)])
 @pytest.mark.parametrize("fit", [None, (16, 12), (4, 3), (0, 0)])
 @pytest.mark.parametrize("kind", [".jpg", ".png"])
-def test_what_is_wanted_in_another_size_is_decoded_anew(
+def test_picture_is_decoded_again_for_another_size(
     size: tuple[int, int], fit: tuple[int, int] | None, kind: str
 ) -> None:
     frame = np.random.default_rng(1).integers(0, 255, (size[1], size[0], 3), np.uint8)
@@ -92,7 +92,7 @@ def test_what_is_wanted_in_another_size_is_decoded_anew(
 
 
 @pytest.mark.parametrize("place", [0, 1, 5_000, 199_999])
-def test_one_other_byte_is_another_picture(place: int) -> None:
+def test_single_changed_byte_gives_a_new_picture(place: int) -> None:
     shape = {"shape": [100, 2000], "encoding": "mono8"}
     first = Message("/camera", bytes(200_000), "image", "image", seq=1, extension=shape)
     shown, error = decode(first, 1.0)
@@ -105,7 +105,7 @@ def test_one_other_byte_is_another_picture(place: int) -> None:
     assert once_more(shown, other, 2.0, None) is None
 
 
-def test_a_picture_is_decoded_for_its_stream(images: Images) -> None:
+def test_picture_is_decoded_for_its_stream(images: Images) -> None:
     stream = images.stream("/camera")
     images.offer([jpeg((10, 20, 30), seq=7)])
     until(lambda: stream.picture is not None)
@@ -114,7 +114,7 @@ def test_a_picture_is_decoded_for_its_stream(images: Images) -> None:
     assert (stream.picture.width, stream.picture.height, stream.picture.seq) == (32, 24, 7)
 
 
-def test_of_a_batch_only_the_newest_is_decoded(images: Images, monkeypatch) -> None:
+def test_only_newest_picture_of_a_batch_is_decoded(images: Images, monkeypatch) -> None:
     decoded: list[int | None] = []
 
     def seen(message: Message, *more: object):
@@ -129,7 +129,7 @@ def test_of_a_batch_only_the_newest_is_decoded(images: Images, monkeypatch) -> N
     assert decoded == [49]
 
 
-def test_other_topics_and_closed_streams_get_nothing(images: Images, watched: list[str]) -> None:
+def test_other_topics_and_closed_streams_receive_nothing(images: Images, watched: list[str]) -> None:
     stream = images.stream("/camera")
     assert watched == ["/camera"]
     images.offer([jpeg((1, 2, 3), "/other")])
@@ -139,7 +139,7 @@ def test_other_topics_and_closed_streams_get_nothing(images: Images, watched: li
     assert watched == []
 
 
-def test_what_is_no_picture_gives_a_sentence_and_keeps_the_last_picture(images: Images) -> None:
+def test_undecodable_picture_sets_error_and_keeps_last_picture(images: Images) -> None:
     stream = images.stream("/camera")
     images.offer([jpeg((1, 2, 3))])
     until(lambda: stream.picture is not None)
@@ -150,7 +150,7 @@ def test_what_is_no_picture_gives_a_sentence_and_keeps_the_last_picture(images: 
     until(lambda: stream.error is None)
 
 
-def test_a_message_that_nobody_foresaw_ends_no_other_pictures(images: Images, monkeypatch) -> None:
+def test_unexpected_decoder_exception_does_not_stop_later_pictures(images: Images, monkeypatch) -> None:
     def strange(message: Message, *more: object):
         if message.seq == 1:
             raise KeyError("no such thing")
@@ -166,7 +166,7 @@ def test_a_message_that_nobody_foresaw_ends_no_other_pictures(images: Images, mo
     assert stream.error is None
 
 
-def test_two_panels_may_look_at_one_topic(images: Images) -> None:
+def test_two_panels_can_show_one_topic(images: Images) -> None:
     one, two = images.stream("/camera"), images.stream("/camera")
     images.offer([jpeg((1, 2, 3))])
     until(lambda: one.picture is not None and two.picture is not None)
@@ -177,7 +177,7 @@ def test_two_panels_may_look_at_one_topic(images: Images) -> None:
     assert one.picture.seq == 1
 
 
-def test_grey_and_alpha_pictures_can_be_shown() -> None:
+def test_grey_and_alpha_pictures_are_decoded() -> None:
     for channels, encoding in ((1, "mono8"), (3, "bgr8"), (3, "rgb8")):
         shape = [4, 6, 3] if channels == 3 else [4, 6]
         data = bytes(range(4 * 6 * channels))
@@ -189,7 +189,7 @@ def test_grey_and_alpha_pictures_can_be_shown() -> None:
         assert picture.bgra.shape == (4, 6, 4)
 
 
-def test_a_rate_needs_two_events_and_forgets() -> None:
+def test_rate_needs_two_events_and_forgets_old_ones() -> None:
     rate = Rate()
     rate.add(0.0)
     assert rate.per_second(1.0) is None
@@ -199,7 +199,7 @@ def test_a_rate_needs_two_events_and_forgets() -> None:
     assert rate.per_second(20.0) is None
 
 
-def test_a_picture_is_shown_once_it_was_painted_and_both_figures_speak_of_the_same_pictures() -> None:
+def test_shown_rate_equals_arrival_rate_when_painting_lags() -> None:
     arriving, shown = Rate(), Rate()
     for number in range(90):
         arriving.add(number / 30)
@@ -216,7 +216,7 @@ def large(seq: int, value: int = 9) -> Message:
     )  # fmt: skip
 
 
-def test_a_picture_is_decoded_as_large_as_it_is_shown_and_again_when_more_is_wanted(images: Images) -> None:
+def test_picture_is_decoded_at_display_size_and_again_when_enlarged(images: Images) -> None:
     stream = images.stream("/camera")
     stream.want((160, 120))
     images.offer([large(1)])
@@ -233,7 +233,7 @@ def test_a_picture_is_decoded_as_large_as_it_is_shown_and_again_when_more_is_wan
     assert not stream.picture.whole
 
 
-def test_of_two_panels_the_one_that_wants_more_decides(images: Images) -> None:
+def test_largest_requested_size_of_two_panels_is_decoded(images: Images) -> None:
     small, whole = images.stream("/camera"), images.stream("/camera")
     small.want((160, 120))
     images.offer([large(1)])
@@ -243,7 +243,9 @@ def test_of_two_panels_the_one_that_wants_more_decides(images: Images) -> None:
     assert small.picture.whole
 
 
-def test_a_held_picture_stays_is_decoded_whole_on_demand_and_arrivals_are_counted(images: Images) -> None:
+def test_held_picture_stays_and_is_decoded_in_full_on_demand_while_arrivals_are_counted(
+    images: Images,
+) -> None:
     stream, other = images.stream("/camera"), images.stream("/camera")
     for each in (stream, other):
         each.want((160, 120))
@@ -264,7 +266,7 @@ def test_a_held_picture_stays_is_decoded_whole_on_demand_and_arrivals_are_counte
 
 
 @pytest.mark.parametrize("kind", [Images])
-def test_pictures_are_decoded_in_the_decoders_thread(images: Images) -> None:
+def test_pictures_are_decoded_in_decoder_thread(images: Images) -> None:
     seen: list[int] = []
 
     class Extension(dict[str, object]):
@@ -279,9 +281,7 @@ def test_pictures_are_decoded_in_the_decoders_thread(images: Images) -> None:
     assert threading.get_ident() not in seen
 
 
-def test_a_stream_that_rests_decodes_nothing_and_keeps_its_picture(
-    images: Images, watched: list[str]
-) -> None:
+def test_suspended_stream_decodes_nothing_and_keeps_its_picture(images: Images, watched: list[str]) -> None:
     stream, other = images.stream("/camera"), images.stream("/camera")
     images.offer([jpeg((1, 2, 3), seq=1)])
     until(lambda: stream.picture is not None and other.picture is not None)
@@ -304,7 +304,7 @@ def test_a_stream_that_rests_decodes_nothing_and_keeps_its_picture(
     assert watched == [], "a stream that was closed stays closed"
 
 
-def test_a_camera_that_nobody_looked_at_is_not_silent_when_somebody_does(kind: type[Images]) -> None:
+def test_resumed_stream_is_not_reported_as_silent(kind: type[Images]) -> None:
     now = [100.0]
     images = kind(lambda topic: Watches(str, str).open([topic]), lambda: now[0])
     stream = images.stream("/camera")
@@ -320,7 +320,7 @@ def test_a_camera_that_nobody_looked_at_is_not_silent_when_somebody_does(kind: t
     images.close()
 
 
-def test_a_picture_that_is_held_while_it_rests_can_still_be_wanted_larger(images: Images) -> None:
+def test_held_picture_of_suspended_stream_can_be_enlarged_after_resume(images: Images) -> None:
     stream = images.stream("/camera")
     stream.want((160, 120))
     images.offer([large(1)])
@@ -335,7 +335,7 @@ def test_a_picture_that_is_held_while_it_rests_can_still_be_wanted_larger(images
     assert (stream.picture.seq, stream.awaits_picture) == (1, True)
 
 
-def test_while_nothing_can_come_no_stream_is_silent(images: Images) -> None:
+def test_streams_are_not_silent_while_source_is_paused(images: Images) -> None:
     now = [10.0]
     images.clock = lambda: now[0]
     stream = images.stream("/camera")

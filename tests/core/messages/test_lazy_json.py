@@ -38,7 +38,7 @@ def index(text: str) -> JsonIndex:
 
 @settings(max_examples=150, deadline=None)
 @given(VALUES, st.sampled_from([None, 1]), st.sampled_from([7, 64, 1 << 20]))
-def test_it_gives_what_a_whole_decoding_gives(value: object, indent: int | None, chunk: int) -> None:
+def test_lazy_json_equals_full_decoding(value: object, indent: int | None, chunk: int) -> None:
     text = json.dumps([value], indent=indent, ensure_ascii=False)
     before = lazy_json.CHUNK
     lazy_json.CHUNK = chunk  # texts and backslashes reach over the edges of chunks
@@ -49,7 +49,7 @@ def test_it_gives_what_a_whole_decoding_gives(value: object, indent: int | None,
     assert whole(found) == json.loads(text)
 
 
-def test_containers_tell_their_size_without_decoding_their_values() -> None:
+def test_containers_know_their_size_without_decoding_values() -> None:
     root = index('{"a": [1, oops, 3], "b": {}, "c": [ ], "d": {"e": "}"}}').root
     assert isinstance(root, LazyObject)
     assert list(root) == ["a", "b", "c", "d"]
@@ -62,7 +62,7 @@ def test_containers_tell_their_size_without_decoding_their_values() -> None:
         a[3]
 
 
-def test_a_value_that_is_no_json_says_so_and_the_others_can_be_read() -> None:
+def test_invalid_value_is_marked_and_other_values_are_readable() -> None:
     root = index('{"good": 1, "bad": oops, "none" , "last": 2}').root
     assert isinstance(root, LazyObject)
     assert (root["good"], root["last"]) == (1, 2)
@@ -71,12 +71,12 @@ def test_a_value_that_is_no_json_says_so_and_the_others_can_be_read() -> None:
 
 
 @pytest.mark.parametrize("broken", ["[1, 2", "]", "][", '["a]', "", "{]]", "[" * 1001 + "]" * 1001])
-def test_brackets_that_do_not_match_are_an_error(broken: str) -> None:
+def test_mismatched_brackets_raise(broken: str) -> None:
     with pytest.raises(ValueError, match=r"match|end|nested"):
         index(broken)
 
 
-def test_the_place_of_a_word_leads_to_its_value() -> None:
+def test_text_offset_maps_to_path_of_its_value() -> None:
     text = '{"people": [{"name": "Aiko"}, {"name": "Jo\\"e", "age": 7}], "n": 12}'
     found = index(text)
     assert found.path_to(text.index("Aiko")) == ("people", 0, "name")
@@ -96,7 +96,7 @@ def test_lazy_values_are_equal_when_their_texts_are() -> None:
     assert len({one[0], two[0]}) == 1
 
 
-def test_of_a_key_given_twice_the_last_one_counts() -> None:
+def test_last_duplicate_key_wins() -> None:
     root = index('{"a": 1, "a": 2}').root
     assert isinstance(root, LazyObject)
     assert (dict(root), len(root)) == ({"a": 2}, 1)

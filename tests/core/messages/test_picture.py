@@ -38,7 +38,7 @@ def raw(frame: np.ndarray, encoding: str) -> Message:
     return message(frame.tobytes(), shape=list(frame.shape), encoding=encoding)
 
 
-def test_all_of_a_picture_is_decoded_when_nobody_says_how_large_it_is_shown() -> None:
+def test_picture_without_target_size_is_decoded_in_full() -> None:
     picture, error = decode(encoded(scene(32, 24)), 7.0)
     assert error is None
     assert picture is not None
@@ -56,7 +56,7 @@ def test_all_of_a_picture_is_decoded_when_nobody_says_how_large_it_is_shown() ->
 
 
 @pytest.mark.parametrize("kind", ["jpg", "png", "bgr8", "rgb8"])
-def test_a_small_view_gets_a_small_picture_of_the_same_content(kind: str) -> None:
+def test_small_view_gets_downscaled_picture(kind: str) -> None:
     frame = scene(640, 480)
     sent = raw(frame, kind) if kind.endswith("8") else encoded(frame, kind)
     picture, _ = decode(sent, 0.0, (150, 100))
@@ -70,13 +70,13 @@ def test_a_small_view_gets_a_small_picture_of_the_same_content(kind: str) -> Non
     assert picture.bgra[60, 10, 3] == 255
 
 
-def test_a_view_of_more_than_half_the_size_gets_every_pixel() -> None:
+def test_view_larger_than_half_size_gets_full_picture() -> None:
     picture, _ = decode(encoded(scene(640, 480), "jpg"), 0.0, (321, 241))
     assert picture is not None
     assert picture.whole
 
 
-def test_grey_and_depth_have_numbers() -> None:
+def test_grey_and_depth_pictures_have_pixel_values() -> None:
     grey = np.arange(24, dtype=np.uint8).reshape(4, 6)
     depth = (grey.astype(np.uint16) + 1) * 1000
     for sent, wanted in ((raw(grey, "mono8"), 23), (encoded(grey), 23), (encoded(depth), 24_000)):
@@ -96,12 +96,15 @@ def test_grey_and_depth_have_numbers() -> None:
     [
         (message(b""), "the image is empty"),
         (message(b"no picture"), "neither a JPEG nor a PNG image"),
-        (message(b"123", shape=[4, 6], encoding="mono8"), "does not match an image of 6 x 4 pixels with 1 bytes each"),
+        (
+            message(b"123", shape=[4, 6], encoding="mono8"),
+            "does not match an image of 6 x 4 pixels with 1 bytes each",
+        ),
         (message(b"123", shape="wide", encoding="bgr8"), "'wide' is not the shape of an image"),
         (message(b"\x89PNG\r\n\x1a\n" + b"\0" * 40), "the PNG image is damaged"),
     ],
 )
-def test_what_is_no_picture_is_a_sentence(sent: Message, words: str) -> None:
+def test_invalid_picture_gives_an_error_message(sent: Message, words: str) -> None:
     picture, error = decode(sent, 0.0)
     assert picture is None
     assert error is not None
@@ -121,7 +124,7 @@ FAR = 3.4e38
         (np.array([[-5, 700], [0, 0]], np.int16), (0, 0), (0, 1)),
     ],
 )
-def test_numbers_of_other_kinds_are_scaled_to_be_seen_and_kept_to_be_read(values, low, high) -> None:
+def test_signed_and_float_values_are_scaled_for_display_and_kept_for_reading(values, low, high) -> None:
     picture, error = decode(
         raw(values, f"{values.dtype.itemsize * 8}{'F' if values.dtype.kind == 'f' else 'S'}C1"), 0
     )
@@ -134,7 +137,7 @@ def test_numbers_of_other_kinds_are_scaled_to_be_seen_and_kept_to_be_read(values
         assert picture.bgra[tuple(place)].tolist() == [0, 0, 0, 255], "no number is black"
 
 
-def test_colours_of_many_bits_and_pictures_of_nothing_but_nan_can_be_shown() -> None:
+def test_pictures_with_high_bit_depth_or_only_nan_are_decoded() -> None:
     deep = np.full((4, 6, 3), 0x8000, np.uint16)
     unit = np.full((4, 6, 3), 0.5, np.float32)
     for sent in (raw(deep, "bgr16"), encoded(deep), raw(unit, "32FC3")):
@@ -148,7 +151,7 @@ def test_colours_of_many_bits_and_pictures_of_nothing_but_nan_can_be_shown() -> 
         assert picture is not None
 
 
-def test_a_small_view_of_depth_is_as_bright_as_a_large_one() -> None:
+def test_downscaled_depth_has_same_brightness_as_full_depth() -> None:
     depth = np.full((400, 600), 1000, np.uint16)
     depth[:, 300:] = 2000
     for sent in (encoded(depth), raw(depth, "mono16"), raw(depth.astype(np.float32), "32FC1")):
@@ -158,7 +161,7 @@ def test_a_small_view_of_depth_is_as_bright_as_a_large_one() -> None:
         assert small.bgra[20, 70].tolist() == [37, 231, 253, 255]
 
 
-def test_a_picture_of_floats_is_no_png_and_says_so() -> None:
+def test_float_picture_cannot_be_encoded_as_png() -> None:
     with pytest.raises(EncodeError, match="cannot encode a 'image of float32' as 'png'; only integers"):
         png_of(raw(np.zeros((4, 6), np.float32), "32FC1"))
 
@@ -171,7 +174,7 @@ def png_of_size(side: int) -> Message:
     return message(bytes(data))
 
 
-def test_no_memory_is_taken_for_pixels_that_no_camera_has() -> None:
+def test_oversized_picture_is_rejected_without_allocating_memory() -> None:
     picture, error = decode(png_of_size(20_000), 0.0)
     assert picture is None
     assert error is not None
@@ -179,7 +182,7 @@ def test_no_memory_is_taken_for_pixels_that_no_camera_has() -> None:
     assert decode(png_of_size(20_000), 0.0, (320, 240)) == (None, error), "nor for a small view"
 
 
-def test_a_head_that_tells_of_too_many_pixels_is_a_sentence_and_no_crash() -> None:
+def test_header_with_huge_dimensions_is_rejected() -> None:
     jpeg = bytearray(cv2.imencode(".jpg", scene(8, 8))[1].tobytes())
     at = jpeg.index(b"\xff\xc0") + 5  # height and width in the frame's head
     jpeg[at : at + 4] = (65_000).to_bytes(2, "big") * 2
@@ -193,7 +196,7 @@ def test_a_head_that_tells_of_too_many_pixels_is_a_sentence_and_no_crash() -> No
         png_of(message(bytes(jpeg)))
 
 
-def test_a_snapshot_is_what_was_received() -> None:
+def test_snapshot_is_identical_to_received_picture() -> None:
     frame = scene(64, 48)
     png = encoded(frame)
     assert png_of(png) == bytes(png.data)
@@ -238,7 +241,7 @@ SENT = (
     st.none() | st.tuples(st.integers(0, 5000), st.integers(0, 5000)),
 )
 @settings(max_examples=400, deadline=None)
-def test_whatever_is_sent_as_a_picture_is_one_or_a_sentence(data, extension, fit) -> None:
+def test_arbitrary_data_is_decoded_or_rejected_with_error_message(data, extension, fit) -> None:
     with patch.object(image_files, "MOST_PIXELS", 1_000_000):  # one byte makes 100 million: seconds
         look_at_a_picture(data, extension, fit)
 

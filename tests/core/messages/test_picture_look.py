@@ -18,12 +18,12 @@ def message(array: np.ndarray) -> Message:
     return Message("/c", array.tobytes(), "image", "image", extension=extension)
 
 
-def test_as_it_came_nothing_is_computed() -> None:
+def test_default_appearance_returns_picture_unchanged() -> None:
     picture = np.arange(12, dtype=np.uint8).reshape(2, 2, 3)
     assert toned(PLAIN, picture) is picture
 
 
-def test_brightness_and_contrast_move_and_spread_and_stay_within_bounds() -> None:
+def test_brightness_and_contrast_are_applied_and_clipped() -> None:
     grey = np.array([[0, 64, 128, 192, 255]], np.uint8)
     assert toned(PictureLook(brightness=0.5), grey).tolist() == [[128, 192, 255, 255, 255]]
     assert toned(PictureLook(brightness=-1), grey).tolist() == [[0, 0, 0, 0, 0]]
@@ -32,7 +32,7 @@ def test_brightness_and_contrast_move_and_spread_and_stay_within_bounds() -> Non
 
 
 @pytest.mark.parametrize("name", COLOUR_MAPS)
-def test_numbers_have_the_colours_that_the_scale_tells(name) -> None:
+def test_pixel_colours_match_the_colour_scale(name) -> None:
     depth = np.array([[100, 600, 1100]], np.uint16)
     bgra, scale = in_colours(PictureLook(colours=name), depth)
     assert (scale.low, scale.high) == (100.0, 1100.0)
@@ -41,7 +41,7 @@ def test_numbers_have_the_colours_that_the_scale_tells(name) -> None:
     assert bgra[0, 2, 2::-1].tolist() == scale.colours[255].tolist()
 
 
-def test_a_range_of_ones_own_and_what_is_beside_it() -> None:
+def test_custom_range_clips_values_outside() -> None:
     depth = np.array([[0.0, 1.0, 2.0, 9.0, np.nan, np.inf]], np.float32)
     bgra, scale = in_colours(PictureLook(colours="grey", low=1.0, high=3.0), depth)
     assert (scale.low, scale.high) == (1.0, 3.0)
@@ -57,20 +57,20 @@ def test_a_range_of_ones_own_and_what_is_beside_it() -> None:
         (np.array([[0, 2**64 - 1]], np.uint64), (0.0, float(2**64 - 1))),
     ],
 )
-def test_odd_numbers_have_a_scale_too(numbers, ends) -> None:
+def test_unusual_values_have_a_colour_scale(numbers, ends) -> None:
     bgra, scale = in_colours(PLAIN, numbers)
     assert bgra.shape == (*numbers.shape, 4)
     assert (scale.low, scale.high) == ends
 
 
-def test_a_range_that_does_not_fit_is_not_turned_round() -> None:
+def test_contradictory_range_collapses_to_its_given_limit() -> None:
     _bgra, scale = in_colours(PictureLook(low=50.0), np.array([[1, 2]], np.uint16))
     assert scale.low == scale.high == 50.0
     _bgra, scale = in_colours(PictureLook(high=-5.0), np.array([[1, 2]], np.uint16))
     assert scale.low == scale.high == -5.0
 
 
-def test_a_decoded_picture_says_how_it_is_shown_and_what_its_colours_mean() -> None:
+def test_decoded_picture_has_its_appearance_and_colour_scale() -> None:
     plain, _error = decode(message(np.array([[0, 255]], np.uint8)), 0.0)
     assert plain is not None
     assert (plain.scale, plain.look) == (None, PLAIN)
@@ -97,5 +97,5 @@ def test_a_decoded_picture_says_how_it_is_shown_and_what_its_colours_mean() -> N
         ({"low": 9.0}, PictureLook(low=9.0)),
     ],
 )
-def test_a_look_is_kept_and_what_does_not_fit_is_as_at_first(saved, look) -> None:
+def test_saved_appearance_is_restored_and_invalid_values_become_defaults(saved, look) -> None:
     assert restored(saved) == look

@@ -26,7 +26,7 @@ def found(text: str, value: object = SEEN) -> dict[str, object]:
     return {str(path): each for path, each in JsonQuery(text).answer(value).found.items()}
 
 
-def test_values_are_found_with_the_paths_that_panels_write() -> None:
+def test_paths_written_by_panels_find_values() -> None:
     assert found("$.people[*].name") == {
         "people[0].name": "Ann",
         "people[1].name": "Bea",
@@ -39,7 +39,7 @@ def test_values_are_found_with_the_paths_that_panels_write() -> None:
     assert found("$.people[?!@.age].at") == {"people[2].at": None}
 
 
-def test_what_is_found_is_what_is_in_the_message_and_its_steps_lead_to_it() -> None:
+def test_query_results_are_the_message_values_with_their_paths() -> None:
     answer = JsonQuery("$.people[?@.name=='Bea'].at").answer(SEEN)
     (path,) = answer.found
     assert path.steps == ("people", 1, "at")
@@ -47,20 +47,20 @@ def test_what_is_found_is_what_is_in_the_message_and_its_steps_lead_to_it() -> N
     assert FoundPath.of(()) == "$"
 
 
-def test_true_is_not_one_and_equal_lists_are_equal() -> None:
+def test_true_differs_from_one_and_equal_lists_are_equal() -> None:
     lists = {"a": [1, {"b": [2]}], "b": [1, {"b": [2]}], "c": [True, {"b": [2]}]}
     assert list(found("$[?@ == $.a]", lists)) == ["a", "b"]
     assert list(found("$[?@ == true]")) == ["on"]
 
 
 @pytest.mark.parametrize("value", [3, None, "words", '{"a": 1}', "[", b"\x00\x01"])
-def test_of_what_is_no_container_only_the_whole_is_found(value) -> None:
+def test_query_of_scalar_finds_only_the_root(value) -> None:
     assert found("$", value) == {"$": value}
     assert found("$.a", value) == {}
     assert found("$..*", value) == {}
 
 
-def test_bytes_are_one_value_and_keys_that_are_numbers_are_written() -> None:
+def test_bytes_are_a_single_value_and_numeric_keys_are_supported() -> None:
     assert found("$.picture") == {"picture": SEEN["picture"]}
     assert found("$.picture[*]") == {}
     assert list(found("$..*", {1: {2: "x"}}).values()) == [{2: "x"}, "x"]
@@ -84,7 +84,7 @@ def test_bytes_are_one_value_and_keys_that_are_numbers_are_written() -> None:
         ("$.a\x1b[2J b", "the query is not valid from \\x1b[2J b on: "),
     ],
 )
-def test_a_wrong_query_is_a_sentence(text, sentence) -> None:
+def test_invalid_query_is_rejected_with_explanation(text, sentence) -> None:
     with pytest.raises(QueryError) as told:
         JsonQuery(text)
     assert told.value.sentence.startswith(sentence)
@@ -104,18 +104,18 @@ MANY = {"people": [{"name": "Ann", "age": number} for number in range(1000)]}
         "$.people[?count($..age) == 3]",
     ],
 )
-def test_a_query_that_multiplies_itself_ends_with_what_it_found(text) -> None:
+def test_exponential_query_stops_at_step_limit_with_partial_result(text) -> None:
     answer = JsonQuery(text).answer(MANY, most_steps=5000)
     assert answer.cut == "Search stopped after 5000 values; these were found so far."
 
 
-def test_comparing_long_lists_counts_what_is_compared() -> None:
+def test_comparing_long_lists_counts_towards_step_limit() -> None:
     lists = {"a": list(range(4000)), "b": list(range(4000))}
     answer = JsonQuery("$[?$.a == $.b]").answer(lists, most_steps=3000)
     assert answer.cut.startswith("Search stopped after 3000 values")
 
 
-def test_so_many_are_shown_and_a_deep_message_says_so() -> None:
+def test_number_of_results_and_depth_are_limited() -> None:
     answer = JsonQuery("$..age").answer(MANY, most_found=10)
     assert (len(answer.found), answer.cut) == (10, "Only the first 10 are shown.")
     deep: dict[str, object] = {}
@@ -126,7 +126,7 @@ def test_so_many_are_shown_and_a_deep_message_says_so() -> None:
     assert answer.cut
 
 
-def test_a_large_message_that_is_only_looked_into_is_asked_too() -> None:
+def test_query_works_on_lazy_large_message() -> None:
     large = read(Message("/big", b'{"a": [{"x": 1}, {"x": 2}]}' + b" " * LARGE_BYTES, "json", "json"))
     assert found("$.a[?@.x > 1].x", large.value) == {"a[1].x": 2}
     assert JsonQuery("$.a").answer(large.value) == QueryAnswer({FoundPath.of(("a",)): large.value["a"]})  # type: ignore[index]

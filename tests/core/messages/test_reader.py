@@ -42,7 +42,7 @@ def large(text: bytes) -> bytes:
     return text + b" " * LARGE_BYTES
 
 
-def test_a_small_message_is_decoded_and_a_bad_one_says_why_it_cant_be() -> None:
+def test_small_message_is_decoded_and_invalid_message_gives_error() -> None:
     found = read(message(b'{"a": [1, 2]}'))
     assert (found.value, found.index, found.error) == ({"a": [1, 2]}, None, None)
     bad = read(message(b"{bad"))
@@ -51,7 +51,7 @@ def test_a_small_message_is_decoded_and_a_bad_one_says_why_it_cant_be() -> None:
     assert read(message(b"{}", seq=2)).error is None
 
 
-def test_large_json_is_looked_into_and_other_messages_are_decoded() -> None:
+def test_large_json_is_indexed_lazily_and_other_messages_are_decoded() -> None:
     found = read(message(large(b'{"a": [1, 2]}')))
     assert isinstance(found.value, LazyObject)
     assert found.index is not None
@@ -60,7 +60,7 @@ def test_large_json_is_looked_into_and_other_messages_are_decoded() -> None:
     assert read(message(large(b'{"a": '))).error == "its brackets do not match"
 
 
-def test_it_reads_in_another_thread(reader: Reader, monkeypatch) -> None:
+def test_reader_runs_in_another_thread(reader: Reader, monkeypatch) -> None:
     threads: list[int] = []
     before = reader_module.read
 
@@ -90,7 +90,7 @@ class SlowRead:
         return Reading(one, one.seq)
 
 
-def test_of_many_only_the_newest_is_read(reader: Reader, monkeypatch) -> None:
+def test_only_newest_pending_message_is_read(reader: Reader, monkeypatch) -> None:
     slow = SlowRead(monkeypatch)
     reader.ask(message(b"1", seq=1))
     assert slow.began.wait(WAIT_S)
@@ -104,7 +104,7 @@ def test_of_many_only_the_newest_is_read(reader: Reader, monkeypatch) -> None:
     assert slow.seqs == [1, 49]
 
 
-def test_what_nobody_wants_any_more_is_not_given(reader: Reader, monkeypatch) -> None:
+def test_forgotten_message_is_not_delivered(reader: Reader, monkeypatch) -> None:
     slow = SlowRead(monkeypatch)
     reader.ask(message(b"1", seq=1))
     assert slow.began.wait(WAIT_S)
@@ -115,7 +115,7 @@ def test_what_nobody_wants_any_more_is_not_given(reader: Reader, monkeypatch) ->
     assert taken(reader).value == 2
 
 
-def test_at_leisure_it_reads_one_a_second_and_none_while_it_is_busy(reader: Reader) -> None:
+def test_low_priority_reads_are_throttled_and_skipped_while_busy(reader: Reader) -> None:
     assert reader.ask_at_leisure(message(b"[1]", seq=1), 10.0)
     assert taken(reader).message.seq == 1
     assert not reader.ask_at_leisure(message(b"[1]", seq=2), 10.9)

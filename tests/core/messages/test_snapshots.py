@@ -18,7 +18,7 @@ def message(topic: str = "/Pepper/camera", data: bytes | None = None) -> Message
     return Message(topic, png if data is None else data, "image", "image", stamp_ns=STAMP_NS)
 
 
-def test_a_file_is_named_by_topic_and_time(tmp_path) -> None:
+def test_snapshot_file_is_named_by_topic_and_time(tmp_path) -> None:
     path = snapshots.save(message(), tmp_path / "new" / "folder")
     assert path.parent == tmp_path / "new" / "folder"
     assert path.name.startswith("Pepper camera 2026-11-")
@@ -26,25 +26,25 @@ def test_a_file_is_named_by_topic_and_time(tmp_path) -> None:
     assert path.read_bytes() == bytes(message().data)
 
 
-def test_the_same_picture_twice_is_two_files(tmp_path) -> None:
+def test_same_picture_saved_twice_gives_two_files(tmp_path) -> None:
     first, second = snapshots.save(message(), tmp_path), snapshots.save(message(), tmp_path)
     assert second.name == f"{first.stem} 2.png"
     assert first.read_bytes() == second.read_bytes()
 
 
-def test_names_that_are_none_for_a_file_are_made_plain(tmp_path) -> None:
+def test_invalid_file_name_characters_are_removed(tmp_path) -> None:
     assert snapshots.file_stem(message("../../etc/:*?")).startswith("etc 2026")
     assert snapshots.file_stem(message("//")).startswith("picture 2026")
     assert len(snapshots.file_stem(message("x" * 500))) < 120
 
 
-def test_what_is_no_picture_leaves_no_file(tmp_path) -> None:
+def test_invalid_picture_leaves_no_file(tmp_path) -> None:
     with pytest.raises(DecodeError):
         snapshots.save(message(data=b"nothing"), tmp_path)
     assert list(tmp_path.iterdir()) == []
 
 
-def test_studios_own_home_keeps_them_together(monkeypatch, tmp_path) -> None:
+def test_snapshots_are_saved_in_studio_home_if_set(monkeypatch, tmp_path) -> None:
     monkeypatch.setenv("NEP_STUDIO_HOME", str(tmp_path))
     assert snapshots.folder() == tmp_path / "Pictures"
     monkeypatch.delenv("NEP_STUDIO_HOME")

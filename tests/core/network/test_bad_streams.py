@@ -39,7 +39,7 @@ def bad_count(session: Session, topic: str) -> int:
     return next((alert.count for alert in session.alerts.active if alert.id == f"message:{topic}"), 0)
 
 
-def test_malformed_messages_at_1000_a_second_are_one_alert_with_the_exact_count(
+def test_malformed_messages_at_1000_hz_are_one_alert_with_exact_count(
     session: Session, talker: nep.Node
 ) -> None:
     with session.watch("/bad"):
@@ -58,7 +58,7 @@ def test_malformed_messages_at_1000_a_second_are_one_alert_with_the_exact_count(
         tick_until(session, lambda: not session.alerts.active)
 
 
-def test_the_count_is_exact_also_when_the_window_was_busy(session: Session, talker: nep.Node) -> None:
+def test_malformed_count_is_exact_after_window_was_busy(session: Session, talker: nep.Node) -> None:
     with session.watch("/bad"):
         publisher = publisher_of(session, talker, "/bad")
         sent = 10 * MESSAGES_PER_TOPIC
@@ -84,7 +84,7 @@ def ticking_s(session: Session, publisher: nep.Publisher, data: bytes, sent: int
     return worked
 
 
-def test_100_000_malformed_messages_are_all_accounted_for(session: Session, talker: nep.Node) -> None:
+def test_100_000_malformed_messages_are_all_counted(session: Session, talker: nep.Node) -> None:
     sent = 100_000
     with session.watch("/good"):
         good_s = ticking_s(session, publisher_of(session, talker, "/good"), GOOD, sent)
@@ -108,7 +108,7 @@ def test_100_000_malformed_messages_are_all_accounted_for(session: Session, talk
         assert bad_s < 3 * good_s  # a tick of the window takes hardly longer because of them
 
 
-def test_a_topic_may_change_its_type(session: Session, talker: nep.Node) -> None:
+def test_topic_can_change_its_type(session: Session, talker: nep.Node) -> None:
     with session.watch("/thing"):
         first = publisher_of(session, talker, "/thing", "json")
         first.publish({"n": 1})
@@ -127,7 +127,9 @@ def test_a_topic_may_change_its_type(session: Session, talker: nep.Node) -> None
         tick_until(session, lambda: not session.alerts.active)
 
 
-def test_messages_of_50_mb_arrive_and_only_the_newest_is_held(session: Session, talker: nep.Node) -> None:
+def test_messages_of_50_mb_are_received_and_only_the_newest_is_kept(
+    session: Session, talker: nep.Node
+) -> None:
     with session.watch("/huge"):
         publisher = publisher_of(session, talker, "/huge", "bytes")
         data = bytes(50_000_000)
@@ -147,7 +149,7 @@ def test_messages_of_50_mb_arrive_and_only_the_newest_is_held(session: Session, 
         assert len(held) <= 2
 
 
-def test_a_publisher_that_dies_and_comes_back_a_hundred_times(session: Session, master: Master) -> None:
+def test_publisher_can_restart_100_times(session: Session, master: Master) -> None:
     threads = threading.active_count()
     with session.watch("/phoenix"):
         sent = 0
@@ -187,7 +189,7 @@ with nep.node("flood") as node:
 """
 
 
-def test_a_session_closes_soon_while_messages_flood_in(session: Session, master: Master) -> None:
+def test_session_closes_quickly_during_message_flood(session: Session, master: Master) -> None:
     flood = subprocess.Popen(
         [sys.executable, "-c", FLOOD],
         stdout=subprocess.PIPE,

@@ -31,7 +31,7 @@ class Clock:
         return self.now
 
 
-def test_every_message_is_tried_and_the_newest_bad_one_is_told() -> None:
+def test_every_message_is_checked_and_newest_error_is_reported() -> None:
     checks = Checks(Clock())
     checks.check("/a", messages(BAD, GOOD, BAD))
     checks.check("/a", messages(GOOD))
@@ -44,7 +44,7 @@ def test_every_message_is_tried_and_the_newest_bad_one_is_told() -> None:
     assert checks.pop_results() == {}
 
 
-def test_a_hundred_thousand_bad_messages_in_a_burst_are_counted_exactly() -> None:
+def test_burst_of_100_000_malformed_messages_is_counted_exactly() -> None:
     began = time.thread_time()
     for message in (some := messages(*[BAD] * 5000)):
         with pytest.raises(NepError):
@@ -60,7 +60,7 @@ def test_a_hundred_thousand_bad_messages_in_a_burst_are_counted_exactly() -> Non
     assert found.unchecked == 0 or found.checked * each_s > 0.3 * module.ADVANCE_S
 
 
-def test_a_topic_that_is_well_leaves_the_reserve_to_those_that_are_not() -> None:
+def test_healthy_topic_leaves_reserve_time_to_failing_topics() -> None:
     clock = Clock(step_s=0.01)
     checks = Checks(clock, clock)
     checks.check("/a", messages(*[GOOD] * 500))
@@ -77,7 +77,7 @@ def test_a_topic_that_is_well_leaves_the_reserve_to_those_that_are_not() -> None
     assert checks.pop_results()["/b"].checked > 40
 
 
-def test_one_bad_message_makes_the_rest_of_its_batch_worth_the_reserve() -> None:
+def test_malformed_message_lets_rest_of_batch_use_reserve_time() -> None:
     checks = Checks(work=Clock(step_s=0.01))
     checks.check("/a", messages(BAD, *[GOOD] * 200))
     found = checks.pop_results()["/a"]
@@ -95,7 +95,7 @@ class Reads(Clock):
         return super().__call__()
 
 
-def test_the_clock_of_work_is_not_read_for_every_message() -> None:
+def test_work_clock_is_not_read_for_every_message() -> None:
     clock = Reads(step_s=1e-6)
     checks = Checks(Clock(), clock)
     checks.check("/a", messages(*[GOOD] * 5000, BAD, *[GOOD] * 5000))
@@ -104,7 +104,7 @@ def test_the_clock_of_work_is_not_read_for_every_message() -> None:
     assert clock.count < 100
 
 
-def test_it_is_read_after_each_large_message_whatever_came_before() -> None:
+def test_work_clock_is_read_after_each_large_message() -> None:
     clock = Reads(step_s=1e-6)
     checks = Checks(Clock(), clock)
     checks.check("/a", messages(*[GOOD] * 1000, *[b" " * 64_000 + GOOD] * 200))
@@ -112,7 +112,7 @@ def test_it_is_read_after_each_large_message_whatever_came_before() -> None:
     assert clock.count > 190
 
 
-def test_a_clock_that_jumps_back_takes_nothing_away() -> None:
+def test_clock_that_jumps_back_does_not_reduce_checks() -> None:
     clock = Clock()
     checks = Checks(clock, clock)
     clock.now -= 50.0
@@ -121,21 +121,21 @@ def test_a_clock_that_jumps_back_takes_nothing_away() -> None:
 
 
 @pytest.mark.parametrize("codec", ["bytes", "image"])
-def test_what_is_not_to_be_read_is_not_tried(codec: str) -> None:
+def test_undecodable_types_and_empty_batches_are_not_checked(codec: str) -> None:
     checks = Checks()
     checks.check("/a", messages(BAD, codec=codec))
     checks.check("/b", [])
     assert checks.pop_results() == {}
 
 
-def test_a_large_message_is_left_to_who_shows_it() -> None:
+def test_large_message_is_not_checked() -> None:
     large = messages(b"[" * (module.LARGE_BYTES + 1))
     checks = Checks()
     checks.check("/a", large)
     assert checks.pop_results()["/a"].bad == 0
 
 
-def test_nothing_is_counted_twice_or_not_at_all_between_threads() -> None:
+def test_counts_are_exact_across_threads() -> None:
     checks = Checks()
     done = threading.Event()
     counted = 0
@@ -159,7 +159,7 @@ def test_nothing_is_counted_twice_or_not_at_all_between_threads() -> None:
     assert counted == 2 * 300 * 2
 
 
-def test_a_topic_that_was_well_for_long_is_no_suspect_any_more() -> None:
+def test_topic_without_recent_errors_loses_reserve_time() -> None:
     clock = Clock()
     checks = Checks(clock, Clock(step_s=0.01))
     checks.check("/a", messages(BAD))

@@ -11,7 +11,7 @@ from nep.programs.doctor import Finding, Tell
 FINE = Finding("master", "ok", "A master runs.")
 
 
-def test_it_looks_beside_the_window_and_keeps_what_it_found() -> None:
+def test_doctor_runs_in_background_and_keeps_its_findings() -> None:
     go_on = threading.Event()
     looks = []
 
@@ -32,7 +32,7 @@ def test_it_looks_beside_the_window_and_keeps_what_it_found() -> None:
     assert doctor.revision == 2
 
 
-def test_what_is_found_so_far_is_told_while_it_looks() -> None:
+def test_partial_findings_are_available_while_doctor_runs() -> None:
     went, go_on = threading.Event(), threading.Event()
 
     def look(_topic: str, tell: Tell) -> list[Finding]:
@@ -52,7 +52,7 @@ def test_what_is_found_so_far_is_told_while_it_looks() -> None:
     assert (doctor.so_far, len(doctor.findings)) == (None, 3)
 
 
-def test_whoever_misses_another_topic_while_it_looks_is_told_of_that_one() -> None:
+def test_topic_requested_during_a_run_is_checked_next() -> None:
     began, go_on = threading.Event(), threading.Event()
     asked = []
 
@@ -73,7 +73,7 @@ def test_whoever_misses_another_topic_while_it_looks_is_told_of_that_one() -> No
     assert (doctor.told_of, doctor.findings[0].sentence) == ("/b", "/b")
 
 
-def test_topics_of_other_networks_are_not_looked_for_in_this_one(tmp_path) -> None:
+def test_topics_of_other_networks_are_not_checked(tmp_path) -> None:
     with socket.socket() as probe:
         probe.bind(("127.0.0.1", 0))
         address = f"127.0.0.1:{probe.getsockname()[1]}"
@@ -83,7 +83,7 @@ def test_topics_of_other_networks_are_not_looked_for_in_this_one(tmp_path) -> No
     assert not any(finding.id.startswith("topic") for finding in doctor.findings)
 
 
-def test_a_doctor_that_breaks_off_says_so() -> None:
+def test_failed_doctor_run_is_reported_as_finding() -> None:
     def look(_topic: str, _tell: object) -> list[Finding]:
         raise ValueError("no such luck")
 
@@ -94,7 +94,7 @@ def test_a_doctor_that_breaks_off_says_so() -> None:
     assert "ValueError: no such luck" in doctor.findings[0].sentence
 
 
-def test_studios_own_folder_is_looked_at(tmp_path) -> None:
+def test_doctor_checks_studio_folder(tmp_path) -> None:
     with socket.socket() as probe:
         probe.bind(("127.0.0.1", 0))
         address = f"127.0.0.1:{probe.getsockname()[1]}"

@@ -24,7 +24,7 @@ def test_drain_gives_batches_by_topic_in_order() -> None:
     assert mailbox.drain().batches == {}
 
 
-def test_a_full_ring_keeps_the_newest_and_counts_the_rest() -> None:
+def test_full_queue_keeps_newest_messages_and_counts_dropped_ones() -> None:
     mailbox = Mailbox(messages_per_topic=3)
     mailbox.post("a", [message("a", number) for number in range(10)])
     batch = mailbox.drain().batches["a"]
@@ -33,7 +33,7 @@ def test_a_full_ring_keeps_the_newest_and_counts_the_rest() -> None:
     assert batch.arrived == 10
 
 
-def test_batch_after_batch_keeps_the_newest_and_counts_exactly() -> None:
+def test_successive_batches_keep_newest_messages_and_exact_drop_count() -> None:
     mailbox = Mailbox(messages_per_topic=4)
     for first in range(0, 30, 3):
         mailbox.post("a", [message("a", number) for number in range(first, first + 3)])
@@ -42,7 +42,7 @@ def test_batch_after_batch_keeps_the_newest_and_counts_exactly() -> None:
     assert (batch.dropped, batch.arrived) == (26, 30)
 
 
-def test_a_ring_is_bounded_in_bytes_but_keeps_one_message_of_any_size() -> None:
+def test_queue_is_limited_in_bytes_but_keeps_one_message_of_any_size() -> None:
     mailbox = Mailbox(bytes_per_topic=100)
     mailbox.post("a", [message("a", 1, 60), message("a", 2, 60), message("a", 3, 500)])
     batch = mailbox.drain().batches["a"]
@@ -60,7 +60,7 @@ def test_events_keep_their_order_and_an_overflow_is_counted() -> None:
     assert mailbox.drain().lost_events == 0
 
 
-def test_no_message_is_unaccounted_for_with_many_threads() -> None:
+def test_every_message_is_counted_with_many_threads() -> None:
     mailbox = Mailbox(messages_per_topic=50)
     threads = [
         threading.Thread(target=lambda: [mailbox.post("a", [message("a", n)]) for n in range(2000)])
@@ -79,7 +79,7 @@ def test_no_message_is_unaccounted_for_with_many_threads() -> None:
     assert arrived == 8000
 
 
-def test_a_topic_may_have_more_room_than_others_for_as_long_as_it_is_asked_for() -> None:
+def test_topic_can_temporarily_have_a_larger_queue() -> None:
     mailbox = Mailbox(messages_per_topic=4)
     messages = [Message("/a", b"1", "json", "json", seq=n) for n in range(10)]
     mailbox.set_room("/a", 8)

@@ -27,7 +27,7 @@ def foreign():
         yield f"127.0.0.1:{held.getsockname()[1]}"
 
 
-def test_a_program_that_is_no_master_is_named_once_and_asked_more_and_more_seldom(foreign) -> None:
+def test_foreign_program_at_master_address_is_named_once_and_retried_with_backoff(foreign) -> None:
     now = [0.0]
     told: list[str] = []
     start = MasterStart(foreign, told.append, lambda: now[0])
@@ -52,7 +52,7 @@ def test_a_program_that_is_no_master_is_named_once_and_asked_more_and_more_seldo
     assert not [each for each in psutil.Process().children() if "master" in each.cmdline()]
 
 
-def test_a_master_that_runs_is_joined(master) -> None:
+def test_running_master_is_joined(master) -> None:
     told: list[str] = []
     start = MasterStart(master.address, told.append)
     start.ensure()
@@ -85,12 +85,12 @@ def the_one_started(address: str) -> None:
     start._process.wait(10)
 
 
-def test_one_is_started_when_nobody_is_there(free) -> None:
+def test_master_is_started_when_none_is_running(free) -> None:
     the_one_started(free)
 
 
 @pytest.mark.skipif(os.name != "posix", reason="a program of one line is a shell's")
-def test_a_frozen_studio_starts_itself_as_the_master(free, monkeypatch, tmp_path: Path) -> None:
+def test_frozen_studio_starts_itself_as_master(free, monkeypatch, tmp_path: Path) -> None:
     """It has no Python that knows "-m nep": it is the only program there, and takes Studio's options."""
     studio = tmp_path / "nep-studio"
     studio.write_text(f'#!/bin/sh\nPYTHONPATH="{ROOT}" exec "{sys.executable}" -m app "$@"\n', "utf-8")
@@ -104,20 +104,20 @@ def view(epoch: int) -> GraphView:
     return GraphView(epoch, 1, {}, {})
 
 
-def test_the_first_master_and_the_same_one_are_believed_at_once() -> None:
+def test_first_and_unchanged_master_are_accepted_at_once() -> None:
     learning = MasterChange()
     assert not learning.still(None, view(1), 0.0)
     assert not learning.still(view(1), view(1), 1.0)
 
 
-def test_another_master_is_believed_when_it_had_time_to_learn() -> None:
+def test_graph_of_new_master_is_accepted_after_discovery_time() -> None:
     learning = MasterChange()
     assert learning.still(view(1), view(2), 10.0)
     assert learning.still(view(1), view(2), 10.0 + DISCOVERY_S - 0.1)
     assert not learning.still(view(1), view(2), 10.0 + DISCOVERY_S)
 
 
-def test_a_third_one_begins_to_learn_anew() -> None:
+def test_third_master_restarts_discovery_time() -> None:
     learning = MasterChange()
     learning.still(view(1), view(2), 10.0)
     assert learning.still(view(1), view(3), 10.0 + DISCOVERY_S)

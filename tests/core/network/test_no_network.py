@@ -31,17 +31,19 @@ session.close()
 """
 
 
-def test_with_the_loopback_down_studio_says_so_once_with_the_next_step(tmp_path: Path) -> None:
+def test_loopback_down_is_reported_once_with_advice(tmp_path: Path) -> None:
     done = alone("-c", LOOK, str(tmp_path), up=False, timeout_s=40)
     assert "Traceback" not in done.stderr
     alert, lines = done.stdout.splitlines()
     assert alert == (
-        "companion:master The master can't be started. Programs on this computer can't reach each other: network is unreachable. Turn on the loopback interface. A firewall or a sandbox may have turned it off. help.doctor"
+        "companion:master The master can't be started. Programs on this computer can't reach each other: "
+        "network is unreachable. Turn on the loopback interface. A firewall or a sandbox may have turned "
+        "it off. help.doctor"
     )
     assert lines == "1 line"
 
 
-def test_a_firewall_that_swallows_everything_is_told_by_the_doctor() -> None:
+def test_doctor_reports_firewall_that_drops_packets() -> None:
     done = alone(
         "-m", "nep", "doctor", up=True, timeout_s=60, silent="10.9.9.1/24", NEP_MASTER="10.9.9.2:7780"
     )  # fmt: skip
@@ -50,7 +52,7 @@ def test_a_firewall_that_swallows_everything_is_told_by_the_doctor() -> None:
     assert "Traceback" not in done.stderr
 
 
-def test_behind_such_a_firewall_studio_says_what_keeps_it_from_its_master(tmp_path: Path) -> None:
+def test_firewall_between_studio_and_master_is_reported(tmp_path: Path) -> None:
     done = alone(
         "-c", LOOK, str(tmp_path), up=True, timeout_s=60, silent="10.9.9.1/24", NEP_MASTER="10.9.9.2:7780"
     )  # fmt: skip
@@ -65,7 +67,7 @@ def test_behind_such_a_firewall_studio_says_what_keeps_it_from_its_master(tmp_pa
 @pytest.mark.e2e
 @pytest.mark.slow
 @pytest.mark.timeout(180)
-def test_with_the_loopback_alone_studio_its_master_and_its_robot_do_the_whole_job(tmp_path: Path) -> None:
+def test_studio_master_and_robot_work_with_loopback_only(tmp_path: Path) -> None:
     done = alone(
         "-m",
         "app",

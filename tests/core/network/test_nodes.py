@@ -31,7 +31,7 @@ def view(revision: int, nodes: list[NodeInfo], topics: list[TopicInfo] = []) -> 
     return GraphView(1, revision, {n.id: n for n in nodes}, {t.name: t for t in topics})
 
 
-def test_a_node_has_what_it_publishes_and_subscribes_each_topic_once() -> None:
+def test_node_lists_each_published_and_subscribed_topic_once() -> None:
     nodes = Nodes()
     nodes.update(view(1, [node("a"), node("b")], [topic("/z", "a", "bb"), topic("/c", "a", "a")]), 0)
     a, b = nodes.get("a"), nodes.get("b")
@@ -42,7 +42,7 @@ def test_a_node_has_what_it_publishes_and_subscribes_each_topic_once() -> None:
     assert (a.host, a.pid, a.language, a.generation, a.since_ns) == ("lab", 7, "Python", "native", 5)
 
 
-def test_what_a_node_subscribes_by_wildcards_stands_with_its_topics() -> None:
+def test_wildcard_subscriptions_are_listed_with_topics_of_the_node() -> None:
     nodes = Nodes()
     seen = view(1, [node("a")], [topic("/z", subscribers="a")])
     wide = PatternInfo(
@@ -54,7 +54,7 @@ def test_what_a_node_subscribes_by_wildcards_stands_with_its_topics() -> None:
     assert found.subscribes == ("/robot/*/camera", "/z")
 
 
-def test_nodes_of_the_first_graph_are_not_new_later_ones_are_until_looked_at() -> None:
+def test_nodes_after_first_graph_are_new_until_seen() -> None:
     nodes = Nodes()
     nodes.update(view(1, [node("a")]), 0)
     nodes.update(view(2, [node("a"), node("b")]), 1)
@@ -66,7 +66,7 @@ def test_nodes_of_the_first_graph_are_not_new_later_ones_are_until_looked_at() -
     assert nodes.revision == before + 1
 
 
-def test_the_load_moves_without_a_new_revision_of_the_graph() -> None:
+def test_load_updates_without_new_graph_revision() -> None:
     nodes = Nodes()
     nodes.update(view(1, [node("a")]), 0)
     before = nodes.revision
@@ -75,7 +75,7 @@ def test_the_load_moves_without_a_new_revision_of_the_graph() -> None:
     assert nodes.revision == before
 
 
-def test_a_vanished_node_stays_ten_seconds_with_what_it_did() -> None:
+def test_vanished_node_stays_listed_for_ten_seconds_with_its_topics() -> None:
     nodes = Nodes()
     nodes.update(view(1, [node("a", cpu=0.2)], [topic("/x", "a")]), 0)
     nodes.update(view(2, []), 5)
@@ -86,7 +86,7 @@ def test_a_vanished_node_stays_ten_seconds_with_what_it_did() -> None:
     assert len(nodes) == 0
 
 
-def test_a_program_that_was_started_again_takes_the_place_of_its_gone_self() -> None:
+def test_restarted_program_replaces_its_vanished_node() -> None:
     nodes = Nodes()
     nodes.update(view(1, [node("a", "arm"), node("b", "arm2")]), 0)
     nodes.update(view(2, []), 1)
@@ -94,7 +94,7 @@ def test_a_program_that_was_started_again_takes_the_place_of_its_gone_self() -> 
     assert [(each.id, each.gone_s is not None) for each in nodes] == [("b", True), ("c", False)]
 
 
-def test_a_node_that_was_only_silent_is_there_again() -> None:
+def test_reappearing_node_is_live_again() -> None:
     nodes = Nodes()
     nodes.update(view(1, [node("a")]), 0)
     nodes.update(view(2, []), 1)
@@ -104,7 +104,7 @@ def test_a_node_that_was_only_silent_is_there_again() -> None:
     assert (back.gone_s, back.new) == (None, False)
 
 
-def test_the_gateway_is_left_out_and_originals_are_known_as_such() -> None:
+def test_gateway_is_hidden_and_original_nodes_are_marked() -> None:
     nodes = Nodes()
     nodes.update(view(1, [node("g", generation="gateway"), node("o", generation="A"), node("n")]), 0)
     assert [(each.id, each.is_original) for each in nodes] == [("o", True), ("n", False)]

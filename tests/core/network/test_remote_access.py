@@ -56,7 +56,7 @@ def make(world, tmp_path):
     return make
 
 
-def test_a_person_lets_others_in_and_no_more(world, make):
+def test_user_can_allow_and_deny_connections_from_other_computers(world, make):
     reach, alerts = make()
     assert reach.typed_by_others("192.168.1.20") == "NEP_MASTER=192.168.1.20:7780"
     reach.listen_at(["192.168.1.20"])
@@ -70,7 +70,7 @@ def test_a_person_lets_others_in_and_no_more(world, make):
     reach.close()
 
 
-def test_what_was_chosen_is_asked_of_the_next_master_but_only_once(world, make):
+def test_remote_access_choice_is_sent_once_to_each_new_master(world, make):
     reach, _alerts = make()
     reach.listen_at(["192.168.1.20"])
     world.answer(reach)
@@ -84,7 +84,7 @@ def test_what_was_chosen_is_asked_of_the_next_master_but_only_once(world, make):
     assert again.hosts == ("192.168.1.20",)
 
 
-def test_a_refusal_is_an_alert_with_the_way_out_until_it_works(world, make):
+def test_rejected_remote_access_is_an_alert_with_fix_until_resolved(world, make):
     reach, alerts = make()
     world.refusal = "'192.168.1.20' is not an address of this computer; its addresses: 10.0.0.7"
     reach.listen_at(["192.168.1.20"])
@@ -100,7 +100,7 @@ def test_a_refusal_is_an_alert_with_the_way_out_until_it_works(world, make):
     reach.close()
 
 
-def test_a_choice_that_can_not_be_kept_is_done_and_said(world, make, tmp_path):
+def test_unsaved_remote_access_choice_is_applied_and_reported(world, make, tmp_path):
     reach, alerts = make()
     (tmp_path / "settings.json").mkdir()  # as a full disk: nothing can be written there
     for hosts, words in ((["192.168.1.20"], "Can't save this change"), ([], "Can't save this change")):
@@ -118,7 +118,7 @@ def test_a_choice_that_can_not_be_kept_is_done_and_said(world, make, tmp_path):
     reach.close()
 
 
-def test_the_master_of_another_computer_is_not_told(make, world):
+def test_remote_access_choice_is_not_sent_to_master_of_another_computer(make, world):
     near, _alerts = make()
     near.listen_at(["192.168.1.20"])  # kept, for the master of this computer
     world.answer(near)
@@ -132,7 +132,7 @@ def test_the_master_of_another_computer_is_not_told(make, world):
     assert not world.asked
 
 
-def test_the_last_wish_is_told_last_however_long_the_first_takes(world, make, monkeypatch):
+def test_last_remote_access_choice_is_sent_last_despite_slow_first_request(world, make, monkeypatch):
     may_go_on, told = threading.Event(), []
 
     def slow(hosts, _address):

@@ -40,7 +40,7 @@ def names(address: str) -> list[str]:
     return sorted(node.name for node in view.nodes.values()) if view is not None else []
 
 
-def test_a_second_studio_has_a_name_of_its_own(
+def test_second_studio_has_unique_node_name(
     master: Master, events: list[object], sources: list[LiveSource]
 ) -> None:
     for wanted in (["studio"], ["studio", "studio 2"], ["studio", "studio 2", "studio 3"]):
@@ -53,7 +53,7 @@ def test_a_second_studio_has_a_name_of_its_own(
     until(lambda: names(master.address) == ["studio", "studio 2", "studio 3"], "its name is used again")
 
 
-def test_it_tells_that_there_is_no_master_once(events: list[object]) -> None:
+def test_missing_master_is_reported_once(events: list[object]) -> None:
     source = LiveSource("127.0.0.1:1", [], events.append)
     source.start()
     try:
@@ -63,7 +63,7 @@ def test_it_tells_that_there_is_no_master_once(events: list[object]) -> None:
     assert [type(event) for event in events] == [MasterLost]
 
 
-def test_what_did_not_arrive_is_counted_from_the_watch_on(
+def test_missed_messages_are_counted_from_start_of_watch(
     master: Master, events: list[object], sources: list[LiveSource]
 ) -> None:
     source = begin(master.address, events, sources)

@@ -24,19 +24,19 @@ def keys(tree: TopicTree) -> list[str]:
     return [row.key for row in tree.rows(by_name)]
 
 
-def test_folders_stand_before_what_is_in_them_and_a_topic_may_have_a_folders_name() -> None:
+def test_folders_precede_their_topics_and_topic_may_have_folder_name() -> None:
     tree = TopicTree([Topic(name) for name in ("/b", "/a/y", "/a/x", "/a/x/deep", "/a")])
     assert keys(tree) == ["/a", "/a/*", "/a/x", "/a/x/*", "/a/x/deep", "/a/y", "/b"]
     assert [folder.deep for folder in tree] == [0, 1]
 
 
-def test_a_closed_folder_shows_nothing_of_what_is_in_it() -> None:
+def test_collapsed_folder_hides_its_contents() -> None:
     topics = [Topic(name) for name in ("/a/x", "/a/b/y", "/c/z")]
     assert keys(TopicTree(topics, {"/a/*"})) == ["/a/*", "/c/*", "/c/z"]
     assert keys(TopicTree(topics, {"/a/b/*", "/never/*"})) == ["/a/*", "/a/b/*", "/a/x", "/c/*", "/c/z"]
 
 
-def test_a_folder_adds_up_what_is_known_of_those_that_are_there() -> None:
+def test_folder_sums_known_figures_of_live_topics() -> None:
     topics = [
         Topic("/a/x", rate_hz=10.0, bandwidth_Bps=100.0, age_s=3.0, lost=2),
         Topic("/a/b/y", rate_hz=5.5, age_s=1.0),
@@ -55,7 +55,7 @@ def test_a_folder_adds_up_what_is_known_of_those_that_are_there() -> None:
     assert tree["/a/*"].figures.rate_hz == 25.5
 
 
-def test_networks_have_folders_of_their_own() -> None:
+def test_networks_have_separate_folders() -> None:
     tree = TopicTree([Topic("/a/x"), Topic("/a/x", network="ros2")])
     assert [folder.key for folder in tree] == ["/a/*", "ros2 /a/*"]
     assert [len(folder.topics) for folder in tree] == [1, 1]
@@ -72,19 +72,19 @@ def test_networks_have_folders_of_their_own() -> None:
         ("/" * 5, ("/////",)),
     ],
 )
-def test_odd_names_are_rows_too(name, parts) -> None:
+def test_unusual_topic_names_are_rows(name, parts) -> None:
     assert parts_of_name(name) == parts
     assert len(TopicTree([Topic(name)]).rows(by_name)) == len(parts)
 
 
-def test_ten_thousand_slashes_make_no_deeper_tree() -> None:
+def test_tree_depth_is_limited() -> None:
     name = "/x" * 10_000
     assert len(parts_of_name(name)) == DEEPEST + 1
     assert len(folders_above(name)) == DEEPEST
     assert max(folder.deep for folder in TopicTree([Topic(name)])) == DEEPEST - 1
 
 
-def test_the_folders_above_a_topic() -> None:
+def test_folders_above_a_topic() -> None:
     assert folders_above("/a/b/c") == ["/a/*", "/a/b/*"]
     assert folders_above("/a/b", "ros2") == ["ros2 /a/*"]
     assert folders_above("/a") == []
@@ -109,5 +109,5 @@ def test_the_folders_above_a_topic() -> None:
         (["*" * 50 + "x"], False),
     ],
 )
-def test_words_are_found_and_patterns_fit_the_whole_name(words, fit) -> None:
+def test_filter_words_match_substrings_and_patterns_match_whole_name(words, fit) -> None:
     assert fits(words)("/robot/depth", " /robot/depth image camera_driver") is fit

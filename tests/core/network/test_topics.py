@@ -36,7 +36,7 @@ def message(number: int, data: bytes = b"{}", stamp_ns: int | None = None) -> Me
     return Message("/a", data, "json", "json", seq=number, stamp_ns=stamp_ns)
 
 
-def test_topics_of_the_first_graph_are_not_new_later_ones_are() -> None:
+def test_topics_after_first_graph_are_new_until_seen() -> None:
     topics = Topics()
     topics.update(view(info("/a")), 0)
     topics.update(view(info("/a"), info("/b")), 1)
@@ -45,7 +45,7 @@ def test_topics_of_the_first_graph_are_not_new_later_ones_are() -> None:
     assert not topics["/b"].new
 
 
-def test_the_figures_are_the_publishers_and_names_are_sorted() -> None:
+def test_topic_figures_come_from_publishers_and_node_names_are_sorted() -> None:
     topics = Topics()
     topics.update(view(info("/a", rate_hz=30.0, lost=3, loss_ratio=0.1)), 0)
     topic = topics["/a"]
@@ -55,7 +55,7 @@ def test_the_figures_are_the_publishers_and_names_are_sorted() -> None:
     assert topic.age_s == 0.5
 
 
-def test_a_vanished_topic_stays_ten_seconds_and_its_figures_are_unknown() -> None:
+def test_vanished_topic_stays_listed_for_ten_seconds_with_unknown_figures() -> None:
     topics = Topics()
     topics.update(view(info("/a")), 0)
     topics.update(view(), 5)
@@ -67,7 +67,7 @@ def test_a_vanished_topic_stays_ten_seconds_and_its_figures_are_unknown() -> Non
     assert len(topics) == 0
 
 
-def test_a_vanished_topic_that_is_watched_leaves_the_lists_too_and_comes_back() -> None:
+def test_vanished_watched_topic_leaves_the_list_and_can_return() -> None:
     topics = Topics()
     topics.update(view(info("/a")), 0)
     topics["/a"].watched = True
@@ -86,7 +86,7 @@ def test_a_vanished_topic_that_is_watched_leaves_the_lists_too_and_comes_back() 
     assert (len(topics), topics.get("/a")) == (0, None)
 
 
-def test_looking_at_a_topic_does_not_keep_it() -> None:
+def test_own_subscription_does_not_keep_topic_alive() -> None:
     topics = Topics(own=("here", 77))
     looking = NodeInfo("n2", "studio", "here", 77, "python", "native", 0)
     there = GraphView(
@@ -104,7 +104,7 @@ def test_looking_at_a_topic_does_not_keep_it() -> None:
     assert [topic.name for topic in topics.live()] == ["/a"]
 
 
-def test_a_topic_that_comes_back_is_live_again() -> None:
+def test_reappearing_topic_is_live_again() -> None:
     topics = Topics()
     topics.update(view(info("/a")), 0)
     topics.update(view(), 1)
@@ -113,7 +113,7 @@ def test_a_topic_that_comes_back_is_live_again() -> None:
     assert topics["/a"].rate_hz == 10.0
 
 
-def test_the_revision_grows_only_when_the_rows_change() -> None:
+def test_revision_increases_only_when_rows_change() -> None:
     topics = Topics()
     topics.update(view(info("/a")), 0)
     revision, values = topics.revision, topics.values_revision
@@ -122,7 +122,7 @@ def test_the_revision_grows_only_when_the_rows_change() -> None:
     assert topics.values_revision > values
 
 
-def test_newest_and_previous_message_and_all_that_arrived() -> None:
+def test_newest_and_previous_message_and_arrivals_are_tracked() -> None:
     topics = Topics()
     topics.update(view(info("/a")), 0)
     topics.add("/a", Batch([message(1)]), 1)
@@ -135,7 +135,7 @@ def test_newest_and_previous_message_and_all_that_arrived() -> None:
     assert topic.newest is None
 
 
-def test_age_without_stamps_counts_from_the_arrival() -> None:
+def test_age_without_time_stamps_counts_from_arrival() -> None:
     topics = Topics()
     topics.update(view(info("/a", last_stamp_ns=None)), 0)
     topics.add("/a", Batch([message(1)]), 10)
@@ -143,12 +143,12 @@ def test_age_without_stamps_counts_from_the_arrival() -> None:
     assert topics["/a"].age_s == 2
 
 
-def test_the_total_rate_is_unknown_when_nobody_tells_one() -> None:
+def test_total_rate_is_unknown_without_reported_rates() -> None:
     assert total_rate_hz([info("/a", rate_hz=None)]) is None
     assert total_rate_hz([info("/a"), info("/b", rate_hz=None)]) == 10.0
 
 
-def test_where_nobody_came_or_went_only_figures_are_renewed() -> None:
+def test_unchanged_graph_updates_only_figures() -> None:
     topics = Topics()
     topics.update(view(info("/a", rate_hz=10.0), revision=7), 0)
     before = topics.revision
@@ -159,7 +159,7 @@ def test_where_nobody_came_or_went_only_figures_are_renewed() -> None:
     assert (topics.revision, topic.publisher_nodes) == (before, ("camera_driver",))
 
 
-def test_of_very_many_topics_every_one_is_renewed_and_ages_within_some_calls() -> None:
+def test_many_topics_are_updated_and_aged_incrementally() -> None:
     topics = Topics()
     names = [f"/{number}" for number in range(4000)]
     topics.update(view(*map(info, names), revision=7), 0)
@@ -191,14 +191,14 @@ def silence(topics: Topics, now: float) -> float | None:
     return topics["/a"].silent_s
 
 
-def test_a_stream_that_nobody_listens_to_is_not_silent() -> None:
+def test_unwatched_stream_is_not_silent() -> None:
     topics = Topics()
     topics.update(view(info("/a")), 0)
     assert silence(topics, 1000) is None
     assert topics["/a"].age_s == 89.0, "its age is told all the same"
 
 
-def test_one_that_is_looked_at_is_silent_from_its_last_message_on() -> None:
+def test_watched_stream_is_silent_since_its_last_message() -> None:
     topics = Topics()
     topics.update(view(heard()), 10)
     topics["/a"].watched = True
@@ -209,7 +209,7 @@ def test_one_that_is_looked_at_is_silent_from_its_last_message_on() -> None:
     assert silence(topics, 60) is None, "nobody looks any more"
 
 
-def test_who_is_heard_again_has_time_to_begin() -> None:
+def test_newly_watched_stream_has_grace_period() -> None:
     topics = Topics()
     topics.update(view(info("/a")), 0)
     topics.update(view(heard()), 100)
@@ -220,7 +220,7 @@ def test_who_is_heard_again_has_time_to_begin() -> None:
     assert silence(topics, 112) == 0.0, "another publisher has taken its place"
 
 
-def test_a_clock_that_goes_wrong_makes_no_silence() -> None:
+def test_wrong_clock_does_not_cause_silence() -> None:
     topics = Topics()
     topics.update(view(heard()), 0)
     topics["/a"].watched = True
@@ -229,7 +229,7 @@ def test_a_clock_that_goes_wrong_makes_no_silence() -> None:
     assert (round(topics["/a"].silent_s or 0, 3), topics["/a"].age_s) == (0.1, (10**18 - 10**9) / 1e9)
 
 
-def test_what_others_hear_is_judged_by_what_the_master_told_last() -> None:
+def test_silence_of_topics_received_by_others_follows_last_master_report() -> None:
     topics = Topics()
     topics.update(view(heard()), 0)
     topics.update(view(heard(last_stamp_ns=2_000_000_000), revision=5), 10)
@@ -238,7 +238,7 @@ def test_what_others_hear_is_judged_by_what_the_master_told_last() -> None:
     assert silence(topics, 60) == STATISTICS_LATE_S
 
 
-def test_a_topic_that_never_sent_is_not_silent() -> None:
+def test_topic_that_never_sent_is_not_silent() -> None:
     topics = Topics()
     never = replace(heard(), last_stamp_ns=None)
     topics.update(view(never), 0)
@@ -246,7 +246,7 @@ def test_a_topic_that_never_sent_is_not_silent() -> None:
     assert silence(topics, 100) is None
 
 
-def test_ages_from_other_computers_are_corrected_by_how_their_clocks_differ() -> None:
+def test_message_ages_are_corrected_by_clock_offset() -> None:
     hour = 3600 * 10**9
     topics = Topics(own=("mine", 7))
     mine = replace(NODE, id="me", host="mine", pid=7, clock_offset_ns=2 * hour, clock_uncertainty_ns=5)
@@ -263,7 +263,7 @@ def test_ages_from_other_computers_are_corrected_by_how_their_clocks_differ() ->
     assert topics["/a"].age_s == 0.3
 
 
-def test_of_publishers_on_two_computers_the_newest_message_counts() -> None:
+def test_newest_message_of_publishers_on_two_computers_counts() -> None:
     topics = Topics(own=("mine", 7))
     mine = replace(NODE, id="me", host="mine", pid=7, clock_offset_ns=0)
     far = replace(NODE, clock_offset_ns=-(10**12))
@@ -274,7 +274,7 @@ def test_of_publishers_on_two_computers_the_newest_message_counts() -> None:
     assert topics["/a"].age_s == 0.25
 
 
-def test_where_ones_own_clock_is_not_known_nothing_is_corrected() -> None:
+def test_ages_are_not_corrected_without_own_clock_offset() -> None:
     topics = Topics(own=("mine", 7))
     far = replace(NODE, clock_offset_ns=-(10**12))
     topics.update(replace(view(info("/a")), nodes={"n1": far}), 0)

@@ -16,7 +16,7 @@ def batch(kept: int, dropped: int) -> Batch:
     return Batch([Message("/a", b"{}", "json", "json", seq=n) for n in range(kept)], dropped)
 
 
-def test_what_was_dropped_and_what_never_arrived_count_as_sent_and_not_shown() -> None:
+def test_dropped_and_missed_messages_count_as_sent_but_not_shown() -> None:
     topics = Topics()
     traffic = Traffic(topics)
     topics.add("/a", batch(2, 5), 1.0)
@@ -28,7 +28,7 @@ def test_what_was_dropped_and_what_never_arrived_count_as_sent_and_not_shown() -
     assert topics["/a"].shown_of == (2, 7 + 14)
 
 
-def test_only_the_last_half_minute_counts() -> None:
+def test_only_last_30_seconds_are_counted() -> None:
     traffic = Traffic(Topics())
     traffic.add({"/a": batch(1, 1)}, 0.0)
     traffic.add({"/a": batch(2, 0)}, 20.0)
@@ -38,7 +38,7 @@ def test_only_the_last_half_minute_counts() -> None:
     assert (traffic.shown_30s, traffic.sent_30s) == (0, 0)
 
 
-def test_a_subscription_that_begins_anew_counts_from_nothing() -> None:
+def test_new_subscription_counts_from_zero() -> None:
     topics = Topics()
     traffic = Traffic(topics)
     topics.add("/a", batch(1, 0), 0.0)
@@ -50,7 +50,7 @@ def test_a_subscription_that_begins_anew_counts_from_nothing() -> None:
     assert traffic.sent_30s == 9
 
 
-def test_the_figures_of_the_network_come_from_the_graph() -> None:
+def test_network_figures_come_from_the_graph() -> None:
     traffic = Traffic(Topics())
     one = PublisherInfo(1, "n1", (), False, 5, 50, 5, 1, 10.0, 100.0)
 
@@ -73,7 +73,7 @@ class Counted(dict[str, TopicInfo]):
         return super().values()
 
 
-def test_very_many_topics_are_summed_up_twice_a_second_and_the_last_figures_are_not_forgotten() -> None:
+def test_figures_of_many_topics_are_summed_twice_a_second_including_last_ones() -> None:
     traffic = Traffic(Topics())
     one = TopicInfo("/a", "json", "json", lost=1, rate_hz=2.0)
     views = [
@@ -90,7 +90,7 @@ def test_very_many_topics_are_summed_up_twice_a_second_and_the_last_figures_are_
     assert traffic.lost_30s == 19 * (AT_ONCE + 1)
 
 
-def test_only_what_was_lost_lately_counts() -> None:
+def test_only_recent_losses_are_counted() -> None:
     losses = RecentLosses()
     assert losses.count(100, 0.0) == 0  # lost before we looked
     assert losses.count(103, 1.0) == 3
@@ -99,7 +99,7 @@ def test_only_what_was_lost_lately_counts() -> None:
     assert losses.count(105, 21.0 + WINDOW_S) == 0
 
 
-def test_a_topic_that_vanished_takes_its_total_along() -> None:
+def test_vanished_topic_is_removed_from_total_losses() -> None:
     losses = RecentLosses()
     losses.count(10, 0.0)
     assert losses.count(0, 1.0) == 0

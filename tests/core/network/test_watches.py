@@ -5,7 +5,7 @@ from __future__ import annotations
 from app.core.network.watches import Watches
 
 
-def test_the_first_watch_begins_and_the_last_ends() -> None:
+def test_first_watch_subscribes_and_last_close_unsubscribes() -> None:
     calls: list[str] = []
     watches = Watches(lambda topic: calls.append(f"+{topic}"), lambda topic: calls.append(f"-{topic}"))
     first = watches.open(["/a", "/b"])
@@ -17,7 +17,7 @@ def test_the_first_watch_begins_and_the_last_ends() -> None:
     assert not watches.watched("/a")
 
 
-def test_a_watch_that_rests_is_not_subscribed_and_still_known() -> None:
+def test_suspended_watch_is_unsubscribed_but_remembered() -> None:
     calls: list[str] = []
     watches = Watches(*(lambda topic, sign=sign: calls.append(f"{sign}{topic}") for sign in "+-!"))
     first, second = watches.open(["/a"]), watches.open(["/a"])

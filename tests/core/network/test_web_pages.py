@@ -73,7 +73,7 @@ def test_settings_changed_during_the_start_reach_the_server(studio: Studio) -> N
     assert studio.wait().allow_moving == {"Turtle"}
 
 
-def test_server_ends_with_its_last_protocol(studio: Studio) -> None:
+def test_server_stops_with_its_last_protocol(studio: Studio) -> None:
     server = studio.switch_on()
     studio.web.serve("foxglove", on=True)
     studio.web.serve("rosbridge", on=False)
@@ -105,7 +105,7 @@ def test_new_token_disconnects_pages_and_the_old_one_can_be_restored(studio: Stu
     assert server.access.token == before
 
 
-def test_taken_port_names_its_program_and_a_free_port(studio: Studio) -> None:
+def test_occupied_port_names_its_program_and_suggests_a_free_port(studio: Studio) -> None:
     with socket.create_server(("127.0.0.1", 0)) as taken:
         web = WebPages(master_address(), studio.events.put, addresses=tuple)
         web.port = taken.getsockname()[1]
@@ -117,7 +117,7 @@ def test_taken_port_names_its_program_and_a_free_port(studio: Studio) -> None:
         web.close()
 
 
-def test_start_without_the_libraries_says_what_to_install(studio: Studio) -> None:
+def test_start_without_optional_libraries_gives_install_advice(studio: Studio) -> None:
     def start(_settings: object) -> FakeWebServer:
         raise NepError("the web server is not installed; install it with: pip install 'nep-studio[web]'")
 
@@ -130,7 +130,7 @@ def test_start_without_the_libraries_says_what_to_install(studio: Studio) -> Non
     web.close()
 
 
-def test_server_that_ends_by_itself_is_detected(studio: Studio) -> None:
+def test_unexpected_server_exit_is_detected(studio: Studio) -> None:
     server = studio.switch_on()
     server.has_ended = True
     studio.web.check()
@@ -138,7 +138,7 @@ def test_server_that_ends_by_itself_is_detected(studio: Studio) -> None:
     assert studio.web.sentence
 
 
-def test_page_that_left_stays_listed_for_a_while(studio: Studio) -> None:
+def test_disconnected_page_stays_listed_for_a_while(studio: Studio) -> None:
     server = studio.switch_on()
     server.pages = (page(1), page(2))
     studio.web.refresh()
@@ -163,7 +163,7 @@ def test_page_is_slow_while_it_drops_messages() -> None:
     assert list(pages.slow()) == []
 
 
-def test_notices_offer_what_helps_until_it_is_allowed_or_dismissed(studio: Studio) -> None:
+def test_rejection_notices_offer_a_fix_until_allowed_or_dismissed(studio: Studio) -> None:
     server = studio.switch_on()
     origin = "http://192.168.1.77:5173"
     server.refusals = (
@@ -182,7 +182,7 @@ def test_notices_offer_what_helps_until_it_is_allowed_or_dismissed(studio: Studi
     assert notices(studio.web) == found[2:]
 
 
-def test_page_that_was_disconnected_here_can_be_let_in_again(studio: Studio) -> None:
+def test_page_disconnected_by_user_can_be_allowed_again(studio: Studio) -> None:
     server = studio.switch_on()
     first = page(1)
     server.pages = (first,)
@@ -196,7 +196,7 @@ def test_page_that_was_disconnected_here_can_be_let_in_again(studio: Studio) -> 
     assert (server.kept_out, notices(studio.web)) == (set(), ())
 
 
-def test_command_for_a_terminal_has_the_present_settings(studio: Studio) -> None:
+def test_terminal_command_has_the_current_settings(studio: Studio) -> None:
     web = studio.web
     assert terminal_command(web, "linux") == "nep web"
     web.open_to(WIFI.host)
@@ -223,7 +223,7 @@ def test_status_warns_while_other_computers_can_connect(studio: Studio) -> None:
     assert "192.168.1.20" in words
 
 
-def test_program_without_a_title_is_called_by_its_library() -> None:
+def test_program_without_title_is_named_by_its_library() -> None:
     named = page(1)
     program = page(2, title="web_lab.example_2", origin="")
     assert (page_name(named), page_name(program)) == ("page1.html", "Chrome")

@@ -22,7 +22,7 @@ def told(done: subprocess.CompletedProcess[str]) -> dict[str, object]:
     return seen
 
 
-def test_ros_1_is_seen_heard_and_lost() -> None:
+def test_ros_1_is_observed_received_and_its_loss_detected() -> None:
     skip_without_ros()
     done = subprocess.run(
         [sys.executable, *PROGRAM, "ros"], capture_output=True, encoding="utf-8", timeout=120, check=False
@@ -35,7 +35,7 @@ def test_ros_1_is_seen_heard_and_lost() -> None:
     assert str(seen["lost"]).startswith("no ROS master replied at '127.0.0.1:")
 
 
-def test_ros_2_is_seen_and_heard_also_who_does_not_insist() -> None:
+def test_ros_2_is_observed_and_received_including_best_effort_publishers() -> None:
     pytest.importorskip("cyclonedds")
     pytest.importorskip("rosbags")
     seen = told(alone(*PROGRAM, "ros2", up=True, timeout_s=120))

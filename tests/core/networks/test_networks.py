@@ -36,7 +36,7 @@ def message(size: int = 10) -> Message:
     return Message("/a", bytes(size), "bytes", "bytes")
 
 
-def test_names_of_topics_of_all_networks_are_told_apart() -> None:
+def test_topic_names_of_all_networks_are_distinct() -> None:
     assert split_key(key_of("ros2", "/camera")) == ("ros2", "/camera")
     assert split_key(key_of("", "/camera")) == ("", "/camera")
     assert split_key(key_of("ros", "/a b c")) == ("ros", "/a b c"), "strangers may name a topic anything"
@@ -45,7 +45,7 @@ def test_names_of_topics_of_all_networks_are_told_apart() -> None:
     assert (list(native), list(others)) == (["/a"], ["ros /a"])
 
 
-def test_nothing_is_looked_at_until_it_is_chosen_and_then_also_at_the_next_start(world: World) -> None:
+def test_network_is_observed_only_when_chosen_and_again_at_next_start(world: World) -> None:
     world.networks.start()
     assert (world.made, world.networks.chosen) == ([], [])
     world.networks.choose("ros2", " 7 ")
@@ -70,7 +70,7 @@ def test_nothing_is_looked_at_until_it_is_chosen_and_then_also_at_the_next_start
 @pytest.mark.parametrize(
     "kept", [[], {"ros2": "999"}, {"ros2": 5}, {"roz": "1"}, {"zenoh": "nowhere at all"}, {"ros": None}]
 )
-def test_whatever_is_kept_and_is_no_choice_is_left_out(kept: object, tmp_path: Path) -> None:
+def test_invalid_network_settings_are_ignored(kept: object, tmp_path: Path) -> None:
     (tmp_path / "settings.json").write_text(json.dumps({KEPT: kept}))
     world = World(Settings(tmp_path))
     world.networks.start()
@@ -88,7 +88,7 @@ def test_whatever_is_kept_and_is_no_choice_is_left_out(kept: object, tmp_path: P
         ("ros", "http://", "is not an address of a ROS master"),
     ],
 )
-def test_a_wrong_address_is_refused_in_words_and_what_was_chosen_stays(
+def test_invalid_address_is_rejected_with_reason_and_choice_stays(
     world: World, kind: str, address: str, said: str
 ) -> None:
     world.networks.choose(kind, "")
@@ -100,7 +100,7 @@ def test_a_wrong_address_is_refused_in_words_and_what_was_chosen_stays(
     assert [network.kind.name for network in world.networks.chosen] == [kind]
 
 
-def test_what_can_not_be_kept_is_looked_at_all_the_same(
+def test_network_is_observed_even_if_choice_cannot_be_saved(
     world: World, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     def refuse(_key: str, _value: object) -> None:
@@ -112,7 +112,7 @@ def test_what_can_not_be_kept_is_looked_at_all_the_same(
     assert [network.kind.name for network in world.networks.chosen] == ["zenoh"]
 
 
-def test_topics_and_nodes_are_there_with_their_network(world: World) -> None:
+def test_topics_and_nodes_are_listed_with_their_network(world: World) -> None:
     before = world.networks.revision
     world.networks.choose("ros", "")
     assert world.networks.revision > before
@@ -128,7 +128,7 @@ def test_topics_and_nodes_are_there_with_their_network(world: World) -> None:
     assert world.networks.topic("zenoh /a") is None
 
 
-def test_a_network_that_does_not_answer_is_grey_with_a_sentence_until_it_is_back(world: World) -> None:
+def test_unreachable_network_is_stale_with_reason_until_it_returns(world: World) -> None:
     world.networks.choose("ros", "")
     world.tell(GraphSeen(graph("/a"), 0.0))
     revision = world.networks.revision
@@ -152,7 +152,7 @@ def test_a_network_that_does_not_answer_is_grey_with_a_sentence_until_it_is_back
     assert list(network.topics) == []
 
 
-def test_what_a_source_tells_that_was_ended_is_not_taken_over(world: World) -> None:
+def test_events_of_closed_source_are_ignored(world: World) -> None:
     world.networks.choose("ros", "127.0.0.1:1")
     world.networks.choose("ros", "127.0.0.1:2")
     world.tell(GraphSeen(graph("/of/the/first"), 0.0), source=0)
@@ -167,7 +167,7 @@ def test_what_a_source_tells_that_was_ended_is_not_taken_over(world: World) -> N
     assert len(world.made) == 3, "the same address again changes nothing"
 
 
-def test_who_looks_before_a_network_is_chosen_sees_it_then(world: World) -> None:
+def test_watch_before_network_is_chosen_takes_effect_later(world: World) -> None:
     world.networks.watch("ros /a")
     world.networks.watch("ros /b")
     world.networks.unwatch("ros /b")
@@ -185,7 +185,7 @@ def test_who_looks_before_a_network_is_chosen_sees_it_then(world: World) -> None
     assert world.made[0].wanted == set()
 
 
-def test_why_a_topic_can_not_be_read_is_known_while_somebody_looks(world: World) -> None:
+def test_reason_for_undecodable_topic_is_available_while_watched(world: World) -> None:
     world.networks.choose("ros2", "")
     world.networks.watch("ros2 /a")
     world.tell(WatchFailed("/a", "there is no type 'my/Own'"))
@@ -198,7 +198,7 @@ def test_why_a_topic_can_not_be_read_is_known_while_somebody_looks(world: World)
     assert world.networks.unread("ros2 /a") == ""
 
 
-def test_what_arrives_is_counted_where_nobody_tells_it() -> None:
+def test_arrivals_are_counted_where_network_reports_no_rate() -> None:
     topics = Topics(("", 0), "ros")
     topics.update(graph("/a", "/b"), 0.0)
     topics["/a"].watched = True
@@ -217,7 +217,7 @@ def test_what_arrives_is_counted_where_nobody_tells_it() -> None:
     assert (topics["/a"].counted, topics.count(1.0, before)) == (None, {})
 
 
-def test_every_kind_is_a_back_end_that_says_what_to_install(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_every_network_kind_is_a_back_end_with_install_advice(monkeypatch: pytest.MonkeyPatch) -> None:
     for kind in KINDS:
         assert kind_named(kind.name) is kind
         assert kind.checked(kind.example) == kind.checked("")
@@ -228,7 +228,7 @@ def test_every_kind_is_a_back_end_that_says_what_to_install(monkeypatch: pytest.
         nep.node("n", "zenoh")
 
 
-def test_a_network_of_zenoh_is_seen_and_heard_beside_the_native_one(session: Session) -> None:
+def test_zenoh_network_is_observed_beside_the_native_network(session: Session) -> None:
     pytest.importorskip("zenoh")
     place = f"local/{uuid.uuid4().hex}"
     with nep.node("talker") as native, nep.node("arm", "zenoh", master=place) as arm:
@@ -266,7 +266,7 @@ class Teller:
         return self._views.pop(0)
 
 
-def test_a_graph_that_is_gathered_anew_is_another_one_only_when_somebody_came_or_went() -> None:
+def test_graph_revision_increases_only_when_nodes_or_topics_change() -> None:
     views = [graph("/a"), graph("/a", rate_hz=5.0), graph("/b"), graph("/b"), GraphView(1, 1), graph("/b")]
     source = OtherSource(KINDS[0], "", [], lambda _event: None)
     teller = Teller(*views)
@@ -274,7 +274,7 @@ def test_a_graph_that_is_gathered_anew_is_another_one_only_when_somebody_came_or
     assert revisions == [1, 1, 2, 2, 3, 4]
 
 
-def test_what_a_library_raises_is_a_sentence() -> None:
+def test_library_exception_is_reported_as_message() -> None:
     class Breaks:
         def graph(self, timeout_s: float) -> GraphView:
             raise OSError(5, "it broke")
@@ -284,7 +284,9 @@ def test_what_a_library_raises_is_a_sentence() -> None:
         source.query_graph(Breaks())  # type: ignore[arg-type]
 
 
-def test_a_missing_package_is_one_sentence(session: Session, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_missing_package_is_reported_in_one_sentence(
+    session: Session, monkeypatch: pytest.MonkeyPatch
+) -> None:
     monkeypatch.setitem(sys.modules, "zenoh", None)
     session.networks.choose("zenoh", "local/nobody")
     network = session.networks.get("zenoh")

@@ -63,7 +63,7 @@ def settled(session: Session, shown: NodeParameters) -> str:
     return shown.refusal
 
 
-def test_they_are_there_with_their_limits_and_each_change_is_seen(
+def test_parameters_have_limits_and_updates_are_received(
     session: Session, robot: nep.Node, shown: NodeParameters
 ) -> None:
     speed = shown.find("speed")
@@ -79,7 +79,7 @@ def test_they_are_there_with_their_limits_and_each_change_is_seen(
     assert shown.changed == {"speed": 7.0, "later": 8.0}
 
 
-def test_one_is_set_and_a_refusal_is_in_the_words_of_the_node(
+def test_parameter_is_set_and_rejection_has_message_of_node(
     session: Session, robot: nep.Node, shown: NodeParameters
 ) -> None:
     robot.parameters.on_change(lambda new: "1.3 shakes the head" if new.get("speed") == 1.3 else None)
@@ -112,7 +112,7 @@ def test_one_is_set_and_a_refusal_is_in_the_words_of_the_node(
     )
 
 
-def test_a_number_that_no_wire_carries_is_refused_and_the_window_lives_on(
+def test_number_out_of_wire_range_is_rejected(
     session: Session, robot: nep.Node, shown: NodeParameters
 ) -> None:
     robot.parameters.declare("count", 1)
@@ -125,7 +125,7 @@ def test_a_number_that_no_wire_carries_is_refused_and_the_window_lives_on(
     assert robot.parameters["count"] == 2**62
 
 
-def test_a_node_that_ends_while_it_is_asked_is_told_in_words(
+def test_node_that_ends_during_request_is_reported(
     session: Session, robot: nep.Node, shown: NodeParameters, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr("app.core.networks.parameters.ANSWER_TIMEOUT_S", 0.3)
@@ -143,14 +143,16 @@ def test_a_node_that_ends_while_it_is_asked_is_told_in_words(
     assert values(shown)["serial"] == "7", "what was known stays to be read"
 
 
-def test_without_a_master_nothing_waits_to_be_set_much_later(session: Session, shown: NodeParameters) -> None:
+def test_parameter_change_without_master_is_rejected_not_queued(
+    session: Session, shown: NodeParameters
+) -> None:
     shown._has_master = lambda: False
     shown.set("speed", "1")
     assert shown.setting == ""
     assert "no master responds" in shown.refusal
 
 
-def test_another_node_and_none_leave_nothing_behind(session: Session, shown: NodeParameters) -> None:
+def test_showing_another_node_or_none_clears_parameters(session: Session, shown: NodeParameters) -> None:
     watching, revision = shown.watching, shown.revision
     shown.show(NodeEntry("x", "without"))
     assert (shown.node, shown.all, shown.watching, shown.heard) == (None, (), None, False)
@@ -163,7 +165,7 @@ def test_another_node_and_none_leave_nothing_behind(session: Session, shown: Nod
     assert shown.refusal == ""
 
 
-def test_whatever_a_stranger_publishes_there_is_said_or_read(
+def test_foreign_messages_on_parameter_topic_are_decoded_or_reported(
     session: Session, robot: nep.Node, shown: NodeParameters
 ) -> None:
     with nep.node("stranger") as stranger, stranger.new_pub(place_of(robot.id)) as loud:
@@ -200,7 +202,7 @@ JSON = st.recursive(
 
 
 @given(state=JSON)
-def test_any_state_is_parameters_or_a_sentence(state: object) -> None:
+def test_any_state_is_decoded_or_rejected_with_explanation(state: object) -> None:
     try:
         found = parameters_in({"parameters": state} if isinstance(state, list) else state)
     except nep.NepError:
@@ -216,7 +218,7 @@ def test_any_state_is_parameters_or_a_sentence(state: object) -> None:
         ({"x": [1]}, "dict"),
     ],
 )  # fmt: skip
-def test_what_is_shown_means_the_same_when_it_is_set(value: object, kind: str) -> None:
+def test_parameter_text_round_trips_to_same_value(value: object, kind: str) -> None:
     assert value_of(text_of(value), kind) == value
     assert type(value_of(text_of(value), kind)) is type(value)
 
@@ -230,12 +232,12 @@ def test_what_is_shown_means_the_same_when_it_is_set(value: object, kind: str) -
         ("[1]", "dict", "an object as JSON"), ("", "dict", "an object as JSON"),
     ],
 )  # fmt: skip
-def test_what_is_no_value_of_its_type_is_refused_with_the_next_step(text: str, kind: str, said: str) -> None:
+def test_value_of_wrong_type_is_rejected_with_advice(text: str, kind: str, said: str) -> None:
     with pytest.raises(ValueError, match=said):
         value_of(text, kind)
 
 
-def test_where_parameters_can_only_be_read_it_is_said() -> None:
+def test_read_only_parameters_are_explained() -> None:
     (parameter,) = parameters_in({"parameters": [{"name": "gain", "value": 1, "type": "int"}]})
     node = NodeEntry("a", "arm", network="zenoh", has_parameters=True)
     assert refusal_of(node, parameter) == "parameters on this network are read-only"

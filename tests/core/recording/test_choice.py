@@ -30,18 +30,18 @@ from app.core.recording.choice import (
         ("not not /a", (), ("/a",)),
     ],
 )
-def test_patterns_are_words_and_not_leaves_out(text, wanted, unwanted):
+def test_patterns_are_parsed_and_not_excludes(text, wanted, unwanted):
     assert read_patterns(text) == (wanted, unwanted)
 
 
-def test_what_is_left_out_wins_and_none_wanted_is_all():
+def test_exclusions_win_and_no_patterns_means_all():
     choice = RecordingChoice("pattern", patterns=("/arm/*",), left_out=("/arm/raw",))
     assert [choice.selection.has(topic) for topic in ("/arm/x", "/arm/raw", "/odom")] == [True, False, False]
     assert RecordingChoice("pattern", left_out=("/raw",)).selection.has("/odom")
     assert RecordingChoice("all", topics=("/a",), left_out=("/b",)).selection.has("/b")
 
 
-def test_what_can_not_be_recorded_says_why():
+def test_invalid_recording_choice_gives_reason():
     assert RecordingChoice("chosen").problem == "No topic is selected."
     assert RecordingChoice("chosen", topics=("/a",)).problem == ""
     assert RecordingChoice("pattern").problem == ""
@@ -53,11 +53,11 @@ def test_what_can_not_be_recorded_says_why():
     [None, 3, "x", [], {}, {"mode": 7, "topics": "abc"}, {"mode": "some", "patterns": [1, None]},
      {"ends_min": 0, "ends_gb": float("nan")}, {"ends_min": "30", "ends_gb": -1}, {"ends_min": True}],
 )  # fmt: skip
-def test_whatever_settings_hold_is_read(told):
+def test_any_recording_settings_are_readable(told):
     assert read_choice(told) == RecordingChoice()
 
 
-def test_choice_and_wish_come_back_as_they_were():
+def test_recording_choice_and_flight_recorder_settings_round_trip():
     choice = RecordingChoice("pattern", ("/a",), ("/b/*",), ("/c",), 30.0, 0.5)
     assert read_choice(plain_choice(choice)) == choice
     wish = RingWish(is_on=True, seconds=90, size_gb=0.5, patterns=("/arm/*",), left_out=("/arm/raw",))
@@ -76,7 +76,7 @@ def test_choice_and_wish_come_back_as_they_were():
         ((0.1, None), (10.0, 100.0, 10.0), (10.0, 100.0)),  # it is about to end
     ],
 )
-def test_how_large_it_will_be_at_its_end(ends, so_far, end):
+def test_final_recording_size_is_estimated(ends, so_far, end):
     assert RecordingChoice("all", ends_min=ends[0], ends_gb=ends[1]).end(*so_far) == end
 
 
@@ -89,7 +89,7 @@ def test_how_large_it_will_be_at_its_end(ends, so_far, end):
         {"seconds": True, "size_gb": "2"},
     ],
 )
-def test_a_wish_that_can_not_be_is_as_at_first(told):
+def test_invalid_flight_recorder_settings_become_defaults(told):
     assert read_wish(told) == RingWish()
 
 
@@ -108,11 +108,11 @@ def test_a_wish_that_can_not_be_is_as_at_first(told):
         ("perro café 犬", "perro café 犬"),
     ],
 )
-def test_a_name_becomes_one_that_every_system_takes(name, stem):
+def test_recording_name_becomes_valid_file_name(name, stem):
     assert file_stem(name) == stem
 
 
-def test_a_path_that_is_taken_gets_a_number(tmp_path: Path):
+def test_occupied_path_gets_a_number(tmp_path: Path):
     first = tmp_path / "a.mcap"
     assert free_path(first) == first
     first.touch()

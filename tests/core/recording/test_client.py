@@ -66,7 +66,7 @@ def made() -> DrivenRecorder:
     return DrivenRecorder()
 
 
-def test_nothing_is_started_before_it_is_needed(made):
+def test_recorder_process_starts_only_when_needed(made):
     made.client.stop()
     made.client.note("x")
     made.client.check()
@@ -75,7 +75,7 @@ def test_nothing_is_started_before_it_is_needed(made):
     assert not made.lines
 
 
-def test_a_recording_begins_tells_its_figures_and_ends(made):
+def test_recording_starts_reports_figures_and_ends(made):
     client = made.client
     assert client.record(Path("a.mcap"), ("/a",), ("/b",), "first")
     assert not client.record(Path("b.mcap"))
@@ -105,7 +105,7 @@ def test_a_recording_begins_tells_its_figures_and_ends(made):
     assert made.lines[0].is_closed
 
 
-def test_what_happens_is_told_while_something_is_recorded_and_else_to_nobody(made):
+def test_events_are_sent_only_while_recording(made):
     client = made.client
     client.write_entry("runs", {"id": "1"})
     assert not made.lines
@@ -122,7 +122,7 @@ def test_what_happens_is_told_while_something_is_recorded_and_else_to_nobody(mad
     assert not made.told()
 
 
-def test_alerts_of_the_disk_come_and_go(made):
+def test_disk_alerts_appear_and_are_resolved(made):
     made.client.record(Path("a.mcap"))
     made.say("recording")
     for _each in range(3):
@@ -148,7 +148,7 @@ def test_alerts_of_the_disk_come_and_go(made):
     assert made.client.record(Path("c.mcap"))
 
 
-def test_a_recorder_that_dies_is_told_and_another_one_takes_its_place(made):
+def test_dead_recorder_is_reported_and_replaced(made):
     made.client.record(Path("a.mcap"))
     made.say("recording")
     made.end("killed")
@@ -160,7 +160,7 @@ def test_a_recorder_that_dies_is_told_and_another_one_takes_its_place(made):
     assert (len(made.lines), made.client.state.phase) == (2, "starting")
 
 
-def test_the_flight_recorder_keeps_the_last_seconds_and_comes_back(made):
+def test_flight_recorder_saves_last_seconds_and_is_restarted(made):
     client, choice = made.client, RingChoice(Path("ring"), 60.0, 10**9, ("/a",))
     client.follow_ring(choice)
     client.follow_ring(choice)
@@ -198,7 +198,7 @@ def test_the_flight_recorder_keeps_the_last_seconds_and_comes_back(made):
     assert not client.keep(Path("c.mcap"), 60.0)
 
 
-def test_a_recorder_that_takes_no_orders_and_events_of_any_kind_harm_nobody(made):
+def test_unresponsive_recorder_and_invalid_events_are_harmless(made):
     made.client.follow_ring(RingChoice(Path("ring")))
     made.lines[0].is_full = True
     assert made.client.record(Path("a.mcap"))
@@ -210,7 +210,7 @@ def test_a_recorder_that_takes_no_orders_and_events_of_any_kind_harm_nobody(made
     made.client.on_event(RecorderSaid(1, {}))
 
 
-def test_the_real_process_records_keeps_and_finishes(master, tmp_path):
+def test_real_recorder_process_records_saves_and_finishes(master, tmp_path):
     events: queue.SimpleQueue[object] = queue.SimpleQueue()
     client = RecorderClient(master.address, Alerts(), events.put)
 
@@ -240,7 +240,7 @@ def test_the_real_process_records_keeps_and_finishes(master, tmp_path):
         assert (kept.words["note"], kept.topics["/a"].message_count) == ("it fell", 20)
 
 
-def test_a_process_that_cannot_be_started_is_told(monkeypatch):
+def test_recorder_start_failure_is_reported(monkeypatch):
     events: queue.SimpleQueue[object] = queue.SimpleQueue()
     monkeypatch.setattr(client_module, "module_command", lambda _module: ["/nothing/of/the/kind"])
     client = RecorderClient("127.0.0.1:1", Alerts(), events.put)

@@ -52,7 +52,7 @@ def event(kind: str, name: str = "/camera", condition: str = "silent") -> AlarmE
     return AlarmEvent(kind, rule, 1.0, 4.0)
 
 
-def test_a_run_is_told_at_its_begin_its_end_and_with_the_time_of_its_stop(told):
+def test_run_is_recorded_at_start_and_end_with_its_stop_time(told):
     begun = replace(RUNNING, begun=True, started_s=1.2)
     stopping = replace(begun, state="stopping", says="x")
     report = StopReport((RobotStop("Pepper", True, 41.0),), 41.2)
@@ -74,24 +74,24 @@ def test_a_run_is_told_at_its_begin_its_end_and_with_the_time_of_its_stop(told):
         ({}, "stopped", ""),
     ],
 )
-def test_how_a_run_ended(told, changes, result, words):
+def test_run_result_is_recorded(told, changes, result, words):
     *_begin, end = told.follow(RUNNING, replace(RUNNING, state="stopping", **changes))
     assert (end["result"], end["words"]) == (result, words)
 
 
-def test_another_run_in_the_same_tick_is_another_one(told):
+def test_second_run_in_same_tick_is_a_separate_event(told):
     first, over, second = told.follow(RUNNING, replace(RUNNING, started_s=7.0, name="Tour"))
     assert (over["id"], over["until_ns"], "result" in over) == (first["id"], 1020, False)
     assert (second["name"], second["until_ns"]) == ("Tour", None)
     assert second["id"] != first["id"]
 
 
-def test_what_is_tried_has_the_words_of_its_block(told):
+def test_tried_stack_is_recorded_with_text_of_its_block(told):
     (said,) = told.follow(replace(RUNNING, trying="wave"))
     assert said["name"] == "wave"
 
 
-def test_an_alarm_is_told_on_and_off_once_each(told):
+def test_alarm_is_recorded_on_and_off_once_each(told):
     for kind in ("on", "still", "off", "off"):
         told.events.take_alarm(event(kind))
     (role, on), (_role, off) = told.said
@@ -103,12 +103,12 @@ def test_an_alarm_is_told_on_and_off_once_each(told):
     assert told.said[-1][1]["id"] != on["id"]
 
 
-def test_an_alarm_about_a_node_names_no_topic(told):
+def test_alarm_about_node_has_no_topic(told):
     told.events.take_alarm(event("on", "arm", "leaves"))
     assert told.said[0][1]["topic"] == ""
 
 
-def test_what_goes_on_is_told_again_and_what_is_over_is_not(told):
+def test_ongoing_events_are_repeated_and_finished_ones_are_not(told):
     told.events.take_alarm(event("on", "/a"))
     told.events.take_alarm(event("on", "/b"))
     told.events.follow_run(RUNNING)
@@ -121,7 +121,7 @@ def test_what_goes_on_is_told_again_and_what_is_over_is_not(told):
     assert all(value["until_ns"] is None for _role, value in told.said)
 
 
-def test_of_very_many_alarms_each_is_told_once_and_no_more_are_kept_than_fit(told, monkeypatch):
+def test_each_of_many_alarms_is_recorded_once_and_number_kept_is_limited(told, monkeypatch):
     monkeypatch.setattr(events_module, "MAX_PRESENT", 3)
     for number in range(5):
         told.events.take_alarm(event("on", f"/{number}"))
@@ -133,7 +133,7 @@ def test_of_very_many_alarms_each_is_told_once_and_no_more_are_kept_than_fit(tol
     assert len(told.said) == 3  # its end is not known, and nothing goes wrong
 
 
-def test_a_session_tells_its_recorder(tmp_path, monkeypatch):
+def test_session_sends_events_to_its_recorder(tmp_path, monkeypatch):
     monkeypatch.setenv("NEP_STUDIO_HOME", str(tmp_path))
     session = Session(Settings(tmp_path), address="127.0.0.1:1", start_processes=False)  # never started
     said: list[tuple[str, object]] = []

@@ -13,7 +13,7 @@ from tests.nep.programs import eventually
 from tests.nep.recordings.messages import START_NS, STEP_NS, json_message, record
 
 
-def test_an_export_tells_what_it_made(tmp_path):
+def test_export_reports_its_files(tmp_path):
     record(tmp_path / "a.mcap", [[json_message(seq, topic="/odom") for seq in range(250)]])
     job = RecordingExport(tmp_path / "a.mcap", "csv", tmp_path / "out")
     eventually(lambda: job.is_over)
@@ -23,7 +23,7 @@ def test_an_export_tells_what_it_made(tmp_path):
     assert len(made.path.read_text("utf-8").splitlines()) == 251
 
 
-def test_a_part_of_it_tells_how_far_it_is_too(tmp_path):
+def test_export_of_a_part_reports_progress(tmp_path):
     messages = [json_message(seq, topic=f"/{'ab'[seq % 2]}") for seq in range(400)]
     record(tmp_path / "a.mcap", [messages])
     part = Part(START_NS + 100 * STEP_NS, START_NS + 300 * STEP_NS, ["/a"])
@@ -32,7 +32,7 @@ def test_a_part_of_it_tells_how_far_it_is_too(tmp_path):
     assert ([(each.topic, each.count) for each in job.files], job.share) == ([("/a", 100)], 1.0)
 
 
-def test_what_fails_is_a_sentence(tmp_path):
+def test_failed_export_is_reported(tmp_path):
     (tmp_path / "a.mcap").write_bytes(b"nothing of the kind")
     job = RecordingExport(tmp_path / "a.mcap", "csv", tmp_path / "out")
     eventually(lambda: job.is_over)
@@ -40,7 +40,7 @@ def test_what_fails_is_a_sentence(tmp_path):
     assert not job.files
 
 
-def test_who_gives_it_up_finds_no_half_file(tmp_path, monkeypatch):
+def test_canceled_export_leaves_no_partial_file(tmp_path, monkeypatch):
     record(tmp_path / "a.mcap", [[json_message(seq, topic="/odom") for seq in range(500)]])
     has_begun, go_on = threading.Event(), threading.Event()
 
@@ -63,7 +63,7 @@ def test_who_gives_it_up_finds_no_half_file(tmp_path, monkeypatch):
     assert list((tmp_path / "out").iterdir()) == []
 
 
-def test_without_pictures_there_is_none(tmp_path):
+def test_recording_without_pictures_has_no_thumbnail(tmp_path):
     record(tmp_path / "a.mcap", [[json_message(1, topic="/odom")]])
     assert picture_in(tmp_path / "a.mcap", (128, 96), LocalOpener()) is None
     assert picture_in(tmp_path / "gone.mcap", (128, 96), LocalOpener()) is None

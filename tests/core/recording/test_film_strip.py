@@ -29,7 +29,7 @@ def look(tmp_path):
     return made
 
 
-def test_pictures_stand_in_the_middles_of_equal_parts(look):
+def test_thumbnails_are_centred_in_equal_intervals(look):
     assert look.end_ns - look.start_ns >= (COUNT - 1) * STEP_NS
     assert len(look.pictures) == 4
     assert [each is not None for each in look.pictures[:3]] == [True] * 3
@@ -39,7 +39,7 @@ def test_pictures_stand_in_the_middles_of_equal_parts(look):
     assert [each.name for each in look.topics] == ["/camera", "/odom"]
 
 
-def test_without_pictures_there_are_counts_and_what_is_none_is_not_there(tmp_path):
+def test_film_strip_without_pictures_has_counts_and_invalid_file_has_none(tmp_path):
     record(tmp_path / "a.mcap", [[json_message(1)]])
     look = film_strip(tmp_path / "a.mcap", 4, 3, (24, 16), LocalOpener())
     assert look is not None
@@ -50,7 +50,7 @@ def test_without_pictures_there_are_counts_and_what_is_none_is_not_there(tmp_pat
         assert film_strip(tmp_path / f"{name}.mcap", 4, 3, (24, 16), LocalOpener()) is None
 
 
-def test_a_part_has_both_its_ends_and_the_topics_that_fit(look):
+def test_part_includes_both_ends_and_matching_topics(look):
     begin, end = START_NS + 3 * STEP_NS, START_NS + 9 * STEP_NS
     assert part_of(look, look.start_ns, look.end_ns, (), ()) == Part()
     assert part_of(look, 0, 2**64, (), ("/camera",)) == Part(None, None, ["/odom"])
@@ -60,7 +60,7 @@ def test_a_part_has_both_its_ends_and_the_topics_that_fit(look):
         part_of(look, begin, end, ("two words",), ())
 
 
-def test_sizes_are_those_of_the_messages_and_of_a_part_about_its_share(look):
+def test_topic_sizes_are_exact_and_part_size_is_proportional(look):
     with Recording(look.path) as recording:
         sizes: dict[str, list[int]] = {}
         for _log_ns, message in recording.read():
@@ -79,7 +79,7 @@ def test_sizes_are_those_of_the_messages_and_of_a_part_about_its_share(look):
     assert look.about(2**64, 2**65, both) == (0, 0)
 
 
-def test_sizes_of_what_nobody_counted_are_those_of_some_messages(tmp_path):
+def test_sizes_of_recording_without_statistics_are_sampled(tmp_path):
     path = tmp_path / "theirs.mcap"
     with path.open("wb") as file:  # by another program: without figures
         writer = Writer(file)

@@ -35,7 +35,7 @@ def folder(tmp_path):
     made.close()
 
 
-def test_each_file_with_what_is_in_it(folder, tmp_path, monkeypatch):
+def test_each_file_is_listed_with_its_contents(folder, tmp_path, monkeypatch):
     assert look(folder) == FolderScan()
     record(tmp_path / "a.mcap", [[json_message(seq, topic="/odom") for seq in range(5)]])
     (tmp_path / "cut.MCAP").write_bytes((tmp_path / "a.mcap").read_bytes()[:-100])
@@ -56,7 +56,7 @@ def test_each_file_with_what_is_in_it(folder, tmp_path, monkeypatch):
     assert {each.path.name: each for each in look(folder).files} == found  # nothing is opened again
 
 
-def test_what_is_being_written_is_not_opened_and_many_come_bit_by_bit(folder, tmp_path, monkeypatch):
+def test_active_recording_is_not_opened_and_files_are_read_incrementally(folder, tmp_path, monkeypatch):
     for name in "abc":
         record(tmp_path / f"{name}.mcap", [[json_message(1)]])
     monkeypatch.setattr(folder_module, "AT_ONCE", 1)
@@ -70,13 +70,13 @@ def test_what_is_being_written_is_not_opened_and_many_come_bit_by_bit(folder, tm
     assert (len(found.files), found.left_out) == (2, 1)
 
 
-def test_a_folder_that_is_not_there_is_a_sentence(tmp_path):
+def test_missing_folder_is_reported(tmp_path):
     folder = RecordingFolder(tmp_path / "nowhere")
     assert "no such file" in look(folder).problem or look(folder).problem
     folder.close()
 
 
-def test_names_are_new_ones(tmp_path, monkeypatch):
+def test_new_recording_names_are_unique(tmp_path, monkeypatch):
     now = datetime(2026, 11, 26, 22, 1, 5, tzinfo=timezone.utc)
     first = new_path(tmp_path, now)
     assert first.name == "recording-2026-11-26-22-01-05.mcap"

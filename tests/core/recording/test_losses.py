@@ -47,7 +47,7 @@ def read_bytes(monkeypatch) -> list[int]:
     return lengths
 
 
-def test_of_a_recording_that_lost_nothing_nothing_is_read(tmp_path, read_bytes) -> None:
+def test_recording_without_losses_is_not_read(tmp_path, read_bytes) -> None:
     recording(tmp_path / "a.mcap", {})
     with Recording(tmp_path / "a.mcap") as made:
         assert len(made.figure_pieces()) > PIECES // 2
@@ -55,7 +55,7 @@ def test_of_a_recording_that_lost_nothing_nothing_is_read(tmp_path, read_bytes) 
     assert read_bytes == []
 
 
-def test_of_one_that_lost_little_little_is_read_and_every_loss_found(tmp_path, read_bytes) -> None:
+def test_few_losses_are_all_found_by_reading_little(tmp_path, read_bytes) -> None:
     path = tmp_path / "a.mcap"
     recording(path, {1: 2, 3000: 3, 3003: 1, 7_600: 7})
     with Recording(path) as made:
@@ -71,7 +71,7 @@ def test_of_one_that_lost_little_little_is_read_and_every_loss_found(tmp_path, r
 
 
 @pytest.mark.parametrize("is_complete", [True, False])
-def test_what_came_late_is_not_lost(tmp_path, is_complete) -> None:
+def test_late_messages_are_not_lost(tmp_path, is_complete) -> None:
     path = tmp_path / "a.mcap"
     order = [*range(200), 205, *range(206, 400), 200, 201, *range(400, 600), 603, *range(604, 800)]
     with RecordingWriter(path, clock=TestClock(), limits=limits(figures_s=0.0)) as writer:

@@ -57,7 +57,7 @@ def path(tmp_path: Path) -> Path:
     return path
 
 
-def test_a_file_that_takes_too_much_is_listed_as_not_scanned(path: Path) -> None:
+def test_file_too_expensive_to_read_is_listed_as_not_scanned(path: Path) -> None:
     plain = RecordingFacts(path, path.stat().st_size, 1.0)
     made = read_facts(plain, Failing(RecordingTooLargeError(str(path), "it takes too long to read")))
     assert (made.path, made.is_read, made.problem) == (path, True, "")
@@ -67,9 +67,7 @@ def test_a_file_that_takes_too_much_is_listed_as_not_scanned(path: Path) -> None
 
 
 @pytest.mark.parametrize("opened", [0, 1])
-def test_a_reader_that_dies_is_an_alert_and_the_window_goes_on(
-    tmp_path: Path, path: Path, opened: int
-) -> None:
+def test_dead_reader_is_an_alert_and_window_continues(tmp_path: Path, path: Path, opened: int) -> None:
     alerts, opener = Alerts(), Failing(RecordingError(str(path), "the process has ended"), opened)
     replay = Replay(path, Settings(tmp_path / "home"), alerts, opener=opener)
     replay.start()
@@ -81,7 +79,7 @@ def test_a_reader_that_dies_is_an_alert_and_the_window_goes_on(
     assert opener.is_closed
 
 
-def test_a_recording_is_played_by_a_process_of_its_own(tmp_path: Path, path: Path) -> None:
+def test_recording_is_played_by_a_separate_process(tmp_path: Path, path: Path) -> None:
     replay = Replay(path, Settings(tmp_path / "home"), Alerts(), opener=process_opener())
     replay.start()
     watch = replay.watch("/odom")
@@ -101,7 +99,7 @@ def test_a_recording_is_played_by_a_process_of_its_own(tmp_path: Path, path: Pat
     assert replay.has_ended
 
 
-def test_studio_reads_in_processes_of_their_own(tmp_path: Path) -> None:
+def test_studio_reads_recordings_in_separate_processes(tmp_path: Path) -> None:
     session = Session(Settings(tmp_path / "home"), journal_folder=tmp_path / "j", start_processes=True)
     try:
         opener = session.recordings.new_opener()
@@ -111,7 +109,7 @@ def test_studio_reads_in_processes_of_their_own(tmp_path: Path) -> None:
         session.close()
 
 
-def test_a_recording_of_too_many_topics_is_refused_with_a_sentence(tmp_path: Path) -> None:
+def test_recording_with_too_many_topics_is_rejected_with_explanation(tmp_path: Path) -> None:
     path = tmp_path / "many.mcap"
     path.write_bytes(hostile.many_channels(MAX_TOPICS + 1))
     with pytest.raises(RecordingError, match=str(MAX_TOPICS)):

@@ -53,7 +53,7 @@ def made(tmp_path, monkeypatch) -> Recorded:
     return Recorded(tmp_path)
 
 
-def test_a_recording_begins_with_the_last_choice_and_ends(made):
+def test_recording_starts_with_last_choice_and_ends(made):
     recordings = made.recordings
     recordings.choose(RecordingChoice("pattern", patterns=("/arm/*",), left_out=("/arm/raw",)))
     assert recordings.record("../Aiko: greets", "second try") == ""
@@ -71,7 +71,7 @@ def test_a_recording_begins_with_the_last_choice_and_ends(made):
     assert (recordings.is_recording, recordings.elapsed_s) == (False, 0.0)
 
 
-def test_a_recording_that_begins_is_told_what_goes_on_already(made):
+def test_new_recording_includes_ongoing_events(made):
     recordings = made.recordings
     rule = AlarmRule("1", AlarmCondition("silent", "/camera", for_s=2.0))
     recordings.events.take_alarm(AlarmEvent("on", rule, 1000.0))
@@ -89,7 +89,7 @@ def test_a_recording_that_begins_is_told_what_goes_on_already(made):
     assert said() == [("/camera", "recording"), ("/camera", "ring")]
 
 
-def test_a_choice_for_one_time_is_not_kept(made):
+def test_one_time_choice_is_not_saved(made):
     only = RecordingChoice("chosen", ("/odom",))
     assert made.recordings.record(choice=only) == ""
     assert made.recordings.recorded == only
@@ -97,14 +97,14 @@ def test_a_choice_for_one_time_is_not_kept(made):
     assert made.again().choice == RecordingChoice()
 
 
-def test_what_can_not_be_is_a_sentence_and_starts_nothing(made):
+def test_impossible_recording_gives_reason_and_starts_nothing(made):
     made.recordings.choose(RecordingChoice("chosen"))
     assert made.recordings.record() == "No topic is selected."
     assert made.recordings.keep() == "The flight recorder is off."
     assert made.lines == []
 
 
-def test_a_name_that_is_taken_gets_a_number_and_nothing_is_written_over(made):
+def test_occupied_name_gets_a_number_and_nothing_is_overwritten(made):
     folder = made.home / "Recordings"
     folder.mkdir()
     (folder / "a.mcap").write_bytes(b"precious")
@@ -112,7 +112,7 @@ def test_a_name_that_is_taken_gets_a_number_and_nothing_is_written_over(made):
     assert made.lines[0].orders[0]["path"] == str(folder / "a 2.mcap")
 
 
-def test_a_chosen_folder_that_is_away_is_not_made_anew_but_said(made):
+def test_missing_chosen_folder_is_reported_not_created(made):
     away = made.home / "stick" / "films"
     made.recordings.set_folder(away)
     assert made.again().folder == away
@@ -126,13 +126,13 @@ def test_a_chosen_folder_that_is_away_is_not_made_anew_but_said(made):
     assert not made.alerts.active
 
 
-def test_a_folder_that_can_not_be_made_is_said(made):
+def test_folder_creation_failure_is_reported(made):
     (made.home / "Recordings").write_bytes(b"a file in its place")
     assert made.recordings.record() == "The recordings folder is missing."
     assert made.alerts.has(NO_FOLDER)
 
 
-def test_the_flight_recorder_is_off_until_somebody_wants_it_and_comes_back_with_the_next_start(made):
+def test_flight_recorder_is_off_by_default_and_restored_at_next_start(made):
     made.recordings.start()
     assert made.lines == []
     made.recordings.set_wish(RingWish(is_on=True, seconds=30, size_gb=0.5))
@@ -152,7 +152,7 @@ def alarm() -> tuple[AlarmEvent, AlarmAction]:
     return AlarmEvent("on", rule, 1000.0), action
 
 
-def test_an_alarm_keeps_the_last_seconds_and_is_told_when_they_are_there(made):
+def test_alarm_saves_last_seconds_and_is_notified_when_saved(made):
     told: list[tuple[bool, str]] = []
     made.recordings.set_wish(RingWish(is_on=True))
     made.say("ring")
@@ -167,7 +167,7 @@ def test_an_alarm_keeps_the_last_seconds_and_is_told_when_they_are_there(made):
     assert made.made == [("alarm-2026-11-26-22-01-05.mcap", "kept")]
 
 
-def test_an_alarm_is_told_why_nothing_was_kept(made):
+def test_alarm_is_notified_why_nothing_was_saved(made):
     told: list[tuple[bool, str]] = []
 
     def done(well: bool, words: str) -> None:
@@ -189,5 +189,5 @@ def test_an_alarm_is_told_why_nothing_was_kept(made):
 
 
 @pytest.mark.parametrize("words", ["", "sound", "kept nothing", "mcap", ".mcapx"])
-def test_words_without_a_file_name_none(words):
+def test_words_without_file_name_give_no_file(words):
     assert kept_file(words) == ""

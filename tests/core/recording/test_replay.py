@@ -86,7 +86,7 @@ class Taker:
         self.seqs.clear()
 
 
-def test_topics_are_those_of_the_file_and_the_newest_message_is_that_of_the_playhead(shown, whole):
+def test_replay_topics_match_file_and_newest_message_follows_playhead(shown, whole):
     topics = shown.replay.topics
     assert [topic.name for topic in topics] == ["/a", LOG_TOPIC]
     assert not any(topic.new for topic in topics)
@@ -99,7 +99,7 @@ def test_topics_are_those_of_the_file_and_the_newest_message_is_that_of_the_play
     assert topics["/a"].newest is None
 
 
-def test_before_its_first_message_a_topic_has_none(shown, whole):
+def test_topic_has_no_newest_message_before_its_first(shown, whole):
     with shown.replay.watch(LOG_TOPIC):
         shown.seek(whole[30][0])
         assert shown.replay.topics[LOG_TOPIC].newest is not None
@@ -107,7 +107,7 @@ def test_before_its_first_message_a_topic_has_none(shown, whole):
         assert shown.replay.topics[LOG_TOPIC].newest is None
 
 
-def test_the_log_is_that_up_to_the_playhead_also_after_going_back(shown, whole):
+def test_log_ends_at_playhead_also_after_seeking_back(shown, whole):
     shown.seek(whole[39][0])
     assert shown.lines() == ["line 5", "line 15", "line 25", "line 35"]
     shown.seek(whole[20][0])
@@ -118,7 +118,7 @@ def test_the_log_is_that_up_to_the_playhead_also_after_going_back(shown, whole):
     assert shown.lines()[:3] == ["line 5", "line 15", "line 25"]
 
 
-def test_a_series_has_what_was_before_the_playhead_and_goes_on_without_doubles(shown, whole):
+def test_series_starts_with_messages_before_playhead_and_has_no_duplicates(shown, whole):
     taker = Taker()
     shown.seek(whole[30][0])
     shown.replay.series.join("/a", taker)
@@ -133,7 +133,7 @@ def test_a_series_has_what_was_before_the_playhead_and_goes_on_without_doubles(s
     assert taker.seqs == [seq for seq in seqs if seq <= 10]
 
 
-def test_figures_say_what_was_lost_and_how_often_a_topic_came(shown, whole):
+def test_figures_show_losses_and_topic_rate(shown, whole):
     shown.seek(whole[-1][0])
     topic = shown.replay.topics["/a"]
     assert topic.lost == LOST
@@ -143,7 +143,7 @@ def test_figures_say_what_was_lost_and_how_often_a_topic_came(shown, whole):
     assert topic.publishers == 1
 
 
-def test_losses_and_density_are_read_in_a_thread(shown, whole):
+def test_losses_and_density_are_read_in_background_thread(shown, whole):
     densities = shown.replay.densities
     densities.want(whole[0][0], whole[-1][0] + 1, COUNT)
     end = time.monotonic() + 60
@@ -155,7 +155,7 @@ def test_losses_and_density_are_read_in_a_thread(shown, whole):
     assert densities.newest.peak("/nowhere") == 0
 
 
-def test_a_person_skips_to_bookmarks_and_to_the_ends(shown, whole):
+def test_user_can_skip_to_bookmarks_and_to_both_ends(shown, whole):
     replay = shown.replay
     shown.seek(whole[20][0])
     made = replay.bookmark("here")
@@ -173,7 +173,7 @@ def test_a_person_skips_to_bookmarks_and_to_the_ends(shown, whole):
     assert replay.bookmarks == ()
 
 
-def test_a_part_is_chosen_by_its_edges(shown, whole):
+def test_loop_is_set_by_its_edges(shown, whole):
     replay = shown.replay
     shown.seek(whole[20][0])
     replay.set_loop_edge(is_start=True)
@@ -193,13 +193,13 @@ def test_a_part_is_chosen_by_its_edges(shown, whole):
 @pytest.mark.parametrize(
     ("asked", "given"), [(0.0, 0.1), (-1.0, 0.1), (1e9, 10.0), (float("nan"), 1.0), (2.5, 2.5)]
 )
-def test_a_speed_that_there_is_not_becomes_the_nearest(shown, asked, given):
+def test_unsupported_speed_becomes_the_nearest(shown, asked, given):
     shown.replay.set_speed(asked)
     shown.tick()
     assert shown.replay.player.speed == given
 
 
-def test_play_at_the_end_begins_again(shown, whole):
+def test_play_at_end_restarts_from_beginning(shown, whole):
     shown.seek(2**64 - 1)
     shown.replay.toggle()
     shown.tick(0.0)
@@ -207,7 +207,7 @@ def test_play_at_the_end_begins_again(shown, whole):
     assert shown.replay.player.is_playing
 
 
-def test_stepping_through_a_topic_that_is_not_there_does_nothing(shown):
+def test_stepping_through_missing_topic_does_nothing(shown):
     shown.replay.choose("/nowhere")
     assert shown.replay.chosen == "/a"
     shown.replay.chosen = "/nowhere"
@@ -217,7 +217,7 @@ def test_stepping_through_a_topic_that_is_not_there_does_nothing(shown):
     assert shown.replay.player.position_ns == before
 
 
-def test_what_cannot_be_played_is_an_alert_and_ends_the_thread(tmp_path):
+def test_unplayable_recording_is_an_alert_and_ends_the_thread(tmp_path):
     path = tmp_path / "broken.mcap"
     path.write_bytes(b"no recording")
     alerts = Alerts()
@@ -232,7 +232,7 @@ def test_what_cannot_be_played_is_an_alert_and_ends_the_thread(tmp_path):
     replay.close()
 
 
-def test_what_was_cut_off_is_told(tmp_path, path):
+def test_truncated_recording_is_an_alert(tmp_path, path):
     cut = tmp_path / "cut.mcap"
     cut.write_bytes(path.read_bytes()[:-3000])
     made = Shown(cut)
@@ -240,7 +240,7 @@ def test_what_was_cut_off_is_told(tmp_path, path):
     made.replay.close()
 
 
-def test_a_topic_whose_publisher_has_no_number_is_there_too(tmp_path):
+def test_topic_without_sequence_numbers_is_listed_with_unknown_losses(tmp_path):
     path = tmp_path / "original.mcap"
     record(path, [[Message("/original", b"{}", "json", "json")]])
     with Recording(path) as recording:
@@ -249,5 +249,5 @@ def test_a_topic_whose_publisher_has_no_number_is_there_too(tmp_path):
     assert view.topics["/original"].lost is None
 
 
-def test_time_between_messages_is_that_of_the_recording(whole):
+def test_message_interval_matches_the_recording(whole):
     assert whole[1][0] - whole[0][0] == STEP_NS

@@ -95,7 +95,7 @@ def some(whole, *topics: str, begin: int = 0, end: int = COUNT):
     return [kept(message) for _ns, message in whole[begin:end] if message.topic in topics]
 
 
-def test_all_of_a_topic_is_sent_from_its_first_message_on_and_panels_get_what_they_watch(played, whole):
+def test_chosen_topics_are_sent_completely_and_panels_receive_watched_topics(played, whole):
     sender = played("/a", "/camera", watched="/b")
     assert sender.taken() == []  # what a panel shows at the beginning is not sent
     sender.do(Playback.play)
@@ -109,7 +109,7 @@ def test_all_of_a_topic_is_sent_from_its_first_message_on_and_panels_get_what_th
     assert sender.taken() == some(whole, "/a", "/camera")
 
 
-def test_a_seek_sends_nothing_of_what_lies_between_and_a_pause_nothing_at_all(played, whole):
+def test_seek_sends_no_skipped_messages_and_pause_sends_nothing(played, whole):
     sender = played("/a", "/b")
     sender.do(Playback.play)
     sender.pass_time(0.1)
@@ -128,7 +128,7 @@ def test_a_seek_sends_nothing_of_what_lies_between_and_a_pause_nothing_at_all(pl
     assert sender.taken() == some(whole, "/a", "/b", begin=51)
 
 
-def test_a_loop_sends_its_part_again_and_again_and_nothing_of_the_rest(played, whole):
+def test_loop_repeats_only_its_part(played, whole):
     sender = played("/a", "/b")
     begin, end = 10, 20
     sender.do(lambda playback: playback.loop(whole[begin][0], whole[end][0]))
@@ -139,7 +139,7 @@ def test_a_loop_sends_its_part_again_and_again_and_nothing_of_the_rest(played, w
     assert sent == (part * 4)[: len(sent)]
 
 
-def test_who_is_late_sends_no_burst_and_the_speed_is_the_replays(played):
+def test_late_replay_sends_no_burst_and_follows_replay_speed(played):
     sender = played("/a", "/b")
     sender.do(Playback.play)
     sender.pass_time(0.1)
@@ -155,7 +155,7 @@ def test_who_is_late_sends_no_burst_and_the_speed_is_the_replays(played):
     assert 15 <= len(quick.messages) <= 25
 
 
-def test_a_panel_that_looks_at_what_is_sent_has_its_newest_message(played, whole):
+def test_watch_on_sent_topic_receives_its_newest_message(played, whole):
     sender = played("/a")
     sender.do(Playback.play)
     sender.pass_time(0.2)
@@ -203,7 +203,7 @@ class TestNode:
         return self.made[-1]
 
 
-def test_replay_leaves_out_what_would_move_a_robot_that_has_just_come():
+def test_replay_omits_messages_that_would_move_a_newly_connected_robot():
     node, jobs, arming, robots = TestNode(), [], Arming(), Robots()
     gate = MotionGate(MotionPermission(), robots)
     outbox = ReplayOutbox(arming, lambda _what, job: jobs.append(job), gate)
@@ -220,7 +220,7 @@ def test_replay_leaves_out_what_would_move_a_robot_that_has_just_come():
     assert (sent.count, sent.skipped) == (1, 1)
 
 
-def test_the_outbox_sends_what_is_allowed_in_its_turn_and_counts_what_it_leaves_out():
+def test_outbox_sends_only_allowed_messages_and_counts_omitted_ones():
     node, jobs, arming = TestNode(), [], Arming()
     outbox = ReplayOutbox(arming, lambda _what, job: jobs.append(job))
     arming.arm()
@@ -272,7 +272,7 @@ def heard_of(heard: list[Message]) -> list[Message]:
     return [each for each in heard if each.topic in ("/test/a", "/camera")]
 
 
-def test_it_is_heard_on_the_network_under_its_new_name_until_stop(
+def test_replayed_topic_is_received_under_its_new_name_until_stop(
     session: Session, path: Path, whole
 ) -> None:
     acting = session.acting
@@ -311,7 +311,7 @@ def test_it_is_heard_on_the_network_under_its_new_name_until_stop(
     assert f"/camera: {sent_words(going[1])}" in said
 
 
-def test_what_moves_robots_is_asked_for_again_also_under_another_name(session: Session, path: Path) -> None:
+def test_motion_commands_need_confirmation_even_under_another_name(session: Session, path: Path) -> None:
     acting = session.acting
     replay, sending = open_and_know(session, path)
     for recorded, name in (("/base/cmd_vel", "/harmless"), ("/b", "/arm/command"), ("/a", "")):

@@ -107,7 +107,7 @@ def newest(whole, topic: str, at_ns: int) -> tuple[object, ...] | None:
     return kept(found[-1]) if found else None
 
 
-def test_what_is_played_is_what_came_byte_for_byte(replay, whole):
+def test_replayed_messages_are_byte_identical(replay, whole):
     played = replay("/a", "/b", "/camera", "/rare")
     first = played.source.pop_results()
     handed = played.do(Playback.play)
@@ -122,7 +122,7 @@ def test_what_is_played_is_what_came_byte_for_byte(replay, whole):
 
 
 @pytest.mark.parametrize("seed", range(4))
-def test_after_a_seek_each_topic_has_its_newest_message_up_to_the_playhead(replay, whole, seed):
+def test_seek_delivers_newest_message_of_each_topic_up_to_playhead(replay, whole, seed):
     topics, chance = ("/a", "/b", "/rare", "/camera"), random.Random(seed)
     played = replay(*topics)
     start_ns, end_ns = whole[0][0], whole[-1][0]
@@ -136,7 +136,7 @@ def test_after_a_seek_each_topic_has_its_newest_message_up_to_the_playhead(repla
         assert handed.drained.batches == {}
 
 
-def test_messages_that_were_not_taken_are_forgotten_by_a_seek(replay, whole):
+def test_seek_discards_undelivered_messages(replay, whole):
     played = replay("/a")
     played.do(Playback.play)
     for _ in range(40):
@@ -147,7 +147,7 @@ def test_messages_that_were_not_taken_are_forgotten_by_a_seek(replay, whole):
     assert handed.drained.batches == {}
 
 
-def test_a_seek_beyond_the_ends_and_with_odd_numbers_goes_to_the_ends(replay, whole):
+def test_seek_is_clamped_to_the_recording(replay, whole):
     played = replay("/a")
     end_ns = played.source.opened.recording.end_ns
     assert end_ns >= whole[-1][0]
@@ -156,7 +156,7 @@ def test_a_seek_beyond_the_ends_and_with_odd_numbers_goes_to_the_ends(replay, wh
         assert played.source.status.player.position_ns == expected
 
 
-def test_only_the_last_of_many_seeks_is_done(replay, whole):
+def test_only_last_of_many_seeks_is_executed(replay, whole):
     played = replay("/a")
     for log_ns, _message in whole:
         played.source.order("seek", lambda playback, at_ns=log_ns: playback.seek(at_ns))
@@ -165,7 +165,7 @@ def test_only_the_last_of_many_seeks_is_done(replay, whole):
     assert played.source.status.player.position_ns == whole[-1][0]
 
 
-def test_a_topic_that_is_looked_at_later_has_its_newest_message_and_all_that_follow(replay, whole):
+def test_late_watch_receives_newest_message_and_all_later_ones(replay, whole):
     played = replay("/a")
     played.source.pop_results()
     played.do(Playback.play)
@@ -181,7 +181,7 @@ def test_a_topic_that_is_looked_at_later_has_its_newest_message_and_all_that_fol
     assert [each.seq for each in came] == [seq for seq in seqs if seq >= came[0].seq]
 
 
-def test_who_looks_no_more_gets_nothing_more(replay):
+def test_unwatched_topic_delivers_nothing(replay):
     played = replay("/a", "/b")
     played.do(Playback.play)
     played.source.unwatch("/b")
@@ -192,7 +192,7 @@ def test_who_looks_no_more_gets_nothing_more(replay):
     assert not of(handed, "/b")
 
 
-def test_steps_go_from_message_to_message_of_one_topic_and_pause(replay, whole):
+def test_step_moves_between_messages_of_one_topic_and_pauses(replay, whole):
     played = replay("/a", "/rare")
     played.do(Playback.play)
     handed = played.do(lambda playback: playback.step("/rare"))
@@ -205,7 +205,7 @@ def test_steps_go_from_message_to_message_of_one_topic_and_pause(replay, whole):
     assert played.do(lambda playback: playback.step("/rare", forward=False)).jump is None
 
 
-def test_a_part_is_played_again_and_again(replay, whole):
+def test_loop_replays_its_part_repeatedly(replay, whole):
     played = replay("/a")
     start_ns = whole[10][0]
     played.do(lambda playback: playback.loop(start_ns, start_ns + 20 * STEP_NS))
@@ -220,9 +220,7 @@ def test_a_part_is_played_again_and_again(replay, whole):
     assert played.source.status.player.is_playing
 
 
-def test_a_window_that_is_slow_misses_messages_and_they_are_counted_but_the_playhead_is_right(
-    tmp_path, replay
-):
+def test_slow_window_drops_and_counts_messages_while_playhead_stays_correct(tmp_path, replay):
     count = 4 * MESSAGES_PER_TOPIC
     path = tmp_path / "fast.mcap"
     with RecordingWriter(path, clock=TestClock(step_ns=1_000_000), limits=limits()) as writer:
@@ -239,13 +237,13 @@ def test_a_window_that_is_slow_misses_messages_and_they_are_counted_but_the_play
     assert played.source.status.player.position_ns == played.source.opened.recording.end_ns
 
 
-def test_small_messages_do_not_keep_the_piece_of_the_file_that_they_came_from(replay):
+def test_small_messages_do_not_retain_their_file_chunk(replay):
     played = replay("/a")
     handed = played.do(lambda playback: playback.seek(2**63))
     assert all(type(each.raw) is bytes for each in handed.jump)
 
 
-def test_who_plots_gets_what_was_before_the_playhead(replay, whole):
+def test_plot_receives_messages_before_the_playhead(replay, whole):
     played = replay()
     played.source.pop_results()
     at_ns = whole[50][0]
@@ -261,7 +259,7 @@ def test_who_plots_gets_what_was_before_the_playhead(replay, whole):
     assert [each.seq for each in handed.history["/a"]] == [seq for seq in before if seq <= 10]
 
 
-def test_figures_are_those_of_the_playhead(replay, whole):
+def test_figures_follow_the_playhead(replay, whole):
     played = replay()
     handed = played.do(lambda playback: playback.seek(whole[59][0]))
     assert handed.figures["/rare"].newest_ns == whole[20][0]
@@ -271,7 +269,7 @@ def test_figures_are_those_of_the_playhead(replay, whole):
     assert handed.figures["/rare"].rate_hz == 0.0
 
 
-def test_a_recording_without_an_end_is_played_as_it_is_and_nothing_is_written(tmp_path, path, whole):
+def test_truncated_recording_is_played_without_modifying_it(tmp_path, path, whole):
     cut = tmp_path / "cut.mcap"
     cut.write_bytes(path.read_bytes()[:-400])
     before = cut.read_bytes()
@@ -285,7 +283,7 @@ def test_a_recording_without_an_end_is_played_as_it_is_and_nothing_is_written(tm
 
 
 @pytest.mark.parametrize("content", [b"", b"no recording", bytes(5000)])
-def test_what_is_no_recording_is_said(tmp_path, content):
+def test_invalid_recording_raises(tmp_path, content):
     path = tmp_path / "broken.mcap"
     path.write_bytes(content)
     source = ReplaySource(path, Pictures(), clock=Clock())
@@ -294,7 +292,7 @@ def test_what_is_no_recording_is_said(tmp_path, content):
     assert list(tmp_path.iterdir()) == [path]
 
 
-def test_a_recording_without_a_message_is_said(tmp_path):
+def test_empty_recording_raises(tmp_path):
     path = tmp_path / "empty.mcap"
     record(path, [])
     source = ReplaySource(path, Pictures(), clock=Clock())

@@ -22,16 +22,16 @@ WHOLE = TimeScale.whole(100 * S, 860 * S)
         (-1_500_000_000, 3, "-0:01.500"),
     ],
 )
-def test_times_are_written(ns, digits, words):
+def test_time_spans_are_formatted(ns, digits, words):
     assert span_words(ns, digits=digits) == words
 
 
-def test_a_clock_has_milliseconds():
+def test_clock_time_has_milliseconds():
     assert clock_words(1_790_000_000_412_999_999).endswith(".412")
 
 
 @pytest.mark.parametrize("seed", range(5))
-def test_whatever_a_person_does_the_part_stays_within_the_recording(seed):
+def test_visible_range_stays_within_the_recording(seed):
     chance, scale = random.Random(seed), WHOLE
     for _ in range(200):
         at_ns = scale.time(chance.uniform(-1, 2))
@@ -48,21 +48,21 @@ def test_whatever_a_person_does_the_part_stays_within_the_recording(seed):
         assert 1 <= len(list(scale.marks(8))) <= 10
 
 
-def test_a_zoom_keeps_the_time_under_the_mouse_where_it_is():
+def test_zoom_keeps_the_time_under_the_mouse():
     scale = WHOLE.zoomed(0.25, 400 * S)
     assert scale.share(400 * S) == pytest.approx(WHOLE.share(400 * S))
     assert not scale.is_whole
     assert scale.zoomed(100.0, 400 * S).is_whole
 
 
-def test_marks_are_full_steps_from_the_beginning():
+def test_tick_marks_are_full_steps_from_the_beginning():
     marks = list(WHOLE.marks(8))
     assert [each - 100 * S for each in marks] == [k * 120 * S for k in range(7)]
     inside = WHOLE.zoomed(0.1, 480 * S)
     assert all((each - 100 * S) % round(inside.step_s(8) * 1e9) == 0 for each in inside.marks(8))
 
 
-def test_a_recording_of_one_moment_has_a_length_to_show():
+def test_recording_of_a_single_moment_has_a_visible_range():
     scale = TimeScale.whole(5 * S, 5 * S)
     assert scale.span_ns == MIN_SPAN_NS
     assert scale.time(0.5) <= scale.last_ns

@@ -45,7 +45,7 @@ def run(**changed: object) -> dict[str, object]:
     return {"id": "run-1", "name": "Greeting", "since_ns": None, "until_ns": None, **changed}
 
 
-def test_a_run_is_from_its_begin_to_its_end_and_the_last_words_count(found):
+def test_run_spans_from_start_to_end_with_its_latest_text(found):
     made = found(
         (2, "runs", run(since_ns=at(1))),
         (5, "runs", run(since_ns=at(1), until_ns=at(4), result="stopped")),
@@ -55,13 +55,13 @@ def test_a_run_is_from_its_begin_to_its_end_and_the_last_words_count(found):
     assert (made.alarms, made.left_out, made.starts()) == ((), 0, [at(1)])
 
 
-def test_what_began_before_and_goes_on_fills_the_recording(found):
+def test_ongoing_event_from_before_the_start_spans_the_whole_recording(found):
     made = found((2, "alarms", run(since_ns=5, severity="error", topic="/camera")))
     first, last = found.ends
     assert made.alarms == (RecordedSpan(first, last, "Greeting", is_error=True, topic="/camera"),)
 
 
-def test_alerts_of_the_graph_are_on_between_two_of_its_lists(found):
+def test_graph_alert_spans_until_the_first_list_without_that_alert(found):
     alert = {"id": "type:/camera", "sentence": "two types on /camera", "hint": ""}
     made = found(
         (2, "alerts", {"alerts": [alert]}),
@@ -86,7 +86,7 @@ def test_alerts_of_the_graph_are_on_between_two_of_its_lists(found):
      run(name=3, result=[], words={})],
 )  # fmt: skip
 @pytest.mark.parametrize("role", ["runs", "alarms", "alerts"])
-def test_whatever_stands_there_spans_lie_within_the_recording(found, role, value):
+def test_spans_stay_within_the_recording_for_any_input(found, role, value):
     made = found((3, role, value))
     first, last = found.ends
     for span in (*made.runs, *made.alarms):
@@ -94,7 +94,7 @@ def test_whatever_stands_there_spans_lie_within_the_recording(found, role, value
         assert span.result == ""
 
 
-def test_no_more_are_kept_than_fit_and_the_others_are_counted(found, monkeypatch):
+def test_number_of_spans_is_limited_and_excess_is_counted(found, monkeypatch):
     monkeypatch.setattr(spans_module, "MAX_SPANS", 4)
     said = [(1, "runs", run(id=f"run-{number}")) for number in range(7)]
     made = found(*said, *said)

@@ -55,7 +55,7 @@ def disk(tmp_path_factory: pytest.TempPathFactory) -> SmallDisk:
     return SmallDisk(tmp_path_factory.mktemp("disk"))
 
 
-def test_on_a_full_disk_a_report_is_whole_or_not_there(disk: SmallDisk) -> None:
+def test_report_on_full_disk_is_complete_or_absent(disk: SmallDisk) -> None:
     told = disk.run(FULL)
     advice = "free some space or choose another folder"
     assert told["report"] == f"can't write other.zip ({told['full']}); {advice}"
@@ -97,7 +97,7 @@ BEFORE = (
 )
 
 
-def test_a_disk_that_can_not_be_written_is_told_in_one_line_and_no_crash_each_time(disk: SmallDisk) -> None:
+def test_read_only_disk_is_logged_once_and_not_reported_as_crash(disk: SmallDisk) -> None:
     told = disk.run(READ_ONLY, BEFORE.format(disk.folder))
     # the mark and the report of before stay, as nothing can be taken away: neither is told at each start
     assert told == {"noted": False, "left": 0, "lines": 1, "new": 0, "all": 1}

@@ -42,7 +42,7 @@ def waits() -> Program:
 # ---- the program of a behaviour
 
 
-def test_a_program_whose_process_crashes_is_reported_with_the_place(crashes, master) -> None:
+def test_crashed_program_process_is_reported_with_its_location(crashes, master) -> None:
     heard = Heard()
     runner = Runner(heard)
     try:
@@ -63,7 +63,7 @@ def test_a_program_whose_process_crashes_is_reported_with_the_place(crashes, mas
 @pytest.mark.parametrize(
     "code", ["raise SystemExit('no room left')", "import os, signal; os.kill(os.getpid(), 15)"]
 )
-def test_a_program_that_ends_otherwise_is_no_crash(crashes, code: str) -> None:
+def test_other_program_exit_is_not_a_crash(crashes, code: str) -> None:
     heard = Heard()
     runner = Runner(heard, command=(sys.executable, "-c", code))
     runner.start(waits(), [], None)
@@ -72,7 +72,7 @@ def test_a_program_that_ends_otherwise_is_no_crash(crashes, code: str) -> None:
     assert crashes() == []
 
 
-def test_a_program_that_studio_stops_is_no_crash(crashes, master) -> None:
+def test_program_stopped_by_studio_is_not_a_crash(crashes, master) -> None:
     heard = Heard()
     runner = Runner(heard)
     runner.start(waits(), [], master.address)
@@ -101,7 +101,7 @@ def died(world: World, said: bytes, code: int) -> LaunchFailed:
     return told
 
 
-def test_a_robot_whose_process_crashes_is_reported_and_its_own_words_are_told(crashes, world: World) -> None:
+def test_crashed_robot_process_is_reported_with_its_output(crashes, world: World) -> None:
     told = died(world, b"it was hot\n" + TRACE, -11)
     assert told.detail == "it was hot"
     (crash,) = crashes()
@@ -110,18 +110,18 @@ def test_a_robot_whose_process_crashes_is_reported_and_its_own_words_are_told(cr
     assert TRACE.decode().strip() in crash.text
 
 
-def test_one_that_says_nothing_else_is_told_as_before(crashes, world: World) -> None:
+def test_crashed_robot_process_without_output_has_default_message(crashes, world: World) -> None:
     assert died(world, TRACE, -11).detail == "Another program on this computer stopped it."
     assert len(crashes()) == 1
 
 
 @pytest.mark.parametrize("code", [1, -signal.SIGTERM])
-def test_one_that_ends_with_words_is_no_crash(crashes, world: World, code: int) -> None:
+def test_robot_process_that_exits_with_output_is_not_a_crash(crashes, world: World, code: int) -> None:
     assert died(world, b"x" * 5000, code).detail == "x" * TAIL_LETTERS
     assert crashes() == []
 
 
-def test_one_that_is_put_away_is_no_crash(crashes, world: World) -> None:
+def test_robot_stopped_by_user_is_not_a_crash(crashes, world: World) -> None:
     world.launcher.start_virtual_robot("Turtle", "diffdrive")
     world.launcher.stop_virtual_robot("Turtle")
     world.launcher.check()
@@ -131,7 +131,7 @@ def test_one_that_is_put_away_is_no_crash(crashes, world: World) -> None:
 # ---- the master
 
 
-def test_a_master_that_crashed_is_reported_when_the_next_one_is_started(crashes) -> None:
+def test_crashed_master_is_reported_at_next_master_start(crashes) -> None:
     with socket.socket() as probe:
         probe.bind(("127.0.0.1", 0))
         address = f"127.0.0.1:{probe.getsockname()[1]}"

@@ -22,22 +22,22 @@ from app.core.reports.crash import end_words, fatal_line, is_crash, split_trace
     ],
 )
 @pytest.mark.skipif(sys.platform == "win32", reason="its signals have other numbers")
-def test_what_is_a_crash(code: int, words: str) -> None:
+def test_crash_exit_codes(code: int, words: str) -> None:
     assert is_crash(code)
     assert end_words(code) == words
 
 
 @pytest.mark.parametrize("code", [0, 1, 2, 3, 255, -signal.SIGINT, -signal.SIGTERM, 0xC000013A])
-def test_what_is_none(code: int) -> None:
+def test_exit_codes_that_are_not_a_crash(code: int) -> None:
     assert not is_crash(code)
 
 
-def test_a_signal_without_a_name_has_its_number() -> None:
+def test_unknown_signal_is_described_by_its_number() -> None:
     assert end_words(-250) == "ended by signal 250"
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="a signal")
-def test_a_process_says_where_it_crashed_behind_its_own_words() -> None:
+def test_crash_trace_follows_output_of_the_process() -> None:
     code = (
         "import os, signal, sys\n"
         "from nep.system.crash_trace import say_where_it_crashes\n"
@@ -54,7 +54,7 @@ def test_a_process_says_where_it_crashed_behind_its_own_words() -> None:
     assert "deep_inside" in trace
 
 
-def test_the_last_fatal_line_says_how_it_ended() -> None:
+def test_last_fatal_line_describes_the_crash() -> None:
     caught = "Windows fatal exception: code 0x800706ba\n\nThread 1\n"
     assert fatal_line("") == ""
     assert fatal_line(caught) == "", "the system's own, which it caught"
@@ -63,7 +63,7 @@ def test_the_last_fatal_line_says_how_it_ended() -> None:
     assert fatal_line("Fatal Python error: Aborted\n\nThread 1\n") == "Fatal Python error: Aborted"
 
 
-def test_what_is_no_trace_stays_whole() -> None:
+def test_output_without_trace_is_not_split() -> None:
     assert split_trace("one\ntwo\n") == ("one\ntwo\n", "")
     assert split_trace("a\nWindows fatal exception: access violation\n\nb") == (
         "a\n",
@@ -72,7 +72,7 @@ def test_what_is_no_trace_stays_whole() -> None:
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="a closed stderr is another matter there")
-def test_a_process_without_an_output_for_errors_goes_on() -> None:
+def test_crash_handler_works_without_stderr() -> None:
     code = (
         "import sys; sys.stderr = None\n"
         "from nep.system.crash_trace import say_where_it_crashes\n"

@@ -34,7 +34,7 @@ def reports(tmp_path: Path, clock: Clock) -> CrashReports:
     return CrashReports(tmp_path / "crashes", clock)
 
 
-def test_a_report_says_what_how_and_when(reports: CrashReports) -> None:
+def test_crash_report_contains_part_cause_and_time(reports: CrashReports) -> None:
     path = reports.add(Crash("robot", "it ended by signal 11", "where it was"))
     assert path is not None
     told = path.read_text("utf-8")
@@ -44,20 +44,20 @@ def test_a_report_says_what_how_and_when(reports: CrashReports) -> None:
 
 
 @pytest.mark.skipif(os.name != "posix", reason="modes")
-def test_it_is_for_its_owner_alone(reports: CrashReports) -> None:
+def test_crash_report_is_private_to_its_owner(reports: CrashReports) -> None:
     path = reports.add(Crash("studio", "how"))
     assert path is not None
     assert stat.S_IMODE(path.stat().st_mode) == 0o600
     assert stat.S_IMODE(path.parent.stat().st_mode) == 0o700
 
 
-def test_the_home_folder_has_no_name_in_it(reports: CrashReports) -> None:
+def test_home_folder_is_removed_from_crash_report(reports: CrashReports) -> None:
     path = reports.add(Crash("studio", "how", f"in {Path.home() / 'thing.py'}"))
     assert path is not None
     assert str(Path.home()) not in path.read_text("utf-8")
 
 
-def test_ten_are_kept_the_newest(reports: CrashReports, clock: Clock) -> None:
+def test_ten_newest_crash_reports_are_kept(reports: CrashReports, clock: Clock) -> None:
     for number in range(MAX_REPORTS + 4):
         clock.now += 60
         reports.add(Crash("editor", f"number {number}"))
@@ -67,7 +67,7 @@ def test_ten_are_kept_the_newest(reports: CrashReports, clock: Clock) -> None:
     assert "number 4" in told[-1]
 
 
-def test_several_in_one_second_have_files_of_their_own_also_when_they_were_told(
+def test_crash_reports_of_the_same_second_have_separate_files(
     reports: CrashReports,
 ) -> None:
     for how in ("one", "two"):
@@ -79,7 +79,7 @@ def test_several_in_one_second_have_files_of_their_own_also_when_they_were_told(
     ]  # fmt: skip
 
 
-def test_each_is_told_once_also_to_two_windows(reports: CrashReports, tmp_path: Path) -> None:
+def test_crash_report_is_offered_once_also_with_two_windows(reports: CrashReports, tmp_path: Path) -> None:
     reports.add(Crash("studio", "how"))
     other = CrashReports(tmp_path / "crashes")
     assert [each.part for each in reports.take_new()] == ["studio"]
@@ -88,7 +88,7 @@ def test_each_is_told_once_also_to_two_windows(reports: CrashReports, tmp_path: 
     assert [each.is_new for each in other.all()] == [False]
 
 
-def test_what_is_no_report_is_left_alone(reports: CrashReports, tmp_path: Path) -> None:
+def test_other_files_in_crash_folder_are_not_changed(reports: CrashReports, tmp_path: Path) -> None:
     folder = tmp_path / "crashes"
     folder.mkdir()
     for name in ("crash of mine.txt", "crash 2026-13-99 99.99.99 studio.txt", "note.txt"):
@@ -100,9 +100,7 @@ def test_what_is_no_report_is_left_alone(reports: CrashReports, tmp_path: Path) 
     assert (folder / "crash of mine.txt").exists()
 
 
-def test_where_nothing_can_be_written_one_line_says_so(
-    tmp_path: Path, caplog: pytest.LogCaptureFixture
-) -> None:
+def test_unwritable_crash_folder_is_logged_once(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
     (tmp_path / "file").write_text("no folder")
     reports = CrashReports(tmp_path / "file" / "crashes")
     assert reports.add(Crash("studio", "how")) is None
@@ -111,7 +109,7 @@ def test_where_nothing_can_be_written_one_line_says_so(
     assert [each.levelname for each in caplog.records] == ["WARNING"]
 
 
-def test_a_record_of_a_crash_becomes_a_report_and_others_do_not(reports: CrashReports) -> None:
+def test_only_crash_log_records_become_reports(reports: CrashReports) -> None:
     log = logging.getLogger("test of crashes")
     handler = CrashLog(reports)
     log.addHandler(handler)
@@ -126,7 +124,7 @@ def test_a_record_of_a_crash_becomes_a_report_and_others_do_not(reports: CrashRe
     assert sorted(each.part for each in reports.all()) == ["behaviour", "behaviour", "robot"]
 
 
-def test_the_next_start_offers_the_worst_once(reports: CrashReports) -> None:
+def test_next_start_offers_the_most_severe_crash_once(reports: CrashReports) -> None:
     alerts = Alerts()
     offer(alerts, reports)
     assert not alerts.has(ALERT)
@@ -144,7 +142,7 @@ def test_the_next_start_offers_the_worst_once(reports: CrashReports) -> None:
     assert not again.active
 
 
-def test_a_crash_of_the_version_before_an_update_is_said_to_be_of_that(reports: CrashReports) -> None:
+def test_crash_before_an_update_is_reported_with_its_version(reports: CrashReports) -> None:
     path = reports.add(Crash("studio", "how", "text", "0.0.9"))
     assert path is not None
     told = path.read_text("utf-8")
@@ -161,7 +159,7 @@ def test_a_crash_of_the_version_before_an_update_is_said_to_be_of_that(reports: 
 @pytest.mark.parametrize(
     "first", ["", "Crash report of NEP Studio \x1b[2J", "Crash report of NEP Studio " + "9" * 99]
 )
-def test_a_report_whose_first_line_is_damaged_is_offered_without_a_version(
+def test_crash_report_with_damaged_first_line_is_offered_without_version(
     reports: CrashReports, first: str
 ) -> None:
     path = reports.add(Crash("robot", "how"))
@@ -173,7 +171,7 @@ def test_a_report_whose_first_line_is_damaged_is_offered_without_a_version(
 
 
 @pytest.mark.parametrize("part", PARTS)
-def test_every_part_is_told_in_the_language_of_the_person(pseudo: None, reports: CrashReports, part) -> None:
+def test_crash_messages_are_translated_for_every_part(pseudo: None, reports: CrashReports, part) -> None:
     alerts = Alerts()
     reports.add(Crash(part, "how", version="0.0.9"))
     offer(alerts, reports)

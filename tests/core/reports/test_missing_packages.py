@@ -27,7 +27,7 @@ sys.exit(main(["--theme", "dark"]))
 """
 
 
-def test_the_extra_to_install_is_named_instead_of_a_traceback() -> None:
+def test_missing_extra_is_named_instead_of_a_traceback() -> None:
     child = subprocess.run(
         [sys.executable, "-c", WITHOUT_THE_EXTRA],
         cwd=ROOT,
@@ -42,18 +42,18 @@ def test_the_extra_to_install_is_named_instead_of_a_traceback() -> None:
     assert "pip install 'nep-studio[studio]'" in child.stderr
 
 
-def test_all_packages_that_are_missing_are_named() -> None:
+def test_all_missing_packages_are_named() -> None:
     error = ModuleNotFoundError("No module named 'platformdirs'", name="platformdirs")
     words = why_not_imported(error, lambda name: name != "PySide6")
     assert "(PySide6 and platformdirs)" in words
 
 
-def test_other_errors_of_an_import_stay_what_they_are() -> None:
+def test_other_import_errors_are_not_explained() -> None:
     assert why_not_imported(ModuleNotFoundError("No module named 'app.odd'", name="app.odd")) == ""
     assert why_not_imported(ImportError("cannot import name 'x'", name="PySide6")) == ""
 
 
-def test_the_modules_are_those_of_the_extra() -> None:
+def test_checked_modules_belong_to_the_extra() -> None:
     wanted = " ".join(metadata.requires("nep-studio") or ()).lower()
     packages = metadata.packages_distributions()
     assert all(any(each.lower() in wanted for each in packages[name]) for name in EXTRA_MODULES)

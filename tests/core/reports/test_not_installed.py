@@ -37,11 +37,11 @@ def found(*names: str, release=dict, also: str = "") -> MissingLibraries | None:
     return missing_libraries(error, lacking(*names, also=also), release)
 
 
-def test_other_errors_of_an_import_are_about_no_library() -> None:
+def test_other_import_errors_are_not_missing_libraries() -> None:
     assert missing_libraries(ImportError("cannot import name 'x'"), lacking("libnss3.so"), dict) is None
 
 
-def test_every_missing_library_is_named_with_one_command_for_their_packages() -> None:
+def test_every_missing_library_is_named_with_one_install_command() -> None:
     made = found("libnss3.so", "libsmime3.so", "libXtst.so.6")
     assert made is not None
     assert made.names[0] == "libnss3.so"
@@ -51,7 +51,7 @@ def test_every_missing_library_is_named_with_one_command_for_their_packages() ->
     assert "libsmime3.so" in made.title
 
 
-def test_the_library_that_another_one_needs_is_named() -> None:
+def test_missing_dependency_of_a_library_is_named() -> None:
     made = found("libnss3.so", also="libnspr4.so")
     assert made == MissingLibraries(("libnspr4.so",), ("libnspr4",))
     unknown = found("libnss3.so", also="libodd.so.1")
@@ -69,7 +69,7 @@ def test_the_library_that_another_one_needs_is_named() -> None:
         ({"ID": "fedora", "VERSION_ID": "43"}, "libasound2"),
     ],
 )
-def test_packages_have_the_names_of_their_release(release: dict[str, str], package: str) -> None:
+def test_package_names_match_the_distribution_release(release: dict[str, str], package: str) -> None:
     made = found("libasound.so.2", release=lambda: release)
     assert made is not None
     assert made.packages == (package,)
@@ -103,7 +103,7 @@ def needed(path: Path) -> Iterator[str]:
                 yield file.read(256).split(b"\0")[0].decode()
 
 
-def test_all_that_qt_needs_of_the_system_is_looked_for() -> None:
+def test_all_system_libraries_of_qt_are_checked() -> None:
     spec = importlib.util.find_spec("PySide6")
     assert spec is not None
     assert spec.origin is not None

@@ -28,7 +28,7 @@ WINDOWS = PureWindowsPath("C:\\Users\\Ana")
         ("nothing of the kind", "nothing of the kind"),
     ],
 )
-def test_the_home_folder_of_linux_and_macos(text: str, shown: str) -> None:
+def test_home_folder_is_removed_on_linux_and_macos(text: str, shown: str) -> None:
     assert without_home(text, HOME) == shown  # type: ignore[arg-type]
 
 
@@ -41,27 +41,27 @@ def test_the_home_folder_of_linux_and_macos(text: str, shown: str) -> None:
         ("C:\\Users\\Anabel\\a", "C:\\Users\\Anabel\\a"),
     ],
 )
-def test_the_home_folder_of_windows(text: str, shown: str) -> None:
+def test_home_folder_is_removed_on_windows(text: str, shown: str) -> None:
     assert without_home(text, WINDOWS) == shown  # type: ignore[arg-type]
 
 
-def test_the_home_of_nobody_is_no_name() -> None:
+def test_root_home_folder_is_not_removed() -> None:
     assert without_home("/usr/bin", PurePosixPath("/")) == "/usr/bin"  # type: ignore[arg-type]
 
 
-def test_only_settings_that_are_known_to_be_harmless_have_their_values() -> None:
+def test_only_harmless_settings_are_reported_with_values() -> None:
     kept = {"theme": "dark", "network_keys": {"room 3": "swordfish"}, "recent": ["/home/a/Secret.nepb"]}
     shown = shown_settings(kept)
     assert shown == {"network_keys": LEFT_OUT, "recent": LEFT_OUT, "theme": "dark"}
 
 
 @given(st.dictionaries(st.text(), st.text(min_size=12), max_size=5))
-def test_whatever_a_later_version_keeps_stays_here(kept: dict[str, str]) -> None:
+def test_unknown_settings_are_reported_without_values(kept: dict[str, str]) -> None:
     told = json.dumps(shown_settings(kept), ensure_ascii=False)
     for name, value in kept.items():
         assert name in HARMLESS or value not in told or value in json.dumps(sorted(kept), ensure_ascii=False)
 
 
 @pytest.mark.parametrize("word", ["key", "secret", "password", "code", "token", "recent", "tabs", "networks"])
-def test_nothing_of_the_kind_is_among_the_harmless(word: str) -> None:
+def test_harmless_settings_contain_no_private_names(word: str) -> None:
     assert not [name for name in HARMLESS if word in name]

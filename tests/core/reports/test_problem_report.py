@@ -53,7 +53,7 @@ def opened(data: bytes) -> dict[str, str]:
         return {name: archive.read(name).decode("utf-8") for name in archive.namelist()}
 
 
-def test_what_a_report_has_in_it(parts: ReportParts) -> None:
+def test_report_contents(parts: ReportParts) -> None:
     parts.crashes.add(Crash("robot", "by signal 11", "where it was"))
     found = opened(make_report(parts, "  It stood still.\nThen it fell. ñ "))
     assert found["what-happened.txt"] == "It stood still.\nThen it fell. ñ"
@@ -76,13 +76,13 @@ def test_what_a_report_has_in_it(parts: ReportParts) -> None:
     }  # fmt: skip
 
 
-def test_what_is_secret_or_the_persons_own_is_nowhere_in_it(parts: ReportParts) -> None:
+def test_report_contains_no_secrets_or_personal_data(parts: ReportParts) -> None:
     whole = "".join(opened(make_report(parts, "")).values())
     for words in ("swordfish", "Private", str(Path.home())):
         assert words not in whole
 
 
-def test_work_goes_in_only_when_it_is_given_and_can_be_opened(parts: ReportParts, tmp_path: Path) -> None:
+def test_report_includes_only_given_documents_with_unique_names(parts: ReportParts, tmp_path: Path) -> None:
     data = file_bytes(BehaviourFile("A/B: c", BLOCKS, {}))
     found = make_report(
         parts, "", [ReportedWork("A/B: c", data), ReportedWork("A_B_ c", data), ReportedWork("...", data)]
@@ -94,7 +94,7 @@ def test_work_goes_in_only_when_it_is_given_and_can_be_opened(parts: ReportParts
     assert read_file(tmp_path / "work" / "A_B_ c.nepb").workspace == BLOCKS
 
 
-def test_a_report_is_made_where_there_is_no_log_yet(tmp_path: Path) -> None:
+def test_report_is_created_without_a_log(tmp_path: Path) -> None:
     parts = ReportParts((), {}, lambda: "", tmp_path / "none", CrashReports(tmp_path / "none" / "crashes"))
     found = opened(make_report(parts, ""))
     assert "README.txt" in found
@@ -102,7 +102,7 @@ def test_a_report_is_made_where_there_is_no_log_yet(tmp_path: Path) -> None:
     assert "which is empty" in what_goes_in(parts)[1]
 
 
-def test_the_person_is_told_what_goes_in(pseudo: None, parts: ReportParts) -> None:
+def test_user_is_shown_the_report_contents(pseudo: None, parts: ReportParts) -> None:
     before = what_goes_in(parts)
     parts.crashes.add(Crash("studio", "how"))
     assert len(what_goes_in(parts)) == len(before) + 1
@@ -111,14 +111,14 @@ def test_the_person_is_told_what_goes_in(pseudo: None, parts: ReportParts) -> No
     )
 
 
-def test_its_name_has_the_day() -> None:
+def test_report_file_name_has_the_date() -> None:
     assert file_name(1_700_000_000.0) in {
         "nep-studio-report-2023-11-14.zip",
         "nep-studio-report-2023-11-15.zip",
     }
 
 
-def test_it_is_written_whole(parts: ReportParts, tmp_path: Path) -> None:
+def test_report_is_written_atomically(parts: ReportParts, tmp_path: Path) -> None:
     writer = ReportWriter(tmp_path / "report.zip", lambda: make_report(parts, "words"))
     assert writer.wait(60)
     assert writer.problem == ""
@@ -128,7 +128,7 @@ def test_it_is_written_whole(parts: ReportParts, tmp_path: Path) -> None:
 
 @pytest.mark.skipif(os.name != "posix", reason="a device that is always full")
 @pytest.mark.skipif(not Path("/dev/full").exists(), reason="no device that is always full")
-def test_a_place_that_takes_nothing_is_said_and_nothing_is_left(tmp_path: Path) -> None:
+def test_unwritable_report_folder_raises_and_leaves_no_file(tmp_path: Path) -> None:
     (tmp_path / "file").write_text("no folder")
     with pytest.raises(ReportError) as raised:
         write_report(tmp_path / "file" / "report.zip", b"zip")
@@ -140,7 +140,7 @@ def test_a_place_that_takes_nothing_is_said_and_nothing_is_left(tmp_path: Path) 
     assert [path.name for path in tmp_path.iterdir()] == ["file"]
 
 
-def test_a_full_disk_has_its_own_advice(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_full_disk_error_has_its_own_advice(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     def full(_path: Path, _data: bytes) -> None:
         raise OSError(errno.ENOSPC, "No space left on device")
 
@@ -149,7 +149,7 @@ def test_a_full_disk_has_its_own_advice(tmp_path: Path, monkeypatch: pytest.Monk
         write_report(tmp_path / "report.zip", b"zip")
 
 
-def test_what_goes_wrong_while_it_is_made_is_said(tmp_path: Path) -> None:
+def test_error_during_report_creation_is_reported(tmp_path: Path) -> None:
     def fails() -> bytes:
         raise KeyError("Name")
 

@@ -55,7 +55,7 @@ def place(tmp_path: Path) -> Place:
     return Place(tmp_path)
 
 
-def test_a_run_that_ends_in_order_leaves_nothing(place: Place) -> None:
+def test_clean_exit_leaves_no_files(place: Place) -> None:
     run = place.run()
     run.begin()
     assert run.is_noted
@@ -69,7 +69,7 @@ def test_a_run_that_ends_in_order_leaves_nothing(place: Place) -> None:
 @pytest.mark.parametrize(
     ("number", "how"), [("SIGSEGV", "Segmentation fault"), ("SIGABRT", "Aborted"), ("SIGBUS", "Bus error")]
 )
-def test_a_native_crash_is_told_with_its_place_once(place: Place, number: str, how: str) -> None:
+def test_native_crash_is_reported_once_with_its_location(place: Place, number: str, how: str) -> None:
     code = f"def deep_inside(): os.kill(os.getpid(), signal.{number})\ndeep_inside()\n"
     assert place.ends(code) == -getattr(signal, number)
     place.log.joinpath("studio.log").write_text("the last line\n")
@@ -83,7 +83,7 @@ def test_a_native_crash_is_told_with_its_place_once(place: Place, number: str, h
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="signals")
-def test_an_end_by_the_system_is_an_end_without_a_word(place: Place) -> None:
+def test_kill_by_the_system_is_reported_as_exit_without_message(place: Place) -> None:
     assert place.ends("os.kill(os.getpid(), signal.SIGKILL)") == -signal.SIGKILL
     (crash,) = place.run().left()
     assert "without a word" in crash.how
@@ -91,14 +91,14 @@ def test_an_end_by_the_system_is_an_end_without_a_word(place: Place) -> None:
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="signals")
-def test_an_end_that_was_asked_for_is_none_unless_it_crashed(place: Place) -> None:
+def test_expected_exit_is_reported_only_if_it_crashed(place: Place) -> None:
     assert place.ends("run.expect_end(); os.kill(os.getpid(), signal.SIGKILL)") == -signal.SIGKILL
     assert place.run().left() == []
     assert place.ends("run.expect_end(); os.kill(os.getpid(), signal.SIGSEGV)") == -signal.SIGSEGV
     assert len(place.run().left()) == 1
 
 
-def test_a_window_that_lives_is_none_whoever_asks(place: Place) -> None:
+def test_running_window_is_not_a_crash(place: Place) -> None:
     own = place.run()
     own.begin()
     with place.process("sys.stdin.read()") as other:
@@ -125,16 +125,14 @@ def entry(place: Place, **other: object) -> Path:
 
 
 @pytest.mark.parametrize(("kept", "version"), [("0.0.9", "0.0.9"), (None, ""), ("9\n9", ""), (["9"], "")])
-def test_a_crash_of_a_version_before_an_update_has_its_version(
-    place: Place, kept: object, version: str
-) -> None:
+def test_crash_before_an_update_has_its_version(place: Place, kept: object, version: str) -> None:
     entry(place, version=kept)
     (crash,) = place.run().left()
     assert crash.version == version
     assert f"It was version {version or 'not known'}, begun " in crash.text
 
 
-def test_what_the_restart_of_the_computer_ended_is_no_crash(place: Place) -> None:
+def test_exit_by_computer_restart_is_not_a_crash(place: Place) -> None:
     entry(place)
     assert len(place.run().left()) == 1
     entry(place, began_s=1000.0)
@@ -142,7 +140,7 @@ def test_what_the_restart_of_the_computer_ended_is_no_crash(place: Place) -> Non
     assert place.files() == []
 
 
-def test_a_number_that_another_process_has_by_now_means_nothing(place: Place) -> None:
+def test_reused_pid_is_recognized_by_process_start_time(place: Place) -> None:
     """On a disk without locks a process is known by its number and its age."""
     entry(place, pid=os.getpid(), began_s=4_000_000_000.0)
     assert place.run().left() == [], "as old as the mark says: it lives"
@@ -162,14 +160,14 @@ def younger_begin(pid: int) -> float:
 
 
 @pytest.mark.parametrize("text", ["", "{", "[]", "{}", '{"pid": "x", "began_s": 1}', '{"pid": 1e400}'])
-def test_a_damaged_mark_is_taken_away(place: Place, text: str) -> None:
+def test_damaged_run_mark_is_deleted(place: Place, text: str) -> None:
     place.runs.mkdir()
     (place.runs / "mark.json").write_text(text)
     assert place.run().left() == []
     assert place.files() == []
 
 
-def test_an_exception_that_ends_it_is_reported_at_once_and_only_once(place: Place) -> None:
+def test_uncaught_exception_is_reported_immediately_and_only_once(place: Place) -> None:
     with pytest.raises(ZeroDivisionError), place.run():
         raise ZeroDivisionError("by nothing")
     (report,) = CrashReports(place.log / "crashes").all()
@@ -179,16 +177,14 @@ def test_an_exception_that_ends_it_is_reported_at_once_and_only_once(place: Plac
     assert place.run().left() == []
 
 
-def test_leaving_by_exit_is_no_crash(place: Place) -> None:
+def test_system_exit_is_not_a_crash(place: Place) -> None:
     with pytest.raises(SystemExit), place.run():
         raise SystemExit(0)
     assert CrashReports(place.log / "crashes").all() == []
     assert place.run().left() == []
 
 
-def test_where_nothing_can_be_written_one_line_of_the_log_says_so(
-    tmp_path: Path, caplog: pytest.LogCaptureFixture
-) -> None:
+def test_unwritable_run_folder_is_logged_once(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
     (tmp_path / "file").write_text("no folder")
     run = StudioRun(tmp_path / "file" / "runs", tmp_path / "file" / "log")
     run.begin()

@@ -19,7 +19,7 @@ DAY_S = 86_400.0
 OLDER = {"version": "0.0.9", "since_s": 1_700_000_000.0}
 
 
-def test_a_version_is_kept_when_another_one_ran_last() -> None:
+def test_version_is_recorded_when_it_changes() -> None:
     kept = with_this_version({}, 1_700_000_000.0, is_first=True, version="0.0.9")
     assert kept == [OLDER]
     assert with_this_version({KEY: kept}, 1_800_000_000.0, is_first=False, version="0.0.9") is None
@@ -29,13 +29,13 @@ def test_a_version_is_kept_when_another_one_ran_last() -> None:
     assert [version for version, _since in known({KEY: back})] == ["0.0.9", "0.1.0", "0.0.9"]
 
 
-def test_versions_that_did_not_keep_this_are_told_as_earlier_ones() -> None:
+def test_versions_without_history_are_listed_as_earlier() -> None:
     kept = with_this_version({"theme": "dark"}, 1_700_000_000.0, is_first=False, version="0.1.0")
     assert used_here({KEY: kept}) == "earlier, 0.1.0 since 2023-11-14"
     assert with_this_version({KEY: kept}, 1_800_000_000.0, is_first=False, version="0.1.0") is None
 
 
-def test_of_many_the_newest_are_kept() -> None:
+def test_only_newest_versions_are_kept() -> None:
     values: dict[str, object] = {}
     for number in range(MAX_VERSIONS + 5):
         values[KEY] = with_this_version(values, float(number), is_first=True, version=f"1.{number}")
@@ -54,7 +54,7 @@ def test_of_many_the_newest_are_kept() -> None:
          for each in (-1, math.nan, math.inf, 2**64 - 1, 1e300, True, "1")],
     ],
 )  # fmt: skip
-def test_what_is_damaged_is_no_version(damaged: object) -> None:
+def test_damaged_version_history_is_ignored(damaged: object) -> None:
     assert known({KEY: damaged}) == []
     assert used_here({KEY: damaged}) == "unknown"
     assert with_this_version({KEY: damaged}, 1.0, is_first=True, version="0.1.0") == [
@@ -62,7 +62,7 @@ def test_what_is_damaged_is_no_version(damaged: object) -> None:
     ]
 
 
-def test_what_is_kept_goes_through_the_settings_file(tmp_path: Path) -> None:
+def test_version_history_survives_the_settings_file(tmp_path: Path) -> None:
     Settings(tmp_path).set(KEY, [OLDER])
     settings = Settings(tmp_path)
     settings.set(KEY, with_this_version(settings.all(), 1_800_000_000.0, is_first=False))
@@ -72,7 +72,7 @@ def test_what_is_kept_goes_through_the_settings_file(tmp_path: Path) -> None:
     ]
 
 
-def test_a_report_after_an_update_tells_both_versions(tmp_path: Path) -> None:
+def test_report_after_an_update_lists_both_versions(tmp_path: Path) -> None:
     values = {KEY: with_this_version({KEY: [OLDER]}, 1_800_000_000.0, is_first=False)}
     parts = ReportParts((), values, lambda: "", tmp_path, CrashReports(tmp_path / "crashes"))
     lines = opened(make_report(parts, ""))["versions.txt"].splitlines()

@@ -25,7 +25,7 @@ def words(*behaviours: dict[str, object]) -> tuple[str, ...]:
     return awaited_values(behaviours, PEPPER, HEARD, "word")
 
 
-def test_the_words_of_its_own_hats_come_first_then_what_is_suggested() -> None:
+def test_words_of_robot_event_blocks_precede_suggested_words() -> None:
     assert words(behaviour(hat("yes"), hat("no"), hat("yes")), behaviour(hat("stop"))) == (
         "yes",
         "no",
@@ -36,7 +36,7 @@ def test_the_words_of_its_own_hats_come_first_then_what_is_suggested() -> None:
     assert words() == ("hello",)
 
 
-def test_a_text_that_is_compared_with_what_it_heard_counts() -> None:
+def test_text_compared_with_heard_word_is_offered() -> None:
     sensor = {"block": {"type": "robot_pepper_get_heard_word", "fields": {"ROBOT": "Pepper"}}}
     text = {"block": {"type": "values_text", "fields": {"TEXT": " blue "}}}
     compare = {"type": "values_compare", "inputs": {"A": sensor, "B": text}}
@@ -46,9 +46,9 @@ def test_a_text_that_is_compared_with_what_it_heard_counts() -> None:
 
 
 @pytest.mark.parametrize("word", ["", "  ", None, "x" * 61])
-def test_what_is_no_word_is_left_out(word: object) -> None:
+def test_invalid_words_are_skipped(word: object) -> None:
     assert words(behaviour(hat(word), {"type": 3, "inputs": [1], "fields": "none"})) == ("hello",)  # type: ignore[dict-item]
 
 
-def test_no_more_are_offered_than_a_menu_can_show() -> None:
+def test_number_of_offered_words_is_limited() -> None:
     assert len(words(behaviour(*(hat(f"word {number}") for number in range(100))))) == MAX_WORDS

@@ -26,7 +26,7 @@ def view(**counts: int) -> GraphView:
     return GraphView(1, 1, {}, topics)
 
 
-def test_robot_that_gets_commands_from_a_bridge_is_reported_once_for_each_graph_with_new_ones() -> None:
+def test_robot_commanded_by_a_bridge_is_reported_once_per_graph_with_new_commands() -> None:
     reported: list[tuple[tuple[str, ...], str]] = []
     commands = BridgedCommands(lambda names, by: reported.append((tuple(names), by)))
     for graph in (view(bridge=0), view(bridge=1), view(bridge=1), view(bridge=4)):

@@ -160,7 +160,7 @@ def _subscribers(session: Session, topic: str) -> int:
     return len(info.subscribers) if info is not None else 0
 
 
-def test_a_stop_reaches_the_robot_whoever_describes_it_as_well(
+def test_stop_reaches_robot_despite_a_second_description(
     session: Session, pepper: WireRobot, evil: nep.Node
 ) -> None:
     the_link(session)
@@ -180,7 +180,7 @@ def test_a_stop_reaches_the_robot_whoever_describes_it_as_well(
     assert (len(pepper.heard("stop")), diverted) == (1, [])
 
 
-def test_a_robot_whose_description_is_huge_is_refused_with_an_alert(session: Session, evil: nep.Node) -> None:
+def test_robot_with_huge_description_is_rejected_with_an_alert(session: Session, evil: nep.Node) -> None:
     announce(evil, "/Big/description", {**described("Big"), "note": "x" * 1_100_000})
     tick_until(session, lambda: session.fleet.link("Big") is not None or bool(session.alerts.active))
     assert session.fleet.link("Big") is None
@@ -192,7 +192,7 @@ def _payloads(messages: object) -> list[Mapping[str, object]]:
     return [message.payload for message in messages]
 
 
-def test_a_robot_that_is_started_anew_is_taken_over_from(session: Session, master: Master) -> None:
+def test_restarted_robot_replaces_its_previous_program(session: Session, master: Master) -> None:
     first = WireRobot(master.address)
     link = the_link(session)
     before = link.identity
@@ -208,7 +208,7 @@ def test_a_robot_that_is_started_anew_is_taken_over_from(session: Session, maste
         second.close()
 
 
-def test_who_takes_the_name_of_a_robot_in_motion_does_not_prove_its_stop(
+def test_new_program_with_name_of_a_moving_robot_does_not_prove_its_stop(
     session: Session, master: Master, pepper: WireRobot
 ) -> None:
     """It is frozen, so the master unlists it; the new one answers, and the old one may still move."""
@@ -235,7 +235,9 @@ def test_who_takes_the_name_of_a_robot_in_motion_does_not_prove_its_stop(
         thief.close()
 
 
-def test_nor_of_one_that_a_person_moved(session: Session, master: Master, pepper: WireRobot) -> None:
+def test_new_program_does_not_prove_stop_of_a_robot_moved_by_hand(
+    session: Session, master: Master, pepper: WireRobot
+) -> None:
     link = the_link(session)
     pepper.slow = {"say"}
     tried = session.fleet.invoke("Pepper", "say", {"text": "Hi"})
@@ -258,7 +260,7 @@ def test_nor_of_one_that_a_person_moved(session: Session, master: Master, pepper
         thief.close()
 
 
-def test_a_robot_may_not_name_the_topics_of_one_that_comes_later_its_own(
+def test_robot_cannot_claim_topics_of_a_robot_that_connects_later(
     session: Session, master: Master, evil: nep.Node
 ) -> None:
     announce(evil, "/Evil/description", described("Evil", command="/Pepper/command"))
@@ -273,7 +275,7 @@ def test_a_robot_may_not_name_the_topics_of_one_that_comes_later_its_own(
         pepper.close()
 
 
-def test_a_changed_description_moves_what_is_sent_to_the_new_topic(session: Session, evil: nep.Node) -> None:
+def test_changed_description_redirects_commands_to_the_new_topic(session: Session, evil: nep.Node) -> None:
     announcement = announce(evil, "/Pepper/description", described())
     link = the_link(session)
     old, new = [], []
@@ -307,7 +309,7 @@ def _view(topics: Mapping[str, int]) -> GraphView:
     return GraphView(1, 1, {"n": node}, infos)
 
 
-def test_a_flood_of_robots_is_bounded_and_told() -> None:
+def test_number_of_announced_robots_is_limited_and_reported() -> None:
     opened: list[str] = []
     announcements = Announcements(Watches(opened.append, opened.remove), Senders())
     announcements.update(_view({f"/r{number}/description": number + 1 for number in range(1000)}))
@@ -338,7 +340,7 @@ def _said_by(publisher: int) -> Batch:
 
 
 @pytest.mark.parametrize("crowd", [0, 20])
-def test_a_robot_that_slept_while_another_had_its_name_is_there_again(crowd: int) -> None:
+def test_robot_returns_after_another_program_used_its_name(crowd: int) -> None:
     """Its latched description came once, over a connection that lasts; nobody sends it again."""
     opened: list[str] = []
     announcements = Announcements(Watches(opened.append, opened.remove), Senders())
@@ -356,7 +358,7 @@ def test_a_robot_that_slept_while_another_had_its_name_is_there_again(crowd: int
     assert [identity.node_id for _, _, identity in announcements.robots] == ["first"]
 
 
-def test_what_one_program_said_wrongly_is_not_held_against_the_next() -> None:
+def test_invalid_description_of_one_program_does_not_block_the_next() -> None:
     opened: list[str] = []
     announcements = Announcements(Watches(opened.append, opened.remove), Senders())
     announcements.update(_two_programs("first"))
@@ -368,7 +370,7 @@ def test_what_one_program_said_wrongly_is_not_held_against_the_next() -> None:
     assert not announcements.claims
 
 
-def test_a_robot_that_slept_is_there_again_though_somebody_else_kept_its_topic_subscribed() -> None:
+def test_suspended_robot_returns_although_its_topic_stayed_subscribed() -> None:
     opened: list[str] = []
     watches = Watches(opened.append, opened.remove)
     announcements = Announcements(watches, Senders())
@@ -381,7 +383,7 @@ def test_a_robot_that_slept_is_there_again_though_somebody_else_kept_its_topic_s
     assert [identity.node_id for _, _, identity in announcements.robots] == ["first"]
 
 
-def test_a_description_that_cant_be_used_is_told_and_what_was_said_before_counts(
+def test_invalid_description_is_reported_and_the_previous_one_stays_valid(
     session: Session, pepper: WireRobot, evil: nep.Node
 ) -> None:
     the_link(session)
@@ -400,7 +402,7 @@ def test_a_description_that_cant_be_used_is_told_and_what_was_said_before_counts
     assert session.fleet.link("Rover").connected
 
 
-def test_descriptions_that_come_again_and_again_take_a_fifth_of_the_window_at_most() -> None:
+def test_repeated_descriptions_use_a_fifth_of_window_time_at_most() -> None:
     """And whoever has just come is read before those who repeat themselves."""
     clock = Clock()
     announcements = Announcements(Watches(len, len), Senders(), clock)
@@ -424,7 +426,7 @@ def test_descriptions_that_come_again_and_again_take_a_fifth_of_the_window_at_mo
     assert 0.1 < 0.5 * len(reads) / clock.now < 0.25
 
 
-def test_senders_do_not_believe_who_takes_a_publishers_id() -> None:
+def test_reused_publisher_id_is_not_trusted() -> None:
     senders, view = Senders(), _view({"/Pepper/answer": 7})
     senders.learn(view, ["/Pepper/answer"])
     thief = NodeInfo("thief", "thief", "there", 2, "python", "native", 0)

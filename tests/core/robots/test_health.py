@@ -42,7 +42,7 @@ def case() -> Case:
     return Case()
 
 
-def test_bad_messages_are_one_alert_with_the_exact_count(case: Case) -> None:
+def test_malformed_messages_are_one_alert_with_exact_count(case: Case) -> None:
     for _ in range(30):
         case.look(33)
     (alert,) = case.alerts.active
@@ -51,7 +51,7 @@ def test_bad_messages_are_one_alert_with_the_exact_count(case: Case) -> None:
     assert alert.detail == "No json. See the raw bytes in the Inspector."
 
 
-def test_what_was_not_tried_is_said(case: Case) -> None:
+def test_unchecked_messages_are_mentioned_in_the_alert(case: Case) -> None:
     case.look(100, unchecked=0)
     case.look(1, unchecked=400)
     alert = case.alert()
@@ -60,7 +60,7 @@ def test_what_was_not_tried_is_said(case: Case) -> None:
     assert "400 more came too fast to be decoded" in alert.detail
 
 
-def test_good_messages_for_a_second_cure_it_and_the_next_count_begins_anew(case: Case) -> None:
+def test_alert_is_resolved_by_a_second_of_valid_messages_and_count_restarts(case: Case) -> None:
     case.look(5)
     case.look(0, 1, last_good=True)
     case.health.check()
@@ -74,7 +74,7 @@ def test_good_messages_for_a_second_cure_it_and_the_next_count_begins_anew(case:
     assert "1 message)" in alert.title
 
 
-def test_a_topic_that_mixes_good_and_bad_is_one_alert_that_stays(case: Case) -> None:
+def test_topic_with_valid_and_malformed_messages_keeps_one_alert(case: Case) -> None:
     seen = []
     for _ in range(20):
         case.look(1, 4, last_good=True)
@@ -86,7 +86,7 @@ def test_a_topic_that_mixes_good_and_bad_is_one_alert_that_stays(case: Case) -> 
     assert seen[0] is not None
 
 
-def test_a_topic_that_fell_silent_after_bad_messages_stays_told_until_nobody_looks(case: Case) -> None:
+def test_alert_of_topic_silent_after_errors_stays_until_unwatched(case: Case) -> None:
     case.look(2)
     case.now += 100
     case.health.check()
@@ -95,12 +95,12 @@ def test_a_topic_that_fell_silent_after_bad_messages_stays_told_until_nobody_loo
     assert case.alert() is None
 
 
-def test_good_messages_are_nothing_to_tell(case: Case) -> None:
+def test_valid_messages_raise_no_alert(case: Case) -> None:
     case.look(0, 500, unchecked=7, last_good=True)
     assert case.alert() is None
 
 
-def test_taken_ports_are_one_alert_for_developers_that_leads_to_the_doctor(case: Case) -> None:
+def test_occupied_ports_are_one_developer_alert_that_opens_the_doctor(case: Case) -> None:
     ports = [Alert(f"port:{port}", f"Port {port} is taken", "Close it.") for port in (7000, 50000, 7777)]
     case.health.graph_alerts(GraphView(1, 1, alerts=(*ports, Alert("name:x", "2 x", ""))))
     told = {alert.id: (alert.action, alert.for_developers) for alert in case.alerts.active}
@@ -130,7 +130,7 @@ def robot(*, virtual: bool, connected: bool = False) -> SimpleNamespace:
     )
 
 
-def test_a_real_robot_that_has_gone_is_told_after_a_while_and_cured_when_it_is_back(case: Case) -> None:
+def test_disconnected_real_robot_is_reported_after_a_delay_and_resolved_on_return(case: Case) -> None:
     case.links.append(robot(virtual=False))
     case.health.check()
     assert case.alert() is None, "its driver may be starting again"
@@ -151,7 +151,7 @@ def test_a_real_robot_that_has_gone_is_told_after_a_while_and_cured_when_it_is_b
     assert case.alert() is None, "the time begins anew"
 
 
-def test_a_virtual_robot_is_told_of_only_while_its_process_runs_here(case: Case) -> None:
+def test_virtual_robot_is_reported_only_while_its_process_runs_here(case: Case) -> None:
     case.links.append(robot(virtual=True))
     case.health.check()
     case.now += RESTART_TIMEOUT_S
@@ -205,7 +205,7 @@ def camera(name: str, subscribers: int) -> TopicInfo:
     return TopicInfo(f"/{name}/camera", "image", "image", (sender,), heard, last_stamp_ns=1_000_000_000)
 
 
-def test_of_two_robots_the_one_that_is_not_shown_is_not_silent(case: Case) -> None:
+def test_hidden_camera_of_second_robot_is_not_reported_as_silent(case: Case) -> None:
     """A virtual robot sends its pictures only while somebody looks."""
     case.links += [seeing("Pepper"), seeing("Turtle")]
     both = {f"/{name}/camera": camera(name, name == "Pepper") for name in ("Pepper", "Turtle")}

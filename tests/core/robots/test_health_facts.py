@@ -54,7 +54,7 @@ def case() -> Case:
     return Case()
 
 
-def test_a_robot_that_is_well(case: Case) -> None:
+def test_facts_of_a_healthy_robot(case: Case) -> None:
     assert [(fact.title, fact.status, fact.words) for fact in case.facts()] == [
         ("Connection", "ok", "last response 3 s ago"),
         ("Battery", "ok", "84 %"),
@@ -67,7 +67,7 @@ def test_a_robot_that_is_well(case: Case) -> None:
     assert not any(fact.to_look_at for fact in case.facts())
 
 
-def test_what_is_not_known_yet_is_no_warning(case: Case) -> None:
+def test_unknown_facts_are_not_warnings(case: Case) -> None:
     case.link.answered_s = case.link.last_stop = None
     case.link.values.clear()
     case.topics.clear()
@@ -78,7 +78,7 @@ def test_what_is_not_known_yet_is_no_warning(case: Case) -> None:
     assert not any(fact.to_look_at for fact in case.facts())
 
 
-def test_a_camera_that_nobody_looks_at_sends_nothing_and_is_well(case: Case) -> None:
+def test_unwatched_camera_is_not_a_warning(case: Case) -> None:
     (camera,) = [sensor.topic for sensor in PEPPER.sensors if sensor.is_image]
     case.topics[camera] = Topic(camera, subscribers=0)
     assert case.says("Camera") == ("off", "ready (not in use)")
@@ -88,7 +88,7 @@ def test_a_camera_that_nobody_looks_at_sends_nothing_and_is_well(case: Case) -> 
     assert case.says("Camera") == ("off", "no image yet")
 
 
-def test_one_that_does_not_answer_says_since_when_and_what_to_do(case: Case) -> None:
+def test_unresponsive_robot_shows_duration_and_advice(case: Case) -> None:
     case.link.mute = True
     assert case.says("Connection") == ("error", "not responding for 3 s; restart it")
     case.link.answered_s = None
@@ -99,7 +99,7 @@ def test_one_that_does_not_answer_says_since_when_and_what_to_do(case: Case) -> 
 @pytest.mark.parametrize(
     ("title", "kind"), [("Rejected messages", "rejected"), ("Driver exceptions", "errors")]
 )
-def test_what_the_driver_rejected_or_caught_is_a_warning_while_it_grows(
+def test_driver_rejections_and_exceptions_are_a_warning_while_they_increase(
     case: Case, title: str, kind: str
 ) -> None:
     assert title not in {fact.title for fact in case.facts()}
@@ -114,7 +114,7 @@ def test_what_the_driver_rejected_or_caught_is_a_warning_while_it_grows(
     assert "12" in words
 
 
-def test_of_one_that_has_gone_nothing_old_is_said(case: Case) -> None:
+def test_disconnected_robot_shows_no_outdated_facts(case: Case) -> None:
     case.link.connected, case.link.gone_s = False, NOW - 12
     assert case.says("Connection") == ("warn", "disconnected 12 s ago; restart it")
     assert [fact.title for fact in case.facts()] == [
@@ -125,14 +125,14 @@ def test_of_one_that_has_gone_nothing_old_is_said(case: Case) -> None:
     ]
 
 
-def test_a_low_battery_comes_first(case: Case) -> None:
+def test_low_battery_is_the_first_fact(case: Case) -> None:
     case.link.values["battery"] = LOW_PERCENT - 1
     assert case.facts()[0] == HealthFact("Battery", "warn", "19 %; charge it soon")
     case.link.values["battery"] = LOW_PERCENT
     assert case.says("Battery") == ("ok", "20 %")
 
 
-def test_the_warmest_part_is_named(case: Case) -> None:
+def test_warmest_part_is_named(case: Case) -> None:
     joints = Sensor(
         "joints", "joints", "object", "/joints",
         fields=(DataField("knee", "left knee", "number", "°C"), DataField("hip", "hip", "number", "°C")),
@@ -153,18 +153,18 @@ def test_the_warmest_part_is_named(case: Case) -> None:
         ("sent at 8:41; this robot can't confirm", "off"),
     ],
 )
-def test_the_last_stop(case: Case, last: str, status: str) -> None:
+def test_last_stop_is_shown_with_its_status(case: Case, last: str, status: str) -> None:
     case.link.last_stop, case.link.last_stop_status = last, status
     assert case.says("Stop") == (status, last)
 
 
-def test_a_silent_camera(case: Case) -> None:
+def test_silent_camera_is_an_error(case: Case) -> None:
     case.link.silent = "camera silent"
     case.topics["/Pepper/camera"].silent_s = 4.0
     assert case.says("Camera") == ("error", "silent for 4 s")
 
 
-def test_sensors_that_tell_all_the_time_and_have_stopped(case: Case) -> None:
+def test_silent_periodic_sensors_are_a_warning(case: Case) -> None:
     case.topics["/Pepper/distance"].silent_s = 8.0
     case.topics["/Pepper/heard_word"].silent_s = 8.0  # tells only when there is something
     assert case.says("Sensors") == ("warn", "distance silent for 8 s")
@@ -174,12 +174,12 @@ def test_sensors_that_tell_all_the_time_and_have_stopped(case: Case) -> None:
     assert case.says("Sensors")[0] == "ok"
 
 
-def test_sensors_that_nobody_hears_are_not_blamed(case: Case) -> None:
+def test_unsubscribed_sensors_are_not_reported_as_silent(case: Case) -> None:
     case.topics["/Pepper/distance"].age_s = 80.0
     assert case.says("Sensors") == ("ok", f"all {len(PEPPER.sensors) - 1} send")
 
 
-def test_what_has_sent_nothing_is_not_said_to_send(case: Case) -> None:
+def test_sensors_without_messages_are_not_counted_as_sending(case: Case) -> None:
     felt = [sensor.topic for sensor in PEPPER.sensors if not sensor.is_image]
     for topic in felt:
         case.topics[topic] = Topic(topic)
@@ -192,7 +192,7 @@ def test_what_has_sent_nothing_is_not_said_to_send(case: Case) -> None:
     assert case.says("Sensors") == ("off", "has sent nothing yet")
 
 
-def test_one_of_rize_has_neither_watchdog_nor_signs_of_life(case: Case) -> None:
+def test_rize_robot_has_no_watchdog_or_heartbeat_fact(case: Case) -> None:
     case.link.robot = rize.robot("Nao")
     case.link.last_stop = None
     assert case.says("Stop") == ("off", "not used yet; this robot can't confirm")

@@ -23,7 +23,7 @@ def settings(tmp_path: Path) -> Settings:
     return Settings(tmp_path)
 
 
-def test_the_one_seen_last_is_first_and_all_are_known_at_the_next_start(settings, tmp_path) -> None:
+def test_known_robots_are_sorted_by_last_seen_and_persist(settings, tmp_path) -> None:
     now = iter([100.0, 200.0, 300.0])
     known = KnownRobots(settings, lambda: next(now))
     known.saw([robot("NAO")])
@@ -33,13 +33,13 @@ def test_the_one_seen_last_is_first_and_all_are_known_at_the_next_start(settings
     assert again.robots == (KnownRobot("NAO", 300.0), KnownRobot("Rover", 200.0))
 
 
-def test_virtual_robots_are_not_kept(settings) -> None:
+def test_virtual_robots_are_not_remembered(settings) -> None:
     known = KnownRobots(settings)
     known.saw([robot("Pepper", virtual=True)])
     assert known.robots == ()
 
 
-def test_a_forgotten_robot_is_known_again_when_it_comes(settings) -> None:
+def test_forgotten_robot_is_known_again_when_it_returns(settings) -> None:
     known = KnownRobots(settings, lambda: 1.0)
     known.saw([robot("NAO"), robot("Rover")])
     known.forget("NAO")
@@ -48,20 +48,20 @@ def test_a_forgotten_robot_is_known_again_when_it_comes(settings) -> None:
     assert {one.name for one in known.robots} == {"NAO", "Rover"}
 
 
-def test_what_does_not_look_like_a_robot_is_left_out(settings) -> None:
+def test_invalid_entries_are_ignored(settings) -> None:
     settings.set(
         KEY, ["NAO", {"name": 3, "seen_s": 1}, {"name": "A", "seen_s": True}, {"name": "B", "seen_s": 2}]
     )
     assert KnownRobots(settings).robots == (KnownRobot("B", 2.0),)
 
 
-def test_not_more_are_kept_than_a_list_can_show(settings) -> None:
+def test_number_of_known_robots_is_limited(settings) -> None:
     known = KnownRobots(settings, lambda: 1.0)
     known.saw([robot(f"R{number}") for number in range(LIMIT + 3)])
     assert len(known.robots) == LIMIT
 
 
-def test_a_robot_that_joins_the_fleet_is_known(settings) -> None:
+def test_robot_that_joins_the_fleet_is_known(settings) -> None:
     fleet = Fleet(Watches(lambda _t: None, lambda _t: None), lambda _what, _job: None, settings=settings)
     fleet.join(robot("NAO"), "robot_action NAO")
     assert [one.name for one in KnownRobots(settings).robots] == ["NAO"]

@@ -27,7 +27,7 @@ def next_start(folder: Path) -> dict[str, str]:
     return launcher.wanted
 
 
-def test_who_was_here_comes_back_and_who_was_put_away_does_not(tmp_path: Path) -> None:
+def test_running_virtual_robots_are_restored_and_stopped_ones_are_not(tmp_path: Path) -> None:
     robots, launcher = LastRobots(Settings(tmp_path)), Launcher()
     assert next_start(tmp_path) == {}
     launcher.start_virtual_robot()
@@ -42,13 +42,13 @@ def test_who_was_here_comes_back_and_who_was_put_away_does_not(tmp_path: Path) -
     assert next_start(tmp_path) == {}
 
 
-def test_a_start_in_which_nobody_was_brought_back_forgets_nobody(tmp_path: Path) -> None:
+def test_start_without_restored_robots_keeps_the_list(tmp_path: Path) -> None:
     Settings(tmp_path).set(KEPT, {"Pepper": "pepper"})
     LastRobots(Settings(tmp_path)).keep(Launcher())
     assert next_start(tmp_path) == {"Pepper": "pepper"}
 
 
-def test_nobody_comes_back_where_a_person_does_not_want_it(tmp_path: Path) -> None:
+def test_robots_are_not_restored_when_disabled(tmp_path: Path) -> None:
     Settings(tmp_path).set(KEPT, {"Pepper": "pepper"})
     robots = LastRobots(Settings(tmp_path))
     assert robots.come_back
@@ -61,11 +61,11 @@ def test_nobody_comes_back_where_a_person_does_not_want_it(tmp_path: Path) -> No
 @pytest.mark.parametrize(
     "kept", [None, [], {"": "pepper"}, {"Pepper": "toaster"}, {"Pepper": 3}, {"Pepper": ["pepper"]}]
 )
-def test_damaged_settings_start_nobody(tmp_path: Path, kept: object) -> None:
+def test_damaged_settings_start_no_robot(tmp_path: Path, kept: object) -> None:
     Settings(tmp_path).set(KEPT, kept)
     assert next_start(tmp_path) == {}
 
 
-def test_settings_full_of_robots_start_only_a_few(tmp_path: Path) -> None:
+def test_number_of_restored_robots_is_limited(tmp_path: Path) -> None:
     Settings(tmp_path).set(KEPT, {f"Pepper {number}": "pepper" for number in range(500)})
     assert len(next_start(tmp_path)) == MAX_ROBOTS

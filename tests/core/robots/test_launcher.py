@@ -52,7 +52,7 @@ def world() -> Iterator[World]:
     made.launcher.close()
 
 
-def test_one_that_is_not_there_is_started_at_once(world: World) -> None:
+def test_missing_virtual_robot_is_started_at_once(world: World) -> None:
     world.launcher.start_virtual_robot("Turtle", "diffdrive")
     assert world.started == [["app.robots.turtle", "--name", "Turtle"]]
     world.processes[0].die(b"", 1)
@@ -60,7 +60,7 @@ def test_one_that_is_not_there_is_started_at_once(world: World) -> None:
     assert len(world.started) == 1  # that it ended is another matter: it is told, not started again
 
 
-def test_one_that_was_there_and_has_ended_is_started_when_that_is_noticed(world: World) -> None:
+def test_virtual_robot_is_started_when_the_existing_one_has_ended(world: World) -> None:
     world.there = True
     world.launcher.start_virtual_robot()
     world.after(REQUEST_KEPT_S - 1)
@@ -72,7 +72,7 @@ def test_one_that_was_there_and_has_ended_is_started_when_that_is_noticed(world:
     assert len(world.started) == 1
 
 
-def test_the_wish_is_forgotten_when_the_one_that_is_there_stays(world: World) -> None:
+def test_start_request_expires_while_existing_robot_stays(world: World) -> None:
     world.there = True
     world.launcher.start_virtual_robot()
     world.after(REQUEST_KEPT_S)
@@ -81,7 +81,7 @@ def test_the_wish_is_forgotten_when_the_one_that_is_there_stays(world: World) ->
     assert not world.started
 
 
-def test_it_waits_until_it_is_known_who_is_there(world: World) -> None:
+def test_start_waits_until_running_robots_are_known(world: World) -> None:
     world.there = None
     world.launcher.start_virtual_robot()
     world.after(FIRST_GRAPH_TIMEOUT_S - 0.1)
@@ -91,7 +91,7 @@ def test_it_waits_until_it_is_known_who_is_there(world: World) -> None:
     assert not world.started
 
 
-def test_it_does_not_wait_where_no_master_was_before(world: World) -> None:
+def test_start_does_not_wait_when_no_master_ran_before(world: World) -> None:
     world.there = None
     world.launcher.start_virtual_robot()
     assert not world.started
@@ -100,7 +100,7 @@ def test_it_does_not_wait_where_no_master_was_before(world: World) -> None:
     assert len(world.started) == 1
 
 
-def test_it_does_not_wait_any_longer_than_some_seconds(world: World) -> None:
+def test_start_waits_for_first_graph_at_most_until_timeout(world: World) -> None:
     world.there = None
     world.launcher.start_virtual_robot()
     world.after(FIRST_GRAPH_TIMEOUT_S)
@@ -108,9 +108,7 @@ def test_it_does_not_wait_any_longer_than_some_seconds(world: World) -> None:
 
 
 @pytest.mark.parametrize("end", [Launcher.stop_virtual_robot, lambda some, _name: some.close()])
-def test_what_was_taken_back_is_not_wished_any_more(
-    world: World, end: Callable[[Launcher, str], None]
-) -> None:
+def test_canceled_start_request_is_dropped(world: World, end: Callable[[Launcher, str], None]) -> None:
     world.there = True
     world.launcher.start_virtual_robot()
     end(world.launcher, "Pepper")
@@ -119,7 +117,7 @@ def test_what_was_taken_back_is_not_wished_any_more(
     assert not world.started
 
 
-def test_starting_it_anew_is_no_second_wish(world: World) -> None:
+def test_restart_is_not_a_second_start_request(world: World) -> None:
     world.there = True
     world.launcher.start_virtual_robot()
     world.launcher.restart_virtual_robot("Pepper")
@@ -129,7 +127,7 @@ def test_starting_it_anew_is_no_second_wish(world: World) -> None:
     assert len(world.started) == 1
 
 
-def test_a_second_studio_uses_the_pepper_that_is_there(master: Master, tmp_path: Path) -> None:
+def test_second_studio_uses_the_running_pepper(master: Master, tmp_path: Path) -> None:
     with nep.node("first", master=master.address) as node, Driver(simulated.ROBOT, "Pepper", node):
         second = Session(
             Settings(tmp_path), address=master.address, journal_folder=tmp_path / "j", start_processes=False
@@ -144,7 +142,7 @@ def test_a_second_studio_uses_the_pepper_that_is_there(master: Master, tmp_path:
             second.close()
 
 
-def test_the_fleet_tells_who_is_there_once_it_was_told() -> None:
+def test_fleet_knows_running_robots_after_the_first_graph() -> None:
     fleet = Fleet(Watches(lambda _topic: None, lambda _topic: None), lambda _what, _job: None)
     assert fleet.is_there("Pepper") is None
     fleet.update(GraphView(1, 1))
@@ -161,7 +159,7 @@ def _described() -> TopicInfo:
     return TopicInfo("/Pepper/description", "robot/description", "json", (publisher,))
 
 
-def test_a_robot_is_coming_until_it_is_there_or_has_failed(world: World) -> None:
+def test_robot_is_starting_until_connected_or_failed(world: World) -> None:
     launcher = world.launcher
     world.there = None
     launcher.start_virtual_robot("Pepper")

@@ -63,7 +63,7 @@ def real_robot(session: Session, master: str) -> Iterator[list[object]]:
         yield told
 
 
-def test_a_message_that_moves_a_real_robot_waits_for_a_yes(rover) -> None:
+def test_message_that_moves_a_real_robot_waits_for_permission(rover) -> None:
     robots, done = Robots(), []
     permission = MotionPermission()
     gate = MotionGate(permission, robots)
@@ -87,7 +87,7 @@ def test_a_message_that_moves_a_real_robot_waits_for_a_yes(rover) -> None:
     assert not gate.is_permitted(TOPIC)
 
 
-def test_robots_without_a_readable_description_are_asked_about_too(rover) -> None:
+def test_robots_without_readable_description_need_permission(rover) -> None:
     robots, permission = Robots(), MotionPermission()
     robots.come(others=(RobotControls("Rover", frozenset({TOPIC})),))
     gate = MotionGate(permission, robots)
@@ -104,7 +104,7 @@ def test_robots_without_a_readable_description_are_asked_about_too(rover) -> Non
     assert permission.question.names == ("the robot on /Fido/go",)
 
 
-def test_shelf_asks_and_ends_what_is_repeated_when_a_real_robot_comes(session: Session, master) -> None:
+def test_shelf_asks_and_ends_repetition_when_a_real_robot_connects(session: Session, master) -> None:
     acting, permission = session.acting, session.fleet.permission
     moved: list[tuple[object, str]] = []
     acting.on_moved = lambda robots, by: moved.append((robots, by))
@@ -134,7 +134,7 @@ def test_shelf_asks_and_ends_what_is_repeated_when_a_real_robot_comes(session: S
         assert len(told) == before + 1
 
 
-def test_another_program_under_the_same_name_is_asked_about_again(session: Session, master) -> None:
+def test_another_program_of_the_same_name_needs_permission_again(session: Session, master) -> None:
     permission, gate = session.fleet.permission, session.fleet.gate
     with real_robot(session, master.address):
         assert not gate.permits(TOPIC, lambda: None)

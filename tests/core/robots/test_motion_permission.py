@@ -21,13 +21,13 @@ def rover() -> Robot:
     return replace(parse(td_for(ROBOT.thing_model, "Rover")), virtual=False)
 
 
-def test_a_virtual_robot_is_never_asked_for(rover) -> None:
+def test_virtual_robot_needs_no_permission(rover) -> None:
     moving = MotionPermission()
     assert moving.permits([(replace(rover, virtual=True), ["move"])], pytest.fail)
     assert moving.question is None
 
 
-def test_the_question_names_what_moves_and_says_that_stop_is_f12(rover) -> None:
+def test_question_names_moving_actions_and_the_f12_stop_key(rover) -> None:
     moving = MotionPermission()
     assert not moving.permits([(rover, ["move", "light", "turn"])], lambda: None)
     question = moving.question
@@ -37,11 +37,11 @@ def test_the_question_names_what_moves_and_says_that_stop_is_f12(rover) -> None:
     assert "Press F12 to stop" in question.sentence
 
 
-def test_actions_without_risk_need_no_answer(rover) -> None:
+def test_actions_without_risk_need_no_permission(rover) -> None:
     assert MotionPermission().permits([(rover, ["light", "stop"])], pytest.fail)
 
 
-def test_a_yes_goes_on_once_and_counts_for_the_session(rover) -> None:
+def test_permission_continues_once_and_lasts_for_the_session(rover) -> None:
     moving, done = MotionPermission(), []
     moving.permits([(rover, ["move"])], lambda: done.append(1))
     moving.answer(let=True)
@@ -53,7 +53,7 @@ def test_a_yes_goes_on_once_and_counts_for_the_session(rover) -> None:
     assert not MotionPermission().permits([(rover, ["move"])], lambda: None)  # and each session
 
 
-def test_not_now_moves_nothing_and_asks_again(rover) -> None:
+def test_denied_permission_moves_nothing_and_asks_again(rover) -> None:
     moving = MotionPermission()
     moving.permits([(rover, ["move"])], pytest.fail)
     moving.answer(let=False, always=True)
@@ -65,7 +65,7 @@ def test_not_now_moves_nothing_and_asks_again(rover) -> None:
     assert not moving.allowed(rover)
 
 
-def test_always_is_kept_for_this_robot_until_it_is_forgotten(rover, tmp_path) -> None:
+def test_permanent_permission_is_saved_for_this_robot_until_reset(rover, tmp_path) -> None:
     moving = MotionPermission(Settings(tmp_path))
     moving.permits([(rover, ["move"])], lambda: None)
     moving.answer(let=True, always=True)
@@ -76,7 +76,7 @@ def test_always_is_kept_for_this_robot_until_it_is_forgotten(rover, tmp_path) ->
     assert not moving.allowed(rover)
 
 
-def test_the_question_replaces_an_older_one(rover) -> None:
+def test_new_question_replaces_the_previous_one(rover) -> None:
     moving, done = MotionPermission(), []
     moving.permits([(rover, ["move"])], lambda: done.append("old"))
     moving.permits([(rover, ["turn"])], lambda: done.append("new"))
@@ -89,7 +89,7 @@ def program_of(source: str) -> Program:
     return Program("p", source, source, {}, actions=asked_actions(ast.parse(source).body))
 
 
-def test_what_a_program_asks_of_robots_is_read_from_it(rover) -> None:
+def test_robot_actions_of_a_program_are_read_from_its_source(rover) -> None:
     source = "robot('Rover').do('move', distance=1)\nrobot('Rover').ask('look', 'w')\nrobot('P').get('b')\n"
     program = program_of(source)
     assert program.actions == {"Rover": ("move", "look")}
@@ -98,7 +98,7 @@ def test_what_a_program_asks_of_robots_is_read_from_it(rover) -> None:
 
 
 @pytest.mark.parametrize("source", ["robot(name).do('move')", "robot('Rover').do(what)", "r.do('move')"])
-def test_a_program_that_hides_what_it_does_may_do_anything(rover, source) -> None:
+def test_program_with_undetectable_actions_needs_permission_for_all(rover, source) -> None:
     program = program_of(source)
     assert program.actions is None
     ((_, actions),) = wanted_by(program, [rover])
@@ -106,17 +106,17 @@ def test_a_program_that_hides_what_it_does_may_do_anything(rover, source) -> Non
     assert not MotionPermission().permits(wanted_by(program, [rover]), lambda: None)
 
 
-def test_a_robot_that_a_program_moves_by_publishing_may_do_anything(rover) -> None:
+def test_robot_moved_by_publishing_needs_permission_for_all_actions(rover) -> None:
     program = replace(program_of("robot('Rover').do('light')"), moves=("Rover",))
     ((_, actions),) = wanted_by(program, [rover])
     assert "move" in actions
 
 
-def test_the_error_names_the_robots() -> None:
+def test_error_names_the_robots() -> None:
     assert "Rover and Tim may not move yet" in str(MayNotMoveError(["Rover", "Tim"]))
 
 
-def test_one_yes_counts_for_all_robots_of_the_question(rover) -> None:
+def test_one_answer_permits_all_robots_of_the_question(rover) -> None:
     moving, other = MotionPermission(), replace(rover, name="Other")
     assert not moving.permits([(rover, ["move"]), (other, ["turn"])], lambda: None)
     assert moving.question is not None

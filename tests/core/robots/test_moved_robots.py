@@ -23,7 +23,7 @@ def ledger() -> Ledger:
     return Ledger()
 
 
-def test_a_robot_leaves_when_its_program_proves_a_stop(ledger: Ledger) -> None:
+def test_robot_is_removed_when_its_program_proves_a_stop(ledger: Ledger) -> None:
     ledger.note(["Pepper"], "shelf")
     ledger.stood_still("Pepper", {"stranger"}, ledger.mark)
     assert ledger.names == ("Pepper",)
@@ -31,7 +31,7 @@ def test_a_robot_leaves_when_its_program_proves_a_stop(ledger: Ledger) -> None:
     assert ledger.names == ()
 
 
-def test_a_stop_proves_nothing_about_what_was_sent_after_it_began(ledger: Ledger) -> None:
+def test_stop_does_not_prove_commands_sent_after_it_began(ledger: Ledger) -> None:
     ledger.note(["Pepper"], "form", id="1")
     mark = ledger.mark
     ledger.note(["Pepper"], "key")
@@ -41,7 +41,7 @@ def test_a_stop_proves_nothing_about_what_was_sent_after_it_began(ledger: Ledger
     assert motion.by == "key"
 
 
-def test_a_final_answer_ends_only_its_own_motion(ledger: Ledger) -> None:
+def test_final_reply_ends_only_its_own_motion(ledger: Ledger) -> None:
     ledger.note(["Pepper"], "form", id="1")
     ledger.note(["Pepper"], "form", id="2")
     ledger.ended("Pepper", "1")
@@ -50,13 +50,13 @@ def test_a_final_answer_ends_only_its_own_motion(ledger: Ledger) -> None:
     assert "Pepper" not in ledger
 
 
-def test_a_final_answer_does_not_end_a_motion_that_goes_on(ledger: Ledger) -> None:
+def test_final_reply_does_not_end_continuous_motion(ledger: Ledger) -> None:
     ledger.note(["Pepper"], "form")  # a speed: no id
     ledger.ended("Pepper", "")
     assert "Pepper" in ledger
 
 
-def test_a_new_program_proves_nothing_about_the_one_before_that_may_still_run(ledger: Ledger) -> None:
+def test_restarted_program_does_not_prove_stop_of_its_possibly_running_predecessor(ledger: Ledger) -> None:
     ledger.note(["Pepper"], "behaviour")
     ledger.now = NEW
     assert ledger.other_programs("Pepper", NEW) == (OLD,)
@@ -69,7 +69,7 @@ def test_a_new_program_proves_nothing_about_the_one_before_that_may_still_run(le
     assert "Pepper" not in ledger
 
 
-def test_a_virtual_robot_is_its_program(ledger: Ledger) -> None:
+def test_virtual_robot_is_removed_when_its_program_ends(ledger: Ledger) -> None:
     ledger.note(["Pepper"], "behaviour")
     ledger.drop_ended("Pepper")
     assert "Pepper" in ledger
@@ -78,13 +78,13 @@ def test_a_virtual_robot_is_its_program(ledger: Ledger) -> None:
     assert "Pepper" not in ledger
 
 
-def test_a_person_is_believed(ledger: Ledger) -> None:
+def test_confirmation_of_the_user_removes_the_robot(ledger: Ledger) -> None:
     ledger.note(["Pepper", "Turtle"], "bridge")
     ledger.confirm(["Turtle", "Nobody"])
     assert ledger.names == ("Pepper",)
 
 
-def test_what_moved_it_is_told_rather_than_that_it_did_not_answer(ledger: Ledger) -> None:
+def test_cause_of_motion_is_preferred_over_missing_stop_reply(ledger: Ledger) -> None:
     ledger.note(["Pepper"], "alarm")
     ledger.note(["Pepper"], "stop")
     motion = ledger.motion("Pepper")
@@ -94,7 +94,7 @@ def test_what_moved_it_is_told_rather_than_that_it_did_not_answer(ledger: Ledger
     assert ledger.motion("Turtle") is None
 
 
-def test_motions_are_bounded_and_none_is_forgotten(ledger: Ledger) -> None:
+def test_number_of_motions_is_limited_without_forgetting_any(ledger: Ledger) -> None:
     for number in range(3 * MAX_MOTIONS):
         ledger.note(["Pepper"], "form", id=str(number))
         ledger.note(["Pepper"], "key")

@@ -85,7 +85,7 @@ def node(master) -> Iterator[nep.Node]:
         yield made
 
 
-def test_a_pause_in_the_middle_of_a_walk_and_the_rest_of_it(master, pepper, node) -> None:
+def test_pause_interrupts_walk_and_resume_completes_it(master, pepper, node) -> None:
     (robot,) = find_robots(node, 30, wanted=("Pepper",)).robots
     walk = block("robot_pepper_do_walk", ROBOT="Pepper", DISTANCE=number(WAY_M))
     program = compile_behaviour(workspace(started(walk)), (robot,), name="Walk")
@@ -112,7 +112,7 @@ def test_a_pause_in_the_middle_of_a_walk_and_the_rest_of_it(master, pepper, node
         runner.close()
 
 
-def test_a_step_does_the_rest_of_what_was_held(master, pepper, node) -> None:
+def test_step_completes_a_held_action(master, pepper, node) -> None:
     (robot,) = find_robots(node, 30, wanted=("Pepper",)).robots
     walks = [block("robot_pepper_do_walk", ROBOT="Pepper", DISTANCE=number(0.4)) for _ in range(2)]
     program = compile_behaviour(workspace(started(*walks)), (robot,), name="Walk")

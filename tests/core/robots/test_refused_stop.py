@@ -65,7 +65,7 @@ def the_link(session: Session, name: str = "Arm") -> RobotLink:
     return link
 
 
-def test_a_robot_that_refuses_stop_is_said_to_refuse_everywhere(session: Session, arm: Driver) -> None:
+def test_rejected_stop_is_shown_everywhere(session: Session, arm: Driver) -> None:
     link = the_link(session)
     assert link.chip == "virtual, ready" if link.virtual else "ready"
     session.runs.stop()
@@ -93,7 +93,7 @@ def test_a_robot_that_refuses_stop_is_said_to_refuse_everywhere(session: Session
     assert not session.alerts.has("stop")
 
 
-def test_a_person_who_says_that_it_is_still_is_believed(session: Session, arm: Driver) -> None:
+def test_user_can_confirm_that_robot_stands_still_after_rejected_stop(session: Session, arm: Driver) -> None:
     link = the_link(session)
     session.runs.stop()
     tick_until(session, lambda: session.runs.view().state == "unanswered")
@@ -101,7 +101,7 @@ def test_a_person_who_says_that_it_is_still_is_believed(session: Session, arm: D
     assert link.state == "ready"
 
 
-def test_going_away_is_no_proof_and_nor_is_another_program_of_the_name(
+def test_neither_disconnection_nor_new_program_of_same_name_proves_a_stop(
     session: Session, master: Master
 ) -> None:
     with nep.node("arm", master=master.address) as node, Driver(ARM, "Arm", node):
@@ -122,7 +122,7 @@ def test_going_away_is_no_proof_and_nor_is_another_program_of_the_name(
         other.close()
 
 
-def test_one_that_went_away_without_a_stop_is_asked_again_until_a_person_says_that_it_is_still(
+def test_robot_lost_without_stop_is_asked_again_until_the_user_confirms(
     session: Session, master: Master
 ) -> None:
     with nep.node("arm", master=master.address) as node, Driver(ARM, "Arm", node):
@@ -138,14 +138,14 @@ def test_one_that_went_away_without_a_stop_is_asked_again_until_a_person_says_th
     assert robots_chip(session) == ("No robot", "off")
 
 
-def test_one_robot_that_refuses_is_said_to_refuse(session: Session, arm: Driver) -> None:
+def test_rejected_stop_of_a_single_robot_is_an_alert(session: Session, arm: Driver) -> None:
     link = the_link(session)
     session.runs.stop_robot("Arm")
     tick_until(session, lambda: session.alerts.has("stop"))
     assert "the brake does not answer" in link.not_stopped
 
 
-def test_run_prints_what_the_robot_said(master: Master, arm: Driver, tmp_path: Path) -> None:
+def test_run_prints_rejection_of_the_robot(master: Master, arm: Driver, tmp_path: Path) -> None:
     path, out = tmp_path / "wave.nepb", io.StringIO()
     wave = workspace(started(block("robot_arm_do_wave", ROBOT="Arm")))
     robots = {"Arm": arm.description}
@@ -172,7 +172,7 @@ def answers(session: Session, robot: WireRobot, count: int = 1) -> None:
         robot._say(command, "succeeded")
 
 
-def test_while_a_stop_is_not_answered_nothing_looks_well(patient: Session, pepper: WireRobot) -> None:
+def test_pending_stop_is_shown_as_not_ready_everywhere(patient: Session, pepper: WireRobot) -> None:
     link = the_link(patient, "Pepper")
     pepper.silent = {"stop"}
     patient.runs.stop()
@@ -186,7 +186,7 @@ def test_while_a_stop_is_not_answered_nothing_looks_well(patient: Session, peppe
     assert link.state == "ready"
 
 
-def test_who_answers_first_is_shown_while_others_are_waited_for(patient: Session, master: Master) -> None:
+def test_first_stop_replies_are_shown_while_others_are_pending(patient: Session, master: Master) -> None:
     """One is proven, one refuses, one is silent: the first two are known before the third."""
     robots = {name: WireRobot(master.address, name) for name in ("Good", "Bad", "Deaf")}
     try:
@@ -209,7 +209,7 @@ def test_who_answers_first_is_shown_while_others_are_waited_for(patient: Session
             robot.close()
 
 
-def test_a_later_stop_asks_those_that_have_not_answered_an_earlier_one(
+def test_later_stop_includes_robots_without_reply_to_an_earlier_one(
     patient: Session, pepper: WireRobot
 ) -> None:
     link = the_link(patient, "Pepper")
@@ -239,9 +239,7 @@ def lives(pepper: WireRobot, *not_ended: str) -> None:
     pepper._answer.publish({**told, "not_ended": list(not_ended), "error": error})
 
 
-def test_an_action_that_goes_on_is_shown_until_the_robot_says_that_it_has_ended(
-    session: Session, pepper: WireRobot
-) -> None:
+def test_ongoing_action_is_shown_until_robot_reports_its_end(session: Session, pepper: WireRobot) -> None:
     link = the_link(session, "Pepper")
     say_ = pepper._say
     said = "Pepper may still move: turn has not ended"
@@ -259,9 +257,7 @@ def test_an_action_that_goes_on_is_shown_until_the_robot_says_that_it_has_ended(
     tick_until(session, lambda: not session.alerts.has("moving:Pepper"))
 
 
-def test_one_whose_stop_is_too_late_each_time_is_asked_once_more_and_not_for_ever(
-    session: Session, pepper: WireRobot
-) -> None:
+def test_robot_whose_stop_is_always_late_is_asked_only_once_more(session: Session, pepper: WireRobot) -> None:
     link = the_link(session, "Pepper")
     say_ = pepper._say
     pepper._say = lambda command, state, error="": say_(command, "failed", SAID)  # type: ignore[method-assign]
@@ -280,9 +276,7 @@ def test_one_whose_stop_is_too_late_each_time_is_asked_once_more_and_not_for_eve
     tick_until(session, lambda: session.runs.view().state == "unanswered", LONG_S)
 
 
-def test_one_that_says_that_it_may_still_move_and_goes_away_stays_red(
-    session: Session, master: Master
-) -> None:
+def test_robot_lost_after_reporting_possible_motion_stays_an_error(session: Session, master: Master) -> None:
     with nep.node("arm", master=master.address) as node, Driver(ARM, "Arm", node) as arm:
         link = the_link(session)
         told = {"op": "alive", "id": "", "action": "", "state": "running", "not_ended": ["the stop itself"]}
@@ -296,7 +290,7 @@ def test_one_that_says_that_it_may_still_move_and_goes_away_stays_red(
     assert link.state == "away"
 
 
-def test_a_virtual_robot_that_goes_away_moves_nothing_any_more(session: Session, pepper: WireRobot) -> None:
+def test_disconnected_virtual_robot_is_not_moving(session: Session, pepper: WireRobot) -> None:
     link = the_link(session, "Pepper")
     lives(pepper, "turn")
     tick_until(session, lambda: link.state == "not stopped")
@@ -305,7 +299,7 @@ def test_a_virtual_robot_that_goes_away_moves_nothing_any_more(session: Session,
     assert link.state == "away"
 
 
-def test_an_action_that_goes_on_after_a_time_out_needs_no_stop(session: Session, pepper: WireRobot) -> None:
+def test_action_that_continues_after_timeout_needs_no_stop(session: Session, pepper: WireRobot) -> None:
     link = the_link(session, "Pepper")
     lives(pepper, "turn")
     tick_until(session, lambda: link.state == "not stopped")
@@ -315,7 +309,7 @@ def test_an_action_that_goes_on_after_a_time_out_needs_no_stop(session: Session,
     assert pepper.heard("stop") == []
 
 
-def test_a_late_answer_changes_what_stands_there(session: Session, pepper: WireRobot) -> None:
+def test_late_stop_reply_updates_the_result(session: Session, pepper: WireRobot) -> None:
     the_link(session, "Pepper")
     pepper.silent = {"stop"}
     session.runs.stop()
@@ -330,7 +324,7 @@ def test_a_late_answer_changes_what_stands_there(session: Session, pepper: WireR
     assert report.elapsed_ms >= (report.robots[0].elapsed_ms or 0) > 1000
 
 
-def test_the_programs_own_silent_robots_are_asked_again(session: Session, pepper: WireRobot) -> None:
+def test_silent_robots_of_the_program_are_asked_again(session: Session, pepper: WireRobot) -> None:
     the_link(session, "Pepper")
     pepper.silent = {"stop"}
     session.document.edited(workspace(started(block("control_wait", SECONDS=number(600)))))
@@ -343,7 +337,7 @@ def test_the_programs_own_silent_robots_are_asked_again(session: Session, pepper
     runner.close()
 
 
-def test_a_stop_without_a_network_names_every_robot(session: Session, pepper: WireRobot) -> None:
+def test_stop_without_network_names_every_robot(session: Session, pepper: WireRobot) -> None:
     the_link(session, "Pepper")
     stopper, session.stopper = session.stopper, None
     session.runs.stop()

@@ -33,7 +33,7 @@ def test_anything_but_a_count_is_ignored(hostile: object) -> None:
     assert (count.value, count.grew_s) == (7, 2.0)
 
 
-def test_count_of_a_restarted_driver_begins_anew() -> None:
+def test_count_of_restarted_driver_starts_over() -> None:
     count = ReportedCount()
     count.update(7, 1.0)
     count.update(0, 2.0)
@@ -43,7 +43,7 @@ def test_count_of_a_restarted_driver_begins_anew() -> None:
     assert not count.is_growing(3.0 + GROWING_S)
 
 
-def test_signs_of_life_bring_the_counts_of_the_robots_own_program(lab: SimulatedLab) -> None:
+def test_counts_are_read_only_from_heartbeats_of_the_robot_program(lab: SimulatedLab) -> None:
     pepper = lab.start_robot("Pepper")
     link = lab.wait_for_link("Pepper")
 

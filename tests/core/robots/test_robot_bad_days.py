@@ -104,7 +104,7 @@ def well_again(session: Session, turtles: Turtles) -> None:
     assert session.runs.view().result_status == "ok"
 
 
-def test_a_robot_that_is_killed_in_the_middle_of_an_action(session: Session, turtles: Turtles) -> None:
+def test_robot_killed_during_an_action_is_reported(session: Session, turtles: Turtles) -> None:
     process = turtles.start()
     there(session)
     runs(session, turtles)
@@ -117,7 +117,7 @@ def test_a_robot_that_is_killed_in_the_middle_of_an_action(session: Session, tur
     well_again(session, turtles)
 
 
-def test_a_robot_that_hangs_in_the_middle_of_an_action(session: Session, turtles: Turtles) -> None:
+def test_robot_that_hangs_during_an_action_is_reported(session: Session, turtles: Turtles) -> None:
     process = turtles.start()
     link = there(session)
     runs(session, turtles)
@@ -179,7 +179,7 @@ def tried(session: Session, liar: Liar) -> Invocation:
     return made
 
 
-def test_it_answers_twice_and_for_others(session: Session, liar: Liar, tried: Invocation) -> None:
+def test_duplicate_and_foreign_replies_are_ignored(session: Session, liar: Liar, tried: Invocation) -> None:
     for other in ("somebody else's", "", None, 7):
         liar.answers.publish({"id": other, "op": "invoke", "state": "succeeded", "output": {}})
     for state in ("dancing", None, 7, ["succeeded"]):
@@ -196,7 +196,7 @@ def test_it_answers_twice_and_for_others(session: Session, liar: Liar, tried: In
     assert (tried.state, tried.error, tried.output) == ("succeeded", None, {"moved": 0.5})
 
 
-def test_it_sends_what_is_no_json(session: Session, liar: Liar, tried: Invocation) -> None:
+def test_malformed_replies_are_ignored(session: Session, liar: Liar, tried: Invocation) -> None:
     for junk in (b"{not json", b"\xff\xfe", b"", b"[" * 5000):
         liar.answers.publish_bytes(junk)
     for odd in (None, 7, "text", [1, 2], {"id": tried.id}):
@@ -225,7 +225,7 @@ def calls_of(function: Callable[[], object]) -> int:
     return count
 
 
-def test_it_floods_its_feedback(session: Session, liar: Liar, tried: Invocation) -> None:
+def test_feedback_flood_is_handled(session: Session, liar: Liar, tried: Invocation) -> None:
     liar.say(tried, "running")
     tick_until(session, lambda: tried.state == "running")
     ended = threading.Event()
@@ -255,7 +255,7 @@ def test_it_floods_its_feedback(session: Session, liar: Liar, tried: Invocation)
     tick_until(session, lambda: not tried.running)
 
 
-def test_it_says_nothing_at_all(session: Session, liar: Liar, tried: Invocation) -> None:
+def test_robot_that_never_replies_is_reported(session: Session, liar: Liar, tried: Invocation) -> None:
     tick_until(session, lambda: not tried.running, SAID_S)
     assert tried.error == "Turtle is not responding. Check that it is switched on."
     assert session.fleet.link("Turtle").state == "not stopped"  # type: ignore[union-attr]
@@ -265,7 +265,9 @@ def test_it_says_nothing_at_all(session: Session, liar: Liar, tried: Invocation)
     assert session.runs.view().title == "Turtle did not reply"
 
 
-def test_it_falls_silent_in_the_middle(session: Session, liar: Liar, tried: Invocation) -> None:
+def test_robot_that_falls_silent_during_an_action_is_reported(
+    session: Session, liar: Liar, tried: Invocation
+) -> None:
     liar.say(tried, "running")
     tick_until(session, lambda: tried.state == "running")
     tick_until(session, lambda: not tried.running, SAID_S)

@@ -99,7 +99,7 @@ def strangers() -> Strangers:
     return Strangers()
 
 
-def test_invented_robots_that_come_and_go_are_forgotten_and_everything_of_them_is_closed(
+def test_invented_robots_are_forgotten_and_their_resources_closed(
     strangers: Strangers,
 ) -> None:
     strangers.pass_by(1000)
@@ -111,12 +111,12 @@ def test_invented_robots_that_come_and_go_are_forgotten_and_everything_of_them_i
     assert len(strangers.fleet.links) == MAX_AWAY
 
 
-def test_publishers_that_are_still_being_opened_are_closed_too(strangers: Strangers) -> None:
+def test_publishers_still_being_opened_are_closed(strangers: Strangers) -> None:
     strangers.pass_by(400, runs_jobs=False)
     assert strangers.open_publishers == sorted(topic_of(name, "command") for name in strangers.names)
 
 
-def test_robot_that_was_moved_and_left_is_still_named_by_stop(strangers: Strangers) -> None:
+def test_moved_robot_that_left_is_still_named_by_stop(strangers: Strangers) -> None:
     strangers.come("Pepper")
     strangers.fleet.moved.note(["Pepper"], "form")
     strangers.leave()
@@ -133,7 +133,7 @@ def test_robot_that_was_moved_and_left_is_still_named_by_stop(strangers: Strange
 
 
 @pytest.mark.parametrize("why", ["proven", "chosen", "used", "being stopped", "not stopped"])
-def test_robots_that_matter_are_not_forgotten(strangers: Strangers, why: str) -> None:
+def test_important_robots_are_not_forgotten(strangers: Strangers, why: str) -> None:
     fleet = strangers.fleet
     link = strangers.come("Pepper")
     if why == "proven":
@@ -154,7 +154,7 @@ def test_robots_that_matter_are_not_forgotten(strangers: Strangers, why: str) ->
     assert len(fleet.links) == MAX_AWAY + 1
 
 
-def test_robots_that_have_answered_are_forgotten_last(strangers: Strangers) -> None:
+def test_robots_that_replied_are_forgotten_last(strangers: Strangers) -> None:
     strangers.come("Pepper").answered_s = 1.0
     strangers.come("Silent")
     strangers.leave()
@@ -163,7 +163,7 @@ def test_robots_that_have_answered_are_forgotten_last(strangers: Strangers) -> N
     assert "Silent" not in strangers.names
 
 
-def test_forgotten_robot_that_comes_back_is_a_new_one(strangers: Strangers) -> None:
+def test_forgotten_robot_that_returns_is_new(strangers: Strangers) -> None:
     before = strangers.come("Rover")
     strangers.leave()
     strangers.pass_by(300)
@@ -190,7 +190,7 @@ def test_alerts_of_forgotten_robots_are_resolved(strangers: Strangers) -> None:
     assert len(health._gone_since) == MAX_AWAY
 
 
-def test_running_program_tells_the_fleet_which_robots_it_uses(tmp_path: Path) -> None:
+def test_running_program_reports_its_robots_to_the_fleet(tmp_path: Path) -> None:
     lab = SimulatedLab(tmp_path)
     try:
         runs, fleet = lab.studio.session.runs, lab.studio.session.fleet
@@ -203,7 +203,7 @@ def test_running_program_tells_the_fleet_which_robots_it_uses(tmp_path: Path) ->
         lab.close()
 
 
-def test_names_that_robots_of_rize_tell_are_bounded() -> None:
+def test_number_of_rize_robot_names_is_limited() -> None:
     names = RizeNames()
     for number in range(1000):
         names.add(f"Robot{number}")

@@ -70,7 +70,7 @@ def room_of(message: object) -> Room:
     return found.room()
 
 
-def test_it_is_joined_when_a_robot_is_there_and_tells_what_was_kept(studio: Studio, tmp_path: Path) -> None:
+def test_room_is_joined_with_first_robot_and_publishes_saved_state(studio: Studio, tmp_path: Path) -> None:
     studio.room.update(GraphView(1, 1))
     assert studio.watched == []
     studio.room.move("ball", 0.5, 0.5, {})
@@ -79,7 +79,7 @@ def test_it_is_joined_when_a_robot_is_there_and_tells_what_was_kept(studio: Stud
     assert room_of(studio.told()[-1]).thing("ball").x == 0.5
 
 
-def test_the_room_comes_back_at_the_next_start(studio: Studio, tmp_path: Path) -> None:
+def test_room_is_restored_at_next_start(studio: Studio, tmp_path: Path) -> None:
     studio.room.move("table", 0.5, 0.5, {})
     studio.room.add("person", 1.5, 1.5)
     studio.later(QUIET_S / 2)
@@ -91,7 +91,7 @@ def test_the_room_comes_back_at_the_next_start(studio: Studio, tmp_path: Path) -
     again.close()
 
 
-def test_what_a_robot_pushed_is_told_again_to_those_who_come_later(studio: Studio) -> None:
+def test_room_change_by_a_robot_is_republished_for_late_subscribers(studio: Studio) -> None:
     studio.join()
     robot = RoomMap()
     robot.move("ball", -1.0, -1.5)
@@ -104,7 +104,7 @@ def test_what_a_robot_pushed_is_told_again_to_those_who_come_later(studio: Studi
     assert room_of(studio.told()[-1]).thing("ball").x == -1.0
 
 
-def test_furniture_and_people_are_not_put_where_a_robot_stands(studio: Studio) -> None:
+def test_furniture_and_people_cannot_be_placed_on_a_robot(studio: Studio) -> None:
     robots = {"Pepper": (0.0, 0.0, 0.27)}
     before = studio.room.room
     assert not studio.room.move("table", 0.1, 0.1, robots)
@@ -115,7 +115,7 @@ def test_furniture_and_people_are_not_put_where_a_robot_stands(studio: Studio) -
 
 
 @pytest.mark.parametrize("kept", [None, [], {"things": 3}, {"things": [{"name": "ball"}]}])
-def test_damaged_settings_are_the_usual_room(tmp_path: Path, kept: object) -> None:
+def test_damaged_room_settings_give_the_default_room(tmp_path: Path, kept: object) -> None:
     Settings(tmp_path).set("room", kept)
     studio = Studio(tmp_path)
     assert studio.room.room == Room()

@@ -66,7 +66,7 @@ def stranger(master: Master) -> Iterator[Stranger]:
     made.node.close()
 
 
-def test_an_answer_of_a_stranger_does_not_stop_a_robot_that_is_frozen(stopper, pepper, stranger) -> None:
+def test_foreign_reply_does_not_prove_stop_of_a_frozen_robot(stopper, pepper, stranger) -> None:
     pepper.silent = {"stop"}
     report = stopper.stop_all(["Pepper"], timeout_s=SHORT_S)
     assert stranger.answered.is_set()
@@ -74,7 +74,7 @@ def test_an_answer_of_a_stranger_does_not_stop_a_robot_that_is_frozen(stopper, p
     assert report.robots[0] == RobotStop("Pepper", False, None)
 
 
-def test_a_stranger_that_only_answers_is_named(master, stopper, pepper) -> None:
+def test_foreign_node_that_only_replies_is_named(master, stopper, pepper) -> None:
     """It has guessed the id of the stop: it read it on the command topic and left again."""
     pepper.silent = {"stop"}
     with nep.node("liar", master=master.address) as liar:
@@ -89,7 +89,7 @@ def test_a_stranger_that_only_answers_is_named(master, stopper, pepper) -> None:
     assert reports[0].strangers == (("Pepper", "liar"),)
 
 
-def test_two_robots_of_one_name_must_both_answer(master, stopper, pepper) -> None:
+def test_two_robots_of_one_name_must_both_reply(master, stopper, pepper) -> None:
     twin = WireRobot(master.address)
     try:
         stopper.see(stopper._node.graph())
@@ -109,7 +109,7 @@ def test_two_robots_of_one_name_must_both_answer(master, stopper, pepper) -> Non
         twin.close()
 
 
-def test_a_program_that_only_listens_to_the_commands_is_named(master, stopper) -> None:
+def test_other_subscriber_of_the_commands_is_named(master, stopper) -> None:
     with nep.node("motor box", master=master.address) as node:
         node.new_sub("/Pepper/command", "robot/command")
         stopper.see(stopper._node.graph())
@@ -119,7 +119,7 @@ def test_a_program_that_only_listens_to_the_commands_is_named(master, stopper) -
     assert [robot.sentence for robot in report.robots][1:] == [said]
 
 
-def test_a_crowd_that_listens_is_one_line(master, stopper) -> None:
+def test_many_other_subscribers_are_one_line(master, stopper) -> None:
     nodes = [nep.node(f"listener {number}", master=master.address) for number in range(6)]
     for node in nodes:
         node.new_sub("/Pepper/command", "robot/command")
@@ -131,7 +131,7 @@ def test_a_crowd_that_listens_is_one_line(master, stopper) -> None:
     assert report.proven
 
 
-def test_whoever_announced_it_first_is_the_robot_also_when_nobody_said_so(master, stopper, pepper) -> None:
+def test_first_announcing_program_is_the_robot(master, stopper, pepper) -> None:
     twin = WireRobot(master.address)
     try:
         view = stopper._node.graph()
@@ -147,7 +147,7 @@ def test_whoever_announced_it_first_is_the_robot_also_when_nobody_said_so(master
         twin.close()
 
 
-def test_a_stop_goes_to_the_topics_of_earlier_descriptions_too(master, stopper, pepper) -> None:
+def test_stop_is_also_sent_to_topics_of_earlier_descriptions(master, stopper, pepper) -> None:
     """The robot says that its commands are elsewhere now, and still hears the old topic only."""
     moved = RobotTopics("/Pepper/description", "/Pepper/other_command", "/Pepper/other_answer")
     changed = replace(pepper.described, topics=moved)
@@ -157,7 +157,7 @@ def test_a_stop_goes_to_the_topics_of_earlier_descriptions_too(master, stopper, 
     assert pepper.heard("stop")
 
 
-def test_what_was_asked_and_not_told_is_named() -> None:
+def test_robot_that_stop_was_not_sent_to_is_named() -> None:
     report = StopReport((RobotStop("Pepper", True, 3.0),), 3.0)
     whole = report.with_asked(["Pepper", "Turtle"], "no master answers")
     assert (whole.proven, whole.silent) == (False, ("Turtle",))
@@ -191,7 +191,7 @@ def broken(master: Master) -> Iterator[Broken]:
         yield Broken(node)
 
 
-def test_a_line_that_failed_is_named_and_does_not_take_others_along(master, broken, pepper) -> None:
+def test_failed_connection_is_named_and_does_not_affect_other_robots(master, broken, pepper) -> None:
     turtle = WireRobot(master.address, "Turtle")
     stopper = RobotStopper(broken)
     try:
@@ -207,7 +207,7 @@ def test_a_line_that_failed_is_named_and_does_not_take_others_along(master, brok
         turtle.close()
 
 
-def test_a_line_that_failed_is_tried_again_at_the_stop(broken, pepper) -> None:
+def test_failed_connection_is_retried_at_stop(broken, pepper) -> None:
     stopper = RobotStopper(broken)
     try:
         stopper.set_robots([pepper.described])
@@ -220,7 +220,7 @@ def test_a_line_that_failed_is_tried_again_at_the_stop(broken, pepper) -> None:
         stopper.close()
 
 
-def test_a_late_answer_is_still_taken(stopper, pepper) -> None:
+def test_late_stop_reply_is_accepted(stopper, pepper) -> None:
     pepper.silent = {"stop"}
     late: list[RobotStop] = []
     report = stopper.stop_all(timeout_s=0.1, on_late=late.append)
@@ -240,7 +240,7 @@ def test_a_late_answer_is_still_taken(stopper, pepper) -> None:
     assert report.with_late(RobotStop("Other", True, 1.0)) is report
 
 
-def test_who_is_told_of_a_late_answer_may_ask_the_stopper(stopper, pepper) -> None:
+def test_late_reply_callback_can_use_the_stopper(stopper, pepper) -> None:
     """The answer waited until the master told whose it is: whoever hears that is told with no lock held."""
     pepper.silent = {"stop"}
     free: list[bool] = []
@@ -263,7 +263,7 @@ def test_who_is_told_of_a_late_answer_may_ask_the_stopper(stopper, pepper) -> No
     until(lambda: free == [True])
 
 
-def test_the_words_of_a_refusal_are_the_robots_own_and_harmless(stopper, pepper) -> None:
+def test_rejection_message_of_the_robot_is_sanitized(stopper, pepper) -> None:
     say_ = pepper._say
     words = "Pepper may still move: the brake\x1b[2J\n does not answer." + "!" * 1000
     pepper._say = lambda command, state, error="": say_(command, "failed", words)

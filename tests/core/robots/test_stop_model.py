@@ -354,7 +354,7 @@ BROKEN_HISTORIES: dict[str, list[Step]] = {
 
 
 @pytest.mark.parametrize("history", BROKEN_HISTORIES.values(), ids=BROKEN_HISTORIES)
-def test_history_that_broke_a_proof_before(history: list[Step]) -> None:
+def test_histories_that_once_broke_a_proof(history: list[Step]) -> None:
     model = StopModel()
     try:
         model.start(both=True)
@@ -366,7 +366,7 @@ def test_history_that_broke_a_proof_before(history: list[Step]) -> None:
 
 
 @pytest.mark.timeout(600 + HISTORIES)
-def test_a_proven_stop_is_true_in_every_history() -> None:
+def test_proven_stop_is_true_in_every_history() -> None:
     count = HISTORIES or FIXED_HISTORIES
     run_state_machine_as_test(
         StopModel,
@@ -382,7 +382,7 @@ def test_a_proven_stop_is_true_in_every_history() -> None:
     )
 
 
-def test_killed_program_does_not_keep_a_stop_of_its_twin_from_being_proven() -> None:
+def test_killed_program_does_not_prevent_proof_for_its_twin() -> None:
     model = StopModel()
     try:
         model.start(both=False)

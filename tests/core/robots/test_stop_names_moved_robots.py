@@ -106,7 +106,7 @@ def test_robot_that_reported_the_end_of_its_motion_is_not_named(lab: SimulatedLa
 
 
 @pytest.mark.parametrize("by", ["shelf", "key", "alarm", "replay", "bridge", "behaviour", "anything"])
-def test_stop_names_what_moved_a_robot(lab: SimulatedLab, by: str) -> None:
+def test_stop_names_the_cause_of_motion(lab: SimulatedLab, by: str) -> None:
     pepper, session = lab.start_robot("Pepper"), lab.studio.session
     lab.wait_for_link("Pepper")
     session.fleet.moved.note(["Pepper"], by)
@@ -125,7 +125,7 @@ def test_stop_without_robots_ends_ready_and_proves_nothing(lab: SimulatedLab) ->
     assert (view.state, view.result_status, view.can_run) == ("ready", "off", True)
 
 
-def test_robot_is_ready_only_when_a_stop_would_arrive(lab: SimulatedLab) -> None:
+def test_robot_is_ready_only_when_stop_can_be_delivered(lab: SimulatedLab) -> None:
     pepper = start_unreachable_robot(lab)
     link = lab.wait_for_link("Pepper")
     assert link.state == "connecting"
@@ -168,7 +168,7 @@ def flood(lab: SimulatedLab, topic: str) -> None:
     lab.studio.hand_to_stopper(topic, batch)
 
 
-def test_flood_of_foreign_answers_does_not_displace_the_robots_answer(lab: SimulatedLab) -> None:
+def test_flood_of_foreign_replies_does_not_displace_reply_of_the_robot(lab: SimulatedLab) -> None:
     pepper, runs = lab.start_robot("Pepper"), lab.studio.session.runs
     topic = lab.wait_for_link("Pepper").robot.topics.answer
     pepper.node.is_held = True
@@ -193,7 +193,7 @@ class Undecodable(Message):
 
 
 @pytest.mark.parametrize("sender", ["known", "unknown"])
-def test_stopper_does_not_decode_the_answer_of_a_stranger(lab: SimulatedLab, sender: str) -> None:
+def test_stopper_does_not_decode_foreign_replies(lab: SimulatedLab, sender: str) -> None:
     topic = "/Pepper/answer"
     stranger = lab.stranger.node.new_pub(topic, "robot/answer")
     pepper = start_unreachable_robot(lab)
@@ -207,7 +207,7 @@ def test_stopper_does_not_decode_the_answer_of_a_stranger(lab: SimulatedLab, sen
 
 @pytest.mark.parametrize("announcing", ["one node", "many nodes"])
 @pytest.mark.parametrize("order", ["before", "after"])
-def test_invented_robots_do_not_keep_a_stop_from_a_real_one(
+def test_invented_robots_do_not_prevent_stop_of_a_real_robot(
     lab: SimulatedLab, order: str, announcing: str
 ) -> None:
     invented = [f"A{number}" for number in range(MAX_ROBOTS + 20)]
@@ -233,7 +233,7 @@ def test_invented_robots_do_not_keep_a_stop_from_a_real_one(
     assert "Pepper" in report.still
 
 
-def test_robot_whose_lease_ended_after_it_answered_is_told_to_stop(lab: SimulatedLab) -> None:
+def test_robot_whose_lease_expired_after_its_reply_still_receives_stop(lab: SimulatedLab) -> None:
     pepper = lab.start_robot("Pepper")
     lab.wait_for_link("Pepper")
     lab.stop()
@@ -244,7 +244,7 @@ def test_robot_whose_lease_ended_after_it_answered_is_told_to_stop(lab: Simulate
     assert lab.studio.session.runs.view().state == "ready", "nobody waits for its answer"
 
 
-def test_answer_of_another_program_does_not_prove_a_stop(lab: SimulatedLab) -> None:
+def test_reply_of_another_program_does_not_prove_a_stop(lab: SimulatedLab) -> None:
     pepper, runs = lab.start_robot("Pepper"), lab.studio.session.runs
     lab.wait_for_link("Pepper")
     pepper.node.is_held = True
@@ -256,7 +256,7 @@ def test_answer_of_another_program_does_not_prove_a_stop(lab: SimulatedLab) -> N
     assert runs.view().state == "unanswered"
 
 
-def test_robot_of_which_only_the_command_topic_is_known_is_told_and_named(lab: SimulatedLab) -> None:
+def test_robot_known_only_by_its_command_topic_receives_stop_and_is_named(lab: SimulatedLab) -> None:
     unknown, runs = lab.start_robot("X"), lab.studio.session.runs
     unknown.node.unlist()  # it announces nothing
     lab.studio.session.fleet.moved.note(["/X/command"], "shelf")

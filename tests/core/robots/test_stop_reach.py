@@ -64,7 +64,7 @@ def is_needed(session: Session) -> bool:
     return any(alert.id == "robot:Lamp" and alert.severity == "error" for alert in session.alerts.active)
 
 
-def test_a_robot_that_went_away_during_the_program_is_named_until_it_answers(session: Session) -> None:
+def test_robot_lost_during_a_program_is_named_until_it_replies(session: Session) -> None:
     with nep.node("lamps") as node:
         with used_by_a_program(session, node):
             pass
@@ -89,7 +89,7 @@ def test_a_robot_that_went_away_during_the_program_is_named_until_it_answers(ses
     tick_until(session, lambda: not within_reach(session))
 
 
-def test_a_person_who_says_that_it_is_still_is_believed(session: Session) -> None:
+def test_user_can_confirm_that_a_lost_robot_stands_still(session: Session) -> None:
     with nep.node("lamps") as node, used_by_a_program(session, node):
         pass
     tick_until(session, lambda: not session.fleet.connected)
@@ -99,7 +99,7 @@ def test_a_person_who_says_that_it_is_still_is_believed(session: Session) -> Non
     tick_until(session, lambda: not within_reach(session))
 
 
-def test_whom_a_new_master_does_not_know_yet_has_not_gone(session: Session) -> None:
+def test_robots_unknown_to_a_new_master_stay_connected_during_discovery(session: Session) -> None:
     with nep.node("lamps") as node:
         driver = Driver(LAMP, "Lamp", node)
         driver.start()
@@ -119,7 +119,7 @@ def test_whom_a_new_master_does_not_know_yet_has_not_gone(session: Session) -> N
         assert not session.fleet.connected
 
 
-def test_closing_the_session_ends_the_program_at_once(session: Session) -> None:
+def test_session_close_ends_the_program_at_once(session: Session) -> None:
     with nep.node("lamps") as node, used_by_a_program(session, node):
         runner = session.runs._runner
         assert runner is not None

@@ -54,7 +54,7 @@ def bench() -> Bench:
     return Bench()
 
 
-def test_a_try_goes_through_its_states_and_is_kept(bench) -> None:
+def test_trial_passes_through_its_states_and_is_kept(bench) -> None:
     made = bench.begin("move", distance=0.5)
     assert bench.sent[0]["input"] == {"distance": 0.5}
     assert made.state == "sent"
@@ -72,13 +72,13 @@ def test_a_try_goes_through_its_states_and_is_kept(bench) -> None:
     assert list(bench.link.tried) == [made]
 
 
-def test_only_the_newest_tries_are_kept(bench) -> None:
+def test_only_newest_trials_are_kept(bench) -> None:
     for _ in range(TRIES_KEPT + 5):
         bench.answer(bench.begin("light"), "succeeded")
     assert len(bench.link.tried) == TRIES_KEPT
 
 
-def test_a_robot_that_says_nothing_to_a_command_fails_it_in_three_seconds(bench) -> None:
+def test_trial_fails_after_three_seconds_without_reply(bench) -> None:
     made = bench.begin()
     bench.pass_time(FIRST_ANSWER_S - 0.1)
     assert made.running
@@ -90,7 +90,7 @@ def test_a_robot_that_says_nothing_to_a_command_fails_it_in_three_seconds(bench)
     assert bench.link.state == "ready"
 
 
-def test_a_robot_that_falls_silent_in_the_middle_fails_it_in_two_seconds(bench) -> None:
+def test_trial_fails_two_seconds_after_robot_falls_silent(bench) -> None:
     made = bench.begin()
     bench.answer(made, "accepted")
     bench.answer(made, "running")
@@ -104,7 +104,7 @@ def test_a_robot_that_falls_silent_in_the_middle_fails_it_in_two_seconds(bench) 
     assert bench.sent[-1] == {"id": made.id, "op": "cancel", "from": "studio", "action": "move"}
 
 
-def test_a_robot_without_a_beat_is_waited_for_until_the_time_limit(bench) -> None:
+def test_robot_without_heartbeat_is_awaited_until_the_time_limit(bench) -> None:
     bench.link.robot = replace(bench.link.robot, beat_s=None)
     made = bench.begin()
     bench.answer(made, "running")
@@ -119,7 +119,7 @@ def test_a_robot_without_a_beat_is_waited_for_until_the_time_limit(bench) -> Non
     assert made.state == "failed"  # what comes later changes nothing
 
 
-def test_what_waits_in_the_queue_of_the_robot_takes_no_time_of_its_limit(bench) -> None:
+def test_time_in_robot_queue_does_not_count_towards_time_limit(bench) -> None:
     made = bench.begin()
     bench.answer(made, "accepted", waits_for=["turn", "turn"])
     for _ in range(200):
@@ -139,27 +139,27 @@ def test_what_waits_in_the_queue_of_the_robot_takes_no_time_of_its_limit(bench) 
         {"op": "invoke", "state": ["succeeded"], "mine": True},
     ],
 )
-def test_answers_to_others_and_nonsense_end_nothing(bench, answer) -> None:
+def test_foreign_and_invalid_replies_do_not_end_a_trial(bench, answer) -> None:
     made = bench.begin()
     bench.answer(made, "running")
     bench.tries.answer(bench.link, {**answer, "id": made.id} if answer.get("mine") else answer)
     assert made.state == "running"
 
 
-def test_the_second_answer_changes_nothing(bench) -> None:
+def test_second_final_reply_is_ignored(bench) -> None:
     made = bench.begin()
     bench.answer(made, "succeeded")
     bench.answer(made, "failed", error="no")
     assert (made.state, made.error) == ("succeeded", None)
 
 
-def test_a_robot_that_can_not_be_reached_fails_at_once(bench) -> None:
+def test_trial_of_unreachable_robot_fails_at_once(bench) -> None:
     bench.reachable = False
     made = bench.begin()
     assert (made.state, made.error) == ("failed", "Turtle can't be reached; check that it is switched on")
 
 
-def test_a_cancel_is_sent_once_it_runs_and_never_after_its_end(bench) -> None:
+def test_cancel_is_sent_while_running_and_never_after_the_end(bench) -> None:
     made = bench.begin()
     bench.tries.cancel(bench.link, "move")
     assert bench.sent[-1]["op"] == "cancel"
@@ -170,7 +170,7 @@ def test_a_cancel_is_sent_once_it_runs_and_never_after_its_end(bench) -> None:
     assert len(bench.sent) == count
 
 
-def test_two_tries_of_one_action_both_come_to_their_end(bench) -> None:
+def test_two_trials_of_one_action_both_end(bench) -> None:
     first, second = bench.begin(), bench.begin()
     bench.answer(first, "accepted")
     bench.answer(second, "accepted", replaces=["move"])
@@ -181,7 +181,7 @@ def test_two_tries_of_one_action_both_come_to_their_end(bench) -> None:
     assert bench.rested == ["Turtle"]
 
 
-def test_what_a_robot_says_went_wrong_is_short_and_turns_no_words_behind_it(bench) -> None:
+def test_error_message_of_the_robot_is_shortened_and_sanitized(bench) -> None:
     made = bench.begin("move", distance=0.5)
     bench.answer(made, "failed", error="\u202ethe brake\x1b[2J\nis stuck" + "!" * 100_000)
     assert made.error is not None

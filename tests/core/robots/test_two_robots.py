@@ -62,7 +62,7 @@ def test_pepper_and_turtle_work_in_one_behaviour(session: Session, node: nep.Nod
             assert (link.drawing["figure"], link.drawing["eyes"]) == ("turtle", "#ff0000")
 
 
-def test_which_robot_the_panels_show(session: Session, node: nep.Node) -> None:
+def test_panels_show_the_chosen_robot_or_the_first_connected(session: Session, node: nep.Node) -> None:
     with Driver(simulated.ROBOT, "Pepper", node):
         there(session, "Pepper")
         with Driver(turtle.ROBOT, "Turtle", node):
@@ -79,7 +79,7 @@ def test_which_robot_the_panels_show(session: Session, node: nep.Node) -> None:
 REAL = replace(turtle.ROBOT, virtual=False)
 
 
-def test_nothing_moves_a_real_robot_before_the_answer(session: Session, node: nep.Node) -> None:
+def test_real_robot_does_not_move_before_permission(session: Session, node: nep.Node) -> None:
     with Driver(REAL, "Turtle", node) as driver:
         there(session, "Turtle")
         wheels = driver.body.wheels  # type: ignore[attr-defined]
@@ -102,7 +102,7 @@ def test_nothing_moves_a_real_robot_before_the_answer(session: Session, node: ne
 
 
 @pytest.mark.parametrize("topic", ["/Turtle/command", "robot_action"])
-def test_a_behaviour_that_publishes_on_a_robots_topic_asks_and_is_stopped_too(
+def test_behaviour_that_publishes_on_a_robot_topic_needs_permission_and_is_stopped(
     session: Session, node: nep.Node, topic: str
 ) -> None:
     """A command in the robot's own words: the block is not the robot's, and moves it all the same."""
@@ -128,7 +128,7 @@ def test_a_behaviour_that_publishes_on_a_robots_topic_asks_and_is_stopped_too(
         assert str(session.runs.view().result).startswith("Turtle stopped (")
 
 
-def test_a_robot_that_comes_while_a_program_runs_is_not_moved_by_what_that_publishes(
+def test_robot_that_connects_during_a_run_is_not_moved_by_published_messages(
     session: Session, node: nep.Node
 ) -> None:
     publish = block("messages_publish", "p", TOPIC="/Turtle/command", VALUE=text("drive"))
@@ -145,7 +145,9 @@ def test_a_robot_that_comes_while_a_program_runs_is_not_moved_by_what_that_publi
         tick_until(session, lambda: session.runs.view().state != "stopping")
 
 
-def test_let_it_move_runs_what_was_wanted_and_asks_no_more(session: Session, node: nep.Node) -> None:
+def test_permission_continues_the_requested_run_without_asking_again(
+    session: Session, node: nep.Node
+) -> None:
     with Driver(REAL, "Turtle", node) as driver:
         there(session, "Turtle")
         wheels = driver.body.wheels  # type: ignore[attr-defined]
@@ -161,7 +163,7 @@ def test_let_it_move_runs_what_was_wanted_and_asks_no_more(session: Session, nod
         tick_until(session, lambda: tried.state == "succeeded", FOUND_S)
 
 
-def test_a_try_goes_on_after_the_answer(session: Session, node: nep.Node) -> None:
+def test_trial_continues_after_permission(session: Session, node: nep.Node) -> None:
     with Driver(REAL, "Turtle", node):
         there(session, "Turtle")
         with pytest.raises(MayNotMoveError, match="Turtle may not move yet"):
@@ -184,9 +186,7 @@ def wait(seconds: float) -> dict[str, object]:
     return block("control_wait", "w", SECONDS=number(seconds))
 
 
-def test_a_pause_holds_a_robot_that_drives_and_go_on_lets_it_drive_again(
-    session: Session, node: nep.Node
-) -> None:
+def test_pause_halts_a_driving_robot_and_resume_lets_it_drive_again(session: Session, node: nep.Node) -> None:
     with Driver(turtle.ROBOT, "Turtle", node) as driver:
         there(session, "Turtle")
         wheels = driver.body.wheels  # type: ignore[attr-defined]
@@ -204,7 +204,7 @@ def test_a_pause_holds_a_robot_that_drives_and_go_on_lets_it_drive_again(
         assert wheels.still()
 
 
-def test_a_step_does_not_leave_a_robot_driving(session: Session, node: nep.Node) -> None:
+def test_step_does_not_leave_a_robot_driving(session: Session, node: nep.Node) -> None:
     with Driver(turtle.ROBOT, "Turtle", node) as driver:
         there(session, "Turtle")
         wheels = driver.body.wheels  # type: ignore[attr-defined]
@@ -220,7 +220,7 @@ def test_a_step_does_not_leave_a_robot_driving(session: Session, node: nep.Node)
         tick_until(session, lambda: session.runs.view().state == "proven")
 
 
-def test_slow_motion_lets_a_robot_drive_no_further(session: Session, node: nep.Node) -> None:
+def test_slow_motion_does_not_lengthen_a_drive(session: Session, node: nep.Node) -> None:
     """It drives for half a second, not also while the blocks behind it wait for their turn."""
     with Driver(turtle.ROBOT, "Turtle", node) as driver:
         there(session, "Turtle")

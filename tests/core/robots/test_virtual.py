@@ -56,17 +56,17 @@ def process() -> Iterator[subprocess.Popen[bytes]]:
     made.communicate()
 
 
-def test_a_process_that_was_started_here_is_ours(process: subprocess.Popen[bytes]) -> None:
+def test_process_started_here_is_own(process: subprocess.Popen[bytes]) -> None:
     known = VirtualProcesses(MODULES, lambda: [process.pid])
     assert known.is_ours(Identity("n", "Turtle", HERE, process.pid))
     assert known.is_ours(Identity("n", "Turtle", HERE, os.getpid()))
 
 
-def test_a_process_that_only_names_the_module_is_not(process: subprocess.Popen[bytes]) -> None:
+def test_process_that_only_mentions_the_module_is_not_own(process: subprocess.Popen[bytes]) -> None:
     assert not VirtualProcesses(MODULES).is_ours(Identity("n", "Turtle", HERE, process.pid))
 
 
-def test_who_is_elsewhere_or_nowhere_is_not(process: subprocess.Popen[bytes]) -> None:
+def test_process_on_another_computer_or_unknown_process_is_not_own(process: subprocess.Popen[bytes]) -> None:
     known = VirtualProcesses(MODULES, lambda: [process.pid])
     assert not known.is_ours(Identity("n", "Turtle", "another-computer", process.pid))
     assert not known.is_ours(Identity("n", "Turtle", HERE, None))
@@ -74,7 +74,7 @@ def test_who_is_elsewhere_or_nowhere_is_not(process: subprocess.Popen[bytes]) ->
     assert not known.is_ours(Identity("n", "Turtle", HERE, 1))
 
 
-def test_a_virtual_robot_of_another_studio_of_this_person_is_ours(master: Master) -> None:
+def test_virtual_robot_of_another_studio_of_this_user_is_own(master: Master) -> None:
     command = [sys.executable, "-m", "app.robots.turtle", "--name", "Turtle", "--owner-pid", str(os.getpid())]
     made = subprocess.Popen(command, env={**os.environ, "NEP_MASTER": master.address})
     try:
@@ -88,7 +88,7 @@ def test_a_virtual_robot_of_another_studio_of_this_person_is_ours(master: Master
         made.wait(10)
 
 
-def test_whether_a_process_has_ended_is_known_of_this_computer_only(
+def test_process_end_is_known_only_on_this_computer(
     process: subprocess.Popen[bytes],
 ) -> None:
     known = VirtualProcesses(MODULES)
@@ -127,7 +127,7 @@ def asks(fleet: Fleet) -> bool:
     return False
 
 
-def test_a_stranger_that_says_that_it_is_virtual_is_asked_about(fleet: Fleet) -> None:
+def test_foreign_robot_that_claims_to_be_virtual_needs_permission(fleet: Fleet) -> None:
     fleet.join(turtle(), "/Turtle/description", STRANGE)
     link = fleet.link("Turtle")
     assert link is not None
@@ -135,7 +135,7 @@ def test_a_stranger_that_says_that_it_is_virtual_is_asked_about(fleet: Fleet) ->
     assert asks(fleet)
 
 
-def test_a_real_robot_that_says_that_it_is_virtual_now_is_asked_about(fleet: Fleet) -> None:
+def test_real_robot_that_now_claims_to_be_virtual_needs_permission(fleet: Fleet) -> None:
     mine = Identity("1", "Turtle", HERE, os.getpid())
     fleet.join(turtle(), "/Turtle/description", mine)
     assert not asks(fleet)
@@ -155,7 +155,7 @@ class World:
         self.changes.append(change)
 
 
-def test_the_world_of_a_strangers_robot_is_not_changed_before_the_answer(fleet: Fleet) -> None:
+def test_world_of_a_foreign_robot_is_not_changed_before_permission(fleet: Fleet) -> None:
     """What it calls its world may be a topic that moves something real."""
     fleet.join(turtle(), "/Turtle/description", STRANGE)
     link, world = fleet.link("Turtle"), World()
@@ -171,7 +171,9 @@ def test_the_world_of_a_strangers_robot_is_not_changed_before_the_answer(fleet: 
     assert len(world.changes) == 2
 
 
-def test_a_yes_is_for_this_program_and_always_for_its_computer(fleet: Fleet, tmp_path: Path) -> None:
+def test_permission_applies_to_this_program_and_permanent_permission_to_its_computer(
+    fleet: Fleet, tmp_path: Path
+) -> None:
     fleet.join(turtle(virtual=False), "/Turtle/description", STRANGE)
     assert asks(fleet)
     fleet.permission.answer(let=True)
@@ -189,7 +191,7 @@ def test_a_yes_is_for_this_program_and_always_for_its_computer(fleet: Fleet, tmp
     assert not MotionPermission(Settings(tmp_path)).allowed(turtle(virtual=False))
 
 
-def test_a_strangers_virtual_robot_on_the_network_is_asked_about(session: Session, master: Master) -> None:
+def test_foreign_virtual_robot_on_the_network_needs_permission(session: Session, master: Master) -> None:
     environment = {**os.environ, "NEP_MASTER": master.address}
     made = subprocess.Popen([sys.executable, "-c", STRANGER], stdin=subprocess.PIPE, env=environment)
     try:
@@ -203,7 +205,7 @@ def test_a_strangers_virtual_robot_on_the_network_is_asked_about(session: Sessio
         made.communicate()
 
 
-def test_only_virtual_robots_go_to_their_start_position_and_only_if_wanted(fleet: Fleet) -> None:
+def test_only_virtual_robots_return_to_start_position_and_only_on_request(fleet: Fleet) -> None:
     fleet.join(turtle(), "/Turtle/description", Identity("1", "Turtle", HERE, os.getpid()))
     stranger = parse(td_for(ROBOT.thing_model, "Other"))
     fleet.join(stranger, "/Other/description", replace(STRANGE, node_id="3"))

@@ -67,7 +67,7 @@ def case() -> Case:
     return Case("Pepper", "Ginger")
 
 
-def test_each_speech_is_said_once_though_no_panel_shows(case) -> None:
+def test_each_utterance_is_spoken_once_without_a_visible_panel(case) -> None:
     for spoken in (0.0, 0.3, 0.95):
         case.tell("Pepper", "Hello", spoken)
     case.tell("Pepper", None)
@@ -80,7 +80,7 @@ def test_each_speech_is_said_once_though_no_panel_shows(case) -> None:
     assert case.said == ["Hello", "Hello", "Hello"]
 
 
-def test_nobody_is_looked_at_without_a_speaker_or_a_wish(case) -> None:
+def test_robot_state_is_not_watched_when_sound_is_off(case) -> None:
     assert {STATE.format("Pepper"), STATE.format("Ginger")} <= case.session.source.wanted
     case.session.voices.switch(on=False)
     case.session.tick()
@@ -90,7 +90,7 @@ def test_nobody_is_looked_at_without_a_speaker_or_a_wish(case) -> None:
     assert STATE.format("Pepper") in case.session.source.wanted
 
 
-def test_two_robots_speak_one_after_the_other_and_the_caption_says_who(case) -> None:
+def test_two_robots_speak_in_turn_and_caption_names_the_speaker(case) -> None:
     case.tell("Pepper", "A long story")
     case.tell("Ginger", "And I say")
     assert case.said == ["A long story"]
@@ -107,7 +107,7 @@ def test_two_robots_speak_one_after_the_other_and_the_caption_says_who(case) -> 
     assert case.session.voices.saying is None
 
 
-def test_too_many_that_wait_are_bounded_and_told(case) -> None:
+def test_queue_of_waiting_utterances_is_bounded_and_drops_are_logged(case) -> None:
     case.tell("Pepper", "A long story")
     for count in range(MAX_WAITING + 1):
         case.tell("Ginger", f"word {count}", 0.95)
@@ -121,7 +121,7 @@ def test_too_many_that_wait_are_bounded_and_told(case) -> None:
     assert heard == ["A long story", *(f"word {count}" for count in range(1, MAX_WAITING + 1))]
 
 
-def test_a_voice_that_never_ends_is_not_waited_for(case) -> None:
+def test_voice_that_never_ends_times_out(case) -> None:
     case.tell("Pepper", "Hello", 0.95)
     case.tell("Ginger", "Hi", 0.95)
     case.session.clock.now += 60.0
@@ -130,7 +130,7 @@ def test_a_voice_that_never_ends_is_not_waited_for(case) -> None:
 
 
 @pytest.mark.parametrize("how", ["broken off", "gone"])
-def test_a_speech_that_is_broken_off_is_silent_at_once(case, how) -> None:
+def test_interrupted_utterance_is_silenced_at_once(case, how) -> None:
     case.tell("Pepper", "A long story", 0.2)
     case.tell("Ginger", "Me, too", 0.95)
     if how == "gone":
@@ -141,7 +141,7 @@ def test_a_speech_that_is_broken_off_is_silent_at_once(case, how) -> None:
     assert case.speaker.did[-2:] == ["stop voice", ("Me, too", "en", 0.4)]
 
 
-def test_stop_silences_all_at_once_also_those_who_wait(case) -> None:
+def test_stop_silences_all_speech_including_queued(case) -> None:
     case.tell("Pepper", "A long story", 0.2)
     case.tell("Ginger", "Me, too", 0.95)
     case.session.fleet.told_to_stop(["Pepper", "Ginger"])
@@ -154,7 +154,7 @@ def test_stop_silences_all_at_once_also_those_who_wait(case) -> None:
     assert case.said == ["A long story"]
 
 
-def test_switched_off_it_ends_at_once_and_begins_with_the_next_speech(case) -> None:
+def test_disabling_sound_silences_at_once_and_enabling_waits_for_next_utterance(case) -> None:
     case.tell("Pepper", "A long story", 0.2)
     case.session.voices.switch(on=False)
     assert case.speaker.did[-1] == "stop"
@@ -165,7 +165,7 @@ def test_switched_off_it_ends_at_once_and_begins_with_the_next_speech(case) -> N
     assert case.said[-1] == "The end"
 
 
-def test_tones_are_played_beside_a_voice_and_end_when_they_are_broken_off(case) -> None:
+def test_tones_play_alongside_speech_and_end_when_interrupted(case) -> None:
     case.tell("Pepper", "Hello")
     bell = {"number": 1, "title": "bell", "played": 0.1, "notes": [[880, 0.3], [0, 0.1]]}
     case.tell("Ginger", None, sound=None)
@@ -188,16 +188,16 @@ def test_tones_are_played_beside_a_voice_and_end_when_they_are_broken_off(case) 
         {"notes": [[440, 99]]},
     ],
 )
-def test_what_is_no_sound_is_silent(wrong) -> None:
+def test_invalid_sound_is_silent(wrong) -> None:
     assert Heard.parse({"sound": wrong, "speech": 3, "spoken": "x", "volume": True}) == Heard()
 
 
-def test_a_sound_ends_where_nobody_wants_to_hear_more() -> None:
+def test_sound_duration_is_limited() -> None:
     notes = Heard.parse({"sound": {"number": 1, "notes": [[440, 0.9]] * 40}}).notes
     assert sum(seconds for _hz, seconds in notes) <= LONGEST_S
 
 
-def test_without_a_speaker_nothing_happens() -> None:
+def test_no_speech_without_a_speaker() -> None:
     session = Session()
     session.join(parse(td_for(PEPPER.thing_model, "Pepper")))
     voices: RobotVoices = session.voices

@@ -29,7 +29,7 @@ def waiting(seconds: dict[str, object] | None, lines: str = "Hello") -> dict[str
     return workspace(started(block("messages_write", "p", VALUE=text(lines)), wait))
 
 
-def test_error_of_a_program_that_stopped_goes_when_its_block_changes(document: Document) -> None:
+def test_error_of_stopped_program_is_cleared_when_its_block_changes(document: Document) -> None:
     soon = text("soon")
     document.edited(waiting(soon))
     errors = BlockErrors()
@@ -43,7 +43,7 @@ def test_error_of_a_program_that_stopped_goes_when_its_block_changes(document: D
     assert errors.by_block == {}
 
 
-def test_error_of_a_deleted_block_goes(document: Document) -> None:
+def test_error_of_deleted_block_is_cleared(document: Document) -> None:
     soon = text("soon")
     document.edited(waiting(soon))
     errors = BlockErrors()
@@ -53,7 +53,7 @@ def test_error_of_a_deleted_block_goes(document: Document) -> None:
     assert errors.forget_repaired()
 
 
-def test_error_that_kept_a_program_from_starting_goes_when_the_blocks_are_right(document: Document) -> None:
+def test_error_that_prevented_start_is_cleared_when_blocks_are_fixed(document: Document) -> None:
     wait = block("control_wait_until", "w")
     document.edited(workspace(started(wait)))
     wanted, errors = Wanted(document), BlockErrors()

@@ -39,13 +39,13 @@ def output(*chunks: bytes) -> Output:
     return Output(Pipe(chunks), Rests())  # type: ignore[arg-type]
 
 
-def test_lines_are_put_together_and_the_rest_is_counted() -> None:
+def test_protocol_lines_are_assembled_and_other_bytes_counted() -> None:
     read = output(b'{"is": "re', b'ady"}\nnoise\n\n{"is": 1}', b"\n", b"tail")
     assert list(read) == [b'{"is": "ready"}', b'{"is": 1}']
     assert read.strange_bytes == len("noise\n") + len("tail")
 
 
-def test_what_follows_a_line_that_was_too_long_is_none_of_ours_until_its_end() -> None:
+def test_oversized_line_is_discarded_to_its_end() -> None:
     long = b'{"is"' + b"x" * LONGEST_LINE
     assert list(output(long, b"x", b'{"is": 2}\n{"is": 3}\n')) == [b'{"is": 3}']
     assert list(output(long + b'\n{"is": 3}\n')) == [b'{"is": 3}']
@@ -60,7 +60,7 @@ def test_what_follows_a_line_that_was_too_long_is_none_of_ours_until_its_end() -
         pytest.param(LINE * (CHUNK // len(LINE)), CHUNK // len(LINE), 120, id="lines of the protocol"),
     ],
 )
-def test_a_flood_is_counted_to_the_byte_and_takes_no_space(
+def test_output_flood_is_counted_exactly_in_constant_memory(
     chunk: bytes, lines_in_it: int, count: int
 ) -> None:
     read = output(*[chunk] * count)
@@ -82,7 +82,7 @@ def rested(chunks: Iterable[bytes], clock: Callable[[], float]) -> Rests:
     return rests
 
 
-def test_after_too_much_in_a_second_it_leaves_the_processor_to_others() -> None:
+def test_reader_pauses_after_exceeding_its_rate() -> None:
     assert rested([LINE] * LINES_PER_S, lambda: 5.0).count == 0
     tired = rested([LINE] * (LINES_PER_S + 3), lambda: 5.0)
     assert tired.count >= 3
@@ -91,13 +91,13 @@ def test_after_too_much_in_a_second_it_leaves_the_processor_to_others() -> None:
     assert rested([b"y" * CHUNK] * (BYTES_PER_S // CHUNK + 3), lambda: 5.0).count >= 2
 
 
-def test_in_the_next_second_it_reads_on_without_a_rest() -> None:
+def test_reader_below_its_rate_does_not_pause() -> None:
     steps = itertools.count()
     slow = 1.0 / LINES_PER_S  # the clock goes on with each look at it: fewer lines than may come in a second
     assert rested([LINE] * (5 * LINES_PER_S), lambda: next(steps) * slow).count == 0
 
 
-def test_the_gate_lets_through_again_after_a_second() -> None:
+def test_rate_limit_reopens_after_a_second() -> None:
     now = [0.0]
     gate = Gate(3, lambda: now[0])
     assert [gate.passes() for _ in range(5)] == [True, True, True, False, False]

@@ -84,7 +84,7 @@ def test_stop_of_one_robot_is_unproven_when_the_stopper_raises(monkeypatch: pyte
 @pytest.mark.parametrize(
     "place", ["control.result_words", "stop_news.stop_words", "stop_news.unanswered_words"]
 )
-def test_a_fault_in_the_words_of_a_stop_leaves_nothing_stopping(
+def test_error_in_stop_message_does_not_leave_run_stopping(
     session: Session, monkeypatch: pytest.MonkeyPatch, place: str
 ) -> None:
     runs = session.runs
@@ -95,7 +95,9 @@ def test_a_fault_in_the_words_of_a_stop_leaves_nothing_stopping(
     assert (runs._run.state, session.fleet.moved.names) == ("unanswered", ("Arm",))
 
 
-def test_stop_stops_whatever_the_question_does(session: Session, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_stop_is_sent_even_if_withdrawing_the_question_fails(
+    session: Session, monkeypatch: pytest.MonkeyPatch
+) -> None:
     monkeypatch.setattr(session.fleet.permission, "withdraw", failing)
     with pytest.raises(OSError, match="out of order"):
         session.runs.stop()
@@ -107,7 +109,7 @@ def title_at_next_tick(session: Session) -> str:
     return session.runs.view().title
 
 
-def test_with_nothing_to_run_the_bar_says_what_to_do_until_something_changes(session: Session) -> None:
+def test_empty_behaviour_shows_run_hint_until_an_edit(session: Session) -> None:
     runs = session.runs
     assert runs.view().title == "Ready"
     runs.run()
@@ -118,7 +120,7 @@ def test_with_nothing_to_run_the_bar_says_what_to_do_until_something_changes(ses
     until(lambda: title_at_next_tick(session) == "Ready")  # on a busy computer it is compiled beside
 
 
-def test_another_behaviour_takes_the_hint_away(session: Session) -> None:
+def test_new_behaviour_clears_run_hint(session: Session) -> None:
     session.runs.step()
     assert session.runs.view().title == "Nothing to run yet"
     session.document.edited({"blocks": {"blocks": []}})
@@ -126,7 +128,7 @@ def test_another_behaviour_takes_the_hint_away(session: Session) -> None:
     until(lambda: title_at_next_tick(session) == "Ready")
 
 
-def test_run_with_a_problem_says_why_it_did_not_start_until_it_is_mended(session: Session) -> None:
+def test_run_with_a_problem_shows_reason_until_fixed(session: Session) -> None:
     wait = {"type": "control_wait", "id": "wait"}
     hat = {"type": "events_started", "id": "hat", "next": {"block": wait}}
     session.document.edited({"blocks": {"blocks": [hat]}})
@@ -140,7 +142,7 @@ def test_run_with_a_problem_says_why_it_did_not_start_until_it_is_mended(session
     until(lambda: title_at_next_tick(session) == "Ready")
 
 
-def test_the_view_is_made_once_a_tick_and_again_when_something_is_done(session: Session) -> None:
+def test_view_is_cached_per_tick_and_updated_after_actions(session: Session) -> None:
     runs = session.runs
     before = runs.view()
     assert runs.view() is before

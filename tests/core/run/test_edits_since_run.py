@@ -25,11 +25,11 @@ def program(runnable: str) -> Program:
     return Program("Mine", "", runnable, {})
 
 
-def test_nothing_ran_nothing_was_edited() -> None:
+def test_no_edit_is_reported_before_the_first_run() -> None:
     assert not EditsSinceRun().seen()
 
 
-def test_an_edit_is_seen_until_it_is_undone_or_run() -> None:
+def test_edit_is_reported_until_undone_or_run() -> None:
     edits, document = EditsSinceRun(), Document()
     edits.ran(document, program("a"))
     assert not edits.seen()
@@ -42,7 +42,7 @@ def test_an_edit_is_seen_until_it_is_undone_or_run() -> None:
     assert not edits.seen()
 
 
-def test_while_a_long_behaviour_is_compiled_it_stays_as_it_was() -> None:
+def test_edit_state_is_unchanged_during_background_compilation() -> None:
     edits, document = EditsSinceRun(), Document()
     edits.ran(document, program("a"))
     document.compiled = None
@@ -51,7 +51,7 @@ def test_while_a_long_behaviour_is_compiled_it_stays_as_it_was() -> None:
     assert edits.seen()
 
 
-def test_a_robot_that_comes_is_no_edit() -> None:
+def test_connected_robot_is_not_an_edit() -> None:
     edits, document = EditsSinceRun(), Document()
     edits.ran(document, program("a"))
     document.compiled = program("a, and what the robot does")

@@ -22,7 +22,7 @@ class Program:
         self.told.append(guarded)
 
 
-def test_program_is_told_of_robots_that_cannot_be_read_and_of_nothing_twice() -> None:
+def test_program_is_informed_of_unreadable_robots_without_repetition() -> None:
     fleet = SimpleNamespace(
         connected=(),
         moved=MovedRobots(),

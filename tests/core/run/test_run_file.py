@@ -66,7 +66,7 @@ def run(path, **more) -> tuple[int, str]:
     return run_file(path, out=out, **more), out.getvalue()
 
 
-def test_a_file_runs_to_its_end_and_the_robot_has_stopped(pepper, saved):
+def test_file_runs_to_end_and_robot_is_stopped(pepper, saved):
     code, out = run(saved(workspace(started(say("Hi"), write(text("done"))))))
     assert code == OK
     assert "“Test” runs" in out
@@ -76,7 +76,7 @@ def test_a_file_runs_to_its_end_and_the_robot_has_stopped(pepper, saved):
     assert [op for op in told if op != "alive"][-1] == "stop"  # a sign of life may come between
 
 
-def test_a_failing_block_is_told(pepper, saved):
+def test_failing_block_is_reported(pepper, saved):
     pepper.refuses = {"say": "no voice"}
     code, out = run(saved(workspace(started(say("Hi")))))
     assert code == FAILED
@@ -84,7 +84,7 @@ def test_a_failing_block_is_told(pepper, saved):
     assert "Pepper stopped (" in out
 
 
-def test_an_interrupt_stops_it_and_proves_it(pepper, saved):
+def test_interrupt_stops_the_run_with_a_proven_stop(pepper, saved):
     pepper.slow = {"say"}
     interrupted = threading.Event()
     found: list[tuple[int, str]] = []
@@ -100,7 +100,7 @@ def test_an_interrupt_stops_it_and_proves_it(pepper, saved):
 
 @pytest.mark.skipif(os.name != "posix", reason="sends signals")
 @pytest.mark.parametrize("how", ["a file of Studio", "a program file"])
-def test_ctrl_c_pressed_again_does_not_cut_the_stop_short(pepper, saved, master, tmp_path, how):
+def test_second_ctrl_c_does_not_interrupt_the_stop(pepper, saved, master, tmp_path, how):
     """The second one comes while the robots' answers are waited for; it is not a robot's answer."""
     pepper.silent, pepper.slow = {"stop"}, {"say"}
     path = saved(workspace(started(say("Hi"))))
@@ -124,20 +124,20 @@ def test_ctrl_c_pressed_again_does_not_cut_the_stop_short(pepper, saved, master,
     assert process.returncode == (FAILED if how == "a file of Studio" else 0)
 
 
-def test_a_robot_that_does_not_stop_is_named(pepper, saved):
+def test_robot_that_does_not_stop_is_named(pepper, saved):
     pepper.silent = {"stop"}
     code, out = run(saved(workspace(started(say("Hi")))))
     assert code == FAILED
     assert "Pepper did not reply. Switch it off by hand." in out
 
 
-def test_a_robot_that_is_not_there(master, saved):
+def test_missing_robot_is_reported(master, saved):
     code, out = run(saved(workspace(started(say("Hi")))), robot_wait_s=0.2)
     assert code == ROBOT_MISSING
     assert "Pepper not found." in out
 
 
-def test_a_robot_that_the_file_names_but_does_not_describe_is_waited_for(master, saved):
+def test_robot_without_description_in_the_file_is_awaited(master, saved):
     path = saved(workspace(started(say("Hi"))))
     content = json.loads(path.read_text())
     path.write_text(json.dumps(content | {"robots": {}}))
@@ -146,7 +146,7 @@ def test_a_robot_that_the_file_names_but_does_not_describe_is_waited_for(master,
     assert "Pepper not found" in out
 
 
-def test_what_cannot_run(master, saved, tmp_path):
+def test_unusable_file_is_rejected(master, saved, tmp_path):
     code, out = run(saved(workspace(started(block("control_wait")))))
     assert (code, "error: wait needs a number." in out) == (UNUSABLE, True)
     assert run(saved(workspace()))[0] == UNUSABLE
@@ -158,7 +158,7 @@ def test_what_cannot_run(master, saved, tmp_path):
     assert run(saved(workspace(started(write(number(1))))), master="127.0.0.1:1")[0] == OK  # needs nobody
 
 
-def test_a_robot_of_rize_is_driven_too(master, tmp_path):
+def test_rize_robot_is_controlled(master, tmp_path):
     rosie = RizeRobot(master.address)
     try:
         hello = block("robot_rize_do_say", ROBOT="Rosie", TEXT=text("hello"))
@@ -177,7 +177,7 @@ def test_a_robot_of_rize_is_driven_too(master, tmp_path):
         rosie.close()
 
 
-def test_a_real_robot_moves_only_when_it_may(master, tmp_path):
+def test_real_robot_moves_only_with_permission(master, tmp_path):
     rosie = RizeRobot(master.address)
     try:
         walk = block("robot_rize_do_walk", ROBOT="Rosie", DIRECTION="forwards", METERS=number(0.5))
@@ -196,7 +196,7 @@ def test_a_real_robot_moves_only_when_it_may(master, tmp_path):
         rosie.close()
 
 
-def test_publishing_on_a_robots_topic_is_moving_it(master, tmp_path):
+def test_publishing_on_a_robot_topic_needs_permission(master, tmp_path):
     with nep.node("rover", master=master.address) as node, Driver(REAL, "Rover", node):
         publish = block("messages_publish", TOPIC="/Rover/command", VALUE=text("drive"))
         content = {"format": "nep-behaviour", "version": 1, "name": "Sly", "robots": {}}
@@ -210,7 +210,7 @@ def test_publishing_on_a_robots_topic_is_moving_it(master, tmp_path):
         assert "Rover stopped (" in out
 
 
-def test_virtual_robot_begins_at_its_start_position_or_keeps_the_one_it_has(master, tmp_path):
+def test_virtual_robot_starts_at_its_start_position_or_keeps_its_current_one(master, tmp_path):
     light = block("robot_diffdrive_do_light", ROBOT="Turtle", COLOUR="#ff0000")
     described = td_for(turtle.ROBOT.thing_model, "Turtle")
     content = {"format": "nep-behaviour", "version": 1, "name": "Light", "robots": {"Turtle": described}}
@@ -230,7 +230,7 @@ def test_virtual_robot_begins_at_its_start_position_or_keeps_the_one_it_has(mast
         until(lambda: x() == first)
 
 
-def test_a_second_program_of_a_robots_name_is_told_and_changes_nothing(master, pepper, saved):
+def test_second_program_with_robot_name_is_reported_and_changes_nothing(master, pepper, saved):
     with nep.node("evil", master=master.address) as evil:
         described = dict(robot().source)
         announcement = evil.new_pub("/Pepper/description", "robot/description", latched=True)
@@ -297,7 +297,7 @@ def example_runs(name: str) -> tuple[int, str]:
 
 @pytest.mark.slow
 @pytest.mark.timeout(400)
-def test_the_examples_run_on_the_virtual_robot():
+def test_examples_run_on_the_virtual_robot():
     """All of them at once: they mostly wait for their robots."""
     with ThreadPoolExecutor(len(SAID)) as pool:
         ended = dict(zip(SAID, pool.map(example_runs, SAID), strict=True))
@@ -309,7 +309,7 @@ def test_the_examples_run_on_the_virtual_robot():
 
 
 @pytest.mark.timeout(240)
-def test_the_program_text_runs_as_a_file(master, pepper, tmp_path):
+def test_generated_program_runs_as_a_file(master, pepper, tmp_path):
     from app.blocks import compile_behaviour
 
     saved = workspace(started(say("Hi"), write(text("done"))))
@@ -345,7 +345,7 @@ class Lost(io.StringIO):
         (errno.ENOSPC, "the output cannot be written: no space left on device; the behaviour was stopped.\n"),
     ],
 )
-def test_an_output_that_is_gone_stops_the_behaviour_and_its_robots(pepper, saved, capsys, number, said):
+def test_closed_output_stops_the_behaviour_and_its_robots(pepper, saved, capsys, number, said):
     path = saved(workspace(started(say("Hi"), write(text("one")), write(text("two")), say("never"))))
     assert run_file(path, out=Lost(number, 1)) == FAILED
     assert capsys.readouterr().err == said
@@ -354,14 +354,14 @@ def test_an_output_that_is_gone_stops_the_behaviour_and_its_robots(pepper, saved
     assert "never" not in [each.get("input") for each in pepper.commands]
 
 
-def test_what_a_behaviour_writes_cannot_steer_the_terminal(pepper, saved):
+def test_control_characters_in_output_are_escaped(pepper, saved):
     code, out = run(saved(workspace(started(write(text("a\x1b[2Jb"))))))
     assert code == OK
     assert "a\\x1b[2Jb" in out.splitlines()
 
 
 @pytest.mark.parametrize("page", ["cp437", "ascii"])
-def test_it_says_everything_in_every_code_page(master, saved, page):
+def test_output_works_in_every_encoding(master, saved, page):
     path = saved(workspace(started(write(text("\u2013 “😀”")))))
     done = subprocess.run(
         [sys.executable, "-m", "app", "run", str(path)],
@@ -375,7 +375,7 @@ def test_it_says_everything_in_every_code_page(master, saved, page):
     assert b'"Test" runs' in done.stdout
 
 
-def test_a_master_whose_name_nobody_knows(saved):
+def test_unknown_master_host_is_reported(saved):
     code, out = run(saved(workspace(started(say("Hi")))), master="nosuchhost.invalid:7781")
     assert code == UNUSABLE
     assert out.startswith("unknown computer 'nosuchhost.invalid'; ")
@@ -403,7 +403,7 @@ run("greeting")
 """
 
 
-def test_a_program_file_writes_into_every_pipe(master, tmp_path):
+def test_program_file_writes_to_ascii_pipe(master, tmp_path):
     file = tmp_path / "greeting.py"
     file.write_text(PROGRAM, encoding="utf-8")
     done = subprocess.run(

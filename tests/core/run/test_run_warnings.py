@@ -7,7 +7,7 @@ from app.core.run.run_warnings import RunWarnings
 SAID = "“walk” was replaced by “turn”"
 
 
-def test_it_stands_at_its_block_with_its_count_until_the_next_run() -> None:
+def test_warning_stays_at_its_block_with_count_until_next_run() -> None:
     log: list[str] = []
     warnings = RunWarnings(log.append)
     warnings.begin()
@@ -26,7 +26,7 @@ def test_it_stands_at_its_block_with_its_count_until_the_next_run() -> None:
     assert warnings.by_block == {}
 
 
-def test_a_loop_does_not_flood_the_console() -> None:
+def test_repeated_warning_does_not_flood_the_console() -> None:
     log: list[str] = []
     warnings = RunWarnings(log.append)
     for _run in range(2):

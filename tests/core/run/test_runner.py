@@ -114,7 +114,7 @@ def stopping_s(begin: Callable[[], Runner]) -> float:
     return took
 
 
-def test_a_program_is_asked_for_less_than_a_tenth_of_a_second_before_it_is_killed():
+def test_stop_grace_period_is_below_100_ms():
     assert runner_module.STOP_GRACE_S < 0.1
 
 
@@ -130,7 +130,7 @@ def endless():
     )
 
 
-def test_a_program_runs_and_ends(runner, heard, master):
+def test_program_runs_and_ends(runner, heard, master):
     made = runner()
     made.start(program(write(text("Hi"))), [], master.address)
     assert made.wait(LONG_S)
@@ -141,7 +141,7 @@ def test_a_program_runs_and_ends(runner, heard, master):
     assert {event.run for event in heard.events} == {made.run}
 
 
-def test_a_program_asks_and_goes_on_with_the_answer(runner, heard, master):
+def test_program_continues_with_the_answer(runner, heard, master):
     made = runner()
     asks = block("asking_ask", QUESTION=text("Name? 👍"))
     made.start(program(asks, write(block("asking_answer"))), [], master.address)
@@ -154,7 +154,7 @@ def test_a_program_asks_and_goes_on_with_the_answer(runner, heard, master):
     assert heard.until("ended").ok
 
 
-def test_a_program_tells_what_can_be_chosen(runner, heard, master):
+def test_question_includes_its_choices(runner, heard, master):
     made = runner()
     asks = block("asking_choices", QUESTION=text("Play?"), CHOICES=list_of(text("yes"), number(2)))
     made.start(program(asks, write(block("asking_answer"))), [], master.address)
@@ -165,7 +165,7 @@ def test_a_program_tells_what_can_be_chosen(runner, heard, master):
     assert heard.until("print").text == "2"
 
 
-def test_pause_step_and_go_on(runner, heard, master):
+def test_pause_step_and_resume(runner, heard, master):
     made = runner()
     first, second = write(text("1")) | {"id": "a"}, write(text("2")) | {"id": "b"}
     made.start(program(first, second), [], master.address, paused=True)
@@ -177,7 +177,7 @@ def test_pause_step_and_go_on(runner, heard, master):
     assert heard.until("ended").ok
 
 
-def test_a_running_program_can_be_paused(runner, heard, master):
+def test_running_program_can_be_paused(runner, heard, master):
     made = runner()
     made.start(endless(), [], master.address)
     heard.until("running")
@@ -190,7 +190,7 @@ def test_a_running_program_can_be_paused(runner, heard, master):
     assert heard.until("ended").ok
 
 
-def test_stop_ends_an_endless_program_at_once(runner, heard, master):
+def test_stop_ends_endless_program_at_once(runner, heard, master):
     made = runner()
 
     def begin() -> Runner:
@@ -205,7 +205,7 @@ def test_stop_ends_an_endless_program_at_once(runner, heard, master):
     assert kinds.count("ended") == 1
 
 
-def test_stop_ends_one_block_that_computes_for_ever(runner, heard, master):
+def test_stop_interrupts_a_block_that_computes_endlessly(runner, heard, master):
     power = number(9)
     for _ in range(3):
         power = block("values_arithmetic", A=number(9), SIGN="**", B=power)
@@ -225,7 +225,7 @@ def test_stop_ends_one_block_that_computes_for_ever(runner, heard, master):
 
 
 @pytest.mark.parametrize("command", [HANGS, IGNORES], ids=["hangs", "ignores everything"])
-def test_a_child_that_hangs_is_killed(runner, heard, command):
+def test_hanging_child_is_killed(runner, heard, command):
     huge = program(*(write(text("x" * 500)) for _ in range(400)))  # far more than a pipe holds
     made = runner(command)
 
@@ -239,7 +239,7 @@ def test_a_child_that_hangs_is_killed(runner, heard, command):
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="signals")
-def test_a_child_that_crashes_is_told(runner, heard):
+def test_crashed_child_is_reported(runner, heard):
     made = runner(CRASHES)
     made.start(program(), [], None)
     ended = heard.until("ended")
@@ -248,13 +248,13 @@ def test_a_child_that_crashes_is_told(runner, heard):
     assert stopping_s(lambda: made) < STOP_WITHIN_S  # there is nothing to wait for
 
 
-def test_a_child_that_fails_says_why(runner, heard):
+def test_failed_child_is_reported_with_reason(runner, heard):
     runner(FAILS).start(program(), [], None)
     assert heard.until("ended").text == "The program's process ended with exit code 1: no room left."
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="signals")
-def test_a_child_that_was_killed_by_somebody_is_told(runner, heard, master):
+def test_child_killed_from_outside_is_reported(runner, heard, master):
     made = runner()
     made.start(endless(), [], master.address)
     heard.until("running")
@@ -263,7 +263,7 @@ def test_a_child_that_was_killed_by_somebody_is_told(runner, heard, master):
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="signals")
-def test_ctrl_c_in_the_terminal_is_for_the_runner(runner, heard, master):
+def test_child_ignores_ctrl_c_of_the_terminal(runner, heard, master):
     made = runner()
     made.start(endless(), [], master.address)
     heard.until("running")
@@ -274,7 +274,7 @@ def test_ctrl_c_in_the_terminal_is_for_the_runner(runner, heard, master):
     assert heard.until("ended").ok
 
 
-def test_what_is_no_event_is_left_out(runner, heard):
+def test_invalid_events_are_skipped(runner, heard):
     made = runner(TALKS)
     made.start(program(), [], None)
     assert heard.until("ended").elapsed_s == 1.5
@@ -284,12 +284,12 @@ def test_what_is_no_event_is_left_out(runner, heard):
     ]
 
 
-def test_a_program_that_cannot_be_started(runner):
+def test_program_that_cannot_be_started_raises(runner):
     with pytest.raises(RunnerError, match="can't start the program"):
         runner(("/there/is/no/such/program",)).start(program(), [], None)
 
 
-def test_a_runner_runs_once(runner, heard, master):
+def test_runner_can_be_started_only_once(runner, heard, master):
     made = runner()
     made.stop()
     made.start(program(), [], master.address)
@@ -298,7 +298,7 @@ def test_a_runner_runs_once(runner, heard, master):
     heard.until("ended")
 
 
-def test_the_robot_is_told_when_the_window_dies(runner, heard, master, pepper):
+def test_robot_is_stopped_when_the_window_process_dies(runner, heard, master, pepper):
     """The child notices that its parent is gone: its input ends."""
     pepper.slow = {"say"}
     made = runner()
@@ -311,7 +311,7 @@ def test_the_robot_is_told_when_the_window_dies(runner, heard, master, pepper):
         assert pepper.changed.wait_for(lambda: bool(pepper.heard("stop")), LONG_S)
 
 
-def test_an_error_has_its_block_and_its_sentence(runner, heard, master):
+def test_error_event_has_block_and_message(runner, heard, master):
     made = runner()
     half = block("values_arithmetic", "v", A=number(1), SIGN="/", B=number(0))
     made.start(program(write(half)), [], master.address)
@@ -320,12 +320,12 @@ def test_an_error_has_its_block_and_its_sentence(runner, heard, master):
     assert not heard.until("ended").ok
 
 
-def test_a_frozen_studio_is_its_own_child(monkeypatch):
+def test_frozen_studio_runs_itself_as_child(monkeypatch):
     monkeypatch.setattr(sys, "frozen", True, raising=False)
     assert child_command() == (sys.executable, "--child")
 
 
-def test_the_values_of_variables_come_and_can_be_given(runner, heard, master):
+def test_variable_values_are_received_and_can_be_set(runner, heard, master):
     same = block("values_compare", A=get("n"), B=number(5), RELATION="==")
     saved = workspace(
         started(

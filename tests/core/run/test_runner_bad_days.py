@@ -61,26 +61,26 @@ def printed(heard: Heard) -> list[str]:
 # ---- memory ----------------------------------------------------------------------------------------
 
 
-def test_a_program_that_eats_memory_is_ended_and_says_so(started, heard) -> None:
+def test_program_over_memory_limit_is_killed_and_reported(started, heard) -> None:
     started(EATS, most_bytes=200_000_000)
     ended = heard.until("ended")
     assert not ended.ok
     assert ended.text == "The program used more than 0.2 GB of memory and was stopped."
 
 
-def test_what_it_starts_counts_with_it(started, heard) -> None:
+def test_memory_of_child_processes_counts_towards_limit(started, heard) -> None:
     started(LETS_EAT, most_bytes=200_000_000)
     assert heard.until("ended").text == "The program used more than 0.2 GB of memory and was stopped."
 
 
-def test_a_behaviours_program_has_a_gigabyte() -> None:
+def test_default_memory_limit_is_one_gigabyte() -> None:
     assert Runner(lambda _event: None)._most_bytes == MAX_BYTES == 1_000_000_000
 
 
 # ---- floods ----------------------------------------------------------------------------------------
 
 
-def test_a_gigabyte_of_output_is_counted_and_stop_works_at_once(started, heard) -> None:
+def test_gigabyte_of_output_is_counted_and_stop_works_at_once(started, heard) -> None:
     me = psutil.Process()
     before = me.memory_info().rss
     shares: list[float] = []
@@ -105,7 +105,7 @@ def test_a_gigabyte_of_output_is_counted_and_stop_works_at_once(started, heard) 
     assert 1 < float(told.split()[0]) < 40 * (seconds + 1)  # MB: at 20 a second it waits for its turn
 
 
-def test_a_flood_of_lines_is_thinned_out_and_counted(started, heard) -> None:
+def test_line_flood_is_throttled_and_counted(started, heard) -> None:
     def begin() -> Runner:
         runner, pause = started(PRINTS), threading.Event()
         heard.until("print", text="x", run=runner.run)
@@ -124,13 +124,13 @@ def test_a_flood_of_lines_is_thinned_out_and_counted(started, heard) -> None:
     assert len(left_out) <= seconds + 2  # one in a second, and one at the end
 
 
-def test_a_line_without_end_is_left_out_and_what_follows_is_read(started, heard) -> None:
+def test_endless_line_is_discarded_and_later_lines_are_read(started, heard) -> None:
     started(NO_END)
     assert heard.until("ended").elapsed_s == 1.0
     assert printed(heard) == ["10.0 MB of unexpected output were discarded"]
 
 
-def test_errors_without_end_are_bounded(started, heard) -> None:
+def test_error_output_is_bounded(started, heard) -> None:
     started(
         "import os\nfor _ in range(50):\n    os.write(2, b'e' * 1_000_000)\nraise SystemExit('last words')"
     )
@@ -140,7 +140,7 @@ def test_errors_without_end_are_bounded(started, heard) -> None:
 # ---- pipes and processes ---------------------------------------------------------------------------
 
 
-def test_a_program_that_closes_its_output_is_ended(started, heard) -> None:
+def test_program_that_closes_its_output_is_ended(started, heard) -> None:
     started(CLOSES)
     assert heard.until("ended").text == "The program lost its connection to Studio and was stopped."
 
@@ -169,7 +169,7 @@ def gone(process: psutil.Process) -> bool:
 
 
 @pytest.mark.parametrize("new", [False, True], ids=["in its group", "in a session of its own"])
-def test_processes_that_it_started_end_with_stop(started, heard, new) -> None:
+def test_child_processes_end_with_stop(started, heard, new) -> None:
     left: list[psutil.Process] = []
 
     def begin() -> Runner:
@@ -182,7 +182,7 @@ def test_processes_that_it_started_end_with_stop(started, heard, new) -> None:
     assert all(gone(each) for each in left)
 
 
-def test_processes_that_it_left_behind_end_when_it_ends(started, heard) -> None:
+def test_orphaned_child_processes_end_with_the_program(started, heard) -> None:
     left = child_of(heard, started(FORKS.format(new=False, wait=0.3)))
     heard.until("ended")
     assert gone(left)

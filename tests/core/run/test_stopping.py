@@ -36,7 +36,7 @@ def stopper(master, robots):
         made.close()
 
 
-def test_all_robots_answer(stopper, robots):
+def test_all_robots_reply_to_stop(stopper, robots):
     answered: list[RobotStop] = []
     report = stopper.stop_all(timeout_s=LONG_S, on_answer=answered.append)
     assert report.proven
@@ -47,7 +47,7 @@ def test_all_robots_answer(stopper, robots):
     assert [len(robot.heard("stop")) for robot in robots] == [1, 1]
 
 
-def test_a_silent_robot_is_named(stopper, robots):
+def test_silent_robot_is_named(stopper, robots):
     robots[1].silent = {"stop"}
     answered: list[RobotStop] = []
     report = stopper.stop_all(timeout_s=SILENT_S, on_answer=answered.append)
@@ -62,24 +62,24 @@ def test_a_silent_robot_is_named(stopper, robots):
     ]  # the answer first, the silence at the end
 
 
-def test_only_the_robots_that_are_named_are_stopped(stopper, robots):
+def test_only_named_robots_are_stopped(stopper, robots):
     assert [robot.name for robot in stopper.stop_all(["Turtle"], timeout_s=LONG_S).robots] == ["Turtle"]
     assert robots[0].heard("stop") == []
 
 
-def test_a_name_that_could_not_be_told_is_in_the_report(stopper, robots):
+def test_unknown_robot_name_is_in_the_report(stopper, robots):
     report = stopper.stop_all(["Turtle", "Nobody"], timeout_s=LONG_S)
     assert (report.proven, report.silent) == (False, ("Nobody",))
     assert report.robots[1].sentence == "Stop was not sent to Nobody. Switch it off by hand."
 
 
-def test_a_stop_without_robots_proves_nothing(stopper):
+def test_stop_without_robots_proves_nothing(stopper):
     stopper.set_robots(())
     report = stopper.stop_all()
     assert (report.robots, report.proven, report.status) == ((), False, "off")
 
 
-def test_a_stop_that_failed_is_told_with_the_robots_words(stopper, robots):
+def test_failed_stop_is_reported_with_robot_message(stopper, robots):
     say_ = robots[0]._say
     robots[0]._say = lambda command, state, error="": say_(command, "failed", "the brake is stuck")
     report = stopper.stop_all(["Pepper"], timeout_s=LONG_S)
@@ -87,7 +87,7 @@ def test_a_stop_that_failed_is_told_with_the_robots_words(stopper, robots):
     assert report.robots[0].sentence == "Pepper may still move: the brake is stuck. Switch it off by hand."
 
 
-def test_a_robot_that_answers_for_another_or_twice_proves_nothing(stopper, robots):
+def test_robot_that_replies_for_another_or_twice_proves_nothing(stopper, robots):
     pepper, turtle = robots
     turtle.silent = {"stop"}
     say_ = pepper._say
@@ -105,7 +105,7 @@ def test_a_robot_that_answers_for_another_or_twice_proves_nothing(stopper, robot
     assert (report.proven, report.silent) == (False, ("Turtle",))
 
 
-def test_robots_come_and_go(stopper, robots):
+def test_robots_can_be_added_and_removed(stopper, robots):
     stopper.set_robots([robots[0].described])
     assert stopper.robots == ("Pepper",)
     stopper.set_robots([each.described for each in robots])
@@ -113,7 +113,7 @@ def test_robots_come_and_go(stopper, robots):
     assert stopper.robots == ("Pepper", "Turtle")
 
 
-def test_a_robot_of_rize_cannot_confirm(master, stopper):
+def test_rize_robot_cannot_confirm_stop(master, stopper):
     rosie = RizeRobot(master.address)
     try:
         stopper.set_robots([rosie.described])
@@ -127,7 +127,7 @@ def test_a_robot_of_rize_cannot_confirm(master, stopper):
         rosie.close()
 
 
-def test_a_closed_node_is_told_in_words(master, robots):
+def test_stop_over_closed_node_is_reported(master, robots):
     with nep.node("studio", master=master.address) as node:
         stopper = RobotStopper(node)
         stopper.set_robots([robots[0].described])
@@ -136,7 +136,7 @@ def test_a_closed_node_is_told_in_words(master, robots):
     assert report.robots[0].sentence.startswith("Stop can't be sent to Pepper: ")
 
 
-def test_a_stop_names_the_program_that_it_ends(stopper, robots):
+def test_stop_names_the_program_to_end(stopper, robots):
     stopper.send_stop(ends="program-1")
     stopper.stop_all(ends="program-2")
     stopper.stop_all()
@@ -144,7 +144,7 @@ def test_a_stop_names_the_program_that_it_ends(stopper, robots):
         assert [stop.get("ends") for stop in robot.heard("stop")] == ["program-1", "program-2", None]
 
 
-def test_two_stops_at_the_same_time_both_get_their_answers(stopper):
+def test_two_simultaneous_stops_both_get_replies(stopper):
     reports: list[StopReport] = []
     threads = [threading.Thread(target=lambda: reports.append(stopper.stop_all())) for _ in range(2)]
     for thread in threads:
@@ -155,7 +155,7 @@ def test_two_stops_at_the_same_time_both_get_their_answers(stopper):
 
 
 @pytest.mark.parametrize("how", ["obeys", "computes for ever", "was killed"])
-def test_robots_stop_whatever_the_program_does(master, stopper, robots, how):
+def test_robots_stay_stopped_whatever_the_program_does(master, stopper, robots, how):
     """A program moves a robot, Stop is pressed, the robot has answered, and nothing moves it again."""
     robots[0].slow = {"say"} if how == "obeys" else set()
     power = number(9)

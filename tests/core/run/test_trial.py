@@ -24,7 +24,7 @@ def began(stack: Stack | None) -> tuple[Trial, str]:
     return made, made.start(program, [robot("Pepper")])
 
 
-def test_a_value_is_the_line_with_its_unit() -> None:
+def test_tried_value_is_shown_with_its_unit() -> None:
     trial, words = began(BATTERY)
     assert words == "battery"
     assert trial.value is None
@@ -33,12 +33,12 @@ def test_a_value_is_the_line_with_its_unit() -> None:
     assert (trial.value.block, trial.value.words) == ("bat", "84 %")
 
 
-def test_an_empty_line_is_a_value_that_is_not_known() -> None:
+def test_empty_line_is_an_unknown_value() -> None:
     trial, _words = began(BATTERY)
     assert trial.parse_line("") == "not known yet"
 
 
-def test_the_next_run_forgets_the_value() -> None:
+def test_next_run_clears_the_tried_value() -> None:
     trial, _words = began(BATTERY)
     trial.parse_line("84")
     trial.begin(Wanted(Document()))
@@ -46,7 +46,7 @@ def test_the_next_run_forgets_the_value() -> None:
     assert trial.parse_line("printed") is None
 
 
-def test_what_a_stack_or_a_behaviour_prints_is_no_value() -> None:
+def test_printed_lines_of_stack_or_behaviour_are_not_a_value() -> None:
     for stack, words in ((Stack("hi"), "say"), (None, "")):
         trial, said = began(stack)
         assert said == words

@@ -21,7 +21,7 @@ def after(*robots: RobotStop, elapsed_ms: float = 41.4, **values: object) -> Run
     return replace(state, **values)
 
 
-def test_ready_names_the_robots() -> None:
+def test_ready_state_names_the_robots() -> None:
     view = view_of(RunState(), ["Pepper", "Turtle"], 0)
     assert (view.title, view.detail) == ("Ready", "Pepper and Turtle are connected")
     assert (view.can_run, view.can_pause, view.can_step, view.stop_filled) == (True, False, True, True)
@@ -30,7 +30,7 @@ def test_ready_names_the_robots() -> None:
     assert (alone.detail, alone.stop_filled) == ("No robot is connected", False)
 
 
-def test_running_tells_its_time_and_what_happens() -> None:
+def test_running_state_shows_elapsed_time_and_activity() -> None:
     run = RunState("running", "Greeting", says="Pepper says “Touch my head.”", started_s=100.0)
     view = view_of(run, ["Pepper"], 114.9)
     assert (view.title, view.detail) == ("Running, 14 s", "Pepper says “Touch my head.”")
@@ -43,7 +43,7 @@ def test_running_tells_its_time_and_what_happens() -> None:
     assert elsewhere.title == "Greeting is starting"
 
 
-def test_a_paused_program_says_what_go_on_will_leave_out() -> None:
+def test_paused_state_warns_what_resume_will_skip() -> None:
     said = "Rover doesn't report how much of “drive” is left; Resume skips it"
     run = RunState("paused", "Greeting", paused_at="drive 2 m", warning=said)
     assert view_of(run, ["Rover"], 1.0).detail == said
@@ -51,7 +51,7 @@ def test_a_paused_program_says_what_go_on_will_leave_out() -> None:
     assert view_of(run, ["Rover"], 1.0).detail == "Robots and timers are paused"
 
 
-def test_the_clock_stands_while_paused() -> None:
+def test_elapsed_time_stops_while_paused() -> None:
     run = RunState("paused", "Greeting", paused_at="wait 2 s", started_s=100.0, pause_began_s=110.0)
     view = view_of(run, ["Pepper"], 200.0)
     assert (view.title, view.detail) == ("Paused at “wait 2 s”", "Robots and timers are paused")
@@ -59,7 +59,7 @@ def test_the_clock_stands_while_paused() -> None:
     assert run.elapsed(200.0) == 10.0
 
 
-def test_stopping_shows_only_after_100_ms_and_counts_the_answers() -> None:
+def test_stopping_state_appears_after_100_ms_and_counts_replies() -> None:
     run = RunState("stopping", "Greeting", pressed_s=10.0, asked=("Pepper", "Turtle"), elapsed_s=14.0)
     assert view_of(run, [], 10.05).stop_word == "Stop"
     run = replace(run, answered=(PEPPER,))
@@ -69,13 +69,13 @@ def test_stopping_shows_only_after_100_ms_and_counts_the_answers() -> None:
     assert not view.can_run
 
 
-def test_a_stop_after_one_that_is_not_proven_never_says_ready() -> None:
+def test_stop_after_unproven_stop_never_shows_ready() -> None:
     run = RunState("stopping", "Greeting", pressed_s=10.0, asked=("Pepper",), again=True)
     view = view_of(run, [], 10.01)
     assert (view.state, view.title, view.stop_word) == ("stopping", "Stopping", "Stopping")
 
 
-def test_proven_says_how_long_it_took() -> None:
+def test_proven_stop_shows_its_duration() -> None:
     view = view_of(after(PEPPER, TURTLE, elapsed_s=14.0, dashed=True), [], 0)
     assert (view.title, view.detail) == ("Stopped after 14 s", "The dashed block is where it stopped")
     assert (view.result, view.result_status) == ("all 2 robots stopped (41 ms)", "ok")
@@ -83,11 +83,11 @@ def test_proven_says_how_long_it_took() -> None:
     assert view_of(after(PEPPER), [], 0).result == "Pepper stopped (41 ms)"
 
 
-def test_an_answer_in_less_than_a_millisecond_is_not_zero() -> None:
+def test_reply_below_one_millisecond_is_not_shown_as_zero() -> None:
     assert view_of(after(PEPPER, elapsed_ms=0.2), [], 0).result == "Pepper stopped (1 ms)"
 
 
-def test_not_answered_names_the_robot_and_what_a_hand_can_do() -> None:
+def test_unanswered_stop_names_the_robot_and_manual_action() -> None:
     view = view_of(after(PEPPER, SILENT), [], 0)
     assert (view.title, view.detail) == (
         "Turtle did not reply",
@@ -99,7 +99,7 @@ def test_not_answered_names_the_robot_and_what_a_hand_can_do() -> None:
     assert (view.can_run, view.can_pause, view.can_step) == (False, False, False)
 
 
-def test_what_a_robot_said_stands_first_in_its_own_words() -> None:
+def test_robot_message_is_shown_first() -> None:
     stuck = RobotStop("Arm", False, 9.0, error="Arm may still move: the brake is stuck", refused=True)
     view = view_of(after(PEPPER, stuck, SILENT), [], 0)
     assert view.title == "Arm may still move: the brake is stuck; Turtle did not reply"
@@ -110,7 +110,7 @@ def test_what_a_robot_said_stands_first_in_its_own_words() -> None:
     assert stop_words(stuck, "8:40") == "Arm may still move: the brake is stuck, at 8:40"
 
 
-def test_many_that_did_not_answer_do_not_fill_the_window() -> None:
+def test_long_list_of_silent_robots_is_shortened() -> None:
     many = [RobotStop("Pepper", False, None, program=f"copy {number}") for number in range(30)]
     title = view_of(after(*many), [], 0).title
     assert title.endswith("Pepper (“copy 3”) and 26 more did not reply")
@@ -120,14 +120,14 @@ def test_many_that_did_not_answer_do_not_fill_the_window() -> None:
     assert view_of(after(*refused), [], 0).title.endswith("R3 may still move: no; 5 more may still move")
 
 
-def test_the_button_beside_the_sentence_leaves_it_room() -> None:
+def test_confirm_button_is_shortened_for_long_names() -> None:
     long = RobotStop("The old blue robot in the entrance hall", False, None)
     view = view_of(after(PEPPER, long), [], 0)
     assert (view.title, view.confirm) == (f"{long.name} did not reply", "It isn't moving")
     assert view_of(after(long, SILENT), [], 0).confirm == "They aren't moving"
 
 
-def test_robots_are_counted_not_the_programs_that_serve_them() -> None:
+def test_stop_result_counts_robots_not_their_programs() -> None:
     twin = RobotStop("Pepper", False, None, program="pepper 2")
     view = view_of(after(PEPPER, twin, TURTLE), [], 0)
     assert view.title == "Pepper (“pepper 2”) did not reply"
@@ -140,7 +140,7 @@ def test_robots_are_counted_not_the_programs_that_serve_them() -> None:
     assert view_of(after(PEPPER, both), [], 0).result == "Pepper stopped (41 ms)"
 
 
-def test_a_robot_is_not_called_stopped_while_another_of_its_programs_is_waited_for() -> None:
+def test_robot_is_not_shown_as_stopped_while_its_other_program_is_pending() -> None:
     run = RunState("stopping", "Greeting", pressed_s=10.0, asked=("Pepper",))
     run = replace(run, answered=(replace(PEPPER, waits=True),))
     view = view_of(run, [], 10.2)
@@ -149,20 +149,20 @@ def test_a_robot_is_not_called_stopped_while_another_of_its_programs_is_waited_f
     assert view_of(run, [], 10.2).result == "1 robot stopped"
 
 
-def test_a_robot_of_rize_is_never_called_stopped() -> None:
+def test_rize_robot_is_never_shown_as_stopped() -> None:
     view = view_of(after(RIZE), [], 0)
     assert view.result == "stop sent; Nao can't confirm"
     both = view_of(after(PEPPER, RIZE), [], 0)
     assert both.result == "Pepper stopped (41 ms); Nao can't confirm"
 
 
-def test_a_program_that_came_to_its_end_or_failed_says_so() -> None:
+def test_finished_and_failed_programs_are_distinguished() -> None:
     assert view_of(after(PEPPER, finished=True, elapsed_s=3.0), [], 0).title == "Finished after 3 s"
     view = view_of(after(PEPPER, errors={"a": "“turn” needs a number."}, elapsed_s=3.0), [], 0)
     assert (view.title, view.detail) == ("Stopped after 3 s because of an error", "“turn” needs a number.")
 
 
-def test_the_last_stop_stays_beside_a_running_program() -> None:
+def test_last_stop_stays_visible_while_running() -> None:
     run = RunState("running", "Greeting", last_words="Pepper stopped (41 ms)")
     assert view_of(run, ["Pepper"], 1).last_stop == "Pepper stopped (41 ms)"
 
@@ -170,11 +170,11 @@ def test_the_last_stop_stays_beside_a_running_program() -> None:
 @pytest.mark.parametrize(
     ("value", "words"), [(0.9, "0 s"), (14.99, "14 s"), (60, "1 min 0 s"), (125, "2 min 5 s")]
 )
-def test_seconds(value: float, words: str) -> None:
+def test_seconds_are_formatted(value: float, words: str) -> None:
     assert seconds(value) == words
 
 
-def test_stop_words() -> None:
+def test_stop_results_are_formatted() -> None:
     assert stop_words(PEPPER, "8:40") == "confirmed in 38 ms, at 8:40"
     assert stop_words(SILENT, "8:40") == "not confirmed, at 8:40"
     assert stop_words(RIZE, "8:40") == "sent at 8:40; this robot can't confirm"
@@ -191,11 +191,11 @@ def test_stop_words() -> None:
         ((PEPPER, RobotStop("Pepper", False, None, can_confirm=False, program="motor box")), "ok"),
     ],
 )
-def test_only_a_complete_proof_is_green(robots: tuple[RobotStop, ...], status: str) -> None:
+def test_only_complete_proof_has_ok_status(robots: tuple[RobotStop, ...], status: str) -> None:
     assert StopReport(robots, 41.0).status == status
 
 
-def test_a_program_without_robots_says_how_it_ended_and_proves_nothing() -> None:
+def test_program_without_robots_shows_its_end_and_proves_nothing() -> None:
     run = RunState("ready", "Greeting", elapsed_s=3.0, finished=True, report=StopReport((), 0.0))
     view = view_of(run, [], 0)
     assert (view.state, view.title, view.result, view.result_status) == (

@@ -17,7 +17,7 @@ def document(*connected: str) -> Document:
     return made
 
 
-def test_a_behaviour_is_wanted_whole() -> None:
+def test_requested_behaviour_runs_completely() -> None:
     wanted = Wanted(document("Pepper"))
     program = wanted.program()
     assert program is wanted.document.program()
@@ -27,7 +27,7 @@ def test_a_behaviour_is_wanted_whole() -> None:
     assert not wanted.gives_value
 
 
-def test_a_stack_is_named_by_its_first_block() -> None:
+def test_requested_stack_is_named_by_its_first_block() -> None:
     wanted = Wanted(document("Pepper", "Ada"), stack=Stack("ada"))
     program = wanted.program()
     assert program is not None
@@ -35,14 +35,14 @@ def test_a_stack_is_named_by_its_first_block() -> None:
     assert "needs a condition" in wanted.problems(program)["gap"]
 
 
-def test_a_block_of_a_robot_that_is_away_says_so() -> None:
+def test_stack_with_block_of_disconnected_robot_cannot_be_tried() -> None:
     wanted = Wanted(document("Pepper"), stack=Stack("ada", state=say("Hi", "Ada") | {"id": "ada"}))
     program = wanted.program()
     assert program is not None
     assert wanted.problems(program) == {"ada": "Ada is not connected, so it can't be tried."}
 
 
-def test_a_value_is_named_as_itself() -> None:
+def test_requested_value_has_its_unit() -> None:
     battery = block("robot_pepper_get_battery", "bat", ROBOT="Pepper")
     wanted = Wanted(document("Pepper"), stack=Stack("bat", "value", battery))
     program = wanted.program()
@@ -54,5 +54,5 @@ def test_a_value_is_named_as_itself() -> None:
     assert wanted.words(program) == "battery"
 
 
-def test_a_stack_that_has_gone_is_no_program() -> None:
+def test_deleted_stack_has_no_program() -> None:
     assert Wanted(document("Pepper"), stack=Stack("nowhere")).program() is None

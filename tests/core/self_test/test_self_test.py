@@ -58,7 +58,7 @@ def told(folder: Path) -> dict:
     return json.loads((folder / "report.json").read_text("utf-8"))
 
 
-def test_a_report_is_true_at_any_moment(tmp_path: Path) -> None:
+def test_report_is_valid_at_any_moment(tmp_path: Path) -> None:
     path = tmp_path / "report.json"
     report = Report(path, {"web": True})
     report.begin("window", "the window", 5.0)
@@ -81,7 +81,7 @@ def test_a_report_is_true_at_any_moment(tmp_path: Path) -> None:
     assert 0 < step["began_ms"] <= step["ms"] <= whole["first_paint_ms"] <= whole["total_ms"]
 
 
-def test_the_first_sentence_is_why_it_failed(tmp_path: Path) -> None:
+def test_first_failure_is_the_reported_reason(tmp_path: Path) -> None:
     report = Report(tmp_path / "report.json", {})
     report.begin("robot", "the virtual robot", 5.0)
     report.fail("The robot does not exist.")
@@ -92,7 +92,7 @@ def test_the_first_sentence_is_why_it_failed(tmp_path: Path) -> None:
     assert (whole["steps"][0]["ok"], whole["steps"][0]["said"]) == (False, "The robot does not exist.")
 
 
-def test_a_report_that_cannot_be_written_any_more_is_a_failure(tmp_path: Path) -> None:
+def test_unwritable_report_is_a_failure(tmp_path: Path) -> None:
     folder = tmp_path / "gone"
     folder.mkdir()
     report = Report(folder / "report.json", {})
@@ -104,7 +104,7 @@ def test_a_report_that_cannot_be_written_any_more_is_a_failure(tmp_path: Path) -
     assert report.why.startswith("The report can't be written (")
 
 
-def test_it_has_a_home_and_a_master_of_its_own(tmp_path: Path) -> None:
+def test_self_test_has_its_own_home_and_master(tmp_path: Path) -> None:
     folder = tmp_path / "自己 テスト"
     folder.mkdir()
     (folder / "window.png").write_bytes(b"of an earlier test")
@@ -122,7 +122,7 @@ def test_it_has_a_home_and_a_master_of_its_own(tmp_path: Path) -> None:
     assert told(folder) == {}
 
 
-def test_a_folder_that_cannot_be_written_is_a_sentence_and_no_window(
+def test_unwritable_folder_is_reported_without_opening_a_window(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     # Where there are no alarms pytest-timeout has a thread, for which the end of a process would not wait.
@@ -138,7 +138,7 @@ def test_a_folder_that_cannot_be_written_is_a_sentence_and_no_window(
         prepare(tmp_path / "file", {}, is_root=False)
 
 
-def test_a_process_in_which_nothing_moves_is_ended_with_all_that_it_started(tmp_path: Path) -> None:
+def test_hanging_process_is_ended_with_its_children(tmp_path: Path) -> None:
     done = subprocess.run(
         [sys.executable, "-c", HANGS, str(tmp_path)],
         capture_output=True,
@@ -156,7 +156,7 @@ def test_a_process_in_which_nothing_moves_is_ended_with_all_that_it_started(tmp_
     assert not psutil.pid_exists(int(done.stdout))
 
 
-def test_when_all_was_well_its_home_goes_with_the_log_that_was_open(tmp_path: Path) -> None:
+def test_home_and_open_log_are_deleted_after_success(tmp_path: Path) -> None:
     subprocess.run(
         [sys.executable, "-c", WELL, str(tmp_path)],
         timeout=60,
@@ -184,7 +184,7 @@ class ItsProgram:
         return list(self.words)
 
 
-def test_what_windows_started_in_our_name_is_not_of_the_test() -> None:
+def test_windows_system_processes_are_not_part_of_the_test() -> None:
     for program in (r"C:\Windows\explorer.exe", r"c:\windows\System32\conhost.exe"):
         assert is_of_windows(ItsProgram(program), r"C:\Windows")
         assert is_of_windows(ItsProgram("", (program, "/desktop")), r"C:\Windows")

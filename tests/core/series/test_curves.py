@@ -85,7 +85,7 @@ def test_every_message_is_a_point_at_its_own_time() -> None:
 
 
 @pytest.mark.parametrize("how", [{"dropped": 5}, {"skip": 5}])
-def test_what_did_not_get_here_is_a_gap_and_counted(how) -> None:
+def test_lost_messages_are_a_gap_and_counted(how) -> None:
     case = Case()
     x = case.curve("/a.x")
     case.send("/a", (0.0, {"x": 1}), (0.1, {"x": 2}))
@@ -97,7 +97,7 @@ def test_what_did_not_get_here_is_a_gap_and_counted(how) -> None:
 @pytest.mark.parametrize(
     "missing", [b"{", {"y": 1}, {"x": None}, {"x": [1]}, b'{"x": NaN}', {"x": {"deep": 1}}]
 )
-def test_a_message_without_the_number_is_a_gap(missing) -> None:
+def test_message_without_the_number_is_a_gap(missing) -> None:
     case = Case()
     x = case.curve("/a.x")
     case.send("/a", (0.0, {"x": 1}), (0.1, missing), (0.2, {"x": 3}))
@@ -106,7 +106,7 @@ def test_a_message_without_the_number_is_a_gap(missing) -> None:
     assert points(x) == [(0.0, 1, False), (0.2, 3, True), (0.4, 4, True)]
 
 
-def test_a_long_silence_is_a_gap_and_a_short_one_is_none() -> None:
+def test_long_silence_is_a_gap_and_short_silence_is_not() -> None:
     case = Case()
     x = case.curve("/a.x")
     case.send("/a", *((n / 10, {"x": n}) for n in range(20)))
@@ -114,7 +114,7 @@ def test_a_long_silence_is_a_gap_and_a_short_one_is_none() -> None:
     assert [t for t, _v, gap in points(x) if gap] == [9.0]
 
 
-def test_a_topic_that_comes_slower_from_now_on_is_a_line_again() -> None:
+def test_slower_topic_becomes_a_continuous_line_again() -> None:
     case = Case()
     x = case.curve("/a.x")
     case.send("/a", *((n / 1000, {"x": n}) for n in range(50)))
@@ -123,7 +123,7 @@ def test_a_topic_that_comes_slower_from_now_on_is_a_line_again() -> None:
 
 
 @pytest.mark.parametrize(("dropped", "skip", "lost"), [(5, 0, 5), (5, 3, 8), (0, 3, 3)])
-def test_what_is_lost_is_counted_once(dropped, skip, lost) -> None:
+def test_lost_messages_are_counted_once(dropped, skip, lost) -> None:
     case = Case()
     case.curve("/a.x")
     case.send("/a", (0.0, {"x": 1}))
@@ -131,7 +131,7 @@ def test_what_is_lost_is_counted_once(dropped, skip, lost) -> None:
     assert case.curves.lost == lost
 
 
-def test_what_is_lost_behind_a_message_without_a_place_is_counted_too() -> None:
+def test_losses_after_message_with_invalid_time_are_counted() -> None:
     case = Case()
     case.curve("/a.x")
     seqs = ((1, ORIGIN), (2, 2**64 - 1), (5, ORIGIN + 10**8), (5 + 4, ORIGIN + 2 * 10**8))
@@ -140,7 +140,7 @@ def test_what_is_lost_behind_a_message_without_a_place_is_counted_too() -> None:
     assert (case.curves.lost, case.curves.unread) == (2 + 3, 1)
 
 
-def test_a_value_may_change_its_type() -> None:
+def test_value_can_change_its_type() -> None:
     case = Case()
     x = case.curve("/a.x")
     case.send(
@@ -156,7 +156,7 @@ def test_a_value_may_change_its_type() -> None:
     assert not x.is_state
 
 
-def test_numbers_beyond_what_can_be_drawn() -> None:
+def test_extreme_numbers_are_kept() -> None:
     case = Case()
     x = case.curve("/a.x")
     case.send("/a", (0.0, {"x": 2**64 - 1}), (0.1, {"x": 1e308}), (0.2, {"x": 0}))
@@ -165,7 +165,7 @@ def test_numbers_beyond_what_can_be_drawn() -> None:
 
 
 @pytest.mark.parametrize("stamp_ns", [2**64 - 1, 2**63, -1])
-def test_a_stamp_that_is_no_time_has_no_place(stamp_ns) -> None:
+def test_message_with_invalid_time_stamp_is_skipped(stamp_ns) -> None:
     case = Case()
     x = case.curve("/a.x")
     case.send("/a", (0.0, {"x": 1}))
@@ -176,7 +176,7 @@ def test_a_stamp_that_is_no_time_has_no_place(stamp_ns) -> None:
     assert points(x) == [(0.0, 1, False), (0.2, 3, True)]
 
 
-def test_a_message_without_a_stamp_has_the_time_at_which_it_came() -> None:
+def test_message_without_time_stamp_uses_arrival_time() -> None:
     case = Case()
     x = case.curve("/a.x")
     case.feed.add({"/a": Batch([Message("/a", b'{"x": 2}', "json", "json")])})
@@ -197,7 +197,7 @@ steps = st.sampled_from([0.01, 0.5, -0.3, -20.0, 1e6])
 
 @settings(max_examples=15, deadline=None)
 @given(st.lists(st.tuples(steps, values_of_all_kinds), max_size=40))
-def test_whatever_comes_the_curves_stay_in_order_and_finite(rows) -> None:
+def test_curves_stay_sorted_and_finite_for_any_input(rows) -> None:
     case = Case()
     made = [
         case.curve(t)
@@ -219,7 +219,7 @@ def test_whatever_comes_the_curves_stay_in_order_and_finite(rows) -> None:
 # -- calculated ---------------------------------------------------------------------------------------
 
 
-def test_curves_that_are_calculated() -> None:
+def test_calculated_curves() -> None:
     case = Case()
     names = ("difference(/a.x)", "derivative(/a.x)", "integral(/a.x)", "mean(/a.x, 0.25 s)", "/a.x * 10")
     difference, derivative, integral, mean, times = (case.curve(name) for name in names)
@@ -233,7 +233,7 @@ def test_curves_that_are_calculated() -> None:
     assert [v for _t, v, _g in points(times)] == [0, 10, 30, 60]
 
 
-def test_what_is_calculated_does_not_reach_over_a_gap() -> None:
+def test_calculations_do_not_span_gaps() -> None:
     case = Case()
     difference, integral = case.curve("difference(/a.x)"), case.curve("integral(/a.x)")
     case.send("/a", (0.0, {"x": 1}), (1.0, {"x": 1}))
@@ -242,7 +242,7 @@ def test_what_is_calculated_does_not_reach_over_a_gap() -> None:
     assert [v for _t, v, _g in points(integral)] == pytest.approx([0, 1, 1, 101.5])
 
 
-def test_what_grows_beyond_all_numbers_is_a_gap_and_no_warning() -> None:
+def test_overflow_is_a_gap_without_warning() -> None:
     case = Case()
     made = [case.curve(f"{kind}(/a.x)") for kind in ("integral", "derivative", "difference")]
     case.send("/a", *((n / 10, {"x": value}) for n, value in enumerate([1.7e308, 1.7e308, -1.7e308, 1, 2])))
@@ -264,7 +264,7 @@ def batch_wise(
 
 @settings(max_examples=15, deadline=None)
 @given(st.lists(st.floats(-1e6, 1e6), min_size=1, max_size=60), st.lists(st.integers(0, 60), max_size=6))
-def test_how_messages_come_together_makes_no_difference(values, cuts) -> None:
+def test_batch_boundaries_do_not_change_results(values, cuts) -> None:
     cuts = sorted(min(each, len(values)) for each in cuts)
     batch_wise(lambda v: list(np.diff(v)), "difference(/a.x)", values, cuts)
     batch_wise(
@@ -281,7 +281,7 @@ def test_how_messages_come_together_makes_no_difference(values, cuts) -> None:
     )
 
 
-def test_two_topics_are_joined_at_the_times_of_the_first() -> None:
+def test_two_topics_are_joined_at_times_of_the_first() -> None:
     case = Case()
     curve = case.curve("/a.x - /b.y")
     case.send("/a", (0.1, {"x": 10}), (0.2, {"x": 20}))
@@ -294,7 +294,7 @@ def test_two_topics_are_joined_at_the_times_of_the_first() -> None:
     assert points(curve)[3:] == [(0.9, 2, False)], "it does not wait for ever"
 
 
-def test_a_clock_that_is_set_back_is_followed_by_what_is_calculated() -> None:
+def test_calculated_curves_follow_a_clock_set_back() -> None:
     case = Case()
     x, doubled, mean = (case.curve(t) for t in ("/a.x", "/a.x * 2", "mean(/a.x, 1 s)"))
     case.send("/a", *((float(n), {"x": n}) for n in range(50)))
@@ -309,7 +309,7 @@ def test_a_clock_that_is_set_back_is_followed_by_what_is_calculated() -> None:
 # -- the plot's curves ------------------------------------------------------------------------------------
 
 
-def test_a_topic_is_looked_at_as_long_as_a_curve_needs_it() -> None:
+def test_topic_is_watched_while_a_curve_needs_it() -> None:
     case = Case()
     one, two = case.curve("/a.x"), case.curve("mean(/a.x - /b.y, 2 s)")
     assert sorted(case.watched) == ["/a", "/b"]
@@ -319,7 +319,7 @@ def test_a_topic_is_looked_at_as_long_as_a_curve_needs_it() -> None:
     assert case.watched == []
 
 
-def test_every_element_is_a_curve_of_its_own() -> None:
+def test_every_list_element_is_a_separate_curve() -> None:
     case = Case()
     case.curve("/a.n")
     case.send("/a", (0.0, {"n": 1, "j": [{"p": 1}, {"p": 2}, {"p": 3}]}))
@@ -331,7 +331,7 @@ def test_every_element_is_a_curve_of_its_own() -> None:
         case.curves.add("/a.n[*]")
 
 
-def test_a_typing_error_is_told_with_what_was_meant() -> None:
+def test_misspelled_field_is_reported_with_suggestion() -> None:
     case = Case()
     sped = case.curve("/a.sped")
     assert case.curves.advice(sped) == ""
@@ -342,7 +342,7 @@ def test_a_typing_error_is_told_with_what_was_meant() -> None:
         case.curves.add("/aa.x")
 
 
-def test_a_plot_has_a_bound() -> None:
+def test_number_of_curves_is_limited() -> None:
     case = Case()
     for number in range(64):
         case.curve(f"/a.x{number}")
@@ -357,7 +357,7 @@ def test_a_plot_has_a_bound() -> None:
     assert sum(curve.samples.limit for curve in case.curves.all) <= 8 << 20
 
 
-def test_a_topic_that_is_not_there_yet_may_be_plotted_by_a_saved_layout() -> None:
+def test_topic_that_does_not_exist_yet_can_be_plotted() -> None:
     case = Case()
     (curve,) = case.curves.add_field("/later", FieldPath.parse("x"))
     assert case.watched == ["/later"]
@@ -366,7 +366,7 @@ def test_a_topic_that_is_not_there_yet_may_be_plotted_by_a_saved_layout() -> Non
     assert points(curve) == [(0.0, 1, False)]
 
 
-def test_csv_has_a_row_for_each_time_and_no_formulas() -> None:
+def test_csv_has_a_row_per_time_and_escapes_formulas() -> None:
     case = Case()
     case.topics.append("ros2 /a")
     made = [case.curve(text) for text in ("/a.x", "/a.word", "/b.y")]
@@ -382,7 +382,7 @@ def test_csv_has_a_row_for_each_time_and_no_formulas() -> None:
 
 
 @pytest.mark.parametrize("rows_at_once", [1, 3, 5000])
-def test_csv_in_parts_is_the_same(monkeypatch, rows_at_once) -> None:
+def test_csv_written_in_parts_is_identical(monkeypatch, rows_at_once) -> None:
     case = Case()
     made = [case.curve(text) for text in ("/a.x", "/a.word", "/b.y")]
     case.send("/a", *((n / 10, {"x": n, "word": "up" if n % 4 < 2 else "down"}) for n in range(20)))

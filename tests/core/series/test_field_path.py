@@ -45,7 +45,7 @@ MESSAGE = {
         ("joints.position", MISSING),
     ],
 )
-def test_a_path_finds_its_value(text, value) -> None:
+def test_path_finds_its_value(text, value) -> None:
     path = FieldPath.parse(text)
     assert path.value_in(MESSAGE) == value
     assert str(path) == text
@@ -54,7 +54,7 @@ def test_a_path_finds_its_value(text, value) -> None:
 @pytest.mark.parametrize(
     "text", ["", ".", "a..b", "a.", "a[", "a[x]", "a]b", "a b", "a[0]b", 'a["b]', "a" * 500, "[[0]]"]
 )
-def test_what_is_no_path_is_told(text) -> None:
+def test_invalid_path_is_rejected(text) -> None:
     with pytest.raises(CurveError):
         FieldPath.parse(text)
 
@@ -67,7 +67,7 @@ def test_what_is_no_path_is_told(text) -> None:
         max_size=8,
     )
 )
-def test_every_path_is_read_as_it_is_written(steps) -> None:
+def test_path_text_round_trips(steps) -> None:
     path = FieldPath(tuple(steps))
     assert FieldPath.parse(str(path)) == path
 
@@ -83,7 +83,7 @@ values = st.recursive(
 
 @settings(max_examples=40, deadline=None)
 @given(values)
-def test_every_field_that_is_offered_is_found_where_it_is_said_to_be(payload) -> None:
+def test_every_suggested_field_is_found_at_its_path(payload) -> None:
     for found in fields_of(payload):
         assert len(str(found.path)) > 0
         for one in found.path.expanded(payload):
@@ -92,7 +92,7 @@ def test_every_field_that_is_offered_is_found_where_it_is_said_to_be(payload) ->
         assert len(found.path.expanded(payload)) == min(found.count, 65)
 
 
-def test_every_element_of_a_list() -> None:
+def test_wildcard_expands_to_every_list_element() -> None:
     assert [str(p) for p in FieldPath.parse("pose.x[*]").expanded(MESSAGE)] == [
         f"pose.x[{n}]" for n in range(3)
     ]
@@ -104,7 +104,7 @@ def test_every_element_of_a_list() -> None:
 @pytest.mark.parametrize(
     "key", ["head-yaw", "a+b", "1/2", "50%", "x^2", "f(x)", "a,b", "*", "x y", "a.b", ""]
 )
-def test_a_key_that_looks_like_a_calculation_can_be_typed_as_it_is_offered(key) -> None:
+def test_key_that_looks_like_an_expression_can_be_typed_as_suggested(key) -> None:
     (found,) = fields_of({key: 3})
     typed = str(FieldSource("/head", found.path))
     assert parse(typed, ["/head"]) == FieldSource("/head", FieldPath((key,)))
@@ -113,11 +113,11 @@ def test_a_key_that_looks_like_a_calculation_can_be_typed_as_it_is_offered(key) 
     assert doubled.inputs == (FieldSource("/head", FieldPath((key,))),)
 
 
-def test_keys_that_are_no_text_are_not_offered() -> None:
+def test_non_text_keys_are_not_suggested() -> None:
     assert list(fields_of({1: 2, b"x": 3, None: 4})) == []
 
 
-def test_what_is_offered_of_a_message() -> None:
+def test_suggested_fields_of_a_message() -> None:
     offered = {str(each.path): each.kind for each in fields_of(MESSAGE)}
     assert offered["pose.x[*]"] == "list"
     assert offered["joints[0].position"] == "number"
@@ -128,7 +128,7 @@ def test_what_is_offered_of_a_message() -> None:
     assert FieldPath.parse("value").value_in({"value": 4}) == 4
 
 
-def test_a_message_of_a_million_fields_is_looked_through_as_far_as_is_bearable() -> None:
+def test_number_and_depth_of_suggested_fields_are_limited() -> None:
     wide = {f"k{n}": n for n in range(100_000)}
     assert len(list(fields_of(wide))) == 2000
     deep: object = 1
@@ -137,7 +137,7 @@ def test_a_message_of_a_million_fields_is_looked_through_as_far_as_is_bearable()
     assert list(fields_of(deep)) == []
 
 
-def test_tab_completes_to_where_ways_part() -> None:
+def test_tab_completes_the_common_prefix() -> None:
     known = ["/odom.pose.x", "/odom.pose.y", "/odometer.km"]
     assert completed("/o", known) == "/odom"
     assert completed("/odom.", known) == "/odom.pose."
@@ -146,7 +146,7 @@ def test_tab_completes_to_where_ways_part() -> None:
     assert completed("/odome", known) == "/odometer."
 
 
-def test_the_field_that_was_meant() -> None:
+def test_similar_field_is_suggested() -> None:
     assert meant_field(FieldPath.parse("pose.y[0]"), MESSAGE) is not None
     assert meant_field(FieldPath.parse("okk"), MESSAGE) == "ok"
     assert meant_field(FieldPath.parse("zzzzzz"), json.loads("{}")) is None

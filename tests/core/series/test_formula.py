@@ -31,7 +31,7 @@ def value(text: str, *numbers: float) -> float:
         ("  /a.b ", "/a", "b"),
     ],
 )
-def test_a_field(text, topic, path) -> None:
+def test_field_is_parsed(text, topic, path) -> None:
     found = parse(text, TOPICS)
     assert isinstance(found, FieldSource)
     assert (found.topic, str(found.path)) == (topic, path)
@@ -59,11 +59,11 @@ def test_a_field(text, topic, path) -> None:
         ("99^999 * /a.x", (1,), np.inf),
     ],
 )
-def test_an_expression(text, numbers, result) -> None:
+def test_expression_is_evaluated(text, numbers, result) -> None:
     assert value(text, *numbers) == pytest.approx(result)
 
 
-def test_things_over_time_may_stand_in_each_other() -> None:
+def test_window_functions_can_be_nested() -> None:
     found = parse("mean(derivative(/odom.x) - /odom.v, 2 s)", TOPICS)
     assert isinstance(found, WindowSource)
     assert (found.kind, found.window_s) == ("mean", 2.0)
@@ -108,7 +108,7 @@ def test_things_over_time_may_stand_in_each_other() -> None:
         ("1" * 350 + " * /odom.x", "can't be calculated"),
     ],
 )
-def test_what_can_not_be_a_curve_says_why(text, said) -> None:
+def test_invalid_formula_is_rejected_with_reason(text, said) -> None:
     with pytest.raises(CurveError) as told:
         parse(text, TOPICS)
     assert said in str(told.value)
@@ -116,7 +116,7 @@ def test_what_can_not_be_a_curve_says_why(text, said) -> None:
 
 @settings(max_examples=60, deadline=None)
 @given(st.text(alphabet="/odomax.[]*(),+-^%0123456789 s_'\"=:lambdaimport\n\\", max_size=60))
-def test_nothing_that_is_typed_does_more_than_be_a_curve_or_not(text) -> None:
+def test_any_text_is_parsed_or_rejected(text) -> None:
     try:
         source = parse(text, TOPICS)
     except CurveError:

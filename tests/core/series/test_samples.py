@@ -63,7 +63,7 @@ batches = st.lists(st.lists(st.tuples(steps, numbers, st.booleans()), max_size=1
 
 @settings(max_examples=30, deadline=None)
 @given(batches)
-def test_in_whatever_order_numbers_come_they_are_kept_as_one_by_one(given_batches) -> None:
+def test_batches_in_any_order_equal_single_insertion(given_batches) -> None:
     samples, time_s = Samples(), 10.0
     wanted: list[float] = []
     for batch in given_batches:
@@ -84,7 +84,7 @@ def test_in_whatever_order_numbers_come_they_are_kept_as_one_by_one(given_batche
 
 @settings(max_examples=25, deadline=None)
 @given(batches.map(lambda found: [[(abs(step), v, g) for step, v, g in batch] for batch in found]))
-def test_gaps_are_where_something_is_missing(given_batches) -> None:
+def test_gaps_match_reference_implementation(given_batches) -> None:
     samples, naive, time_s = Samples(), Naive(), 0.0
     for batch in given_batches:
         rows = []
@@ -98,14 +98,14 @@ def test_gaps_are_where_something_is_missing(given_batches) -> None:
     assert rows_of(samples) == naive.rows
 
 
-def test_what_is_a_little_late_is_put_in_its_place() -> None:
+def test_slightly_late_sample_is_inserted_in_order() -> None:
     samples = filled([(1.0, 1, False), (2.0, 2, False), (3.0, 3, True)])
     samples.add(2.5, 2.5)
     assert rows_of(samples) == [(1, 1, False), (2, 2, False), (2.5, 2.5, True), (3, 3, False)]
     assert samples.rewritten_from(0) == 2.5
 
 
-def test_a_clock_that_was_set_back_goes_on_from_there() -> None:
+def test_clock_set_back_restarts_from_that_time() -> None:
     samples = filled([(float(n), n, False) for n in range(100)])
     samples.add(50.5, 7.0)
     assert len(samples) == 52
@@ -113,7 +113,7 @@ def test_a_clock_that_was_set_back_goes_on_from_there() -> None:
     assert samples.undone == 49
 
 
-def test_a_stamp_from_the_far_future_is_undone_by_the_next_good_one() -> None:
+def test_future_time_stamp_is_removed_by_next_valid_one() -> None:
     samples = filled([(1.0, 1, False), (1e10, 2, False), (2.0, 3, False)])
     assert [row[:2] for row in rows_of(samples)] == [(1.0, 1.0), (2.0, 3.0)]
 
@@ -135,7 +135,7 @@ def series(draw) -> tuple[Samples, list[Row]]:
 
 @settings(max_examples=15, deadline=None)
 @given(series(), st.floats(-0.1, 1.1), st.floats(-0.1, 1.1))
-def test_the_figures_of_a_range_are_those_of_its_numbers(made, one, other) -> None:
+def test_figures_of_a_range_match_its_samples(made, one, other) -> None:
     samples, rows = made
     length = rows[-1][0]
     begin, end = sorted((one * length, other * length))
@@ -152,7 +152,7 @@ def test_the_figures_of_a_range_are_those_of_its_numbers(made, one, other) -> No
 
 @settings(max_examples=15, deadline=None)
 @given(series(), st.sampled_from([3, 40, 333]), st.floats(0, 0.5), st.floats(0.5, 1))
-def test_a_drawn_line_has_every_peak_and_crosses_no_gap(made, columns, one, other) -> None:
+def test_drawn_line_has_every_peak_and_crosses_no_gap(made, columns, one, other) -> None:
     samples, rows = made
     length = rows[-1][0]
     begin, end = one * length, other * length
@@ -172,7 +172,7 @@ def test_a_drawn_line_has_every_peak_and_crosses_no_gap(made, columns, one, othe
         assert line.points > RAW_PER_COLUMN * columns
 
 
-def test_a_long_gap_is_no_line_however_far_one_looks_from() -> None:
+def test_long_gap_is_not_drawn_at_any_zoom_level() -> None:
     times = np.concatenate([np.arange(0, 50, 0.001), np.arange(70, 120, 0.001)])
     gaps = np.zeros(len(times), dtype=bool)
     gaps[50_000] = True
@@ -185,7 +185,7 @@ def test_a_long_gap_is_no_line_however_far_one_looks_from() -> None:
     assert line.times[broken + 1] > 69.5
 
 
-def test_a_number_alone_between_two_gaps_can_be_seen() -> None:
+def test_single_sample_between_two_gaps_is_visible() -> None:
     samples = filled([(1.0, 1, False), (2.0, 2, False), (3.0, 7, True), (4.0, 4, True), (4.1, 4, False)])
     line = samples.line(0, 10, 100)
     assert line.times[2:6].tolist() == pytest.approx([3.0, 3.0, 3.1, 4.0])
@@ -205,7 +205,7 @@ def test_a_number_alone_between_two_gaps_can_be_seen() -> None:
     assert 0 < seen.times[alone + 1] - seen.times[alone] < 120 / 300
 
 
-def test_room_is_given_back_when_a_plot_has_more_curves() -> None:
+def test_memory_is_released_when_the_limit_is_lowered() -> None:
     samples = Samples()
     times = np.arange(200_000) / 1000
     samples.extend(times, times, np.zeros(len(times), dtype=bool))
@@ -219,7 +219,7 @@ def test_room_is_given_back_when_a_plot_has_more_curves() -> None:
     assert samples.begun + len(samples) == 400_001
 
 
-def test_columns_stay_where_they_are_while_the_plot_moves_on() -> None:
+def test_columns_are_stable_while_the_plot_scrolls() -> None:
     samples = Samples()
     times = np.arange(0, 100, 0.001)
     samples.extend(times, np.sin(times * 300), np.zeros(len(times), dtype=bool))
@@ -230,7 +230,7 @@ def test_columns_stay_where_they_are_while_the_plot_moves_on() -> None:
 
 @settings(max_examples=25)
 @given(st.integers(0, 2**32 - 1), st.sampled_from([20_000, 1 << 20]), st.sampled_from([30, 200]))
-def test_what_was_drawn_before_is_drawn_as_if_for_the_first_time(seed, limit, columns) -> None:
+def test_incremental_drawing_equals_full_drawing(seed, limit, columns) -> None:
     random = np.random.default_rng(seed)
     samples, now_s = Samples(limit), 0.0
     for _turn in range(12):
@@ -253,7 +253,7 @@ def test_what_was_drawn_before_is_drawn_as_if_for_the_first_time(seed, limit, co
         assert np.array_equal(one.values, two.values, equal_nan=True)
 
 
-def test_what_is_sent_again_at_the_same_times_is_drawn_anew() -> None:
+def test_rewritten_samples_are_redrawn() -> None:
     samples, times = Samples(), np.arange(20_000) / 1000
     none = np.zeros(len(times), dtype=bool)
     samples.extend(times, np.zeros(len(times)), none)
@@ -265,7 +265,7 @@ def test_what_is_sent_again_at_the_same_times_is_drawn_anew() -> None:
     assert line.values[line.times > 10.5].min() == 1
 
 
-def test_the_oldest_go_and_are_counted_and_figures_stay_right() -> None:
+def test_oldest_samples_are_evicted_and_counted_with_correct_figures() -> None:
     samples = Samples(limit=8192)
     random = np.random.default_rng(1)
     rows: list[float] = []
@@ -282,7 +282,7 @@ def test_the_oldest_go_and_are_counted_and_figures_stay_right() -> None:
     assert samples.size_bytes < 8192 * 80
 
 
-def test_a_late_number_is_in_the_peaks_that_were_built_before() -> None:
+def test_late_sample_updates_existing_peaks() -> None:
     samples = Samples()
     times = np.arange(5000) / 1000
     samples.extend(times, np.zeros(5000), np.zeros(5000, dtype=bool))
@@ -293,12 +293,12 @@ def test_a_late_number_is_in_the_peaks_that_were_built_before() -> None:
     assert samples.figures(4.3, 10).most == 0
 
 
-def test_huge_numbers_have_no_mean_rather_than_a_wrong_one() -> None:
+def test_overflowing_mean_is_unknown_instead_of_wrong() -> None:
     samples = filled([(float(n), 1.7e308, False) for n in range(1 << SHIFTS[-1])])
     assert samples.figures(0, 1e9) == Figures(1 << SHIFTS[-1], 1.7e308, 1.7e308, None)
 
 
-def test_a_step_to_the_number_before_and_after() -> None:
+def test_step_to_previous_and_next_sample() -> None:
     samples = filled([(1.0, 1, False), (2.0, 2, False), (3.0, 3, True)])
     assert [samples.beside(2.0, step) for step in (-2, -1, 1, 2)] == [None, 1.0, 3.0, None]
     assert samples.at(0.5) is None

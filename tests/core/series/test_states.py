@@ -18,7 +18,7 @@ def dense(count: int) -> States:
     return states
 
 
-def test_of_states_that_change_within_a_step_one_is_enough() -> None:
+def test_states_that_change_within_a_step_are_reduced_to_a_single_state() -> None:
     states = dense(8000)
     every = list(states.runs(-1, 100))
     assert len(every) == 8000
@@ -32,7 +32,7 @@ def test_of_states_that_change_within_a_step_one_is_enough() -> None:
     assert states.words(-1, 100) == {"true", "false"}
 
 
-def test_what_is_not_known_is_passed_over_only_when_it_is_wished() -> None:
+def test_unknown_states_are_skipped_only_on_request() -> None:
     states = States()
     states.add(1.0, "")
     states.add(2.0, None)
@@ -46,7 +46,7 @@ def test_what_is_not_known_is_passed_over_only_when_it_is_wished() -> None:
 @pytest.mark.parametrize(
     ("begin_s", "end_s"), [(-1.0, 100.0), (0.01, 0.0205), (0.05, 0.05), (90.0, 95.0), (-9.0, -8.0)]
 )
-def test_changes_and_how_long_are_as_the_runs_say(begin_s: float, end_s: float) -> None:
+def test_change_count_and_duration_match_the_runs(begin_s: float, end_s: float) -> None:
     states = dense(100)
     runs = list(states.runs(begin_s, end_s))
     assert states.changes(begin_s, end_s) == max(0, len(runs) - 1)

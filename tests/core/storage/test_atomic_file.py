@@ -20,7 +20,7 @@ from app.errors import DocumentError
 from nep.system.replace_file import replace_file
 
 
-def test_it_writes_and_replaces(tmp_path: Path) -> None:
+def test_write_creates_and_replaces_a_file(tmp_path: Path) -> None:
     path = tmp_path / "folder" / "a.json"
     write_atomically(path, b"one")
     write_atomically(path, b"two")
@@ -30,7 +30,7 @@ def test_it_writes_and_replaces(tmp_path: Path) -> None:
 
 @pytest.mark.skipif(os.name != "posix", reason="Windows does not replace a file that is open")
 @pytest.mark.parametrize("durable", [True, False])
-def test_who_reads_meanwhile_reads_the_old_file_to_its_end(tmp_path: Path, durable: bool) -> None:
+def test_open_reader_reads_the_old_file_to_its_end(tmp_path: Path, durable: bool) -> None:
     path = tmp_path / "a.json"
     write_atomically(path, b"one", durable=durable)
     with path.open("rb") as reader:
@@ -39,7 +39,7 @@ def test_who_reads_meanwhile_reads_the_old_file_to_its_end(tmp_path: Path, durab
     assert path.read_bytes() == b"second"
 
 
-def test_nothing_is_never_written_over_something(tmp_path: Path) -> None:
+def test_empty_data_never_overwrites_a_file(tmp_path: Path) -> None:
     path = tmp_path / "a.json"
     write_atomically(path, b"one")
     with pytest.raises(ValueError, match="empty"):
@@ -47,7 +47,7 @@ def test_nothing_is_never_written_over_something(tmp_path: Path) -> None:
     assert path.read_bytes() == b"one"
 
 
-def test_what_comes_in_parts_is_whole_or_not_there(tmp_path: Path) -> None:
+def test_streamed_write_is_complete_or_absent(tmp_path: Path) -> None:
     path = tmp_path / "a.csv"
     write_atomically(path, (f"{n}\n".encode() for n in range(1000)))
     assert path.read_text().splitlines() == [str(n) for n in range(1000)]
@@ -62,7 +62,7 @@ def test_what_comes_in_parts_is_whole_or_not_there(tmp_path: Path) -> None:
     assert [file.name for file in tmp_path.iterdir()] == ["a.csv"]
 
 
-def test_a_failed_write_leaves_the_old_file_and_no_litter(tmp_path: Path) -> None:
+def test_failed_write_keeps_the_old_file_and_leaves_no_temporary_file(tmp_path: Path) -> None:
     path = tmp_path / "a"
     path.mkdir()
     (path / "inside").write_text("kept")
@@ -74,7 +74,7 @@ def test_a_failed_write_leaves_the_old_file_and_no_litter(tmp_path: Path) -> Non
 
 
 @pytest.mark.skipif(os.name != "posix", reason="kills with SIGKILL")
-def test_a_killed_writer_never_leaves_a_part(tmp_path: Path) -> None:
+def test_killed_writer_never_leaves_a_partial_file(tmp_path: Path) -> None:
     path = tmp_path / "a.txt"
     code = (
         "import sys, pathlib\n"
@@ -98,7 +98,7 @@ def test_a_killed_writer_never_leaves_a_part(tmp_path: Path) -> None:
         assert len(set(data)) == 1
 
 
-def test_what_killed_writers_left_is_swept_away_but_no_write_that_goes_on(tmp_path: Path) -> None:
+def test_stale_temporary_files_are_deleted_but_not_those_in_use(tmp_path: Path) -> None:
     path = tmp_path / "a [1].nepb"
     old, young = tmp_path / ".a [1].nepb.x1.part", tmp_path / ".a [1].nepb.x2.part"
     other = tmp_path / ".b.nepb.x3.part"
@@ -113,7 +113,7 @@ def test_what_killed_writers_left_is_swept_away_but_no_write_that_goes_on(tmp_pa
 # ---- what is read ----------------------------------------------------------------------------------
 
 
-def test_a_regular_file_is_read_whole(tmp_path: Path) -> None:
+def test_regular_file_is_read_completely(tmp_path: Path) -> None:
     path = tmp_path / "a"
     path.write_bytes(b"x" * 1000)
     assert read_whole(path, 1000) == b"x" * 1000
@@ -128,7 +128,7 @@ def test_a_regular_file_is_read_whole(tmp_path: Path) -> None:
 
 @pytest.mark.skipif(os.name != "posix", reason="needs pipes and devices that look like files")
 @pytest.mark.parametrize("kind", ["pipe", "device", "folder", "link to a pipe", "link to a device"])
-def test_what_is_no_file_is_a_sentence_for_every_reader(tmp_path: Path, kind: str) -> None:
+def test_non_regular_file_is_rejected_with_reason(tmp_path: Path, kind: str) -> None:
     path = tmp_path / "settings.json"
     real = tmp_path / "real" if kind.startswith("link") else path
     if "pipe" in kind:
@@ -151,7 +151,7 @@ def test_what_is_no_file_is_a_sentence_for_every_reader(tmp_path: Path, kind: st
 
 
 @pytest.mark.skipif(os.name != "posix", reason="needs pipes that look like files")
-def test_a_pipe_in_place_of_a_file_holds_nobody_up(tmp_path: Path) -> None:
+def test_pipe_in_place_of_a_file_does_not_block(tmp_path: Path) -> None:
     for name in ("settings.json", "Round.nepb"):
         os.mkfifo(tmp_path / name)
     assert Settings(tmp_path).get("a", 1) == 1
@@ -176,7 +176,7 @@ def modes(folder: Path) -> dict[str, int]:
 
 @pytest.mark.skipif(os.name != "posix", reason="Windows has no modes")
 @pytest.mark.usefixtures("open_umask")
-def test_what_concerns_only_its_user_is_private_whatever_the_umask(tmp_path: Path) -> None:
+def test_user_data_files_are_private_regardless_of_umask(tmp_path: Path) -> None:
     home = tmp_path / "home"
     Settings(home).set("a", 1)
     Journal(home / "journal").write("x", None, "{}", {})
@@ -193,7 +193,7 @@ def test_what_concerns_only_its_user_is_private_whatever_the_umask(tmp_path: Pat
 
 @pytest.mark.skipif(os.name != "posix", reason="Windows has no modes")
 @pytest.mark.parametrize(("umask", "mode"), [(0o077, 0o600), (0o022, 0o644), (0o002, 0o664)])
-def test_a_new_behaviour_is_as_shared_as_the_umask_says(tmp_path: Path, umask: int, mode: int) -> None:
+def test_new_behaviour_file_follows_umask(tmp_path: Path, umask: int, mode: int) -> None:
     path = tmp_path / "mine.nepb"
     before = os.umask(umask)
     try:
@@ -207,7 +207,7 @@ def test_a_new_behaviour_is_as_shared_as_the_umask_says(tmp_path: Path, umask: i
 
 @pytest.mark.skipif(os.name != "posix", reason="Windows has no modes")
 @pytest.mark.usefixtures("open_umask")
-def test_what_an_earlier_version_left_open_is_closed_at_the_start(tmp_path: Path) -> None:
+def test_permissions_of_files_from_earlier_versions_are_tightened_at_start(tmp_path: Path) -> None:
     home = tmp_path / "home"
     for folder in (home, home / "journal", home / "earlier"):
         folder.mkdir()
@@ -234,7 +234,7 @@ def busy(code: int) -> PermissionError:
 
 
 @pytest.mark.parametrize("code", [5, 32, 33])
-def test_a_file_that_is_open_elsewhere_is_tried_again(tmp_path: Path, code: int) -> None:
+def test_replacing_a_file_in_use_is_retried(tmp_path: Path, code: int) -> None:
     errors, waited = [busy(code), busy(code)], []
 
     def replace(new: Path, old: Path) -> None:
@@ -248,7 +248,7 @@ def test_a_file_that_is_open_elsewhere_is_tried_again(tmp_path: Path, code: int)
     assert len(waited) == 2
 
 
-def test_one_that_stays_open_is_a_sentence(tmp_path: Path) -> None:
+def test_file_that_stays_in_use_is_reported(tmp_path: Path) -> None:
     waited: list[float] = []
 
     def replace(new: Path, old: Path) -> None:
@@ -259,7 +259,7 @@ def test_one_that_stays_open_is_a_sentence(tmp_path: Path) -> None:
     assert 0 < sum(waited) <= 1
 
 
-def test_a_refusal_of_another_kind_is_not_tried_again(tmp_path: Path) -> None:
+def test_other_permission_errors_are_not_retried(tmp_path: Path) -> None:
     def replace(new: Path, old: Path) -> None:
         raise PermissionError(13, "read only")
 

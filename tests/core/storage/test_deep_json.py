@@ -18,20 +18,20 @@ def stack(blocks: int) -> dict[str, object]:
 
 
 @pytest.mark.parametrize("blocks", [1, 400, 600, 3000])
-def test_a_stack_of_any_usual_length_comes_back(blocks: int) -> None:
+def test_deeply_nested_json_round_trips(blocks: int) -> None:
     text = deep_json.dumps(stack(blocks))
     assert deep_json.same(deep_json.loads(text), stack(blocks))
     assert deep_json.same(deep_json.loads(deep_json.dumps(stack(blocks), indent=1)), stack(blocks))
 
 
-def test_what_is_no_json_is_a_value_error_and_an_abyss_a_recursion_error() -> None:
+def test_invalid_json_raises_value_error_and_excessive_depth_raises_recursion_error() -> None:
     with pytest.raises(ValueError, match="Expecting"):
         deep_json.loads("{")
     with pytest.raises(RecursionError):
         deep_json.loads("[" * 100_000)
 
 
-def test_limits_are_as_before() -> None:
+def test_recursion_limit_and_thread_stack_size_are_restored() -> None:
     limit, size = sys.getrecursionlimit(), threading.stack_size()
     deep_json.dumps(stack(2000))
     assert (sys.getrecursionlimit(), threading.stack_size()) == (limit, size)

@@ -42,22 +42,20 @@ def holder(tmp_path: Path) -> Iterator[subprocess.Popen[str]]:
     process.communicate()
 
 
-def test_it_is_held_by_one_and_free_afterwards(tmp_path: Path) -> None:
+def test_lock_is_exclusive_and_released_afterwards(tmp_path: Path) -> None:
     for _ in range(2):
         with locked(tmp_path / "file") as held:
             assert held
 
 
-def test_who_can_not_have_it_goes_on_after_a_bounded_wait(
-    tmp_path: Path, holder: subprocess.Popen[str]
-) -> None:
+def test_unavailable_lock_times_out(tmp_path: Path, holder: subprocess.Popen[str]) -> None:
     began = time.monotonic()
     with locked(tmp_path / "file", within_s=0.2) as held:
         assert not held
     assert 0.2 <= time.monotonic() - began < 5.0
 
 
-def test_where_the_disk_has_no_locks_nobody_waits(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_file_system_without_locks_does_not_block(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     def refuse(_file: object) -> None:
         raise OSError(errno.ENOLCK, "no locks available")
 
@@ -66,19 +64,19 @@ def test_where_the_disk_has_no_locks_nobody_waits(tmp_path: Path, monkeypatch: p
         assert not held
 
 
-def test_it_is_free_when_its_process_is_killed(tmp_path: Path, holder: subprocess.Popen[str]) -> None:
+def test_lock_is_released_when_its_process_is_killed(tmp_path: Path, holder: subprocess.Popen[str]) -> None:
     holder.kill()
     with locked(tmp_path / "file", within_s=10.0) as held:
         assert held
 
 
-def test_a_folder_that_cant_be_made_is_no_reason_to_stop(tmp_path: Path) -> None:
+def test_failure_to_create_the_lock_folder_is_ignored(tmp_path: Path) -> None:
     (tmp_path / "file").write_text("in the way")
     with locked(tmp_path / "file" / "below") as held:
         assert not held
 
 
-def test_a_turn_is_one_process_s_until_it_leaves_or_dies(
+def test_file_lock_is_held_until_release_or_process_exit(
     holder: subprocess.Popen[str], tmp_path: Path
 ) -> None:
     turn, other = FileLock(tmp_path / "file"), FileLock(tmp_path / "file")
@@ -94,6 +92,6 @@ def test_a_turn_is_one_process_s_until_it_leaves_or_dies(
     other.release()
 
 
-def test_where_there_are_no_locks_everybody_has_the_turn(tmp_path: Path) -> None:
+def test_acquire_succeeds_if_the_lock_file_cannot_be_created(tmp_path: Path) -> None:
     (tmp_path / "file").write_text("no folder")
     assert FileLock(tmp_path / "file" / "starting").acquire()

@@ -29,7 +29,7 @@ def write(path: Path, content: object) -> bytes:
 # ---- settings
 
 
-def test_settings_of_a_newer_studio_are_left_as_they_are(tmp_path: Path) -> None:
+def test_settings_of_a_newer_version_are_not_modified(tmp_path: Path) -> None:
     before = write(tmp_path / "settings.json", NEWER)
     settings = Settings(tmp_path)
     assert settings.get("theme", "light") == "dark", "what can be read of them is taken"
@@ -42,7 +42,7 @@ def test_settings_of_a_newer_studio_are_left_as_they_are(tmp_path: Path) -> None
     assert not settings.are_new
 
 
-def test_what_is_chosen_then_is_kept_beside_and_the_notice_comes_once(tmp_path: Path) -> None:
+def test_changes_to_newer_settings_go_to_a_separate_file_with_one_notice(tmp_path: Path) -> None:
     write(tmp_path / "settings.json", NEWER)
     Settings(tmp_path).set("theme", "light")
     again = Settings(tmp_path)
@@ -53,7 +53,7 @@ def test_what_is_chosen_then_is_kept_beside_and_the_notice_comes_once(tmp_path: 
     assert kept["later"] == [1]
 
 
-def test_a_newer_studio_that_writes_while_this_one_runs_loses_nothing(tmp_path: Path) -> None:
+def test_settings_that_a_newer_version_writes_at_runtime_are_not_overwritten(tmp_path: Path) -> None:
     settings = Settings(tmp_path)
     settings.set("theme", "light")
     newer = write(tmp_path / "settings.json", NEWER)
@@ -65,7 +65,7 @@ def test_a_newer_studio_that_writes_while_this_one_runs_loses_nothing(tmp_path: 
 
 
 @pytest.mark.parametrize("said", [None, "2", 1.5, True, [], 1])
-def test_settings_of_an_older_studio_are_read_and_written_in_place(tmp_path: Path, said: object) -> None:
+def test_settings_of_an_older_version_are_read_and_migrated_in_place(tmp_path: Path, said: object) -> None:
     old: dict[str, object] = {"theme": "dark", "of another plug-in": 7}
     write(tmp_path / "settings.json", old if said is None else {**old, "format": said})
     settings = Settings(tmp_path)
@@ -76,7 +76,7 @@ def test_settings_of_an_older_studio_are_read_and_written_in_place(tmp_path: Pat
     assert [path.name for path in tmp_path.glob("settings*.json")] == ["settings.json"]
 
 
-def test_settings_of_its_own_that_are_newer_still_are_set_aside(tmp_path: Path) -> None:
+def test_own_settings_file_in_an_unreadable_newer_format_is_backed_up(tmp_path: Path) -> None:
     write(tmp_path / "settings.json", NEWER)
     whole = write(tmp_path / "settings.format-1.json", NEWER)
     settings = Settings(tmp_path)
@@ -86,7 +86,7 @@ def test_settings_of_its_own_that_are_newer_still_are_set_aside(tmp_path: Path) 
     assert Settings(tmp_path).get("theme", "") == "light"
 
 
-def test_a_damaged_file_of_ones_own_beside_a_newer_one_is_kept(tmp_path: Path) -> None:
+def test_damaged_own_settings_file_next_to_a_newer_one_is_backed_up(tmp_path: Path) -> None:
     before = write(tmp_path / "settings.json", NEWER)
     (tmp_path / "settings.format-1.json").write_text("{")
     settings = Settings(tmp_path)
@@ -95,14 +95,14 @@ def test_a_damaged_file_of_ones_own_beside_a_newer_one_is_kept(tmp_path: Path) -
     assert (tmp_path / "settings.json").read_bytes() == before
 
 
-def test_the_states_of_layouts_have_a_number_of_their_own_and_are_part_of_the_settings() -> None:
+def test_layout_state_version_is_tied_to_the_settings_format() -> None:
     assert (FORMAT, STATE_VERSION) == (1, 1), "another number of layouts needs another one of settings"
 
 
 # ---- unsaved work
 
 
-def test_unsaved_work_of_a_newer_studio_is_named_and_not_touched(tmp_path: Path) -> None:
+def test_unsaved_work_of_a_newer_version_is_listed_and_not_modified(tmp_path: Path) -> None:
     before = write(tmp_path / "a.json", {**JOURNAL, "format": 2, "workspace": "in another way"})
     write(tmp_path / "b.json", {**JOURNAL, "name": "Other", "format": 1})
     assert of_newer(tmp_path) == ["Mine"]
@@ -110,7 +110,7 @@ def test_unsaved_work_of_a_newer_studio_is_named_and_not_touched(tmp_path: Path)
     assert (tmp_path / "a.json").read_bytes() == before
 
 
-def test_unsaved_work_of_an_older_studio_comes_back(tmp_path: Path) -> None:
+def test_unsaved_work_of_an_older_version_is_restored(tmp_path: Path) -> None:
     write(tmp_path / "a.json", JOURNAL)
     (found,) = left_behind(tmp_path)
     assert (found.name, found.workspace) == ("Mine", {"blocks": 1})
@@ -119,7 +119,7 @@ def test_unsaved_work_of_an_older_studio_comes_back(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("content", ["", "{", "[]", '{"format": 2}', '{"format": 2, "pid": []}'])
-def test_what_is_no_journal_is_nobodys_work(tmp_path: Path, content: str) -> None:
+def test_invalid_journal_is_ignored(tmp_path: Path, content: str) -> None:
     (tmp_path / "a.json").write_text(content)
     assert of_newer(tmp_path) == []
     assert left_behind(tmp_path) == []
@@ -128,7 +128,7 @@ def test_what_is_no_journal_is_nobodys_work(tmp_path: Path, content: str) -> Non
 # ---- the backpack
 
 
-def test_a_backpack_of_a_newer_studio_is_left_as_it_is(tmp_path: Path) -> None:
+def test_backpack_of_a_newer_version_is_not_modified(tmp_path: Path) -> None:
     before = write(tmp_path / "backpack.json", {"backpack": 2, "things": [{"id": "x"}]})
     backpack = Backpack(tmp_path)
     backpack.reload_if_changed()
@@ -145,7 +145,7 @@ def test_a_backpack_of_a_newer_studio_is_left_as_it_is(tmp_path: Path) -> None:
     assert again.take_trouble() == ""
 
 
-def test_a_backpack_of_ones_own_that_is_newer_still_is_set_aside(tmp_path: Path) -> None:
+def test_own_backpack_file_in_an_unreadable_newer_format_is_backed_up(tmp_path: Path) -> None:
     for name in ("backpack.json", "backpack.format-1.json"):
         write(tmp_path / name, {"backpack": 2})
     backpack = Backpack(tmp_path)
@@ -158,7 +158,7 @@ def test_a_backpack_of_ones_own_that_is_newer_still_is_set_aside(tmp_path: Path)
 # ---- behaviours
 
 
-def test_a_behaviour_of_a_newer_studio_is_told_in_one_sentence_and_not_touched(tmp_path: Path) -> None:
+def test_behaviour_of_a_newer_version_is_rejected_with_a_message_and_not_modified(tmp_path: Path) -> None:
     path = tmp_path / "Mine.nepb"
     before = write(path, {"format": "nep-behaviour", "version": 2, "workspace": {"blocks": {}}})
     with pytest.raises(DocumentError) as raised:
@@ -169,7 +169,7 @@ def test_a_behaviour_of_a_newer_studio_is_told_in_one_sentence_and_not_touched(t
     assert path.read_bytes() == before
 
 
-def test_what_a_later_program_added_to_a_behaviour_is_written_again(tmp_path: Path) -> None:
+def test_unknown_fields_of_a_behaviour_file_are_preserved_on_save(tmp_path: Path) -> None:
     path = tmp_path / "Mine.nepb"
     write(
         path,

@@ -37,7 +37,7 @@ def beside(path: Path) -> Path:
     return path.with_name("words.damaged.json")
 
 
-def test_what_is_whole_is_read_and_what_is_not_there_is_nothing(path: Path) -> None:
+def test_valid_file_is_read_and_missing_file_is_empty(path: Path) -> None:
     assert read(path) == KeptFile()
     assert read(path / "below") == KeptFile()
     path.write_bytes(b"ab")
@@ -45,7 +45,7 @@ def test_what_is_whole_is_read_and_what_is_not_there_is_nothing(path: Path) -> N
     assert not beside(path).exists()
 
 
-def test_of_a_damaged_file_the_rest_is_used_and_a_copy_kept(path: Path) -> None:
+def test_damaged_file_is_backed_up_and_its_valid_part_is_used(path: Path) -> None:
     path.write_bytes(b"a1b")
     found = read(path)
     assert found.value == ["a", "b"]
@@ -53,14 +53,14 @@ def test_of_a_damaged_file_the_rest_is_used_and_a_copy_kept(path: Path) -> None:
     assert (path.read_bytes(), beside(path).read_bytes()) == (b"a1b", b"a1b")
 
 
-def test_what_is_no_such_file_is_put_aside(path: Path) -> None:
+def test_unreadable_file_is_moved_to_a_backup(path: Path) -> None:
     path.write_bytes(b"!")
     found = read(path)
     assert (found.value, "it is no text" in found.problem, found.is_newer) == (None, True, False)
     assert (path.exists(), beside(path).read_bytes()) == (False, b"!")
 
 
-def test_what_is_too_large_or_no_file_is_put_aside_too(path: Path) -> None:
+def test_oversized_file_or_folder_is_moved_to_a_backup(path: Path) -> None:
     path.write_bytes(b"a" * 101)
     assert "MB" in read(path).problem
     assert beside(path).stat().st_size == 101
@@ -70,7 +70,7 @@ def test_what_is_too_large_or_no_file_is_put_aside_too(path: Path) -> None:
     assert beside(path).is_dir()
 
 
-def test_a_newer_file_is_left_as_it_is(path: Path) -> None:
+def test_file_of_a_newer_version_is_not_modified(path: Path) -> None:
     path.write_bytes(b"9")
     found = read(path)
     assert (found.value, found.is_newer) == (None, True)

@@ -10,12 +10,12 @@ from app.core.storage.settings import RECENT_LIMIT, Settings, home, kept_languag
 from app.errors import SettingsError
 
 
-def test_a_value_is_there_after_a_restart(tmp_path: Path) -> None:
+def test_value_persists_after_a_restart(tmp_path: Path) -> None:
     Settings(tmp_path).set("theme", "dark")
     assert Settings(tmp_path).get("theme", "light") == "dark"
 
 
-def test_settings_are_new_until_something_is_kept(tmp_path: Path) -> None:
+def test_settings_are_new_until_a_value_is_saved(tmp_path: Path) -> None:
     assert Settings(tmp_path).are_new
     assert Settings(tmp_path).are_new
     Settings(tmp_path).set("theme", "dark")
@@ -27,13 +27,13 @@ def test_damaged_settings_are_not_new(tmp_path: Path) -> None:
     assert not Settings(tmp_path).are_new
 
 
-def test_a_value_of_another_type_gives_the_default(tmp_path: Path) -> None:
+def test_value_of_wrong_type_falls_back_to_the_default(tmp_path: Path) -> None:
     Settings(tmp_path).set("theme", 5)
     assert Settings(tmp_path).get("theme", "light") == "light"
 
 
 @pytest.mark.parametrize("damage", [b"", b"{", b"[1]", b"\xff\xfe", b'{"theme": "da'])
-def test_a_damaged_file_is_kept_beside(tmp_path: Path, damage: bytes) -> None:
+def test_damaged_file_is_backed_up(tmp_path: Path, damage: bytes) -> None:
     (tmp_path / "settings.json").write_bytes(damage)
     settings = Settings(tmp_path)
     assert settings.get("theme", "light") == "light"
@@ -57,7 +57,7 @@ def test_a_damaged_file_is_kept_beside(tmp_path: Path, damage: bytes) -> None:
         (None, ""),
     ],
 )
-def test_the_language_is_known_before_anything_is_moved(
+def test_language_is_read_without_modifying_any_file(
     tmp_path: Path, kept: bytes | None, language: str
 ) -> None:
     if kept is not None:
@@ -66,7 +66,7 @@ def test_the_language_is_known_before_anything_is_moved(
     assert [each.read_bytes() for each in tmp_path.iterdir()] == ([] if kept is None else [kept])
 
 
-def test_the_language_that_was_chosen_beside_the_settings_of_a_newer_studio_counts(tmp_path: Path) -> None:
+def test_language_from_the_separate_file_overrides_newer_settings(tmp_path: Path) -> None:
     (tmp_path / "settings.json").write_text('{"format": 99, "language": "ja"}', "utf-8")
     assert kept_language(tmp_path) == "ja"
     Settings(tmp_path).set("language", "fr")
@@ -75,7 +75,7 @@ def test_the_language_that_was_chosen_beside_the_settings_of_a_newer_studio_coun
     assert kept_language(tmp_path) == "es"
 
 
-def test_recent_files_are_newest_first_without_doubles_or_missing_ones(tmp_path: Path) -> None:
+def test_recent_files_are_newest_first_without_duplicates_or_missing_files(tmp_path: Path) -> None:
     settings = Settings(tmp_path / "home")
     files = [tmp_path / f"{number}.nepb" for number in range(RECENT_LIMIT + 3)]
     for file in files:
@@ -90,18 +90,18 @@ def test_recent_files_are_newest_first_without_doubles_or_missing_ones(tmp_path:
     assert len({item.path for item in recent}) == len(recent) <= RECENT_LIMIT
 
 
-def test_a_folder_that_cant_be_written_is_told(tmp_path: Path) -> None:
+def test_unwritable_folder_raises_settings_error(tmp_path: Path) -> None:
     (tmp_path / "file").write_text("not a folder")
     with pytest.raises(SettingsError, match="can't save settings"):
         Settings(tmp_path / "file").set("theme", "dark")
 
 
-def test_the_folder_can_be_chosen(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_settings_folder_is_configurable(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("NEP_STUDIO_HOME", str(tmp_path))
     assert home() == tmp_path
 
 
-def test_what_could_not_be_written_is_known_until_it_can_be(tmp_path: Path) -> None:
+def test_unsaved_changes_are_tracked_until_the_file_is_writable(tmp_path: Path) -> None:
     settings = Settings(tmp_path)
     settings.set("theme", "light")
     assert settings.not_kept is None
@@ -123,7 +123,7 @@ def test_what_could_not_be_written_is_known_until_it_can_be(tmp_path: Path) -> N
     )  # fmt: skip
 
 
-def test_a_file_whose_name_is_no_utf_8_is_remembered_and_keeps_nothing_else_from_being_kept(
+def test_recent_file_with_non_utf_8_name_is_saved_with_the_other_settings(
     tmp_path: Path,
 ) -> None:
     """A disk of another system has such names; Python gives them as lone surrogates."""
@@ -138,7 +138,7 @@ def test_a_file_whose_name_is_no_utf_8_is_remembered_and_keeps_nothing_else_from
 
 
 @pytest.mark.parametrize("value", [object(), {"a": {1, 2}}, {("a", "b"): 1}])
-def test_what_json_cant_say_is_refused_and_keeps_nothing_else_from_being_kept(
+def test_value_that_json_cannot_represent_is_rejected_and_other_settings_are_saved(
     tmp_path: Path, value: object
 ) -> None:
     settings = Settings(tmp_path)

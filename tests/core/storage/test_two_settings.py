@@ -22,7 +22,7 @@ for number in range(50):
 """
 
 
-def test_each_keeps_what_the_other_has_set(tmp_path: Path) -> None:
+def test_each_instance_preserves_values_set_by_the_other(tmp_path: Path) -> None:
     first, second = Settings(tmp_path), Settings(tmp_path)
     first.set("theme", "dark")
     second.set("text_percent", 150)
@@ -36,14 +36,14 @@ def test_each_keeps_what_the_other_has_set(tmp_path: Path) -> None:
     assert first.get("text_percent", 0) == 150
 
 
-def test_the_last_one_decides_about_the_same_key(tmp_path: Path) -> None:
+def test_last_write_wins_for_the_same_key(tmp_path: Path) -> None:
     first, second = Settings(tmp_path), Settings(tmp_path)
     first.set("theme", "dark")
     second.set("theme", "light")
     assert Settings(tmp_path).get("theme", "") == "light"
 
 
-def test_recent_files_of_both_are_remembered(tmp_path: Path) -> None:
+def test_recent_files_of_both_instances_are_merged(tmp_path: Path) -> None:
     first, second = Settings(tmp_path), Settings(tmp_path)
     for settings, name in ((first, "one"), (second, "two"), (first, "three")):
         (tmp_path / name).write_text("x")
@@ -51,7 +51,7 @@ def test_recent_files_of_both_are_remembered(tmp_path: Path) -> None:
     assert [file.path.name for file in Settings(tmp_path).recent] == ["three", "two", "one"]
 
 
-def test_a_file_that_another_one_damaged_does_not_lose_what_is_known(tmp_path: Path) -> None:
+def test_file_damaged_by_another_program_does_not_lose_values_in_memory(tmp_path: Path) -> None:
     settings = Settings(tmp_path)
     settings.set("theme", "dark")
     settings.path.write_text("{ half of")
@@ -63,7 +63,7 @@ def test_a_file_that_another_one_damaged_does_not_lose_what_is_known(tmp_path: P
     }
 
 
-def test_two_processes_that_write_at_once_lose_nothing(tmp_path: Path) -> None:
+def test_concurrent_writes_of_two_processes_lose_nothing(tmp_path: Path) -> None:
     environ = {**os.environ, "PYTHONPATH": str(Path(__file__).parents[3])}
     writers = [
         subprocess.Popen(

@@ -28,7 +28,7 @@ def written(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return out
 
 
-def test_the_bill_has_all_that_is_inside(written: Path) -> None:
+def test_bill_of_materials_lists_every_component(written: Path) -> None:
     told = json.loads((written / "bill.json").read_text("utf-8"))
     assert told["bomFormat"] == "CycloneDX"
     assert told["metadata"]["component"]["version"] == __version__
@@ -45,7 +45,7 @@ def test_the_bill_has_all_that_is_inside(written: Path) -> None:
     assert everything == {each["bom-ref"] for each in told["components"]}, "nothing hangs in the air"
 
 
-def test_every_licence_is_in_the_folder(written: Path) -> None:
+def test_licence_folder_contains_every_licence_text(written: Path) -> None:
     notice = (written / "NOTICE.txt").read_text("utf-8")
     assert f"NEP Studio {__version__}" in notice
     assert f"Qt {metadata.version('PySide6-Essentials')} and" in notice
@@ -69,7 +69,7 @@ def test_every_licence_is_in_the_folder(written: Path) -> None:
         assert len(text) > 500, name
 
 
-def test_a_library_that_nobody_knows_stops_the_build(
+def test_unknown_library_fails_the_build(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     for each in ("parts_of", "parts_in_wheels"):
@@ -80,18 +80,18 @@ def test_a_library_that_nobody_knows_stops_the_build(
     assert not (tmp_path / "bill.json").exists()
 
 
-def test_the_same_parts_give_the_same_bill() -> None:
+def test_bill_of_materials_is_reproducible() -> None:
     parts = [Part("a", "1", "MIT"), Part("b", "2", "Zlib", (), "generic", "a"), QT]
     assert bill(parts, "linux", 1_700_000_000, "1.0") == bill(parts, "linux", 1_700_000_000, "1.0")
 
 
-def test_a_licence_in_words_is_a_name() -> None:
+def test_non_spdx_licence_is_written_as_a_name() -> None:
     told = json.loads(bill([Part("odd", "1", "My own words, and more")], "linux", 0, "1.0"))
     (component,) = told["components"]
     assert component["licenses"] == [{"license": {"name": "My own words, and more"}}]
 
 
-def test_what_two_have_inside_is_told_once() -> None:
+def test_component_shared_by_two_packages_is_listed_once() -> None:
     crates = [Part("pyo3", "1", "MIT", (), "cargo", within) for within in ("a", "b")]
     told = json.loads(bill([Part("a", "1", "MIT"), Part("b", "1", "MIT"), *crates], "linux", 0, "1.0"))
     assert [each["name"] for each in told["components"]] == ["a", "b", "pyo3"]
@@ -99,12 +99,12 @@ def test_what_two_have_inside_is_told_once() -> None:
     assert depends["pypi/a@1"] == depends["pypi/b@1"] == ["cargo/pyo3@1"]
 
 
-def test_a_package_of_the_system_has_its_distributor_in_the_address() -> None:
+def test_purl_of_a_system_package_names_its_distributor() -> None:
     told = json.loads(bill([Part("libssl3", "3.0", "Apache-2.0", (), "deb/debian")], "linux", 0, "1.0"))
     assert told["components"][0]["purl"] == "pkg:deb/debian/libssl3@3.0"
 
 
-def test_a_name_with_a_slash_stays_in_its_folder(tmp_path: Path) -> None:
+def test_slash_in_a_package_name_is_replaced_in_its_folder_name(tmp_path: Path) -> None:
     text = tmp_path / "text"
     text.write_text("words", "utf-8")
     parts = [Part("@blockly/field-colour", "1", "MIT", [("LICENSE", text)], "npm"), QT]
@@ -112,7 +112,7 @@ def test_a_name_with_a_slash_stays_in_its_folder(tmp_path: Path) -> None:
     assert (tmp_path / "out" / "licences" / "blockly-field-colour" / "LICENSE").read_text("utf-8") == "words"
 
 
-def test_crates_are_in_one_list_with_their_authors_and_each_text_once(tmp_path: Path) -> None:
+def test_crate_licences_are_merged_into_one_file_with_authors_and_unique_texts(tmp_path: Path) -> None:
     parts = [
         Part("one", "1", "MIT OR Apache-2.0", (), "cargo", "a", "Ana"),
         Part("one", "1", "MIT OR Apache-2.0", (), "cargo", "b", "Ana"),
@@ -141,11 +141,11 @@ def test_crates_are_in_one_list_with_their_authors_and_each_text_once(tmp_path: 
         ("Apache-2.0 WITH LLVM-exception OR Apache-2.0 OR MIT", ["Apache-2.0", "Apache-2.0", "MIT"]),
     ],
 )
-def test_of_alternatives_one_text_is_enough(licence: str, needed: Sequence[str]) -> None:
+def test_one_licence_text_is_enough_for_alternatives(licence: str, needed: Sequence[str]) -> None:
     assert standard_texts(Part("a", "1", licence, (), "cargo")) == needed
 
 
 @pytest.mark.parametrize("licence", ["GPL-9.0-only", "MIT AND GPL-9.0-only", "", "My own"])
-def test_a_crate_whose_text_is_missing_stops_the_build(licence: str) -> None:
+def test_crate_without_licence_text_fails_the_build(licence: str) -> None:
     with pytest.raises(InventoryError, match="the licence text of odd is missing"):
         standard_texts(Part("odd", "1", licence, (), "cargo"))

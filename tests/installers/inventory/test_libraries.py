@@ -65,7 +65,7 @@ def put(folder: Path, *names: str, content: bytes = ELF) -> Path:
         ("libnss3.so", ""),
     ],
 )
-def test_libraries_are_known_by_their_names_on_each_system(name: str, part: str) -> None:
+def test_libraries_are_identified_by_file_name_on_each_system(name: str, part: str) -> None:
     library = library_of(name)
     assert library is not None
     assert library.of == part
@@ -83,11 +83,11 @@ def test_libraries_are_known_by_their_names_on_each_system(name: str, part: str)
         "x.dll",
     ],
 )
-def test_others_are_not(name: str) -> None:
+def test_other_file_names_match_no_library(name: str) -> None:
     assert library_of(name) is None
 
 
-def test_the_table_names_texts_that_are_there_and_no_name_twice() -> None:
+def test_library_table_has_existing_licence_texts_and_unique_names() -> None:
     for library in LIBRARIES:
         assert library.licence
         assert all((LICENCES / f"{each}.txt").is_file() for each in library.texts), library.files
@@ -95,7 +95,7 @@ def test_the_table_names_texts_that_are_there_and_no_name_twice() -> None:
     assert {each for each in names if names.count(each) > 1} == {"openblas"}
 
 
-def test_compiled_files_are_known_by_their_first_bytes(tmp_path: Path) -> None:
+def test_compiled_files_are_detected_by_magic_bytes(tmp_path: Path) -> None:
     for name, content in (
         ("a", ELF),
         ("b.dll", b"MZ"),
@@ -107,7 +107,7 @@ def test_compiled_files_are_known_by_their_first_bytes(tmp_path: Path) -> None:
     assert [path.name for path in compiled_files(tmp_path)] == ["a", "b.dll", "c"]
 
 
-def test_programs_modules_and_what_is_told_need_no_part_of_their_own(tmp_path: Path) -> None:
+def test_programs_modules_and_listed_libraries_need_no_extra_part(tmp_path: Path) -> None:
     (orjson,) = (file.name for file in metadata.files("orjson") or () if file.suffix in {".so", ".pyd"})
     dynload = Path(sysconfig.get_path("stdlib")) / "lib-dynload"
     of_python = [next(dynload.glob("_json*.so")).name] if dynload.is_dir() else []
@@ -123,13 +123,13 @@ def test_programs_modules_and_what_is_told_need_no_part_of_their_own(tmp_path: P
     assert list(parts_in_folder(tmp_path, [*OURS, Part("orjson", "1", "MIT")])) == []
 
 
-def test_a_module_of_a_wheel_that_is_not_told_is_said(tmp_path: Path) -> None:
+def test_module_of_an_unlisted_wheel_is_reported(tmp_path: Path) -> None:
     (orjson,) = (file.name for file in metadata.files("orjson") or () if file.suffix in {".so", ".pyd"})
     with pytest.raises(InventoryError, match="orjson"):
         list(parts_in_folder(put(tmp_path, orjson), OURS))
 
 
-def test_all_that_nobody_knows_is_said_at_once(tmp_path: Path) -> None:
+def test_all_unknown_libraries_are_reported_at_once(tmp_path: Path) -> None:
     put(tmp_path, "_internal/libreadline.so.8", "numpy.libs/libnew-12ab.so.1", "app.libs/libzmq.so.5")
     with pytest.raises(InventoryError) as raised:
         list(parts_in_folder(tmp_path, [*OURS, Part("numpy", "2", "BSD-3-Clause")]))
@@ -138,7 +138,7 @@ def test_all_that_nobody_knows_is_said_at_once(tmp_path: Path) -> None:
     assert all("put it into LIBRARIES" in line for line in lines)
 
 
-def test_empty_libraries_stand_for_ffmpeg_and_ffmpeg_itself_is_refused(tmp_path: Path) -> None:
+def test_ffmpeg_stubs_are_accepted_and_real_ffmpeg_is_rejected(tmp_path: Path) -> None:
     name = "libavcodec-57aca189.so.62.28.102"
     assert list(parts_in_folder(put(tmp_path, name), OURS)) == []
     put(tmp_path, name, content=ELF + bytes(200_000))
@@ -146,7 +146,7 @@ def test_empty_libraries_stand_for_ffmpeg_and_ffmpeg_itself_is_refused(tmp_path:
         list(parts_in_folder(tmp_path, OURS))
 
 
-def test_what_wheels_carry_besides_has_a_part_of_its_own(tmp_path: Path) -> None:
+def test_libraries_bundled_in_wheels_become_separate_parts(tmp_path: Path) -> None:
     put(tmp_path, "libaom-a0d22147.so.3.14.1", "libicuuc.so.73", "libicui18n.so.73", "opengl32sw.dll")
     parts = {each.name: each for each in parts_in_folder(tmp_path, OURS)}
     assert {name: each.version for name, each in parts.items()} == {
@@ -160,7 +160,7 @@ def test_what_wheels_carry_besides_has_a_part_of_its_own(tmp_path: Path) -> None
 @pytest.mark.skipif(
     not Path("/var/lib/dpkg/info/zlib1g:amd64.list").is_file(), reason="needs Debian's zlib1g"
 )
-def test_a_library_of_the_system_is_its_package_with_its_text(tmp_path: Path) -> None:
+def test_system_library_is_attributed_to_its_package_with_its_licence_text(tmp_path: Path) -> None:
     (part,) = parts_in_folder(put(tmp_path, "libz.so.1"), OURS)
     assert (part.name, part.licence) == ("zlib1g", "Zlib")
     assert part.version
@@ -170,7 +170,7 @@ def test_a_library_of_the_system_is_its_package_with_its_text(tmp_path: Path) ->
     assert "zlib" in text.read_text("utf-8")
 
 
-def test_a_library_of_the_system_whose_package_is_not_there_stops_the_build(
+def test_system_library_without_package_fails_the_build(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setenv("PATH", str(tmp_path))  # no dpkg-query

@@ -27,7 +27,7 @@ def parts() -> list[Part]:
     return list(parts_of())
 
 
-def test_every_distribution_inside_is_told_once_with_its_licence(parts: list[Part]) -> None:
+def test_every_bundled_distribution_is_listed_once_with_its_licence(parts: list[Part]) -> None:
     names = [each.name for each in parts]
     assert len(names) == len(set(names))
     assert {"nep-studio", "pyzmq", "pyside6-essentials", "numpy", "pynng", "cffi", "jsonschema"} <= set(names)
@@ -36,22 +36,22 @@ def test_every_distribution_inside_is_told_once_with_its_licence(parts: list[Par
     assert [each.version for each in parts] == [metadata.version(each.name) for each in parts]
 
 
-def test_all_have_their_licence_text(parts: list[Part]) -> None:
+def test_every_part_has_its_licence_text(parts: list[Part]) -> None:
     assert {each.name for each in (*parts, *others(RESOURCES)) if not each.texts} <= WITHOUT_TEXT
 
 
-def test_a_text_with_a_number_at_its_end_is_one(parts: list[Part]) -> None:
+def test_licence_file_name_with_trailing_version_is_recognised(parts: list[Part]) -> None:
     (orjson,) = (each for each in parts if each.name == "orjson")
     assert "LICENSE-MPL-2.0" in {name for name, _text in orjson.texts}
 
 
-def test_pythons_licence_is_there_whether_it_has_one_or_not(tmp_path: Path) -> None:
+def test_python_licence_falls_back_to_the_bundled_text(tmp_path: Path) -> None:
     assert _texts_of_python(tmp_path) == [("LICENSE.txt", LICENCES / "PSF-2.0.txt")]
     (tmp_path / "LICENSE.txt").write_text("that of Python for Windows", "utf-8")
     assert _texts_of_python(tmp_path) == [("LICENSE.txt", tmp_path / "LICENSE.txt")]
 
 
-def test_a_text_of_ours_says_who_has_the_rights_and_under_what() -> None:
+def test_generated_licence_text_has_the_copyright_holder_and_the_licences() -> None:
     ((name, text),) = own_text("Copyright Ana", "MIT", "Zlib")
     assert name == "LICENSE.txt"
     assert isinstance(text, str)
@@ -61,7 +61,7 @@ def test_a_text_of_ours_says_who_has_the_rights_and_under_what() -> None:
         own_text("Copyright Ana", "WTFPL")
 
 
-def test_the_editors_parts_are_read_from_what_its_bundler_wrote() -> None:
+def test_editor_parts_are_read_from_the_legal_file_of_the_bundler() -> None:
     parts = {each.name: each for each in editor_parts(RESOURCES / "blockly" / "LEGAL.txt")}
     assert parts["blockly"].version.startswith("13.")
     assert parts["blockly"].licence == "Apache-2.0"

@@ -46,7 +46,7 @@ def parts_of_wheel(name: str) -> dict[str, Part]:
         ("pyside6-addons", {"chromium"}),
     ],
 )
-def test_what_a_wheel_has_inside_is_told_with_its_licence(wheel: str, inside: set[str]) -> None:
+def test_components_compiled_into_a_wheel_are_listed_with_their_licence(wheel: str, inside: set[str]) -> None:
     told = parts_of_wheel(wheel)
     assert inside <= told.keys()
     assert all(each.licence for each in told.values())
@@ -57,16 +57,18 @@ def test_what_a_wheel_has_inside_is_told_with_its_licence(wheel: str, inside: se
 @pytest.mark.parametrize(
     ("wheel", "name"), [("pynng", "nng"), ("pynng", "mbedtls"), ("pyzmq", "libzmq"), ("numpy", "openblas")]
 )
-def test_versions_are_those_of_what_is_installed(wheel: str, name: str) -> None:
+def test_component_versions_match_the_installed_wheel(wheel: str, name: str) -> None:
     assert re.fullmatch(r"\d+\.\d+(\.\d+)+", parts_of_wheel(wheel)[name].version)
 
 
-def test_the_browser_inside_qt_has_its_version() -> None:
+def test_chromium_inside_qt_has_its_version() -> None:
     assert re.fullmatch(r"\d+\.0\.\d+\.\d+", parts_of_wheel("pyside6-addons")["chromium"].version)
 
 
 @pytest.mark.parametrize("folder", ["", "licenses/", "licenses/licenses/"])
-def test_a_text_is_found_in_old_and_new_wheels_and_the_uppermost_counts(folder: str, tmp_path: Path) -> None:
+def test_licence_text_is_found_in_old_and_new_wheels_and_the_topmost_wins(
+    folder: str, tmp_path: Path
+) -> None:
     info = tmp_path / "made_up-1.dist-info"
     names = [
         f"{info.name}/{folder}LICENSE.txt",
@@ -84,11 +86,11 @@ def test_a_text_is_found_in_old_and_new_wheels_and_the_uppermost_counts(folder: 
         wheels._file(found, "COPYING")
 
 
-def test_a_package_of_the_system_or_of_the_editor_is_no_wheel() -> None:
+def test_system_and_editor_packages_are_not_treated_as_wheels() -> None:
     assert list(parts_in_wheels([Part("libssl3", "3", "Apache-2.0", (), "deb/debian")])) == []
 
 
-def test_what_opencv_says_of_its_build_is_read() -> None:
+def test_opencv_build_information_is_parsed() -> None:
     told = {each.name: each for each in parts_of_build(BUILD, THEIRS)}
     assert {name: each.version for name, each in told.items()} == {
         "carotene": "0.0.1",
@@ -104,12 +106,12 @@ def test_what_opencv_says_of_its_build_is_read() -> None:
     assert "Sam Leffler" in told["libtiff"].texts[0][1]
 
 
-def test_a_part_of_opencv_that_nobody_knows_is_said() -> None:
+def test_unknown_component_of_opencv_is_reported() -> None:
     with pytest.raises(InventoryError, match="OpenCV has 'libnew' inside"):
         list(parts_of_build("3rdparty dependencies: libnew", THEIRS))
 
 
-def test_crates_that_only_built_a_wheel_are_not_in_it() -> None:
+def test_build_only_crates_are_excluded() -> None:
     expression = {"expression": "MIT"}
     made = {
         "components": [
@@ -132,19 +134,19 @@ def test_crates_that_only_built_a_wheel_are_not_in_it() -> None:
     assert list(parts_of_crates({}, "wheel")) == []
 
 
-def test_a_crate_without_a_licence_is_said() -> None:
+def test_crate_without_a_licence_is_reported() -> None:
     made = {"components": [{"name": "odd", "version": "1", "purl": "pkg:cargo/odd@1"}]}
     with pytest.raises(InventoryError, match="the crate 'odd' in wheel tells no licence"):
         list(parts_of_crates(made, "wheel"))
 
 
-def test_a_crate_of_iceoryx2_that_nobody_knows_is_said(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_unknown_crate_of_iceoryx2_is_reported(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(wheels, "CRATES", {})
     with pytest.raises(InventoryError, match="iceoryx2 has the crate 'arc-swap' inside"):
         parts_of_wheel.__wrapped__("iceoryx2")
 
 
-def test_a_version_is_found_in_a_file(tmp_path: Path) -> None:
+def test_version_is_extracted_from_a_binary_file(tmp_path: Path) -> None:
     path = tmp_path / "library"
     path.write_bytes(b"")
     assert version_in(path, rb"v(\d+)") == ""

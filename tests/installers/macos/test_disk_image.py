@@ -17,7 +17,7 @@ from tests.installers.macos.made_up_app import ICON, context, made_up_app, put
 TOOLS = shutil.which("xorrisofs") is not None and shutil.which("7z") is not None
 
 
-def test_dmgbuild_is_told_of_both_sides_of_the_arrow(tmp_path: Path) -> None:
+def test_dmgbuild_settings_place_application_and_applications_link(tmp_path: Path) -> None:
     app = tmp_path / "NEP Studio.app"
     told = settings(app, tmp_path / "background.png", tmp_path / "nep-studio.icns")
     assert told["files"] == [(str(app), "NEP Studio.app")]
@@ -30,7 +30,7 @@ def test_dmgbuild_is_told_of_both_sides_of_the_arrow(tmp_path: Path) -> None:
     assert told["format"] == "ULMO"
 
 
-def test_dmgbuild_knows_everything_that_it_is_told(tmp_path: Path) -> None:
+def test_dmgbuild_knows_every_setting_it_is_given(tmp_path: Path) -> None:
     """Its options are read from its source: it can be imported on a Mac only, and takes what it knows not."""
     found = find_spec("ds_store")
     if found is None or found.origin is None:
@@ -41,7 +41,7 @@ def test_dmgbuild_knows_everything_that_it_is_told(tmp_path: Path) -> None:
 
 
 @pytest.mark.skipif(this_system() == "macos", reason="a Mac can make it")
-def test_where_there_is_no_hdiutil_it_says_so(tmp_path: Path) -> None:
+def test_missing_hdiutil_is_reported(tmp_path: Path) -> None:
     with pytest.raises(PackageError, match="on a Mac only"):
         dmg(tmp_path / "a.dmg", tmp_path / "a.app", tmp_path / "b.png", tmp_path / "c.icns")
     with pytest.raises(PackageError, match="on a Mac only"):
@@ -49,7 +49,7 @@ def test_where_there_is_no_hdiutil_it_says_so(tmp_path: Path) -> None:
 
 
 @pytest.mark.skipif(not TOOLS, reason="needs xorriso and p7zip")
-def test_the_image_holds_the_application_with_its_links_and_the_window(tmp_path: Path) -> None:
+def test_image_contains_the_application_with_its_links_and_the_window(tmp_path: Path) -> None:
     store = pytest.importorskip("ds_store").DSStore
     app = made_up_app(tmp_path)
     icon, ground = put(tmp_path / "nep-studio.icns", ICON), put(tmp_path / "background.png", b"picture")

@@ -23,14 +23,14 @@ CS = "com.apple.security.cs."
 
 
 @pytest.mark.parametrize("allowed", [STUDIO, WEB_PROCESS])
-def test_every_key_is_one_that_apple_documents(allowed: dict[str, str], tmp_path: Path) -> None:
+def test_every_entitlement_is_documented_by_apple(allowed: dict[str, str], tmp_path: Path) -> None:
     read = plistlib.loads(write(tmp_path / "a.entitlements", allowed).read_bytes())
     assert read == dict.fromkeys(allowed, True)
     assert read.keys() <= DOCUMENTED.keys()
     assert all(allowed.values()), "each has its reason"
 
 
-def test_the_table_has_what_apples_page_of_the_hardened_runtime_lists() -> None:
+def test_documented_keys_match_apples_hardened_runtime_page() -> None:
     # The page's two groups, as they stood in November 2026: six exceptions and seven resources.
     groups = {
         CS: "allow-jit allow-unsigned-executable-memory allow-dyld-environment-variables debugger "
@@ -43,7 +43,7 @@ def test_the_table_has_what_apples_page_of_the_hardened_runtime_lists() -> None:
     assert set(DOCUMENTED) == listed
 
 
-def test_every_key_has_its_page_and_what_is_none_has_not() -> None:
+def test_every_documented_key_has_its_page_and_unknown_keys_raise() -> None:
     pages = {source_of(key) for key in DOCUMENTED}
     assert len(pages) == len(DOCUMENTED)
     assert all(each.startswith("https://developer.apple.com/documentation/") for each in pages)
@@ -51,7 +51,7 @@ def test_every_key_has_its_page_and_what_is_none_has_not() -> None:
         source_of("com.apple.security.get-task-allow")
 
 
-def test_a_misspelt_key_is_found(tmp_path: Path) -> None:
+def test_misspelt_entitlement_is_detected(tmp_path: Path) -> None:
     wrong = f"{CS}disable-executable-apge-protection"
     assert problems({wrong: True}) == [f"Apple documents no '{wrong}'"]
     with pytest.raises(ValueError, match="apge"):
@@ -60,21 +60,21 @@ def test_a_misspelt_key_is_found(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("value", [False, "true", 1])
-def test_a_key_is_true_or_not_there(value: object) -> None:
+def test_entitlement_that_is_not_true_is_rejected(value: object) -> None:
     assert problems({f"{CS}allow-jit": value}) == [f"'{CS}allow-jit' must be true or left out"]
 
 
-def test_the_web_process_gets_what_qt_gives_it_but_for_libraries_of_strangers() -> None:
+def test_web_process_has_the_entitlements_of_qt_except_library_validation() -> None:
     assert set(WEB_PROCESS) == QT_WEB_PROCESS - {f"{CS}disable-library-validation"}
 
 
-def test_studio_gives_away_less_than_its_web_process() -> None:
+def test_studio_has_fewer_entitlements_than_its_web_process() -> None:
     assert set(STUDIO) < set(WEB_PROCESS)
     assert not any(".device." in key or ".personal-information." in key for key in STUDIO)
 
 
 @pytest.mark.skipif(sys.platform != "darwin", reason="only Qt for macOS has a list of its own")
-def test_what_we_know_of_qt_is_what_it_ships() -> None:
+def test_known_qt_entitlements_match_the_shipped_ones() -> None:
     (path,) = Path(PySide6.__file__).parent.glob(
         "Qt/lib/QtWebEngineCore.framework/Helpers/QtWebEngineProcess.app/Contents/Resources/*.entitlements"
     )

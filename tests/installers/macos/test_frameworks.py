@@ -22,12 +22,12 @@ def wanted(name: str) -> set[bool]:
 
 
 @pytest.mark.parametrize("name", ["QtVirtualKeyboard", "QtQuickControls2", "QtCharts", "QtSql", "Qt3DCore"])
-def test_of_what_is_not_used_nothing_stays(name: str) -> None:
+def test_unused_framework_is_left_out_completely(name: str) -> None:
     assert wanted(name) == {False}
 
 
 @pytest.mark.parametrize(
     "name", ["QtCore", "QtWidgets", "QtWebEngineCore", "QtQuick", "QtQml", "QtMultimedia"]
 )
-def test_what_is_used_stays_whole(name: str) -> None:
+def test_used_framework_is_kept_completely(name: str) -> None:
     assert wanted(name) == {True}

@@ -23,7 +23,7 @@ from installers.macos.information import (
 from nep.version import __version__
 
 
-def test_macos_knows_our_type_and_who_opens_it() -> None:
+def test_document_type_and_its_editor_are_declared() -> None:
     told = information(__version__, "arm64")
     (exported,) = told["UTExportedTypeDeclarations"]
     (document,) = told["CFBundleDocumentTypes"]
@@ -36,7 +36,7 @@ def test_macos_knows_our_type_and_who_opens_it() -> None:
     }
 
 
-def test_recordings_are_known_but_studio_does_not_claim_to_open_them() -> None:
+def test_recording_type_is_imported_but_not_claimed_as_document() -> None:
     told = information(__version__, "arm64")
     (recording,) = told["UTImportedTypeDeclarations"]
     assert recording["UTTypeTagSpecification"] == {"public.filename-extension": ["mcap"]}
@@ -45,7 +45,7 @@ def test_recordings_are_known_but_studio_does_not_claim_to_open_them() -> None:
 
 
 @pytest.mark.parametrize("machine", ["arm64", "x86_64"])
-def test_every_key_is_one_that_apple_documents(machine: str) -> None:
+def test_every_plist_key_is_documented_by_apple(machine: str) -> None:
     told = information(__version__, machine)
     assert told.keys() == DOCUMENTED, "all that are listed are used, and no others"
     pages = {source_of(key) for key in told}
@@ -58,14 +58,14 @@ def test_every_key_is_one_that_apple_documents(machine: str) -> None:
         source_of("UTTypeConformsTo", "CFBundleDocumentTypes")
 
 
-def test_what_a_type_conforms_to_ends_in_data() -> None:
+def test_declared_types_conform_to_public_data() -> None:
     told = information(__version__, "arm64")
     kinds = (*told["UTExportedTypeDeclarations"], *told["UTImportedTypeDeclarations"])
     data = {"public.json", "public.data"}  # uttypejson: it conforms to text, and that to data
     assert [kind["UTTypeIdentifier"] for kind in kinds if not data & set(kind["UTTypeConformsTo"])] == []
 
 
-def test_the_version_is_that_of_nep(tmp_path: Path) -> None:
+def test_bundle_version_matches_the_version_of_nep(tmp_path: Path) -> None:
     read = plistlib.loads(write_information(tmp_path / "Info.plist", __version__, "arm64").read_bytes())
     assert read == information(__version__, "arm64")
     assert read["CFBundleShortVersionString"] == read["CFBundleVersion"] == apple_version(__version__)
@@ -75,32 +75,32 @@ def test_the_version_is_that_of_nep(tmp_path: Path) -> None:
     ("given", "told"),
     [("0.1.0", "0.1.0"), ("1.2", "1.2"), ("0.2.0rc1", "0.2.0"), ("1.2.3.dev4+g12", "1.2.3")],
 )
-def test_macos_gets_up_to_three_numbers(given: str, told: str) -> None:
+def test_apple_version_has_up_to_three_numbers(given: str, told: str) -> None:
     assert apple_version(given) == told
 
 
-def test_a_version_without_a_number_is_an_error() -> None:
+def test_version_without_a_number_raises() -> None:
     with pytest.raises(ValueError, match="no version 'new'"):
         apple_version("new")
 
 
-def test_the_application_is_seen_and_looks_sharp() -> None:
+def test_application_is_in_the_foreground_and_supports_high_resolution() -> None:
     told = information(__version__, "arm64")
     assert told["LSBackgroundOnly"] is False
     assert told["NSHighResolutionCapable"] is True
 
 
 @pytest.mark.parametrize(("machine", "oldest"), [("arm64", "13.0"), ("x86_64", "13.0")])
-def test_the_oldest_macos_is_that_of_the_libraries_for_the_processor(machine: str, oldest: str) -> None:
+def test_minimum_macos_version_depends_on_the_processor(machine: str, oldest: str) -> None:
     assert information(__version__, machine)["LSMinimumSystemVersion"] == oldest
 
 
-def test_there_is_no_package_for_another_processor() -> None:
+def test_unsupported_processor_raises() -> None:
     with pytest.raises(KeyError, match="ppc"):
         information(__version__, "ppc")
 
 
-def test_every_permission_that_macos_asks_for_has_a_sentence_in_each_language(tmp_path: Path) -> None:
+def test_every_permission_prompt_has_a_sentence_in_each_language(tmp_path: Path) -> None:
     asked = {key for key in information(__version__, "arm64") if key.endswith("UsageDescription")}
     assert asked >= {
         "NSLocalNetworkUsageDescription",
@@ -119,14 +119,14 @@ def test_every_permission_that_macos_asks_for_has_a_sentence_in_each_language(tm
     assert all(english[key] != spanish[key] for key in english)
 
 
-def test_the_names_of_types_are_said_in_each_language() -> None:
+def test_type_names_are_translated_into_each_language() -> None:
     told = information(__version__, "arm64")
     for kind in (*told["UTExportedTypeDeclarations"], *told["UTImportedTypeDeclarations"]):
         assert sentences("en")[kind["UTTypeDescription"]] == kind["UTTypeDescription"]
         assert sentences("es")[kind["UTTypeDescription"]]
 
 
-def test_the_languages_are_those_of_studio() -> None:
+def test_plist_languages_match_those_of_studio() -> None:
     folder = Path(nep.__file__).parent / "locale"
     translated = {each.name for each in folder.iterdir() if (each / "LC_MESSAGES").is_dir()} - {"qps"}
     assert set(LANGUAGES) == {"en", *translated}

@@ -132,12 +132,12 @@ SPOILED: dict[str, tuple[Callable[[Path], object], str]] = {
 }
 
 
-def test_what_pyinstaller_makes_is_as_macos_wants_it(tmp_path: Path) -> None:
+def test_pyinstaller_output_passes_the_layout_check(tmp_path: Path) -> None:
     assert check(made_up_app(tmp_path), VERSION, "arm64") == []
 
 
 @pytest.mark.parametrize("case", SPOILED)
-def test_each_thing_that_is_wrong_is_found(tmp_path: Path, case: str) -> None:
+def test_each_layout_error_is_detected(tmp_path: Path, case: str) -> None:
     app = made_up_app(tmp_path)
     spoil, said = SPOILED[case]
     spoil(app)
@@ -145,12 +145,12 @@ def test_each_thing_that_is_wrong_is_found(tmp_path: Path, case: str) -> None:
     assert any(said in sentence for sentence in found), found
 
 
-def test_another_version_is_not_this_one(tmp_path: Path) -> None:
+def test_version_mismatch_is_detected(tmp_path: Path) -> None:
     found = check(made_up_app(tmp_path), "0.2.0", "arm64")
     assert found[0] == "Contents/Info.plist has '0.1.0' for CFBundleVersion, not '0.2.0'"
 
 
-def test_what_wants_a_newer_macos_is_told(tmp_path: Path) -> None:
+def test_libraries_that_need_a_newer_macos_are_reported(tmp_path: Path) -> None:
     app = made_up_app(tmp_path)
     assert made_for_newer(app, "arm64") == {}
     newer = put(app / "Contents/Frameworks/a.so", fat(header(macos=(15, 2)), header(machine="x86_64")))
@@ -158,7 +158,7 @@ def test_what_wants_a_newer_macos_is_told(tmp_path: Path) -> None:
     assert check(app, VERSION, "arm64") == []  # it is loaded all the same
 
 
-def test_a_program_is_no_library(tmp_path: Path) -> None:
+def test_executable_with_a_library_slice_passes_the_layout_check(tmp_path: Path) -> None:
     app = made_up_app(tmp_path)
     put(app / "Contents/MacOS/nep-studio", fat(header(LIBRARY), header(PROGRAM)), 0o755)
     assert check(app, VERSION, "arm64") == []

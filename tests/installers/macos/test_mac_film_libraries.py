@@ -38,7 +38,7 @@ def exported(path: Path) -> set[str]:
 
 
 @pytest.mark.skipif(not all(shutil.which(tool) for tool in NEEDED), reason="needs clang and LLVM's linker")
-def test_films_leave_and_pictures_stay(tmp_path: Path) -> None:
+def test_video_libraries_are_removed_and_image_libraries_kept(tmp_path: Path) -> None:
     app = made_up_app(tmp_path)
     folder = app / CV2 / "__dot__dylibs"
     system = library(tmp_path / "libSystem.B.dylib", SYSTEM)
@@ -67,13 +67,13 @@ def test_films_leave_and_pictures_stay(tmp_path: Path) -> None:
     assert check(app, VERSION, "arm64") == []
 
 
-def test_without_films_nothing_changes(tmp_path: Path) -> None:
+def test_application_without_video_libraries_is_unchanged(tmp_path: Path) -> None:
     app = made_up_app(tmp_path)
     put(app / CV2 / "cv2.abi3.so", header())
     assert leave_out_films(context(tmp_path), app) == 0
 
 
-def test_films_at_another_place_are_an_error(tmp_path: Path) -> None:
+def test_video_libraries_in_an_unexpected_folder_raise(tmp_path: Path) -> None:
     app = made_up_app(tmp_path)
     put(app / "Contents/Frameworks/libavcodec.61.dylib", header())
     with pytest.raises(PackageError, match="FFmpeg is not where OpenCV brings it"):
@@ -84,5 +84,5 @@ def test_films_at_another_place_are_an_error(tmp_path: Path) -> None:
     ("name", "is_film"),
     [("libavcodec.61.19.101.dylib", True), ("libpostproc.58.dylib", True), ("libavif.16.3.0.dylib", False)],
 )
-def test_pictures_of_avif_are_no_films(name: str, is_film: bool) -> None:
+def test_avif_libraries_are_not_treated_as_video_libraries(name: str, is_film: bool) -> None:
     assert (FILMS.match(name) is not None) == is_film

@@ -12,12 +12,12 @@ from tests.installers.macos.made_up_app import PROGRAM, fat, header, put
 SYSTEM = ("/usr/lib/libSystem.B.dylib",)
 
 
-def test_a_program_for_one_processor(tmp_path: Path) -> None:
+def test_thin_executable_is_recognised(tmp_path: Path) -> None:
     path = put(tmp_path / "a", header(PROGRAM, "arm64", (13, 4), ["@rpath/libzmq.5.dylib"]))
     assert read(path) == (Slice("arm64", True, (13, 4), (*SYSTEM, "@rpath/libzmq.5.dylib")),)
 
 
-def test_a_library_for_two(tmp_path: Path) -> None:
+def test_universal_library_is_recognised(tmp_path: Path) -> None:
     path = put(tmp_path / "a", fat(header(macos=(15, 0)), header(machine="x86_64")))
     assert read(path) == (Slice("arm64", False, (15, 0), SYSTEM), Slice("x86_64", False, (13, 0), SYSTEM))
 
@@ -36,10 +36,10 @@ def test_a_library_for_two(tmp_path: Path) -> None:
         fat(header())[:4100],
     ],
 )
-def test_anything_else_is_none(tmp_path: Path, content: bytes) -> None:
+def test_other_files_are_not_recognised(tmp_path: Path, content: bytes) -> None:
     assert read(put(tmp_path / "a", content)) == ()
 
 
-def test_what_is_not_there_is_an_error(tmp_path: Path) -> None:
+def test_missing_file_raises(tmp_path: Path) -> None:
     with pytest.raises(FileNotFoundError):
         read(tmp_path / "a")

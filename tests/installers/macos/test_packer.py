@@ -45,7 +45,7 @@ else:
 pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="its tools are scripts of a Unix")
 
 
-def test_what_pyinstaller_needs_is_made_before(tmp_path: Path) -> None:
+def test_inputs_of_pyinstaller_are_generated_before_freezing(tmp_path: Path) -> None:
     made = dataclasses.replace(context(tmp_path), python=(sys.executable,))
     (tmp_path / "installers").symlink_to(ROOT / "installers")
     for name in ("app", "nep", "resources"):
@@ -61,7 +61,7 @@ def test_what_pyinstaller_needs_is_made_before(tmp_path: Path) -> None:
         assert word in (ROOT / "installers" / "nep-studio.spec").read_text("utf-8")
 
 
-def test_first_it_is_frozen_then_signed_and_only_then_put_into_the_image(
+def test_application_is_frozen_then_signed_then_put_into_the_image(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     log = noting_tools(tmp_path / "tools", sys.executable)
@@ -115,7 +115,7 @@ def test_first_it_is_frozen_then_signed_and_only_then_put_into_the_image(
     assert ["python", "-m", "PyInstaller"] not in calls(log)
 
 
-def test_what_was_not_frozen_can_not_be_packed(tmp_path: Path) -> None:
+def test_packing_without_a_frozen_application_raises(tmp_path: Path) -> None:
     made = context(tmp_path)
     with pytest.raises(PackageError, match=r"NEP Studio\.app"):
         packer.finish(made, packer.application(made), signing.identity_of({}))

@@ -60,7 +60,7 @@ def raw(content: bytes) -> bytes:
 
 
 @pytest.mark.parametrize("name", ["nep-studio.icns", "behaviour.icns"])
-def test_an_icon_has_all_sizes_and_those_of_retina_screens(pictures: Path, name: str) -> None:
+def test_icon_has_all_sizes_including_retina(pictures: Path, name: str) -> None:
     found = dict(entries((pictures / name).read_bytes()))
     assert found.keys() == SIDES.keys() | RETINA.keys()
     for kind, side in (SIDES | RETINA).items():
@@ -78,17 +78,17 @@ def test_an_icon_has_all_sizes_and_those_of_retina_screens(pictures: Path, name:
 
 
 @pytest.mark.parametrize("name", ["nep-studio.icns", "behaviour.icns"])
-def test_another_reader_takes_the_icon(pictures: Path, name: str) -> None:
+def test_icon_is_readable_by_pillow(pictures: Path, name: str) -> None:
     with (pictures / name).open("rb") as file:
         largest = IcnsFile(file).getimage((512, 512, 2))
     assert largest.size == (1024, 1024)
 
 
-def test_the_two_icons_can_be_told_apart(pictures: Path) -> None:
+def test_application_and_document_icons_differ(pictures: Path) -> None:
     assert (pictures / "nep-studio.icns").read_bytes() != (pictures / "behaviour.icns").read_bytes()
 
 
-def test_the_ground_is_light_and_its_arrow_leads_from_the_one_to_the_other(pictures: Path) -> None:
+def test_background_is_light_with_an_arrow_from_application_to_applications_folder(pictures: Path) -> None:
     with Image.open(pictures / "background.png") as file:
         ground = file.convert("L")
     assert ground.size == WINDOW
@@ -100,7 +100,7 @@ def test_the_ground_is_light_and_its_arrow_leads_from_the_one_to_the_other(pictu
         assert retina.size == (2 * WINDOW[0], 2 * WINDOW[1])
 
 
-def test_the_same_pictures_come_out_each_time(pictures: Path, tmp_path: Path) -> None:
+def test_generated_pictures_are_reproducible(pictures: Path, tmp_path: Path) -> None:
     subprocess.run([sys.executable, "-m", "installers.macos.pictures", tmp_path], cwd=ROOT, check=True)
     for each in pictures.iterdir():
         assert (tmp_path / each.name).read_bytes() == each.read_bytes(), each.name

@@ -54,7 +54,7 @@ def signed(log: Path, app: Path) -> list[tuple[str, str]]:
     return found
 
 
-def test_everything_is_signed_once_and_what_is_inside_comes_first(tmp_path: Path, tools: Path) -> None:
+def test_everything_is_signed_once_from_the_inside_out(tmp_path: Path, tools: Path) -> None:
     app = finished(tmp_path, signing.Identity(NAME))
     found = signed(tools, app)
     places = [path for path, _allowed in found]
@@ -80,7 +80,7 @@ def test_everything_is_signed_once_and_what_is_inside_comes_first(tmp_path: Path
     }
 
 
-def test_what_is_deeper_comes_first_in_bundles_of_bundles(tmp_path: Path) -> None:
+def test_deeper_items_are_signed_first_in_nested_bundles(tmp_path: Path) -> None:
     app = made_up_app(tmp_path)
     web = app / WEB
     inner = framework(web / "Frameworks", "Inner")
@@ -91,7 +91,7 @@ def test_what_is_deeper_comes_first_in_bundles_of_bundles(tmp_path: Path) -> Non
     assert len(order) == len(set(order))
 
 
-def test_a_known_name_gives_the_hardened_runtime_and_a_time_stamp(tmp_path: Path, tools: Path) -> None:
+def test_signing_identity_enables_hardened_runtime_and_timestamp(tmp_path: Path, tools: Path) -> None:
     finished(tmp_path, signing.Identity(NAME))
     for name, *words in calls(tools):
         if name == "codesign" and "--sign" in words:
@@ -99,7 +99,7 @@ def test_a_known_name_gives_the_hardened_runtime_and_a_time_stamp(tmp_path: Path
             assert "--deep" not in words  # it would give Studio's entitlements to everything
 
 
-def test_without_a_name_it_is_signed_for_trying_and_one_line_says_so(
+def test_ad_hoc_signing_without_identity_is_reported(
     tmp_path: Path, tools: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     app = finished(tmp_path, signing.identity_of({}))
@@ -112,7 +112,7 @@ def test_without_a_name_it_is_signed_for_trying_and_one_line_says_so(
     )
 
 
-def test_signed_but_not_notarised_is_said_too(
+def test_skipped_notarisation_is_reported(
     tmp_path: Path, tools: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     finished(tmp_path, signing.identity_of({"NEP_MACOS_IDENTITY": NAME}))
@@ -121,7 +121,9 @@ def test_signed_but_not_notarised_is_said_too(
     assert said == "· notarising: skipped, as NEP_MACOS_NOTARY_PROFILE is not given (installers/README.md)\n"
 
 
-def test_it_is_verified_then_notarised_stapled_and_shown_to_gatekeeper(tmp_path: Path, tools: Path) -> None:
+def test_application_is_verified_notarised_stapled_and_assessed_by_gatekeeper(
+    tmp_path: Path, tools: Path
+) -> None:
     app = finished(tmp_path, signing.identity_of({"NEP_MACOS_IDENTITY": NAME, **KEY}))
     sent = str(context(tmp_path).work / "NEP Studio.zip")
     key = ["--key", "/keys/AuthKey.p8", "--key-id", "2X9R4HXF34", "--issuer", "57246542-96fe"]
@@ -136,7 +138,7 @@ def test_it_is_verified_then_notarised_stapled_and_shown_to_gatekeeper(tmp_path:
     ]
 
 
-def test_a_disk_image_is_signed_notarised_and_assessed_as_one(tmp_path: Path, tools: Path) -> None:
+def test_disk_image_is_signed_notarised_and_assessed(tmp_path: Path, tools: Path) -> None:
     image, made = put(tmp_path / "NEP-Studio.dmg"), context(tmp_path)
     identity = signing.identity_of({"NEP_MACOS_IDENTITY": NAME, "NEP_MACOS_NOTARY_PROFILE": "school"})
     signing.sign_image(made, image, identity)
@@ -153,12 +155,12 @@ def test_a_disk_image_is_signed_notarised_and_assessed_as_one(tmp_path: Path, to
     ]  # fmt: skip
 
 
-def test_a_disk_image_that_nobody_known_signs_is_left_alone(tmp_path: Path, tools: Path) -> None:
+def test_disk_image_is_not_signed_without_an_identity(tmp_path: Path, tools: Path) -> None:
     signing.sign_image(context(tmp_path), put(tmp_path / "a.dmg"), signing.identity_of({}))
     assert calls(tools) == []
 
 
-def test_what_apple_refuses_is_said_and_nothing_is_stapled(
+def test_rejected_notarisation_is_reported_and_nothing_is_stapled(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     log = noting_tools(tmp_path / "tools", sys.executable, status="Invalid")
@@ -172,7 +174,7 @@ def test_what_apple_refuses_is_said_and_nothing_is_stapled(
     assert [call[1:3] for call in calls(log)] == [["notarytool", "submit"], ["notarytool", "log"]]
 
 
-def test_a_signature_that_fails_ends_the_packaging(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_failed_signing_aborts_packaging(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     log = noting_tools(tmp_path / "tools", sys.executable, fails="codesign")
     monkeypatch.setenv("PATH", str(log.parent))
     with pytest.raises(PackageError, match="'codesign' ended with 3"):
@@ -180,16 +182,14 @@ def test_a_signature_that_fails_ends_the_packaging(tmp_path: Path, monkeypatch: 
     assert [call[0] for call in calls(log)] == ["codesign"]
 
 
-def test_a_notary_that_can_not_be_reached_ends_the_packaging(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_unreachable_notary_service_aborts_packaging(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     log = noting_tools(tmp_path / "tools", sys.executable, fails="xcrun")
     monkeypatch.setenv("PATH", str(log.parent))
     with pytest.raises(PackageError, match="'xcrun notarytool submit' ended with 3"):
         signing.notarise(context(tmp_path), put(tmp_path / "a.dmg"), signing.Identity(NAME, ("--key", "k")))
 
 
-def test_an_application_that_is_not_right_is_not_signed(tmp_path: Path, tools: Path) -> None:
+def test_application_with_layout_errors_is_not_signed(tmp_path: Path, tools: Path) -> None:
     made, app = context(tmp_path), made_up_app(tmp_path)
     put(made.work / "pictures" / "behaviour.icns", ICON)
     put(app / "Contents" / "Frameworks" / "notes.txt")
@@ -209,12 +209,12 @@ def test_an_application_that_is_not_right_is_not_signed(tmp_path: Path, tools: P
         ),
     ],
 )
-def test_half_a_name_is_an_error_at_once(environ: dict[str, str], said: str) -> None:
+def test_incomplete_signing_identity_raises(environ: dict[str, str], said: str) -> None:
     with pytest.raises(PackageError, match=said):
         signing.identity_of(environ)
 
 
-def test_the_entitlements_are_written_as_codesign_reads_them(tmp_path: Path, tools: Path) -> None:
+def test_entitlements_are_written_as_codesign_reads_them(tmp_path: Path, tools: Path) -> None:
     finished(tmp_path, signing.Identity(NAME))
     work = context(tmp_path).work
     for name, allowed in (("studio", STUDIO), ("web-process", WEB_PROCESS)):

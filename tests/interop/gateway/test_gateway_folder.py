@@ -15,9 +15,7 @@ pytestmark = [
 ]
 
 
-def test_a_folder_that_takes_no_files_is_an_alert_and_originals_are_served(
-    fixed_ports, native, original, tmp_path
-):
+def test_unwritable_folder_raises_an_alert_and_originals_are_served(fixed_ports, native, original, tmp_path):
     (tmp_path / "file").touch()
     gateway = Gateway(native, SystemProcesses(), tmp_path / "file" / "map.json")
     try:

@@ -45,7 +45,7 @@ quick = settings(max_examples=60, deadline=None, suppress_health_check=[HealthCh
 
 @given(REQUESTS, st.sampled_from([7000, 50000]))
 @settings(max_examples=300, deadline=None)
-def test_a_request_is_understood_or_refused_with_a_sentence(data, port):
+def test_request_is_parsed_or_rejected_with_a_message(data, port):
     try:
         understood = isinstance(read_request(data, port), Request)
     except RequestError as error:
@@ -55,7 +55,7 @@ def test_a_request_is_understood_or_refused_with_a_sentence(data, port):
 
 @given(FRAMES, st.sampled_from(["prefixed", "bare"]), st.sampled_from(["json", "string", "image", "bytes"]))
 @settings(max_examples=300, deadline=None)
-def test_a_frame_is_read_or_refused_and_nothing_else(frame, framing, codec):
+def test_frame_is_parsed_or_rejected_with_a_frame_error(frame, framing, codec):
     shape = Shape("t", framing, codec)
     try:
         understood = isinstance(shape.read(frame), bytes)
@@ -73,7 +73,7 @@ def test_every_request_is_answered(gateway, original, data, port):
     assert answer["state"] == "success" or answer["error"]
 
 
-def test_a_request_of_many_megabytes_ends_its_connection_and_nothing_else(gateway, original):
+def test_request_of_many_megabytes_closes_only_its_connection(gateway, original):
     with original.socket(zmq.REQ) as asking:
         asking.connect("tcp://127.0.0.1:7000")
         asking.send(b"x" * 20_000_000)
@@ -81,7 +81,7 @@ def test_a_request_of_many_megabytes_ends_its_connection_and_nothing_else(gatewa
     assert original.ask("t")["state"] == "success"
 
 
-def test_bad_frames_are_counted_named_and_what_is_good_between_them_arrives(gateway, original, native):
+def test_invalid_frames_are_counted_and_named_and_valid_ones_between_arrive(gateway, original, native):
     port = original.ask("t", "subscriber")["port"]
     bad = 0
     with original.subscriber(port + 1, b"t") as subscriber, original.publisher(port) as publisher:
@@ -104,7 +104,7 @@ def test_bad_frames_are_counted_named_and_what_is_good_between_them_arrives(gate
 
 @quick
 @given(filters=st.lists(st.binary(max_size=80), min_size=1, max_size=8))
-def test_odd_filters_of_subscribers_change_nothing_for_others(gateway, original, native, filters):
+def test_malformed_subscription_filters_do_not_affect_others(gateway, original, native, filters):
     port = original.ask("t", "subscriber")["port"]
     with original.socket(zmq.XSUB) as odd, original.subscriber(port + 1, b"t") as subscriber:
         odd.connect(f"tcp://127.0.0.1:{port + 1}")
@@ -115,7 +115,7 @@ def test_odd_filters_of_subscribers_change_nothing_for_others(gateway, original,
     assert not {id for id in native.alerts if id.startswith("message:")}
 
 
-def test_a_huge_filter_ends_its_connection_and_nothing_else(gateway, original):
+def test_huge_subscription_filter_closes_only_its_connection(gateway, original):
     """libzmq keeps filters in a tree and would walk down 5 million levels of it when the socket closes."""
     port = original.ask("t", "subscriber")["port"]
     code = """if True:

@@ -18,13 +18,13 @@ def is_open(port: int) -> bool:
         return probe.connect_ex(("127.0.0.1", port)) == 0
 
 
-def test_a_second_node_of_one_name_harms_nobody(gateway, original, native):
+def test_second_node_of_the_same_name_affects_nobody(gateway, original, native):
     original.ask("t", node="twin", pid=os.getpid())
     assert original.ask("t", node="twin", pid=os.getppid())["state"] == "success"
     native.wait(lambda: len(native.programs) == 2)
 
 
-def test_the_role_comes_from_the_traffic_and_ends_with_it(gateway, original, native):
+def test_role_is_derived_from_traffic_and_ends_with_it(gateway, original, native):
     port = original.ask("t", "publisher", node="js")["port"]
     native.wait(lambda: [program.name for program in native.programs] == ["js"])
     with original.subscriber(port + 1, b"t"):
@@ -34,7 +34,7 @@ def test_the_role_comes_from_the_traffic_and_ends_with_it(gateway, original, nat
     native.wait(lambda: not native.programs)
 
 
-def test_a_restarted_gateway_serves_those_who_never_ask_again(gateway_at, original, new_native):
+def test_restarted_gateway_serves_programs_without_a_new_request(gateway_at, original, new_native):
     first, second = new_native(), new_native()
     gateway = gateway_at(first)
     original.ask("other", node="other")
@@ -50,7 +50,7 @@ def test_a_restarted_gateway_serves_those_who_never_ask_again(gateway_at, origin
         assert original.ask("t", "subscriber")["port"] == port
 
 
-def test_a_visitor_who_does_not_speak_zeromq_harms_nobody(gateway, original, native):
+def test_non_zeromq_connection_affects_nobody(gateway, original, native):
     port = original.ask("t", "subscriber")["port"]
     with original.subscriber(port + 1, b"t") as subscriber, original.publisher(port) as publisher:
         original.publish_until(publisher, b't {"n":1}', lambda: subscriber.poll(0))
@@ -84,7 +84,7 @@ def test_nep_0546_and_0547_are_named_in_an_alert(gateway, original, native):
     assert not native.published
 
 
-def test_a_topic_that_programs_leave_keeps_its_port_but_no_sockets(gateway, original, native):
+def test_abandoned_topic_keeps_its_port_but_closes_its_sockets(gateway, original, native):
     port = original.ask("t", "subscriber")["port"]
     with original.subscriber(port + 1, b"t"):
         native.wait(lambda: native.subscribed)

@@ -45,7 +45,7 @@ def read_to_end(subscriber):
     return frames
 
 
-def test_native_is_subscribed_only_while_an_original_wants_it(gateway, original, native):
+def test_native_topic_is_subscribed_only_while_an_original_subscribes(gateway, original, native):
     port = original.ask("t", "subscriber", port=50000)["port"]
     assert not native.subscribed
     with original.subscriber(port + 1) as subscriber:
@@ -56,7 +56,7 @@ def test_native_is_subscribed_only_while_an_original_wants_it(gateway, original,
     native.wait(lambda: not native.subscribed)
 
 
-def test_a_native_string_does_not_reach_those_who_want_json(gateway, original, native):
+def test_native_string_is_not_forwarded_to_json_subscribers(gateway, original, native):
     port = original.ask("t", "subscriber")["port"]
     with original.subscriber(port + 1, b"t") as subscriber:
         native.wait(lambda: native.subscribed)

@@ -14,7 +14,7 @@ from nep.programs.gateway.request_server import Ports
 pytestmark = [pytest.mark.ports]
 
 
-def test_the_answer_has_the_originals_shape_and_ports_from_9000_up(gateway, original):
+def test_reply_has_the_original_shape_and_ports_from_9000_up(gateway, original):
     first = original.ask_raw(
         b'{"node":"n1","topic":"t1","mode":"many2many","socket":"publisher","pid":1,"msg_type":"json"}'
     )
@@ -25,7 +25,7 @@ def test_the_answer_has_the_originals_shape_and_ports_from_9000_up(gateway, orig
     assert original.ask("t1", "subscriber")["port"] == 9000
 
 
-def test_the_two_framings_of_a_topic_have_pairs_of_their_own(gateway, original):
+def test_each_framing_of_a_topic_has_its_own_port_pair(gateway, original):
     assert original.ask("t", port=7000)["port"] != original.ask("t", port=50000)["port"]
     assert (
         original.ask("t", port=50000, msg_type="dictionary")["port"] == original.ask("t", port=7000)["port"]
@@ -53,12 +53,12 @@ def test_the_two_framings_of_a_topic_have_pairs_of_their_own(gateway, original):
     ],
     ids=range(14),
 )
-def test_bad_requests_are_answered_and_kill_nothing(gateway, original, bad, port):
+def test_invalid_requests_are_answered_and_the_gateway_survives(gateway, original, bad, port):
     assert json.loads(original.ask_raw(bad, port))["state"] == "failure"
     assert original.ask("fine", port=port)["state"] == "success"
 
 
-def test_a_request_of_many_parts_and_one_without_an_answer_kill_nothing(gateway, original):
+def test_multipart_request_and_client_that_leaves_early_do_no_harm(gateway, original):
     with original.socket(zmq.REQ) as asking:
         asking.connect("tcp://127.0.0.1:7000")
         asking.send_multipart([b'{"node":"n",', b'"topic":"t","socket":"publisher"}'])
@@ -73,12 +73,12 @@ def test_a_request_of_many_parts_and_one_without_an_answer_kill_nothing(gateway,
         assert original.ask("t")["state"] == "success"
 
 
-def test_unknown_keys_a_missing_pid_and_a_pid_as_text_are_fine(gateway, original):
+def test_unknown_keys_missing_pid_and_text_pid_are_accepted(gateway, original):
     assert original.ask("t", pid="4711", colour="green")["state"] == "success"
     assert original.ask("t", pid="none", language="Rust")["state"] == "success"
 
 
-def test_client_and_server_get_one_port_and_no_translation(gateway, original, native):
+def test_client_and_server_share_a_port_without_translation(gateway, original, native):
     answer = original.ask("s", "server")
     assert "mode" not in answer
     assert original.ask("s", "client", port=50000)["port"] == answer["port"]
@@ -91,7 +91,7 @@ def test_client_and_server_get_one_port_and_no_translation(gateway, original, na
     assert not native.published
 
 
-def test_the_broadcast_tells_all_topics_after_each_request(gateway, original):
+def test_broadcast_lists_all_topics_after_each_request(gateway, original):
     with original.subscriber(7777, b"master") as tool:
         for number in range(100):
             original.ask(f"t{number % 3}", node="n1")
@@ -103,9 +103,7 @@ def test_the_broadcast_tells_all_topics_after_each_request(gateway, original):
         assert topics["t0"]["nodes"] == {"n1": {"socket": "publisher", "pid": os.getpid(), "ip": "127.0.0.1"}}
 
 
-def test_a_taken_port_is_an_alert_and_is_served_as_soon_as_it_is_free(
-    fixed_ports, gateway_at, original, native
-):
+def test_taken_port_raises_an_alert_and_is_served_once_it_is_free(fixed_ports, gateway_at, original, native):
     with socket.socket() as airplay:
         airplay.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
         airplay.bind(("127.0.0.1", 7000))
@@ -117,7 +115,7 @@ def test_a_taken_port_is_an_alert_and_is_served_as_soon_as_it_is_free(
     assert original.ask("t", port=7000)["state"] == "success"
 
 
-def test_a_taken_pair_is_passed_over(fixed_ports, gateway, original):
+def test_taken_port_pair_is_skipped(fixed_ports, gateway, original):
     with socket.socket() as other:
         other.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
         other.bind(("127.0.0.1", 9001))
@@ -125,7 +123,7 @@ def test_a_taken_pair_is_passed_over(fixed_ports, gateway, original):
         assert original.ask("t")["port"] == 9002
 
 
-def test_nothing_is_bound_but_on_the_loopback_address(gateway, original):
+def test_only_the_loopback_address_is_bound(gateway, original):
     import psutil
 
     original.ask("t")
@@ -136,7 +134,7 @@ def test_nothing_is_bound_but_on_the_loopback_address(gateway, original):
     assert {address.ip for address in listening} == {"127.0.0.1"}
 
 
-def test_other_ports_can_be_chosen_and_left_out(gateway_at):
+def test_gateway_ports_can_be_changed_or_disabled(gateway_at):
     gateway_at(ports=Ports(0, 0, 0))
     with socket.socket() as probe:
         assert probe.connect_ex(("127.0.0.1", 7000)) != 0

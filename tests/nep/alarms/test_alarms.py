@@ -39,7 +39,7 @@ def scene_with(*actions: AlarmAction, hands: Hands, **more: object) -> Scene:
     return made
 
 
-def test_actions_are_done_once_in_their_order_and_written_down() -> None:
+def test_actions_run_once_in_order_and_are_recorded() -> None:
     hands = Hands()
     scene = scene_with(AlarmAction("stop"), AlarmAction("banner"), AlarmAction("sound"), hands=hands)
     near(scene)
@@ -53,7 +53,7 @@ def test_actions_are_done_once_in_their_order_and_written_down() -> None:
     assert not scene.alarms.is_busy
 
 
-def test_a_call_that_fails_is_tried_again_while_it_is_on() -> None:
+def test_failed_call_is_retried_while_the_alarm_is_active() -> None:
     hands = Hands()
     hands.well = False
     scene = scene_with(CALL, hands=hands)
@@ -70,7 +70,7 @@ def test_a_call_that_fails_is_tried_again_while_it_is_on() -> None:
     assert len(hands.done) == 3
 
 
-def test_nothing_is_tried_again_when_it_is_well_or_the_rule_has_changed() -> None:
+def test_retry_is_cancelled_when_the_alarm_clears_or_the_rule_is_removed() -> None:
     hands = Hands()
     hands.well = False
     scene = scene_with(CALL, hands=hands)
@@ -85,7 +85,7 @@ def test_nothing_is_tried_again_when_it_is_well_or_the_rule_has_changed() -> Non
     assert len(hands.done) == 2
 
 
-def test_an_action_that_raises_does_not_keep_the_next_from_its_turn() -> None:
+def test_action_that_raises_does_not_block_the_next_one() -> None:
     def broken(_event, _action, _done) -> None:
         raise RuntimeError("no arm")
 
@@ -99,7 +99,7 @@ def test_an_action_that_raises_does_not_keep_the_next_from_its_turn() -> None:
     assert [deed.words for deed in scene.alarms.history.records[0].deeds] == ["no arm", "answered"]
 
 
-def test_while_it_is_snoozed_nothing_is_done_and_the_history_goes_on() -> None:
+def test_snoozed_alarm_runs_no_action_but_is_recorded_in_the_history() -> None:
     hands = Hands()
     scene = scene_with(AlarmAction("banner"), hands=hands, snoozed_until_s=MIDNIGHT_S + 110)
     near(scene)
@@ -112,7 +112,7 @@ def test_while_it_is_snoozed_nothing_is_done_and_the_history_goes_on() -> None:
     assert len(hands.done) == 1
 
 
-def test_a_snooze_that_ends_when_it_is_well_does_nothing() -> None:
+def test_snooze_that_ends_after_the_alarm_cleared_runs_no_action() -> None:
     hands = Hands()
     scene = scene_with(AlarmAction("banner"), hands=hands, snoozed_until_s=MIDNIGHT_S + 110)
     near(scene)
@@ -124,7 +124,7 @@ def test_a_snooze_that_ends_when_it_is_well_does_nothing() -> None:
     assert hands.done == [("on", "banner")]
 
 
-def test_the_history_is_bounded_and_says_how_often() -> None:
+def test_history_is_bounded_and_counts_occurrences() -> None:
     history = AlarmHistory()
     for number in range(MAX_RECORDS + 10):
         history.add(AlarmRecord("a" if number % 2 else "b", "x", float(number), is_on=number == 509))

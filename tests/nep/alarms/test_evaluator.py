@@ -16,14 +16,14 @@ from nep.protocol.graph_view import SubscriberInfo, TopicInfo
 from tests.nep.alarms.scene import MIDNIGHT_S, Scene, message, rule
 
 
-def test_a_topic_that_was_never_there_is_waited_for() -> None:
+def test_topic_that_never_existed_does_not_trigger_a_silence_alarm() -> None:
     scene = Scene(rule("silent", "/cam", for_s=2.0))
     scene.graph(("/other",))
     assert scene.wait(10) == []
     assert scene.state() == "waits"
 
 
-def test_silence_is_told_with_its_length_and_ends_with_a_message() -> None:
+def test_silence_alarm_reports_its_duration_and_clears_on_a_message() -> None:
     scene = Scene(rule("silent", "/cam", for_s=2.0))
     scene.graph(("/cam",))
     assert scene.wait(1.5) == []
@@ -44,7 +44,7 @@ def test_silence_is_told_with_its_length_and_ends_with_a_message() -> None:
     assert not record.is_on
 
 
-def test_a_publisher_that_leaves_is_silent_too_and_a_master_that_is_away_changes_nothing() -> None:
+def test_silence_alarm_covers_a_closed_publisher_and_ignores_a_missing_master() -> None:
     scene = Scene(rule("silent", "/cam", for_s=1.0))
     scene.graph(("/cam",))
     scene.send("/cam", 1)
@@ -63,14 +63,14 @@ def test_a_publisher_that_leaves_is_silent_too_and_a_master_that_is_away_changes
         ("is_not", "ok", "ok", "hot"), ("above", 2**53, 2**53, 2**64 - 1),
     ],
 )  # fmt: skip
-def test_a_value_is_compared(kind: str, limit: object, well: object, bad: object) -> None:
+def test_value_is_compared_with_the_limit(kind: str, limit: object, well: object, bad: object) -> None:
     scene = Scene(rule(kind, "/d", path="a.v[1]", limit=limit))
     scene.graph(("/d",))
     assert scene.send("/d", {"a": {"v": [0, well]}}) == []
     assert scene.send("/d", {"a": {"v": [0, bad]}}) == [("on", bad)]
 
 
-def test_an_integer_beyond_every_float_is_very_large() -> None:
+def test_integer_beyond_float_range_is_treated_as_infinite() -> None:
     scene = Scene(rule("below", "/d", path=".", limit=-1))
     scene.graph(("/d",))
     huge = message("/d", 0)
@@ -80,7 +80,7 @@ def test_an_integer_beyond_every_float_is_very_large() -> None:
 
 @pytest.mark.parametrize("kind", ["changes", "equals", "is_not"])
 @pytest.mark.parametrize("huge", [10**400, -(10**400), 2**64, 2**64 - 1, -(2**63)])
-def test_a_huge_integer_is_told_in_words(kind: str, huge: int) -> None:
+def test_huge_integer_is_described_in_words(kind: str, huge: int) -> None:
     scene = Scene(rule(kind, "/d", path=".", limit=1 if kind == "is_not" else huge))
     scene.graph(("/d",))
     told = message("/d", 0)
@@ -96,7 +96,7 @@ def test_a_huge_integer_is_told_in_words(kind: str, huge: int) -> None:
     assert condition_words(scene.alarms.rules[0].condition)
 
 
-def test_what_stays_no_number_has_not_changed() -> None:
+def test_repeated_nan_is_not_a_change() -> None:
     scene = Scene(rule("changes", "/d", path="r"))
     scene.graph(("/d",))
     nan = b'{"r": NaN}'
@@ -104,7 +104,7 @@ def test_what_stays_no_number_has_not_changed() -> None:
     assert [kind for kind, _seen in scene.send("/d", {"r": 1}, nan)] == ["on"]
 
 
-def test_a_moment_is_seen_though_the_next_message_of_the_batch_is_well() -> None:
+def test_brief_violation_within_a_batch_triggers_the_alarm() -> None:
     scene = Scene(rule("below", "/d", path="r", limit=0.4))
     scene.graph(("/d",))
     assert scene.send("/d", {"r": 1}, {"r": 0.3}, {"r": 1}) == [("on", 0.3)]
@@ -113,7 +113,7 @@ def test_a_moment_is_seen_though_the_next_message_of_the_batch_is_well() -> None
 @pytest.mark.parametrize(
     "payload", [b"{oops", {"r": "near"}, {"r": True}, {"other": 0}, b'{"r": NaN}', [], 0]
 )
-def test_what_cannot_be_compared_is_no_alarm_and_says_so(payload: object) -> None:
+def test_incomparable_value_triggers_no_alarm_and_is_reported(payload: object) -> None:
     scene = Scene(rule("below", "/d", path="r", limit=0.4))
     scene.graph(("/d",))
     assert scene.send("/d", payload) == []
@@ -123,7 +123,7 @@ def test_what_cannot_be_compared_is_no_alarm_and_says_so(payload: object) -> Non
     assert scene.alarms.evaluator.state(scene.alarms.rules[0]).trouble == ""
 
 
-def test_it_must_be_so_for_its_time_without_a_break() -> None:
+def test_condition_must_hold_without_interruption_for_its_duration() -> None:
     scene = Scene(rule("below", "/d", path="r", limit=1, for_s=1.0))
     scene.graph(("/d",))
     scene.send("/d", {"r": 0})
@@ -135,7 +135,7 @@ def test_it_must_be_so_for_its_time_without_a_break() -> None:
     assert scene.wait(1.2) == [("on", 0.5)]
 
 
-def test_what_flutters_is_one_alarm_with_a_count() -> None:
+def test_flapping_condition_is_one_alarm_with_a_count() -> None:
     scene = Scene(rule("below", "/d", path="r", limit=1, calm_s=1.0))
     scene.graph(("/d",))
     events = []
@@ -148,7 +148,7 @@ def test_what_flutters_is_one_alarm_with_a_count() -> None:
     assert record.lasted_s == pytest.approx(2.5, abs=0.2)
 
 
-def test_within_the_margin_it_stays_on() -> None:
+def test_alarm_stays_active_within_the_hysteresis_margin() -> None:
     scene = Scene(rule("below", "/d", path="r", limit=1, margin=0.5, calm_s=1.0))
     scene.graph(("/d",))
     scene.send("/d", {"r": 0.9})
@@ -158,7 +158,7 @@ def test_within_the_margin_it_stays_on() -> None:
     assert scene.wait(1.2) == [("off", 1.5)]
 
 
-def test_a_change_is_told_but_not_the_first_value() -> None:
+def test_change_triggers_the_alarm_but_the_first_value_does_not() -> None:
     scene = Scene(rule("changes", "/mode", path="."))
     scene.graph(("/mode",))
     assert scene.send("/mode", "idle", "idle") == []
@@ -166,7 +166,7 @@ def test_a_change_is_told_but_not_the_first_value() -> None:
     assert scene.wait(6) == [("off", "run")]
 
 
-def test_a_node_leaves_only_when_it_was_there_and_the_master_knows_all() -> None:
+def test_leave_alarm_requires_a_known_node_and_a_complete_graph() -> None:
     scene = Scene(rule("leaves", "lidar"))
     scene.graph(nodes=("other",))
     scene.wait(5)
@@ -183,7 +183,7 @@ def test_a_node_leaves_only_when_it_was_there_and_the_master_knows_all() -> None
     assert scene.wait(3) == [("off", None)]
 
 
-def test_a_node_that_comes_and_a_topic_that_appears_are_moments() -> None:
+def test_joining_node_and_appearing_topic_are_momentary_alarms() -> None:
     scene = Scene(rule("comes", "arm"), rule("appears", "/debug/*", id="t"))
     scene.graph(("/debug/old",), ("arm",))
     scene.wait(4)
@@ -195,7 +195,7 @@ def test_a_node_that_comes_and_a_topic_that_appears_are_moments() -> None:
     assert [kind for kind, _ in scene.wait(6)] == ["off", "off"]
 
 
-def test_rates_are_counted_and_not_known_at_once() -> None:
+def test_rate_alarm_triggers_only_after_the_rate_is_measured() -> None:
     scene = Scene(rule("rate_below", "/odom", limit=8.0, calm_s=1.0))
     scene.graph(("/odom",))
     events = []
@@ -207,7 +207,7 @@ def test_rates_are_counted_and_not_known_at_once() -> None:
     assert events[0][1] < 8.0
 
 
-def test_losses_of_any_subscriber_are_a_share_of_the_last_seconds() -> None:
+def test_loss_is_the_percentage_over_the_last_seconds_for_any_subscriber() -> None:
     scene = Scene(rule("loses", "/cmd", limit=1.0, for_s=10.0))
     events = []
     for second in range(20):
@@ -217,7 +217,7 @@ def test_losses_of_any_subscriber_are_a_share_of_the_last_seconds() -> None:
     assert 1.0 < events[0][1] < 20.0
 
 
-def test_a_subscriber_that_begins_anew_is_no_loss() -> None:
+def test_restarted_subscriber_does_not_count_as_loss() -> None:
     losses = TopicLosses()
     assert losses.percent(10, 0.0) is None
 
@@ -235,7 +235,7 @@ def test_a_subscriber_that_begins_anew_is_no_loss() -> None:
     assert losses.percent(10, 50.0) == 0.0
 
 
-def test_large_messages_are_read_once_a_batch_and_the_others_counted() -> None:
+def test_only_one_large_message_per_batch_is_decoded_and_the_others_counted() -> None:
     scene = Scene(rule("above", "/big", path="n", limit=5))
     scene.graph(("/big",))
     large = [message("/big", {"n": n, "x": "x" * LARGE_BYTES}) for n in (9, 9, 1)]
@@ -244,7 +244,7 @@ def test_large_messages_are_read_once_a_batch_and_the_others_counted() -> None:
     assert scene.send("/big", large[0]) == [("on", 9)]
 
 
-def test_rules_that_stay_keep_what_is_known_and_one_that_goes_ends_its_alarm() -> None:
+def test_unchanged_rules_keep_their_state_and_a_removed_rule_clears_its_alarm() -> None:
     stays = rule("below", "/d", path="r", limit=1)
     scene = Scene(stays, rule("above", "/d", path="r", limit=-1, id="goes"))
     scene.graph(("/d",))
@@ -258,7 +258,7 @@ def test_rules_that_stay_keep_what_is_known_and_one_that_goes_ends_its_alarm() -
     assert scene.state() == "well"  # it was heard
 
 
-def test_who_is_off_or_has_a_problem_is_not_watched() -> None:
+def test_disabled_or_invalid_rule_is_not_watched() -> None:
     scene = Scene(rule("silent", "/cam", for_s=1.0, is_on=False), rule("silent", "", for_s=1.0, id="new"))
     scene.graph(("/cam",))
     assert scene.wait(5) == []
@@ -267,7 +267,7 @@ def test_who_is_off_or_has_a_problem_is_not_watched() -> None:
     assert scene.alarms.evaluator.topics == frozenset()
 
 
-def test_messages_and_ticks_in_two_threads_lose_nothing() -> None:
+def test_concurrent_messages_and_ticks_lose_no_event() -> None:
     scene = Scene(rule("changes", "/n", path=".", calm_s=0.5))
     scene.graph(("/n",))
     batches = [[message("/n", number) for number in range(start, start + 50)] for start in range(0, 2000, 50)]

@@ -42,7 +42,7 @@ def every_rule() -> list[AlarmRule]:
     return made
 
 
-def test_every_rule_is_the_same_after_writing_and_reading() -> None:
+def test_every_rule_round_trips() -> None:
     rules = every_rule()
     rules[0] = rule("silent", "/t", for_s=2.0, is_on=False, calm_s=9.0, snoozed_until_s=5.0)
     rules.append(rule("is_not", "/t", path='["a key"]', limit='“quoted” \n"', margin=0.5, id="text"))
@@ -52,14 +52,17 @@ def test_every_rule_is_the_same_after_writing_and_reading() -> None:
     assert len({rule_words(each) for each in rules}) == len(rules)
 
 
-def test_the_example_is_right() -> None:
+def test_example_file_is_valid() -> None:
     assert len(read(EXAMPLE).rules) == 5
 
 
 @pytest.mark.parametrize(
     ("alarm", "said"),
     [
-        ({"when": {"topic": "/t", "is": "bellow", "than": 1}}, "unknown condition 'bellow'; did you mean 'below'"),
+        (
+            {"when": {"topic": "/t", "is": "bellow", "than": 1}},
+            "unknown condition 'bellow'; did you mean 'below'",
+        ),
         ({"when": {"topic": "/t"}}, "'when': the condition is missing"),
         ({"when": {"is": "silent"}}, "the topic name is missing"),
         ({"when": {"node": "n", "is": "silent"}}, "'silent' needs a topic"),
@@ -83,7 +86,7 @@ def test_the_example_is_right() -> None:
         ([], "it is not an alarm"),
     ],
 )  # fmt: skip
-def test_what_is_wrong_is_said_with_its_line(alarm: object, said: str) -> None:
+def test_invalid_alarm_is_rejected_with_its_line(alarm: object, said: str) -> None:
     good = {"when": {"topic": "/t", "is": "silent"}, "do": ["banner"]}
     text = of(good, alarm)
     with pytest.raises(NepError) as error:
@@ -112,7 +115,7 @@ def test_what_is_wrong_is_said_with_its_line(alarm: object, said: str) -> None:
         (json.dumps({"alarms": [{}] * 201}), "more than 200"),
     ],
 )
-def test_what_is_no_file_of_alarms_is_said_also_to_who_is_lenient(text: str, said: str) -> None:
+def test_invalid_alarm_file_is_rejected_also_in_lenient_mode(text: str, said: str) -> None:
     for lenient in (False, True):
         if lenient and "1" * 5000 in text:
             continue
@@ -121,8 +124,8 @@ def test_what_is_no_file_of_alarms_is_said_also_to_who_is_lenient(text: str, sai
         assert said in str(error.value)
 
 
-def test_bytes_that_are_no_text_and_a_file_that_is_not_there(tmp_path) -> None:
-    with pytest.raises(NepError, match="line 2 of 'f' .*UTF-8"):
+def test_non_utf_8_missing_and_oversized_files_are_rejected(tmp_path) -> None:
+    with pytest.raises(NepError, match=r"line 2 of 'f' .*UTF-8"):
         read_text(b'{\n"\xff": 1}', "f")
     with pytest.raises(NepError, match="cannot be read"):
         read_alarms(tmp_path / "none.json")
@@ -130,13 +133,13 @@ def test_bytes_that_are_no_text_and_a_file_that_is_not_there(tmp_path) -> None:
         read_text(b" " * 4_000_001, "f")
 
 
-def test_two_alarms_with_one_id() -> None:
+def test_duplicate_alarm_id_is_rejected() -> None:
     alarm = {"id": "a", "when": {"topic": "/t", "is": "silent"}}
     with pytest.raises(NepError, match="'id': another alarm"):
         read(of(alarm, alarm))
 
 
-def test_the_history_is_kept_and_what_is_damaged_of_it_left_out() -> None:
+def test_history_round_trips_and_damaged_records_are_skipped() -> None:
     history = AlarmHistory([AlarmRecord("a", "x is 1", 12.5, 3.0, count=2, was_snoozed=True)])
     history.records[0].add(AlarmDeed("call", "no answer"))
     history.records[0].add(AlarmDeed("call", "answered"))
@@ -167,7 +170,7 @@ VALUES = DEEPER | st.lists(DEEPER, max_size=2) | st.dictionaries(KEYS, DEEPER, m
 
 
 @given(st.lists(VALUES, max_size=3))
-def test_whatever_stands_in_it_is_read_or_said(alarms: list[object]) -> None:
+def test_every_alarm_in_a_file_is_loaded_or_reported(alarms: list[object]) -> None:
     text = json.dumps({"alarms": alarms})
     kept = read(text, lenient=True)
     assert len(kept.rules) + len(kept.problems) == len(alarms)

@@ -15,8 +15,8 @@ from tests.nep.meeting import Make, meeting
 
 _DOMAIN = "6"
 LEFT_OUT = {
-    "test_the_bytes_are_bounded_and_the_newest_stays",
-    "test_the_history_of_a_program_that_is_killed_is_gone_and_of_its_successor_there",
+    "test_history_is_bounded_in_bytes_and_keeps_the_newest",
+    "test_history_ends_with_a_killed_program_and_its_successor_has_its_own",
 }
 globals().update({
     name: test

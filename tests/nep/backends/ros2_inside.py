@@ -34,7 +34,7 @@ from tests.nep.programs import eventually
 
 
 @pytest.mark.parametrize("quality", ["", "reliable"])
-def test_the_first_message_reaches_a_subscriber_that_another_program_had(make: Make, quality: str) -> None:
+def test_first_message_reaches_an_existing_subscriber_of_another_program(make: Make, quality: str) -> None:
     code = f"sub = node.new_sub('t', qos={quality!r})\nsay('ready')\n"
     code += "for _ in range(3): say(sub.listen(timeout_s=60)[1])\nsay(sub.lost)"
     with nep_program(code) as other:
@@ -46,7 +46,7 @@ def test_the_first_message_reaches_a_subscriber_that_another_program_had(make: M
         assert [other.line() for _ in range(4)] == ["0", "1", "2", "0"]
 
 
-def test_the_next_message_reaches_a_subscriber_that_another_program_gets(make: Make) -> None:
+def test_next_message_reaches_a_new_subscriber_of_another_program(make: Make) -> None:
     pub = make("a").new_pub("t")
     code = "knows('t')\nsub = node.new_sub('t')\nsay('ready')\nsay(sub.listen(timeout_s=60)[1])"
     with nep_program(code) as other:
@@ -55,7 +55,7 @@ def test_the_next_message_reaches_a_subscriber_that_another_program_gets(make: M
         assert other.line() == "first"
 
 
-def test_every_type_travels_between_programs(make: Make) -> None:
+def test_every_type_is_exchanged_between_programs(make: Make) -> None:
     code = """
 import numpy as np
 pubs = [node.new_pub(*each) for each in [
@@ -98,7 +98,7 @@ sys.stdin.read()
         assert raw.listen(timeout_s=60.0)[1]["data"] == b"abcd"  # type: ignore[index]
 
 
-def test_dataclasses_with_ros_s_names_travel_as_ros_s_own_types(make: Make) -> None:
+def test_dataclasses_named_like_ros_types_are_sent_as_those_types(make: Make) -> None:
     a, b = make("a"), make("b")
     poses, maps = b.new_sub("p", PoseStamped), b.new_sub("p", "geometry_msgs/msg/PoseStamped")
     pub = a.new_pub("p", PoseStamped)
@@ -110,7 +110,7 @@ def test_dataclasses_with_ros_s_names_travel_as_ros_s_own_types(make: Make) -> N
     assert plain["header"] == {"stamp": {"sec": 5, "nanosec": 6}, "frame_id": "map"}
 
 
-def test_a_burst_and_8_mb_arrive_whole(make: Make) -> None:
+def test_burst_and_8_mb_messages_arrive_complete(make: Make) -> None:
     code = """
 sub = node.new_sub('t', 'bytes')
 say('ready')
@@ -136,7 +136,7 @@ say(got == list(range(5000))); say(many.lost)
         assert (other.line(), other.line()) == ("True", "0")
 
 
-def test_what_is_latched_reaches_another_program_once(make: Make) -> None:
+def test_latched_message_reaches_another_program_once(make: Make) -> None:
     pub = make("a").new_pub("/robot/description", latched=True)
     pub.publish(1)
     pub.publish(2)
@@ -149,7 +149,7 @@ def test_what_is_latched_reaches_another_program_once(make: Make) -> None:
         assert (other.line(), other.line()) == ("3", "(False, {})")
 
 
-def test_a_publisher_that_dies_leaves_its_subscribers_well(make: Make) -> None:
+def test_subscriber_survives_a_killed_publisher(make: Make) -> None:
     node = make("a")
     sub = node.new_sub("t")
     code = "knows('t')\npub = node.new_pub('t')\npub.publish(1)\nsay('ready')\nsys.stdin.read()"
@@ -163,7 +163,7 @@ def test_a_publisher_that_dies_leaves_its_subscribers_well(make: Make) -> None:
     eventually(lambda: "other" not in {each.name.strip("/") for each in node.graph().nodes.values()})
 
 
-def test_a_subscriber_that_dies_stops_no_publisher(make: Make) -> None:
+def test_killed_subscriber_does_not_block_the_publisher(make: Make) -> None:
     code = "sub = node.new_sub('t', 'bytes')\nsay('ready')\nsys.stdin.read()"
     pub = make("a").new_pub("t", "bytes")
     with nep_program(code, **killed_soon()) as other:
@@ -177,7 +177,7 @@ def test_a_subscriber_that_dies_stops_no_publisher(make: Make) -> None:
     assert sub.listen(timeout_s=60.0) == (True, b"1")
 
 
-def test_who_does_not_answer_is_named_and_waited_for_no_longer_than_it_is_said(
+def test_unresponsive_subscriber_is_named_and_waited_for_only_until_the_timeout(
     make: Make, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr("nep.backends.ros2.publisher.HANDSHAKE_S", 0.2)
@@ -197,7 +197,7 @@ def test_who_does_not_answer_is_named_and_waited_for_no_longer_than_it_is_said(
 # ---- what ROS 2 is told
 
 
-def test_the_graph_of_another_program_has_its_nodes_topics_and_ids(make: Make) -> None:
+def test_graph_has_nodes_topics_and_ids_of_another_program(make: Make) -> None:
     code = """
 second = nep.node('space/second', 'ros2')
 pub = node.new_pub('t', 'geometry_msgs/Twist'); sub = second.new_sub('u', 'json')
@@ -236,7 +236,7 @@ def discovered(topic: str) -> tuple[object, object]:
     return participant, found[0]
 
 
-def test_a_writer_tells_what_ros_2_reads(make: Make) -> None:
+def test_writer_announces_type_and_qos_as_ros_2_expects(make: Make) -> None:
     make("a").new_pub("/chatter", "std_msgs/msg/String", qos="sensor")
     participant, found = discovered("rt/chatter")
     policies = dds().qos.Policy
@@ -249,7 +249,7 @@ def test_a_writer_tells_what_ros_2_reads(make: Make) -> None:
     participant.__del__()  # type: ignore[attr-defined]
 
 
-def test_ids_are_as_long_as_the_release_has_them() -> None:
+def test_gid_length_matches_the_ros_release() -> None:
     code = """
 from nep.backends.ros2 import message_types
 print(message_types().gid_bytes, len(message_types().encode('rmw_dds_common/msg/Gid', {})) - 4)
@@ -262,7 +262,7 @@ say([each.name for each in node.graph().nodes.values()])
     assert (MessageTypes("iron").gid_bytes, MessageTypes("jazzy").gid_bytes) == (16, 16)
 
 
-def test_what_tells_of_the_graph_has_the_hash_of_ros_2(make: Make) -> None:
+def test_discovery_topic_has_the_type_hash_of_ros_2(make: Make) -> None:
     make("a").new_pub("t")
     participant, found = discovered("ros_discovery_info")
     told = user_data_of(found.qos[dds().qos.Policy.Userdata].data)  # type: ignore[attr-defined]
@@ -270,7 +270,7 @@ def test_what_tells_of_the_graph_has_the_hash_of_ros_2(make: Make) -> None:
     participant.__del__()  # type: ignore[attr-defined]
 
 
-def test_ros_2_node_list_reads_the_nodes_and_what_belongs_to_them(make: Make) -> None:
+def test_ros_discovery_info_lists_nodes_with_their_readers_and_writers(make: Make) -> None:
     """The bytes of `ros_discovery_info`, read by hand as they are laid down by ROS 2's message."""
     first, second = make("talker"), make("arm/left/grip per")
     pub, sub = first.new_pub("t", "std_msgs/String"), second.new_sub("t", "std_msgs/String")
@@ -325,7 +325,7 @@ def udp_sockets() -> dict[int, tuple[str, bytes]]:
         ({"ROS_STATIC_PEERS": "127.0.0.1"}, True),
     ],
 )
-def test_sockets_hear_loopback_alone_unless_it_is_said(
+def test_sockets_are_bound_to_loopback_unless_configured(
     make: Make, monkeypatch: pytest.MonkeyPatch, environment: dict[str, str], *, is_open: bool
 ) -> None:
     for key, value in environment.items():
@@ -337,7 +337,7 @@ def test_sockets_hear_loopback_alone_unless_it_is_said(
     assert (heard <= {"127.0.0.1"}) is not is_open
 
 
-def test_a_program_for_which_there_is_no_room_is_told() -> None:
+def test_missing_participant_index_is_reported() -> None:
     """In a program of its own: Cyclone DDS leaves its sockets behind."""
     code = """
     from nep.backends.ros2 import environment
@@ -351,7 +351,7 @@ def test_a_program_for_which_there_is_no_room_is_told() -> None:
         assert other.line().endswith("whether the domain already has 100 programs")
 
 
-def test_who_is_off_meets_nobody(make: Make, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_discovery_range_off_isolates_the_node(make: Make, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("ROS_AUTOMATIC_DISCOVERY_RANGE", "OFF")
     with nep_program("node.new_pub('t'); say('ready'); sys.stdin.read()") as other:
         assert other.line() == "ready"
@@ -363,7 +363,7 @@ def test_who_is_off_meets_nobody(make: Make, monkeypatch: pytest.MonkeyPatch) ->
 # ---- qualities, and what is wrong
 
 
-def test_who_wants_reliability_does_not_hear_who_has_none(make: Make) -> None:
+def test_reliable_subscriber_does_not_receive_from_a_best_effort_publisher(make: Make) -> None:
     pub = make("a").new_pub("t", qos="best_effort")
     node = make("b")
     wants, takes = node.new_sub("t"), node.new_sub("t", qos="sensor")
@@ -380,7 +380,7 @@ def test_who_wants_reliability_does_not_hear_who_has_none(make: Make) -> None:
     assert node.graph().alerts == ()
 
 
-def test_another_type_on_the_topic_is_an_alert_and_nothing_is_heard(make: Make) -> None:
+def test_type_mismatch_on_a_topic_raises_an_alert_and_delivers_nothing(make: Make) -> None:
     node = make("a")
     sub = node.new_sub("t", "std_msgs/Int64")
     code = "knows('t')\npub = node.new_pub('t', 'std_msgs/Float64')\nsay('ready')\n"
@@ -394,7 +394,7 @@ def test_another_type_on_the_topic_is_an_alert_and_nothing_is_heard(make: Make) 
     eventually(lambda: node.graph().alerts == ())
 
 
-def test_another_definition_of_a_type_is_an_alert(make: Make, tmp_path: Path) -> None:
+def test_differing_definition_of_a_type_raises_an_alert(make: Make, tmp_path: Path) -> None:
     code = "sub = node.new_sub('t', 'changed/Pose')\nsay('ready')\nsys.stdin.read()"
     (tmp_path / "changed").mkdir()
     (tmp_path / "changed" / "Pose.msg").write_text("float64 x\nfloat64 y\n")
@@ -407,7 +407,7 @@ def test_another_definition_of_a_type_is_an_alert(make: Make, tmp_path: Path) ->
         assert alert.sentence == "“/other” and “a” have different definitions of “changed/msg/Pose” on “t”"
 
 
-def test_words_that_are_none(make: Make) -> None:
+def test_invalid_qos_types_and_names_are_rejected(make: Make) -> None:
     node = make("a")
     with pytest.raises(ValueError, match="qos is 'quick'; use '', 'reliable', 'best_effort' or 'sensor'"):
         node.new_pub("t", qos="quick")
@@ -421,7 +421,7 @@ def test_words_that_are_none(make: Make) -> None:
     assert node.graph().topics == {}
 
 
-def test_a_node_is_in_the_domain_that_it_is_given_and_in_no_other(make: Make) -> None:
+def test_node_joins_only_its_own_domain(make: Make) -> None:
     here = make("here")
     hears = here.new_sub("t")
     with nep.node("there", "ros2", master="201") as there, nep.node("too", "ros2", master="201") as too:
@@ -436,7 +436,7 @@ def test_a_node_is_in_the_domain_that_it_is_given_and_in_no_other(make: Make) ->
     assert {each.name for each in here.graph().nodes.values()} == {"here"}
 
 
-def test_fields_that_do_not_fit_are_named(make: Make, caplog: pytest.LogCaptureFixture) -> None:
+def test_invalid_fields_are_named(make: Make, caplog: pytest.LogCaptureFixture) -> None:
     node = make("a")
     pub = node.new_pub("t", "geometry_msgs/Twist")
     sub = make("b").new_sub("t", "geometry_msgs/Twist")
@@ -452,7 +452,7 @@ def test_fields_that_do_not_fit_are_named(make: Make, caplog: pytest.LogCaptureF
     assert (pub.count, pub.refused) == (1, 1)
 
 
-def test_bytes_that_are_no_message_are_refused_and_change_nothing(make: Make) -> None:
+def test_invalid_message_bytes_are_rejected_without_side_effects(make: Make) -> None:
     node = make("a")
     twist, pub = node.new_sub("t", "geometry_msgs/Twist"), node.new_pub("t", "geometry_msgs/Twist")
     bad = (b"", b"ab", b"\0\1\0\0", b"\0\1\0\0" + bytes(40), b"\0\3\0\0" + bytes(48))
@@ -468,7 +468,7 @@ def test_bytes_that_are_no_message_are_refused_and_change_nothing(make: Make) ->
     assert twist.listen() == (False, {})
 
 
-def test_what_strangers_tell_of_matches_changes_nothing(make: Make, caplog: pytest.LogCaptureFixture) -> None:
+def test_forged_match_messages_are_ignored(make: Make, caplog: pytest.LogCaptureFixture) -> None:
     node = make("a")
     pub, sub = node.new_pub("t"), node.new_sub("t")
     own = pub._transport._writer.guid.bytes
@@ -496,7 +496,7 @@ def test_what_strangers_tell_of_matches_changes_nothing(make: Make, caplog: pyte
     assert caplog.text == ""
 
 
-def test_a_zero_byte_has_no_place_in_a_text(make: Make) -> None:
+def test_string_with_a_null_byte_is_rejected(make: Make) -> None:
     node = make("a")
     sub, pub = node.new_sub("t", "string"), node.new_pub("t", "string")
     pub.publish("a\0b")
@@ -505,7 +505,7 @@ def test_a_zero_byte_has_no_place_in_a_text(make: Make) -> None:
     assert pub.refused == 1
 
 
-def test_a_child_that_is_forked_is_closed_and_ends(make: Make) -> None:
+def test_node_is_closed_in_a_forked_child(make: Make) -> None:
     node = make("a")
     sub, pub = node.new_sub("t"), node.new_pub("t")
     child = os.fork()
@@ -528,7 +528,7 @@ def test_a_child_that_is_forked_is_closed_and_ends(make: Make) -> None:
     assert sub.listen(timeout_s=60.0) == (True, 1)
 
 
-def test_an_interpreter_that_was_forked_ends_by_itself() -> None:
+def test_forked_interpreter_exits_cleanly() -> None:
     code = """
 import os
 pub, sub = node.new_pub('t'), node.new_sub('t')
@@ -540,7 +540,7 @@ if child:
         assert other.line() == "0"
 
 
-def test_a_node_that_is_closed_while_others_make_things_on_it_ends_them(make: Make) -> None:
+def test_node_closed_while_other_threads_open_endpoints_raises_closed_error(make: Make) -> None:
     def work(node: nep.Node, begun: threading.Event, ended: list[object]) -> None:
         try:
             while True:
@@ -565,7 +565,7 @@ def test_a_node_that_is_closed_while_others_make_things_on_it_ends_them(make: Ma
         assert ended == [node] * 3
 
 
-def test_closing_in_any_order_and_twice(make: Make) -> None:
+def test_close_in_any_order_and_twice(make: Make) -> None:
     first, second = make("a"), make("b")
     pub, sub = first.new_pub("t"), second.new_sub("t")
     first.close()
@@ -581,7 +581,7 @@ def test_closing_in_any_order_and_twice(make: Make) -> None:
     assert sub.listen(timeout_s=60.0) == (True, 1)
 
 
-def test_types_of_one_s_own(make: Make, tmp_path: Path) -> None:
+def test_custom_types_are_exchanged(make: Make, tmp_path: Path) -> None:
     folder = tmp_path / "my_robot" / "msg"
     folder.mkdir(parents=True)
     (folder / "Arm.msg").write_text("float64[2] joints\nJoint[] more\nstring<=3 name\n")

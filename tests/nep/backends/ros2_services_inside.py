@@ -26,8 +26,8 @@ __all__ = ["spin"]
 
 Make = contract.Make
 LEFT_OUT = {
-    "test_a_server_that_closes_answers_what_it_carries_out",
-    "test_a_second_server_is_an_alert_and_takes_over",
+    "test_closing_server_finishes_its_running_call",
+    "test_second_server_raises_an_alert_and_takes_over",
 }
 globals().update({
     name: test
@@ -71,7 +71,7 @@ def registered(make: Make) -> Make:
 LONG_S = 60.0
 
 
-def test_common_types_travel_as_maps(make: Make) -> None:
+def test_common_service_types_are_exchanged_as_dicts(make: Make) -> None:
     def switched(request):
         return {"success": request["data"], "message": "grüß"}
 
@@ -95,7 +95,7 @@ def test_common_types_travel_as_maps(make: Make) -> None:
     assert make("plain").new_client("/add", timeout_s=LONG_S).call({"a": 1, "b": 2}) == {"sum": 3}
 
 
-def test_what_does_not_fit_is_told_with_its_place(make: Make) -> None:
+def test_invalid_request_or_reply_is_reported_with_its_field(make: Make) -> None:
     make("server").new_server(
         "/add", lambda asked: {"sum": "three"}, msg_type="example_interfaces/AddTwoInts", threads=1
     )
@@ -108,7 +108,7 @@ def test_what_does_not_fit_is_told_with_its_place(make: Make) -> None:
         add.call({"a": 1})
 
 
-def test_programs_of_nep_tell_each_other_of_failures(make: Make) -> None:
+def test_service_errors_are_reported_between_nep_programs(make: Make) -> None:
     def answer(_request):
         raise LookupError("no map")
 
@@ -119,7 +119,7 @@ def test_programs_of_nep_tell_each_other_of_failures(make: Make) -> None:
     assert (server.calls, server.errors) == (1, 1)
 
 
-def test_types_that_are_not_known_are_told(make: Make, tmp_path, monkeypatch) -> None:
+def test_unknown_service_types_are_rejected(make: Make, tmp_path, monkeypatch) -> None:
     node = make("node")
     with pytest.raises(nep.NepError, match="'std_srvs/srv/SetBol'; did you mean 'std_srvs/srv/SetBool'"):
         node.new_server("/x", msg_type="std_srvs/SetBol")
@@ -164,7 +164,7 @@ def peer(request: pytest.FixtureRequest):
         ("example_interfaces/srv/AddTwoInts", {"a": -5, "b": 2**40}, [-5, 2**40], {"sum": 2**40 - 5}),
     ],
 )
-def test_nep_calls_a_program_with_dds_alone(make: Make, peer, request, kind, asked, heard, said) -> None:
+def test_nep_calls_a_server_that_uses_plain_dds(make: Make, peer, request, kind, asked, heard, said) -> None:
     last = kind.rpartition("/")[2]
     service = f"/to/{last}/{request.node.callspec.params['peer']}"
     with peer("serve", f"to/{last}", last) as other:  # one that was killed is there for ten seconds more
@@ -187,7 +187,7 @@ def test_nep_calls_a_program_with_dds_alone(make: Make, peer, request, kind, ask
         ("example_interfaces/AddTwoInts", [2, 3], {"a": 2, "b": 3}, {"sum": -5}, [-5]),
     ],
 )
-def test_a_program_with_dds_alone_calls_nep(
+def test_client_that_uses_plain_dds_calls_nep(
     make: Make, peer, request, kind, given, asked, answer, said
 ) -> None:
     seen = []
@@ -222,7 +222,7 @@ SERVER = """
 """
 
 
-def test_a_server_that_dies_while_it_is_called_is_reported(make: Make) -> None:
+def test_server_that_dies_during_a_call_is_reported(make: Make) -> None:
     client = make("client").new_client("/x", timeout_s=LONG_S)
     with running(SERVER, **killed_soon()) as program:
         program.line()
@@ -238,7 +238,7 @@ def test_a_server_that_dies_while_it_is_called_is_reported(make: Make) -> None:
         assert client.call({}) == {"pid": program.process.pid}
 
 
-def test_the_commands_see_and_call_services_of_ros(make: Make) -> None:
+def test_service_commands_list_and_call_ros_services(make: Make) -> None:
     make("server").new_server(
         "/add", lambda asked: {"sum": asked["a"] + asked["b"]},
         msg_type="example_interfaces/AddTwoInts", threads=1,
@@ -277,7 +277,7 @@ STRANGER = """
 """
 
 
-def test_a_server_whose_type_is_not_known_is_told_at_the_call(make: Make) -> None:
+def test_server_of_unknown_type_is_reported_at_the_call(make: Make) -> None:
     node = make("node")
     client = node.new_client("/odd", timeout_s=LONG_S)
     with running(STRANGER) as other:
@@ -294,19 +294,21 @@ def test_a_server_whose_type_is_not_known_is_told_at_the_call(make: Make) -> Non
             told.call({}, timeout_s=0.2)
 
 
-def test_surveys_are_refused(make: Make) -> None:
+def test_surveys_are_rejected(make: Make) -> None:
     node = make("node")
     for new in (node.new_surveyor, node.new_respondent):
         with pytest.raises(nep.NepError, match="the back end 'ros2' does not support surveys; use 'zeromq'"):
             new("/who")
 
 
-def test_a_forked_child_is_told_and_ends(make: Make) -> None:
+def test_forked_child_raises_an_error_and_exits(make: Make) -> None:
     check_fork("nep.node('parent', 'ros2')")
 
 
 @pytest.mark.parametrize("has_digit", [True, False])
-def test_parameters_are_read_and_set_whatever_the_node_s_id_begins_with(make: Make, has_digit: bool) -> None:
+def test_parameters_are_read_and_set_for_ids_starting_with_digit_or_letter(
+    make: Make, has_digit: bool
+) -> None:
     node = next(each for n in range(200) if (each := make(f"robot {n}")).id[0].isdigit() is has_digit)
     node.parameters.declare("speed", 0.5, max=2)
     code = f"""

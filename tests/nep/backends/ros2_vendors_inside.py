@@ -46,7 +46,7 @@ def start(request: pytest.FixtureRequest) -> Start:
     return lambda *words: running("import os, sys; os.execv(sys.argv[1], sys.argv[1:])", peer, *words)
 
 
-def test_another_vendor_hears_what_nep_says(make: Make, start: Start) -> None:
+def test_other_vendor_receives_messages_from_nep(make: Make, start: Start) -> None:
     with start("hear", "rt/chatter") as other:
         assert other.line() == "ready"
         pub = make("a").new_pub("/chatter", "std_msgs/msg/String")
@@ -58,7 +58,7 @@ def test_another_vendor_hears_what_nep_says(make: Make, start: Start) -> None:
         pub.close()
 
 
-def test_nep_hears_what_another_vendor_says(make: Make, start: Start) -> None:
+def test_nep_receives_messages_from_other_vendor(make: Make, start: Start) -> None:
     """What is said before both have found each other may be lost, and is said again."""
     node = make("a")
     text, data = node.new_sub("chatter", "std_msgs/String"), node.new_sub("chatter", "json")
@@ -81,7 +81,7 @@ def test_nep_hears_what_another_vendor_says(make: Make, start: Start) -> None:
         assert view.nodes[publisher.node_id].name.startswith("dds/")
 
 
-def test_another_vendor_that_comes_late_hears_what_is_latched(make: Make, start: Start) -> None:
+def test_late_subscriber_of_other_vendor_receives_the_latched_message(make: Make, start: Start) -> None:
     pub = make("a").new_pub("map", "std_msgs/msg/String", latched=True)
     pub.publish({"data": "old"})
     pub.publish({"data": "last"})
@@ -92,7 +92,7 @@ def test_another_vendor_that_comes_late_hears_what_is_latched(make: Make, start:
         pub.close()
 
 
-def test_nep_that_comes_late_hears_what_another_vendor_has_latched(make: Make, start: Start) -> None:
+def test_late_nep_subscriber_receives_the_latched_message_of_other_vendor(make: Make, start: Start) -> None:
     with start("say", "rt/map", "latched") as other:
         assert other.line() == "ready"
         other.say("last")

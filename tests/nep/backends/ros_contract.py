@@ -32,43 +32,43 @@ pytestmark = [  # rospy's own ways
 ]
 
 for _name in (
-    "test_the_paper_s_listing_polls",
-    "test_every_type_arrives_as_it_was",
-    "test_many_to_many",
+    "test_polling_listing_of_the_paper_works",
+    "test_every_type_round_trips",
+    "test_every_subscriber_receives_from_every_publisher",
     "test_the_next_message_reaches_a_new_subscriber",
-    "test_what_is_latched_and_cannot_be_sent_leaves_what_was_latched_before",
-    "test_whoever_begins_to_listen_ends_no_publisher",
-    "test_a_payload_of_a_wrong_type_is_an_error_heard_or_unheard",
-    "test_whatever_is_inside_ends_no_program",
-    "test_callbacks_run_in_the_thread_that_spins",
-    "test_timers_run_in_the_thread_that_spins_and_beside_callbacks",
-    "test_a_timer_that_is_made_while_a_node_spins_runs",
-    "test_a_timer_may_close_its_node",
-    "test_what_a_callback_raises_comes_out_of_spin",
-    "test_spin_ends_after_its_time_and_when_told",
-    "test_a_sink_gets_batches_in_a_thread_of_the_node",
-    "test_a_sink_that_fails_gets_the_next_batch",
-    "test_bad_bytes_are_skipped_by_listen_and_become_an_alert",
-    "test_a_full_inbox_drops_the_oldest_and_counts",
-    "test_a_callback_s_full_inbox_drops_the_oldest_and_counts",
-    "test_what_can_still_be_changed_is_copied",
-    "test_closing_discards_unread_messages",
+    "test_rejected_payload_does_not_replace_the_latched_message",
+    "test_new_subscriber_does_not_make_an_invalid_payload_raise",
+    "test_payload_of_a_wrong_type_raises_with_and_without_a_subscriber",
+    "test_payload_with_invalid_content_is_counted_and_does_not_raise",
+    "test_callbacks_run_in_the_spinning_thread",
+    "test_timers_run_in_the_spinning_thread_between_callbacks",
+    "test_timer_created_during_a_spin_runs",
+    "test_timer_can_close_its_node",
+    "test_exception_in_a_callback_propagates_from_spin",
+    "test_spin_ends_at_its_timeout_and_on_stop_spin",
+    "test_sink_receives_batches_in_a_thread_of_the_node",
+    "test_sink_that_raises_receives_the_next_batch",
+    "test_undecodable_messages_are_skipped_by_listen_and_raise_an_alert",
+    "test_full_inbox_drops_the_oldest_and_counts",
+    "test_full_callback_inbox_drops_the_oldest_and_counts",
+    "test_mutable_payloads_are_copied_on_publish",
+    "test_close_discards_unread_messages",
 ):
     globals()[_name] = getattr(contract, _name)
 
 
 for _name in (
-    "test_a_time_limit_and_none",
-    "test_whoever_is_cancelled_has_taken_no_message",
+    "test_async_receive_with_and_without_timeout",
+    "test_cancelled_receive_consumes_no_message",
     "test_two_coroutines_share_a_subscriber",
-    "test_closing_ends_who_waits",
-    "test_closing_in_the_loop_while_another_coroutine_waits",
+    "test_close_wakes_waiting_coroutines",
+    "test_close_in_the_loop_wakes_a_waiting_coroutine",
     "test_spin_runs_functions_and_coroutine_functions_one_at_a_time",
-    "test_timers_and_other_coroutines_run_beside_a_spin",
-    "test_what_others_order_reaches_a_spin_that_waits",
-    "test_what_a_callback_raises_comes_out_of_the_spin",
-    "test_a_spin_that_is_cancelled_leaves_nothing",
-    "test_two_loops_in_two_threads",
+    "test_timers_and_other_coroutines_run_during_an_async_spin",
+    "test_callbacks_added_and_stop_requested_from_other_threads_wake_an_async_spin",
+    "test_exception_in_a_callback_propagates_from_async_spin",
+    "test_cancelled_async_spin_releases_everything",
+    "test_two_loops_in_two_threads_share_a_subscriber",
 ):
     globals()[_name] = getattr(contract_async, _name)
 
@@ -183,14 +183,14 @@ def from_two_to_two(make: Make, kind: str, payload: object) -> object:
 
 @pytest.mark.parametrize("kind", PAYLOADS)
 @pytest.mark.parametrize("pattern", [listened, latched, called_back, newest, poured, from_two_to_two])
-def test_every_type_with_every_pattern(
+def test_every_type_is_exchanged_with_every_publisher_subscriber_pattern(
     make: Make, pattern: Callable[[Make, str, object], object], kind: str
 ) -> None:
     msg_type, payload = PAYLOADS[kind]
     assert is_same(pattern(make, msg_type, payload), payload)
 
 
-def test_order_is_kept_and_nothing_is_lost(make: Make) -> None:
+def test_messages_arrive_in_order_without_loss(make: Make) -> None:
     sub = make("b").new_sub("topic")
     pub = make("a").new_pub("topic")
     for n in range(5000):
@@ -199,7 +199,7 @@ def test_order_is_kept_and_nothing_is_lost(make: Make) -> None:
     assert (sub.received, sub.lost) == (5000, None)
 
 
-def test_a_late_subscriber_gets_what_is_latched_once(make: Make) -> None:
+def test_late_subscriber_receives_the_latched_message_once(make: Make) -> None:
     pub = make("a").new_pub("/robot/description", "robot/description", latched=True)
     early = make("early").new_sub("/robot/description", "robot/description")
     pub.publish({"v": 1})
@@ -213,7 +213,7 @@ def test_a_late_subscriber_gets_what_is_latched_once(make: Make) -> None:
     assert early.listen(timeout_s=0.05) == (False, {})
 
 
-def test_keep_latest(make: Make) -> None:
+def test_keep_latest_delivers_only_the_newest_message(make: Make) -> None:
     sub = make("b").new_sub("topic", keep="latest")
     other = make("c").new_sub("topic")
     pub = make("a").new_pub("topic")
@@ -228,7 +228,7 @@ def test_keep_latest(make: Make) -> None:
     assert sub.listen() == (False, {})
 
 
-def test_a_header_numbers_messages_and_has_the_time(make: Make) -> None:
+def test_header_has_sequence_numbers_and_time_stamps(make: Make) -> None:
     sub = make("b").new_sub("stamped", "geometry_msgs/TwistStamped")
     pub = make("a").new_pub("stamped", "geometry_msgs/TwistStamped")
     before = time.time_ns()
@@ -245,7 +245,7 @@ def test_a_header_numbers_messages_and_has_the_time(make: Make) -> None:
     assert sub.lost == 4
 
 
-def test_the_graph_has_this_program_s_nodes_with_counts(make: Make) -> None:
+def test_graph_has_nodes_of_this_program_with_counts(make: Make) -> None:
     node, other = make("a"), make("b")
     pub = node.new_pub("topic", "geometry_msgs/Twist", latched=True)
     sub = other.new_sub("topic", "geometry_msgs/Twist")
@@ -262,7 +262,7 @@ def test_the_graph_has_this_program_s_nodes_with_counts(make: Make) -> None:
     assert node.graph().topics["/topic"].subscribers == ()
 
 
-def test_two_types_of_one_program_on_a_topic_are_refused_until_the_first_is_gone(make: Make) -> None:
+def test_second_type_of_one_program_on_a_topic_is_rejected_until_the_first_closes(make: Make) -> None:
     first = make("a").new_pub("topic", "json")
     with pytest.raises(nep.NepError, match=r"this program publishes 'std_msgs/String' on '/topic'"):
         make("b").new_pub("topic", "bytes")
@@ -272,7 +272,7 @@ def test_two_types_of_one_program_on_a_topic_are_refused_until_the_first_is_gone
         make("d").new_pub("/rosout", "json")
 
 
-def test_a_subscriber_of_another_type_says_so(make: Make, caplog: pytest.LogCaptureFixture) -> None:
+def test_type_mismatch_is_reported_by_the_subscriber(make: Make, caplog: pytest.LogCaptureFixture) -> None:
     sub, node = make("b").new_sub("topic", "bytes"), make("a")
     pub = node.new_pub("topic", "json")
     pub.publish(1)
@@ -283,7 +283,7 @@ def test_a_subscriber_of_another_type_says_so(make: Make, caplog: pytest.LogCapt
     assert any("std_msgs/String" in alert.sentence for alert in node.graph().alerts)
 
 
-def test_what_rospy_has_queued_is_sent_before_a_publisher_closes(make: Make) -> None:
+def test_messages_queued_by_rospy_are_sent_before_a_publisher_closes(make: Make) -> None:
     sub, pub = make("b").new_sub("big", "bytes"), make("a").new_pub("big", "bytes")
     for n in range(20):
         pub.publish(bytes([n]) * 8_000_000)
@@ -294,7 +294,7 @@ def test_what_rospy_has_queued_is_sent_before_a_publisher_closes(make: Make) -> 
         assert data == bytes([n]) * 8_000_000
 
 
-def test_closing_ends_waits_and_is_said(make: Make) -> None:
+def test_close_wakes_waiting_readers_with_closed_error(make: Make) -> None:
     node = make("a")
     sub, pub = node.new_sub("topic"), node.new_pub("topic")
     ended: list[str] = []
@@ -316,7 +316,7 @@ def test_closing_ends_waits_and_is_said(make: Make) -> None:
         node.new_sub("topic")
 
 
-def test_another_master_is_refused_in_a_sentence(make: Make, ros: str, tmp_path: Path) -> None:
+def test_second_ros_master_in_one_program_is_rejected(make: Make, ros: str, tmp_path: Path) -> None:
     make("a").new_pub("topic")
     with (
         ros_master(tmp_path) as other,
@@ -327,13 +327,13 @@ def test_another_master_is_refused_in_a_sentence(make: Make, ros: str, tmp_path:
 
 
 @pytest.mark.parametrize("topic", ["ü", "/a//b", "a/", "1a", "a-b", "a\u0301", "~", "~/", "/", "a~"])
-def test_topics_that_ros_does_not_have(make: Make, topic: str) -> None:
+def test_topic_names_invalid_in_ros_are_rejected(make: Make, topic: str) -> None:
     with pytest.raises(nep.BadTopicError, match=f"'{topic}' .*ROS topic"):
         make("a").new_sub(topic)
 
 
 @pytest.mark.skipif(not hasattr(os, "fork"), reason="there are no forks")
-def test_a_forked_child_says_that_it_cannot_and_leaves_the_parent_alone(make: Make) -> None:
+def test_forked_child_raises_an_error_and_the_parent_keeps_working(make: Make) -> None:
     sub, pub = make("b").new_sub("topic"), make("a").new_pub("topic")
     ros = pub._transport.process.master.address
     read, write = os.pipe()
@@ -352,7 +352,7 @@ def test_a_forked_child_says_that_it_cannot_and_leaves_the_parent_alone(make: Ma
     assert sub.listen(timeout_s=30.0) == (True, 1)
 
 
-def test_dataclasses_with_ros_s_names_travel_as_ros_s_own_types(make: Make) -> None:
+def test_dataclasses_named_like_ros_types_are_sent_as_those_types(make: Make) -> None:
     a, b = make("a"), make("b")
     twists, maps, poses = b.new_sub("/t", Twist), b.new_sub("/t"), b.new_sub("/p", PoseStamped)
     pub, stamped = a.new_pub("/t", Twist), a.new_pub("/p", PoseStamped)

@@ -21,11 +21,11 @@ pytestmark = [  # rospy's own ways
     pytest.mark.filterwarnings("ignore::ResourceWarning"),
 ]
 LEFT_OUT = {
-    "test_an_awaited_call_that_is_cancelled_is_forgotten",
-    "test_a_server_that_takes_too_long_is_another_error_and_its_answer_is_dropped",
-    "test_a_server_that_closes_answers_what_it_carries_out",
-    "test_a_second_server_is_an_alert_and_takes_over",
-    "test_the_graph_tells_of_services_and_not_of_topics",
+    "test_cancelled_awaited_call_discards_its_reply",
+    "test_slow_server_raises_service_timeout_and_its_late_reply_is_dropped",
+    "test_closing_server_finishes_its_running_call",
+    "test_second_server_raises_an_alert_and_takes_over",
+    "test_services_are_listed_in_the_graph_apart_from_topics",
 }
 globals().update({
     name: test
@@ -40,7 +40,7 @@ def registered(make: Make) -> Make:
     return make
 
 
-def test_a_server_that_takes_too_long_is_another_error(make: Make) -> None:
+def test_slow_server_raises_service_timeout_error(make: Make) -> None:
     server = make("server").new_server("/slow")
     client = make("client").new_client("/slow")
     with pytest.raises(nep.ServiceTimeoutError, match=r"0\.2 s.*'/slow'"):
@@ -50,7 +50,7 @@ def test_a_server_that_takes_too_long_is_another_error(make: Make) -> None:
     assert client.late == 0
 
 
-def test_the_graph_tells_of_services_and_not_of_those_of_rospy(make: Make) -> None:
+def test_graph_lists_services_but_not_those_of_rospy(make: Make) -> None:
     a, b = make("a"), make("b")
     server = a.new_server("x", lambda request: 1 / 0 if request == "bad" else request, threads=1)
     client = b.new_client("/x", timeout_s=30.0)
@@ -71,7 +71,7 @@ def test_the_graph_tells_of_services_and_not_of_those_of_rospy(make: Make) -> No
     assert not b.graph().services
 
 
-def test_a_second_server_of_a_program_is_refused_until_the_first_is_closed(make: Make) -> None:
+def test_second_server_in_one_program_is_rejected_until_the_first_closes(make: Make) -> None:
     first = make("a").new_server("/x")
     with pytest.raises(nep.NepError, match=r"program .*'/x'.*ROS"):
         make("b").new_server("/x")
@@ -80,7 +80,7 @@ def test_a_second_server_of_a_program_is_refused_until_the_first_is_closed(make:
     assert make("d").new_client("/x").call(5, timeout_s=30.0) == 5
 
 
-def test_types_that_are_not_there_are_refused(make: Make) -> None:
+def test_unknown_service_types_are_rejected(make: Make) -> None:
     with pytest.raises(nep.NepError, match=r"'std_srvs/SetBoot'.*-srvs'"):
         make("a").new_server("/x", msg_type="std_srvs/SetBoot")
     with pytest.raises(nep.NepError, match=r"ROS service.*'image'.*'std_srvs/SetBool'"):

@@ -92,7 +92,7 @@ def is_message(parts: list[bytes]) -> bool:
     return read.header.codec in {1, 3, 5} and read.topic == "bad"
 
 
-def test_a_subscriber_hears_all_that_is_good_between_what_is_not(
+def test_subscriber_receives_valid_messages_between_invalid_ones(
     context: zmq.Context[zmq.Socket[bytes]],
 ) -> None:
     rogue = Rogue(context)
@@ -130,7 +130,7 @@ def test_a_subscriber_hears_all_that_is_good_between_what_is_not(
 
 
 @pytest.mark.parametrize("in_batches", [False, True])
-def test_one_part_of_another_size_than_told_is_refused(
+def test_single_part_with_a_wrong_length_is_rejected(
     context: zmq.Context[zmq.Socket[bytes]], in_batches: bool
 ) -> None:
     rogue = Rogue(context)
@@ -179,7 +179,7 @@ def shake_hands(port: int) -> socket.socket:
     return made
 
 
-def test_a_publisher_leaves_whoever_subscribes_a_book(master: Master) -> None:
+def test_publisher_disconnects_a_subscriber_that_sends_an_oversized_subscription(master: Master) -> None:
     with nep.node("victim", master=master.address) as node:
         pub = node.new_pub("book", "bytes")
         sub = node.new_sub("book", "bytes")
@@ -198,7 +198,7 @@ def test_a_publisher_leaves_whoever_subscribes_a_book(master: Master) -> None:
         assert (pub.subscribers, sub.lost) == (1, 0)
 
 
-def test_a_publisher_serves_on_whatever_subscribers_send(
+def test_publisher_survives_invalid_subscriptions(
     context: zmq.Context[zmq.Socket[bytes]], master: Master
 ) -> None:
     with nep.node("victim", master=master.address) as node:
@@ -273,7 +273,7 @@ REQUESTS = (
 )
 
 
-def test_a_master_answers_everything_and_serves_on(
+def test_master_answers_every_request_and_keeps_serving(
     context: zmq.Context[zmq.Socket[bytes]], master: Master, caplog: pytest.LogCaptureFixture
 ) -> None:
     with nep.node("bystander", master=master.address) as node:
@@ -309,7 +309,7 @@ def test_a_master_answers_everything_and_serves_on(
 
 
 @pytest.mark.parametrize("size", [0, 1, 200, 255])
-def test_a_master_serves_nodes_with_any_id(
+def test_master_serves_nodes_with_any_routing_id(
     context: zmq.Context[zmq.Socket[bytes]], master: Master, size: int
 ) -> None:
     with context.socket(zmq.DEALER) as dealer:
@@ -354,7 +354,7 @@ ANSWERS = (
 )
 
 
-def test_a_node_stands_whatever_a_master_says(
+def test_node_survives_invalid_replies_of_a_master(
     context: zmq.Context[zmq.Socket[bytes]], caplog: pytest.LogCaptureFixture
 ) -> None:
     router = context.socket(zmq.ROUTER)

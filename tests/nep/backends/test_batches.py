@@ -92,7 +92,7 @@ def all_of(subscriber: nep.Subscriber, count: int) -> list[nep.Message]:
 # ---- what arrives
 
 
-def test_a_burst_arrives_in_order_and_each_message_is_whole(node: nep.Node) -> None:
+def test_burst_arrives_in_order_with_every_message_intact(node: nep.Node) -> None:
     sub, pub = node.new_sub("t"), node.new_pub("t")
     burst(pub, 2000)
     got = all_of(sub, 2000)
@@ -104,7 +104,7 @@ def test_a_burst_arrives_in_order_and_each_message_is_whole(node: nep.Node) -> N
     assert (sub.received, sub.lost, sub.refused, pub.count) == (2000, 0, 0, 2000)
 
 
-def test_bytes_are_counted_as_they_are(node: nep.Node) -> None:
+def test_batched_bytes_are_counted_by_payload_size(node: nep.Node) -> None:
     sub, pub = node.new_sub("t", "bytes"), node.new_pub("t", "bytes")
     for _ in range(100):
         pub.publish(b"12345")
@@ -112,7 +112,9 @@ def test_bytes_are_counted_as_they_are(node: nep.Node) -> None:
     assert pub._transport.counts().bytes == 500
 
 
-def test_those_that_read_batches_get_them(node: nep.Node, stranger: Callable[..., zmq.Socket[bytes]]) -> None:
+def test_subscribers_that_support_batches_receive_batches(
+    node: nep.Node, stranger: Callable[..., zmq.Socket[bytes]]
+) -> None:
     pub = node.new_pub("t")
     socket = stranger("t", able("t"))
 
@@ -131,7 +133,7 @@ def test_those_that_read_batches_get_them(node: nep.Node, stranger: Callable[...
 
 
 @pytest.mark.parametrize("other", ["an older nep", "a debugger"])
-def test_nobody_gets_what_he_does_not_read(
+def test_subscribers_without_batch_support_receive_single_messages(
     node: nep.Node, stranger: Callable[..., zmq.Socket[bytes]], other: str
 ) -> None:
     pub, sub = node.new_pub("t"), node.new_sub("t")
@@ -143,21 +145,23 @@ def test_nobody_gets_what_he_does_not_read(
 
 
 @pytest.mark.parametrize("how", ["latched", "not wanted"])
-def test_some_never_wait(node: nep.Node, stranger: Callable[..., zmq.Socket[bytes]], how: str) -> None:
+def test_latched_and_unbatched_publishers_send_without_delay(
+    node: nep.Node, stranger: Callable[..., zmq.Socket[bytes]], how: str
+) -> None:
     pub = node.new_pub("t", latched=how == "latched", batch=how != "not wanted")
     socket = stranger("t", able("t"))
     burst(pub, 300)
     assert {many for many, _seq in heard(socket, 300)} == {1}
 
 
-def test_the_rest_of_a_burst_needs_nobody_to_publish_on(node: nep.Node) -> None:
+def test_remaining_batch_is_flushed_without_further_publishing(node: nep.Node) -> None:
     sub, pub = node.new_sub("t"), node.new_pub("t")
     for _ in range(20):
         burst(pub, 7)
         assert [each.payload for each in all_of(sub, 7)] == list(range(7))
 
 
-def test_closing_at_once_loses_nothing(node: nep.Node, master: Master) -> None:
+def test_immediate_close_flushes_pending_messages(node: nep.Node, master: Master) -> None:
     sub = node.new_sub("t")
     with nep.node("short", master=master.address) as short:
         burst(short.new_pub("t"), 100)
@@ -172,7 +176,7 @@ def test_closing_at_once_loses_nothing(node: nep.Node, master: Master) -> None:
     assert sub.lost == 0
 
 
-def test_large_and_odd_ones_between_keep_their_place(node: nep.Node) -> None:
+def test_large_and_annotated_messages_keep_their_order_among_batches(node: nep.Node) -> None:
     sub, pub = node.new_sub("t", "bytes"), node.new_pub("t", "bytes")
     sizes = [1, 0, 16_383, 16_384, 5, 70_000, 2, 3, 0, 100_000, 9]
     for turn in range(20):
@@ -185,7 +189,7 @@ def test_large_and_odd_ones_between_keep_their_place(node: nep.Node) -> None:
     assert sub.lost == 0
 
 
-def test_a_subscriber_that_comes_within_a_burst_counts_right(node: nep.Node) -> None:
+def test_subscriber_that_joins_during_a_burst_counts_correctly(node: nep.Node) -> None:
     pub, sub = node.new_pub("t"), node.new_sub("t")
     burst(pub, 50)
     late = node.new_sub("t")
@@ -208,7 +212,7 @@ def test_a_subscriber_that_comes_within_a_burst_counts_right(node: nep.Node) -> 
     assert pub.count == 150
 
 
-def test_what_there_is_no_room_for_is_dropped_and_counted(node: nep.Node) -> None:
+def test_batched_messages_beyond_the_inbox_limit_are_dropped_and_counted(node: nep.Node) -> None:
     pub = node.new_pub("t")
     latest = node.new_sub("t", keep="latest")
     few = node.new_sub("t", max_messages=3)
@@ -224,7 +228,7 @@ def test_what_there_is_no_room_for_is_dropped_and_counted(node: nep.Node) -> Non
     assert len(few._transport.ready) <= 3
 
 
-def test_no_reader_keeps_more_of_a_batch_than_it_wants(node: nep.Node) -> None:
+def test_reader_keeps_only_max_messages_of_a_batch(node: nep.Node) -> None:
     sub = node.new_sub("t", "bytes", max_messages=2)
     sub._transport.ready.extend(
         nep.Message("t", bytes([number]), "bytes", "bytes") for number in range(5)
@@ -245,7 +249,7 @@ def waiting(batch: PendingBatch, *stamps_ns: int) -> None:
         batch.pending.append((b"x", stamp_ns))
 
 
-def test_who_may_wait() -> None:
+def test_batching_requires_permission_and_readers_that_support_it() -> None:
     batch = PendingBatch(may_wait=True)
     batch.open_window(1000)
     assert batch.until_ns == 0  # nobody has said that he reads batches
@@ -258,7 +262,7 @@ def test_who_may_wait() -> None:
     assert (never.is_allowed, never.until_ns) == (False, 0)
 
 
-def test_when_the_node_s_thread_comes_again() -> None:
+def test_next_flush_check_is_scheduled_by_the_maximum_delay() -> None:
     batch = PendingBatch(may_wait=True)
     batch.is_flush_scheduled = True
     waiting(batch, 10_000, 12_000)
@@ -274,7 +278,7 @@ def test_when_the_node_s_thread_comes_again() -> None:
     assert batch.burst_check_s == 0.0  # nothing went since
 
 
-def test_a_clock_that_is_set_back_holds_nothing_up() -> None:
+def test_clock_set_back_does_not_delay_a_flush() -> None:
     batch = PendingBatch(may_wait=True)
     waiting(batch, 10**18)
     assert batch.next_check_s(5 * 10**17) == 0.0
@@ -287,7 +291,7 @@ def test_a_clock_that_is_set_back_holds_nothing_up() -> None:
     st.lists(st.tuples(st.integers(0, 2**64 - 1), st.binary(max_size=50)), min_size=1, max_size=BATCH_MAX),
     st.integers(1, 2**63),
 )
-def test_a_batch_is_read_back(messages: list[tuple[int, bytes]], seq: int) -> None:
+def test_batch_round_trips(messages: list[tuple[int, bytes]], seq: int) -> None:
     stamps, payloads = [each[0] for each in messages], [each[1] for each in messages]
     part = batch_part(b"t\0", wire.form_of(3, 0), seq, 9, stamps, payloads)
     topic, head, body = wire.apart(part)
@@ -298,7 +302,7 @@ def test_a_batch_is_read_back(messages: list[tuple[int, bytes]], seq: int) -> No
 
 
 @given(st.binary(max_size=200))
-def test_what_is_no_batch_is_refused_with_a_reason(body: bytes) -> None:
+def test_invalid_batch_is_rejected_with_a_reason(body: bytes) -> None:
     try:
         read = entries(body)
     except WireError as error:
@@ -319,7 +323,7 @@ class _HeardWay:
     def flush_soon_locked(self) -> None: ...
 
 
-def test_an_encoded_payload_is_not_encoded_again() -> None:
+def test_encoded_payload_is_not_encoded_again() -> None:
     encoded: list[object] = []
     passed: list[object] = []
     asked = QuickPublish(

@@ -42,7 +42,7 @@ def is_bound(name: str) -> bool:
 
 
 @pytest.mark.parametrize("first", ["publisher", "subscriber"])
-def test_it_is_used_whoever_comes_first(node: nep.Node, first: str) -> None:
+def test_local_socket_is_used_regardless_of_start_order(node: nep.Node, first: str) -> None:
     if first == "publisher":
         pub = node.new_pub("t", "string")
         sub = node.new_sub("t", "string")
@@ -61,12 +61,12 @@ def test_it_is_used_whoever_comes_first(node: nep.Node, first: str) -> None:
 
 
 @pytest.mark.parametrize("msg_type", ["bytes", "image"])
-def test_what_may_be_large_goes_by_tcp(node: nep.Node, msg_type: str) -> None:
+def test_message_types_that_may_be_large_use_tcp(node: nep.Node, msg_type: str) -> None:
     with node.new_pub("t", msg_type), node.new_sub("t", msg_type) as sub:
         assert ends(sub) == [endpoint(node, "t")]
 
 
-def test_a_publisher_may_leave_it_out(node: nep.Node, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_environment_variable_disables_local_sockets(node: nep.Node, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("NEP_LOCAL", "0")
     pub = node.new_pub("t", "string")
     sub = node.new_sub("t", "string")
@@ -76,7 +76,9 @@ def test_a_publisher_may_leave_it_out(node: nep.Node, monkeypatch: pytest.Monkey
     assert sub.receive(30.0) is not None
 
 
-def test_where_a_sandbox_forbids_it_there_is_tcp(node: nep.Node, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_tcp_is_used_where_a_sandbox_forbids_local_sockets(
+    node: nep.Node, monkeypatch: pytest.MonkeyPatch
+) -> None:
     def forbidden(_self: socket.socket, _address: object) -> None:
         raise PermissionError
 
@@ -90,7 +92,9 @@ def test_where_a_sandbox_forbids_it_there_is_tcp(node: nep.Node, monkeypatch: py
     assert sub.receive(30.0) is not None
 
 
-def test_a_name_that_is_taken_is_left_alone(node: nep.Node, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_local_name_taken_by_another_program_falls_back_to_tcp(
+    node: nep.Node, monkeypatch: pytest.MonkeyPatch
+) -> None:
     with contextlib.ExitStack() as taken:
 
         def take(end: str) -> str:
@@ -110,7 +114,7 @@ def test_a_name_that_is_taken_is_left_alone(node: nep.Node, monkeypatch: pytest.
         assert sub.receive(30.0) is not None
 
 
-def test_a_loopback_endpoint_is_the_only_one_with_a_name() -> None:
+def test_only_loopback_endpoints_have_a_local_name() -> None:
     assert bindings.local_name("tcp://127.0.0.1:4711") == "ipc://@nep-4711"
     assert bindings.local_name("tcp://192.168.1.20:4711") == ""
     assert bindings.local_name("") == ""

@@ -21,7 +21,7 @@ class Held:
     done = False
 
 
-def test_what_is_under_way_is_bounded_for_any_sizes() -> None:
+def test_bytes_in_flight_are_bounded_for_any_message_sizes() -> None:
     for seed in range(20):
         chance, window, most = random.Random(seed), SendWindow(), 0
         for seq in range(1, 3000):
@@ -36,7 +36,7 @@ def test_what_is_under_way_is_bounded_for_any_sizes() -> None:
         assert window.unacked_bytes == 0
 
 
-def test_a_message_larger_than_the_window_goes_when_nearly_nothing_is_under_way() -> None:
+def test_message_larger_than_the_window_is_sent_when_little_is_in_flight() -> None:
     window = SendWindow()
     window.sent(1, ACK_STEP_BYTES)
     assert window.has_room(WINDOW_BYTES * 2)
@@ -49,7 +49,7 @@ def test_a_message_larger_than_the_window_goes_when_nearly_nothing_is_under_way(
 
 
 @pytest.mark.parametrize("bound", [0, 1, MIN_WINDOW_BYTES, 2**64 - 1])
-def test_a_subscriber_chooses_its_bound_within_limits(bound: int) -> None:
+def test_subscriber_sets_its_window_within_limits(bound: int) -> None:
     window = SendWindow()
     window.acknowledge(0, bound)
     size, count = 2**20, 0
@@ -59,7 +59,7 @@ def test_a_subscriber_chooses_its_bound_within_limits(bound: int) -> None:
     assert count * size == max(MIN_WINDOW_BYTES, min(bound, WINDOW_BYTES))
 
 
-def test_many_small_messages_need_few_entries() -> None:
+def test_many_small_messages_need_few_window_entries() -> None:
     window = SendWindow()
     for seq in range(1, 200_000):
         window.sent(seq, 1000)
@@ -68,7 +68,7 @@ def test_many_small_messages_need_few_entries() -> None:
     assert window.unacked_bytes == 0
 
 
-def test_it_is_asked_for_each_step_and_again_while_it_has_no_room() -> None:
+def test_acknowledgement_is_requested_per_step_and_again_while_the_window_is_full() -> None:
     window = SendWindow()
     window.sent(1, ACK_STEP_BYTES - 1)
     assert not window.should_request_ack(0.0, has_room=True)
@@ -80,7 +80,7 @@ def test_it_is_asked_for_each_step_and_again_while_it_has_no_room() -> None:
     assert not window.should_request_ack(0.7, has_room=False)
 
 
-def test_who_missed_something_is_told_once_when_there_is_room_again() -> None:
+def test_drop_is_notified_once_when_there_is_room_again() -> None:
     window = SendWindow()
     window.sent(1, WINDOW_BYTES)
     assert not window.should_notify()
@@ -91,7 +91,7 @@ def test_who_missed_something_is_told_once_when_there_is_room_again() -> None:
     assert not window.should_notify()
 
 
-def test_what_cannot_be_asked_is_counted_until_it_is_let_go_of_in_order() -> None:
+def test_backlog_of_unacknowledging_peers_is_counted_until_released_in_order() -> None:
     backlog, first, second = Backlog(), Held(), Held()
     backlog.sent(first, 100 * 2**20)
     backlog.sent(second, 92 * 2**20)

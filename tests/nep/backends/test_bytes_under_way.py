@@ -82,7 +82,7 @@ def is_all_counted(program: Program, count: int) -> bool:
     return sum(told(program)) == count
 
 
-def test_a_stopped_subscriber_costs_its_publisher_no_more_and_counts_what_it_missed(
+def test_stopped_subscriber_does_not_grow_publisher_memory_and_counts_its_losses(
     publisher: nep.Publisher, master: Master
 ) -> None:
     with running(SUBSCRIBER, master.address, "idle") as stopped:
@@ -95,7 +95,7 @@ def test_a_stopped_subscriber_costs_its_publisher_no_more_and_counts_what_it_mis
         eventually(lambda: is_all_counted(stopped, 1080))
 
 
-def test_a_busy_sink_costs_its_own_program_no_more(publisher: nep.Publisher, master: Master) -> None:
+def test_busy_sink_does_not_grow_the_memory_of_its_program(publisher: nep.Publisher, master: Master) -> None:
     with running(SUBSCRIBER, master.address, "busy") as busy:
         subscribed(busy)
         before = rss(busy.process.pid)
@@ -116,7 +116,7 @@ def test_a_busy_sink_costs_its_own_program_no_more(publisher: nep.Publisher, mas
         assert rss(busy.process.pid) - before < MOST
 
 
-def test_one_that_is_stopped_takes_nothing_from_the_others(publisher: nep.Publisher, master: Master) -> None:
+def test_stopped_subscriber_does_not_affect_others(publisher: nep.Publisher, master: Master) -> None:
     with (
         running(SUBSCRIBER, master.address, "idle") as stopped,
         running(SUBSCRIBER, master.address, "quick") as quick,
@@ -137,7 +137,7 @@ def test_one_that_is_stopped_takes_nothing_from_the_others(publisher: nep.Publis
             eventually(lambda each=each: is_all_counted(each, 81))  # type: ignore[misc]
 
 
-def test_a_burst_of_thirty_pictures_is_not_lost_even_if_its_reader_is_late(
+def test_burst_of_thirty_pictures_is_not_lost_with_a_late_reader(
     publisher: nep.Publisher, master: Master
 ) -> None:
     with running(SUBSCRIBER, master.address, "idle") as late:
@@ -152,7 +152,7 @@ def test_a_burst_of_thirty_pictures_is_not_lost_even_if_its_reader_is_late(
         assert late.line() == "31 0"
 
 
-def test_who_says_no_hello_and_reads_nothing_takes_nothing_from_those_who_do(
+def test_subscriber_without_hello_that_reads_nothing_does_not_affect_others(
     node: nep.Node, publisher: nep.Publisher, master: Master
 ) -> None:
     """It could be asked nothing: what libzmq holds for it is counted."""

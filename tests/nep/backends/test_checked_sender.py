@@ -35,7 +35,7 @@ def forge(own: nep.Publisher, named: int, seq: int, payload: object, *, in_parts
 
 @pytest.mark.parametrize("in_parts", [False, True])
 @pytest.mark.parametrize("batch", [False, True])
-def test_a_forged_answer_is_dropped_and_the_publishers_own_arrive(
+def test_forged_answer_is_dropped_and_those_of_the_publisher_arrive(
     master: Master, *, in_parts: bool, batch: bool
 ) -> None:
     heard: list[object] = []
@@ -63,7 +63,7 @@ def test_a_forged_answer_is_dropped_and_the_publishers_own_arrive(
         assert subscriber.refused == 1
 
 
-def test_a_late_subscriber_receives_what_is_latched(master: Master) -> None:
+def test_late_subscriber_receives_the_latched_message(master: Master) -> None:
     heard: list[object] = []
     with (
         nep.node("Pepper", master=master.address) as pepper,

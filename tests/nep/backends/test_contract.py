@@ -54,7 +54,7 @@ def seq(number: int) -> int | None:
     return None if _has_ros2 else number
 
 
-def test_a_message_arrives_with_all_that_is_known_of_it(make: Make) -> None:
+def test_message_arrives_with_all_its_metadata(make: Make) -> None:
     sub = make("b").new_sub("topic", "json")
     pub = make("a").new_pub("topic", "json")
     pub.publish({"message": "hello"})
@@ -67,7 +67,7 @@ def test_a_message_arrives_with_all_that_is_known_of_it(make: Make) -> None:
     assert message.size_bytes == len(b'{"message":"hello"}')
 
 
-def test_the_paper_s_listing_polls(make: Make) -> None:
+def test_polling_listing_of_the_paper_works(make: Make) -> None:
     sub = make("b").new_sub("example", "json")
     pub = make("a").new_pub("example", "json")
     assert sub.listen() == (False, {})
@@ -80,14 +80,14 @@ def test_the_paper_s_listing_polls(make: Make) -> None:
     ("msg_type", "payload"),
     [("json", [1, {"a": None}]), ("string", "grüß"), ("bytes", b"\0\xff"), ("msgpack", {"b": b"x", "1": 2})],
 )
-def test_every_type_arrives_as_it_was(make: Make, msg_type: str, payload: object) -> None:
+def test_every_type_round_trips(make: Make, msg_type: str, payload: object) -> None:
     sub = make("b").new_sub("topic", msg_type)
     make("a").new_pub("topic", msg_type).publish(payload)
     assert sub.listen(timeout_s=30.0) == (True, payload)
 
 
 @pytest.mark.parametrize("topic", _topics)
-def test_a_topic_that_begins_alike_is_another(make: Make, topic: str) -> None:
+def test_topic_with_a_common_prefix_is_another_topic(make: Make, topic: str) -> None:
     sub, node = make("b").new_sub(topic), make("a")
     node.new_pub(topic + "2").publish(1)
     node.new_pub(topic).publish(2)
@@ -95,7 +95,7 @@ def test_a_topic_that_begins_alike_is_another(make: Make, topic: str) -> None:
     assert sub.listen() == (False, {})
 
 
-def test_order_is_kept_and_nothing_is_lost(make: Make) -> None:
+def test_messages_arrive_in_order_without_loss(make: Make) -> None:
     sub = make("b").new_sub("topic")
     pub = make("a").new_pub("topic")
     for n in range(5000):
@@ -104,7 +104,7 @@ def test_order_is_kept_and_nothing_is_lost(make: Make) -> None:
     assert (sub.received, sub.lost) == (5000, 0)
 
 
-def test_many_to_many(make: Make) -> None:
+def test_every_subscriber_receives_from_every_publisher(make: Make) -> None:
     subs = [make(f"s{n}").new_sub("topic") for n in range(3)]
     pubs = [make(f"p{n}").new_pub("topic") for n in range(3)]
     for n, pub in enumerate(pubs):
@@ -122,7 +122,7 @@ def test_the_next_message_reaches_a_new_subscriber(make: Make) -> None:
     assert sorted(sub.listen(timeout_s=30.0)[1] for _ in pubs) == [0, 1, 2]  # type: ignore[type-var]
 
 
-def test_a_late_subscriber_gets_what_is_latched_once(make: Make) -> None:
+def test_late_subscriber_receives_the_latched_message_once(make: Make) -> None:
     pub = make("a").new_pub("/robot/description", "robot/description", latched=True)
     early = make("early").new_sub("/robot/description", "robot/description")
     pub.publish({"v": 1})
@@ -137,7 +137,7 @@ def test_a_late_subscriber_gets_what_is_latched_once(make: Make) -> None:
     assert (early.lost, late.lost) == (0, 0)
 
 
-def test_what_cannot_be_sent_is_the_same_with_and_without_a_listener(
+def test_payload_that_cannot_be_encoded_is_rejected_with_and_without_a_subscriber(
     make: Make, caplog: pytest.LogCaptureFixture
 ) -> None:
     node = make("a")
@@ -160,7 +160,7 @@ def test_what_cannot_be_sent_is_the_same_with_and_without_a_listener(
     eventually(lambda: not node.graph().alerts)
 
 
-def test_whoever_begins_to_listen_ends_no_publisher(make: Make) -> None:
+def test_new_subscriber_does_not_make_an_invalid_payload_raise(make: Make) -> None:
     pub = make("a").new_pub("topic")
     bad = {"joints": {1, 2}}
     pub.publish(bad)
@@ -170,7 +170,7 @@ def test_whoever_begins_to_listen_ends_no_publisher(make: Make) -> None:
     assert sub.listen(timeout_s=2.0) == (True, 1)
 
 
-def test_what_is_latched_and_cannot_be_sent_leaves_what_was_latched_before(make: Make) -> None:
+def test_rejected_payload_does_not_replace_the_latched_message(make: Make) -> None:
     pub = make("a").new_pub("topic", latched=True)
     pub.publish("good")
     pub.publish(object())
@@ -192,7 +192,7 @@ def test_what_is_latched_and_cannot_be_sent_leaves_what_was_latched_before(make:
         ("json", nep.Encoded(b"1", [1]), "cannot encode a 'list' as 'json'; an extension must be a map"),  # type: ignore[arg-type]
     ],
 )
-def test_a_payload_of_a_wrong_type_is_an_error_heard_or_unheard(
+def test_payload_of_a_wrong_type_raises_with_and_without_a_subscriber(
     make: Make, msg_type: str, payload: object, sentence: str, is_heard: bool, latched: bool
 ) -> None:
     pub = make("a").new_pub("topic", msg_type, latched=latched)
@@ -230,7 +230,7 @@ class Treacherous:
         ("bytes", nep.Encoded(b"1", {"a": object()})),
     ],
 )
-def test_whatever_is_inside_ends_no_program(
+def test_payload_with_invalid_content_is_counted_and_does_not_raise(
     make: Make, msg_type: str, payload: object, is_heard: bool
 ) -> None:
     pub = make("a").new_pub("topic", msg_type)
@@ -241,7 +241,7 @@ def test_whatever_is_inside_ends_no_program(
 
 
 @pytest.mark.parametrize("is_heard", [False, True])
-def test_strict_raises_whatever_cannot_be_sent_heard_or_unheard(make: Make, is_heard: bool) -> None:
+def test_strict_publisher_raises_with_and_without_a_subscriber(make: Make, is_heard: bool) -> None:
     pub = make("a").new_pub("topic")
     sub = make("b").new_sub("topic") if is_heard else None
     for payload, sentence in (
@@ -266,7 +266,7 @@ def test_strict_raises_whatever_cannot_be_sent_heard_or_unheard(make: Make, is_h
         pub.publish(1, strict=True)
 
 
-def test_keep_latest(make: Make) -> None:
+def test_keep_latest_delivers_only_the_newest_message(make: Make) -> None:
     sub = make("b").new_sub("topic", keep="latest")
     other = make("c").new_sub("topic")
     pub = make("a").new_pub("topic")
@@ -282,7 +282,7 @@ def test_keep_latest(make: Make) -> None:
     assert sub.lost == 0
 
 
-def test_a_full_inbox_drops_the_oldest_and_counts(make: Make) -> None:
+def test_full_inbox_drops_the_oldest_and_counts(make: Make) -> None:
     sub = make("b").new_sub("topic", max_messages=10)
     pub = make("a").new_pub("topic")
     other = make("c").new_sub("topic")
@@ -298,7 +298,7 @@ def test_a_full_inbox_drops_the_oldest_and_counts(make: Make) -> None:
     assert (sub.received, sub.lost) == (10, 90)
 
 
-def test_callbacks_run_in_the_thread_that_spins(make: Make) -> None:
+def test_callbacks_run_in_the_spinning_thread(make: Make) -> None:
     node, pub = make("b"), make("a").new_pub("example")
     got: list[tuple[object, str]] = []
 
@@ -316,7 +316,7 @@ def test_callbacks_run_in_the_thread_that_spins(make: Make) -> None:
     assert got == [({"n": n}, threading.current_thread().name) for n in range(3)]
 
 
-def test_a_slow_callback_that_keeps_the_latest_is_never_behind(make: Make) -> None:
+def test_slow_callback_with_keep_latest_skips_to_the_newest_message(make: Make) -> None:
     node, pub = make("b"), make("a").new_pub("example")
     got: list[object] = []
 
@@ -338,7 +338,7 @@ def test_a_slow_callback_that_keeps_the_latest_is_never_behind(make: Make) -> No
     assert sub.lost == 0
 
 
-def test_a_callback_s_full_inbox_drops_the_oldest_and_counts(make: Make) -> None:
+def test_full_callback_inbox_drops_the_oldest_and_counts(make: Make) -> None:
     node, pub = make("b"), make("a").new_pub("topic")
     got: list[object] = []
 
@@ -356,7 +356,7 @@ def test_a_callback_s_full_inbox_drops_the_oldest_and_counts(make: Make) -> None
     assert (sub.received, sub.lost) == (10, 90)
 
 
-def test_a_callback_gets_the_whole_message_when_it_wants_it(
+def test_callback_with_message_receives_the_whole_message(
     make: Make, caplog: pytest.LogCaptureFixture
 ) -> None:
     node, pub = make("b"), make("a").new_pub("example")
@@ -377,7 +377,7 @@ def test_a_callback_gets_the_whole_message_when_it_wants_it(
     assert "a message on 'example' cannot be read (1 so far): cannot decode 8 bytes" in caplog.text
 
 
-def test_timers_run_in_the_thread_that_spins_and_beside_callbacks(make: Make) -> None:
+def test_timers_run_in_the_spinning_thread_between_callbacks(make: Make) -> None:
     node, pub = make("b"), make("a").new_pub("example")
     threads: set[int] = set()
     fired: list[int] = []
@@ -403,7 +403,7 @@ def test_timers_run_in_the_thread_that_spins_and_beside_callbacks(make: Make) ->
     assert (len(fired), timer.is_cancelled) == (count, True)
 
 
-def test_a_timer_that_is_made_while_a_node_spins_runs(make: Make) -> None:
+def test_timer_created_during_a_spin_runs(make: Make) -> None:
     node = make("b")
     spinning = threading.Event()
     node.new_timer(0.001, spinning.set)
@@ -415,7 +415,7 @@ def test_a_timer_that_is_made_while_a_node_spins_runs(make: Make) -> None:
     assert not thread.is_alive()
 
 
-def test_a_timer_may_close_its_node(make: Make) -> None:
+def test_timer_can_close_its_node(make: Make) -> None:
     node = make("b")
     timer = node.new_timer(0.001, node.close)
     node.spin()
@@ -424,7 +424,7 @@ def test_a_timer_may_close_its_node(make: Make) -> None:
         node.new_timer(1.0, print)
 
 
-def test_what_a_callback_raises_comes_out_of_spin(make: Make) -> None:
+def test_exception_in_a_callback_propagates_from_spin(make: Make) -> None:
     node, pub = make("b"), make("a").new_pub("example")
 
     def callback(_message: object) -> None:
@@ -436,7 +436,7 @@ def test_what_a_callback_raises_comes_out_of_spin(make: Make) -> None:
         node.spin(5.0)
 
 
-def test_spin_ends_after_its_time_and_when_told(make: Make) -> None:
+def test_spin_ends_at_its_timeout_and_on_stop_spin(make: Make) -> None:
     node = make("b")
     node.new_callback("example", "json", lambda _: None)
     node.spin(0.05)
@@ -447,7 +447,7 @@ def test_spin_ends_after_its_time_and_when_told(make: Make) -> None:
     assert not thread.is_alive()
 
 
-def test_a_sink_gets_batches_in_a_thread_of_the_node(make: Make) -> None:
+def test_sink_receives_batches_in_a_thread_of_the_node(make: Make) -> None:
     batches: list[list[object]] = []
     done = threading.Event()
     names: set[str] = set()
@@ -469,7 +469,7 @@ def test_a_sink_gets_batches_in_a_thread_of_the_node(make: Make) -> None:
 
 
 @pytest.mark.parametrize("error", [ZeroDivisionError, SystemExit])
-def test_a_sink_that_fails_gets_the_next_batch(
+def test_sink_that_raises_receives_the_next_batch(
     make: Make, caplog: pytest.LogCaptureFixture, error: type[BaseException]
 ) -> None:
     got = threading.Semaphore(0)
@@ -486,7 +486,7 @@ def test_a_sink_that_fails_gets_the_next_batch(
     eventually(lambda: caplog.text.count("the sink of 'topic' failed") == 2)
 
 
-def test_bad_bytes_are_skipped_by_listen_and_become_an_alert(make: Make) -> None:
+def test_undecodable_messages_are_skipped_by_listen_and_raise_an_alert(make: Make) -> None:
     sub, node = make("b").new_sub("topic"), make("a")
     pub = node.new_pub("topic")
     pub.publish_bytes(b"{no json")
@@ -500,7 +500,7 @@ def test_bad_bytes_are_skipped_by_listen_and_become_an_alert(make: Make) -> None
     assert sub.listen(timeout_s=0.1) == (False, {})
 
 
-def test_closing(make: Make) -> None:
+def test_close_is_idempotent_and_later_use_raises_closed_error(make: Make) -> None:
     node = make("b")
     sub, pub = node.new_sub("topic"), make("a").new_pub("topic")
     sub.close()
@@ -517,7 +517,7 @@ def test_closing(make: Make) -> None:
         node.new_sub("topic")
 
 
-def test_closing_discards_unread_messages(make: Make) -> None:
+def test_close_discards_unread_messages(make: Make) -> None:
     sub, pub = make("b").new_sub("unread", "json"), make("a").new_pub("unread", "json")
     for n in range(3):
         pub.publish(n)
@@ -532,7 +532,7 @@ def test_closing_discards_unread_messages(make: Make) -> None:
     ] == []
 
 
-def test_a_reader_in_another_thread_is_released_by_closing(make: Make) -> None:
+def test_close_wakes_a_reader_in_another_thread(make: Make) -> None:
     node = make("b")
     sub = node.new_sub("topic")
     ended: list[str] = []
@@ -584,7 +584,7 @@ def test_opening_while_another_thread_closes_the_node_raises_closed_error(make: 
     eventually(lambda: "closing" not in names(other.graph()), 5.0)
 
 
-def test_the_graph_knows_everybody(make: Make) -> None:
+def test_graph_lists_nodes_topics_publishers_and_subscribers(make: Make) -> None:
     node, other = make("a"), make("b")
     pub = node.new_pub("topic", "robot/description", latched=True)
     sub = other.new_sub("topic", "robot/description")
@@ -600,7 +600,7 @@ def test_the_graph_knows_everybody(make: Make) -> None:
     assert names(node.graph()) == {"a"}
 
 
-def test_two_types_on_a_topic_and_two_nodes_of_a_name_are_alerts(make: Make) -> None:
+def test_conflicting_types_and_duplicate_node_names_are_alerts(make: Make) -> None:
     first, second = make("twin"), make("twin")
     first.new_pub("topic", "json")
     second.new_pub("topic", "string")
@@ -611,7 +611,7 @@ def test_two_types_on_a_topic_and_two_nodes_of_a_name_are_alerts(make: Make) -> 
     assert first.graph().alerts == ()
 
 
-def test_publishing_from_many_threads(make: Make) -> None:
+def test_concurrent_publishing_from_many_threads_loses_nothing(make: Make) -> None:
     sub = make("b").new_sub("topic")
     pub = make("a").new_pub("topic")
 
@@ -629,7 +629,7 @@ def test_publishing_from_many_threads(make: Make) -> None:
     assert sub.lost == 0
 
 
-def test_what_can_still_be_changed_is_copied(make: Make) -> None:
+def test_mutable_payloads_are_copied_on_publish(make: Make) -> None:
     sub, pub = make("b").new_sub("topic", "bytes"), make("a").new_pub("topic", "bytes")
     data = bytearray(100_000)
     pub.publish(data)

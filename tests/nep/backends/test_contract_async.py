@@ -47,7 +47,7 @@ def waiting_threads() -> int:
     return sum(each.name == "nep-async" for each in threading.enumerate())
 
 
-def test_messages_come_in_order_and_none_is_lost(make: Make) -> None:
+def test_messages_arrive_in_order_without_loss(make: Make) -> None:
     sub = make("b").new_sub("topic")
     pub = make("a").new_pub("topic")
 
@@ -97,7 +97,7 @@ def test_many_subscribers_of_a_loop_share_one_thread(make: Make) -> None:
     assert max(seen) <= 1
 
 
-def test_a_time_limit_and_none(make: Make) -> None:
+def test_async_receive_with_and_without_timeout(make: Make) -> None:
     sub = make("b").new_sub("topic")
     pub = make("a").new_pub("topic")
 
@@ -114,7 +114,7 @@ def test_a_time_limit_and_none(make: Make) -> None:
     run(main())
 
 
-def test_whoever_is_cancelled_has_taken_no_message(make: Make) -> None:
+def test_cancelled_receive_consumes_no_message(make: Make) -> None:
     sub = make("b").new_sub("topic")
     pub = make("a").new_pub("topic")
 
@@ -155,7 +155,7 @@ def test_two_coroutines_share_a_subscriber(make: Make) -> None:
 
 
 @pytest.mark.parametrize("what", ["subscriber", "node"])
-def test_closing_ends_who_waits(make: Make, what: str) -> None:
+def test_close_wakes_waiting_coroutines(make: Make, what: str) -> None:
     node = make("b")
     sub = node.new_sub("topic")
     closed = sub if what == "subscriber" else node
@@ -178,7 +178,7 @@ def test_closing_ends_who_waits(make: Make, what: str) -> None:
     run(main())
 
 
-def test_closing_in_the_loop_while_another_coroutine_waits(make: Make) -> None:
+def test_close_in_the_loop_wakes_a_waiting_coroutine(make: Make) -> None:
     node = make("b")
     sub = node.new_sub("topic")
 
@@ -192,7 +192,7 @@ def test_closing_in_the_loop_while_another_coroutine_waits(make: Make) -> None:
     run(main())
 
 
-def test_a_flood_leaves_other_coroutines_their_turn(make: Make) -> None:
+def test_message_flood_does_not_starve_other_coroutines(make: Make) -> None:
     sub = make("b").new_sub("topic")
     pub = make("a").new_pub("topic")
     turns: list[int] = []
@@ -242,7 +242,7 @@ def test_spin_runs_functions_and_coroutine_functions_one_at_a_time(make: Make) -
     assert [each[1] for each in events[::2] if isinstance(each[1], str)] == [f"quick {n}" for n in range(5)]  # type: ignore[index]
 
 
-def test_timers_and_other_coroutines_run_beside_a_spin(make: Make) -> None:
+def test_timers_and_other_coroutines_run_during_an_async_spin(make: Make) -> None:
     node = make("b")
     sub = make("c").new_sub("tick")
     pub = node.new_pub("tick")
@@ -270,7 +270,7 @@ def test_timers_and_other_coroutines_run_beside_a_spin(make: Make) -> None:
     assert len(fired) >= 3
 
 
-def test_what_others_order_reaches_a_spin_that_waits(make: Make) -> None:
+def test_callbacks_added_and_stop_requested_from_other_threads_wake_an_async_spin(make: Make) -> None:
     node, other = make("b"), make("a")
     got: list[object] = []
 
@@ -297,7 +297,7 @@ def test_what_others_order_reaches_a_spin_that_waits(make: Make) -> None:
 
 
 @pytest.mark.parametrize("backend", ["memory", "zeromq"])
-def test_a_spin_in_a_loop_answers_calls(master: Master, backend: str) -> None:
+def test_async_spin_answers_service_calls(master: Master, backend: str) -> None:
     with nep.node("server", backend) as node, nep.node("client", backend) as other:
         client = other.new_client("double", timeout_s=30.0)
 
@@ -314,7 +314,7 @@ def test_a_spin_in_a_loop_answers_calls(master: Master, backend: str) -> None:
 
 
 @pytest.mark.parametrize("is_coroutine", [False, True])
-def test_what_a_callback_raises_comes_out_of_the_spin(make: Make, is_coroutine: bool) -> None:
+def test_exception_in_a_callback_propagates_from_async_spin(make: Make, is_coroutine: bool) -> None:
     node, pub = make("b"), make("a").new_pub("example")
 
     def fail(_payload: object) -> None:
@@ -335,7 +335,7 @@ def test_what_a_callback_raises_comes_out_of_the_spin(make: Make, is_coroutine: 
     run(main())
 
 
-def test_a_spin_that_is_cancelled_leaves_nothing(make: Make) -> None:
+def test_cancelled_async_spin_releases_everything(make: Make) -> None:
     node, pub = make("b"), make("a").new_pub("example")
 
     async def main() -> None:
@@ -354,7 +354,7 @@ def test_a_spin_that_is_cancelled_leaves_nothing(make: Make) -> None:
     assert node._work._watchers == ()
 
 
-def test_messages_are_counted_not_threads(make: Make, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_loop_is_woken_once_per_batch_of_messages(make: Make, monkeypatch: pytest.MonkeyPatch) -> None:
     """A message that comes alone rings once; those of a burst are read without it."""
     sub = make("b").new_sub("topic")
     pub = make("a").new_pub("topic")
@@ -385,7 +385,7 @@ def test_messages_are_counted_not_threads(make: Make, monkeypatch: pytest.Monkey
     run(main())
 
 
-def test_a_loop_that_is_closed_without_farewell_ends_the_thread(make: Make) -> None:
+def test_closed_event_loop_ends_the_waiting_thread(make: Make) -> None:
     sub = make("b").new_sub("topic")
     loop = asyncio.new_event_loop()
     task = loop.create_task(sub.receive_async(0.01))
@@ -398,7 +398,7 @@ def test_a_loop_that_is_closed_without_farewell_ends_the_thread(make: Make) -> N
     assert run(sub.receive_async(0.01)) is None, "and another loop begins anew"
 
 
-def test_two_loops_in_two_threads(make: Make) -> None:
+def test_two_loops_in_two_threads_share_a_subscriber(make: Make) -> None:
     sub = make("b").new_sub("topic")
     pub = make("a").new_pub("topic")
     got: list[list[object]] = [[], []]
@@ -425,7 +425,7 @@ def test_two_loops_in_two_threads(make: Make) -> None:
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="Windows does not fork")
-def test_a_coroutine_may_fork(master: Master) -> None:
+def test_coroutine_can_fork(master: Master) -> None:
     code = """
     import asyncio, os, sys, nep
     node = nep.node("a")
@@ -454,7 +454,7 @@ def test_a_coroutine_may_fork(master: Master) -> None:
         assert program.end()[1] == ""
 
 
-def test_a_publisher_that_is_killed_leaves_a_loop_that_waits(master: Master) -> None:
+def test_killed_publisher_does_not_disturb_a_waiting_loop(master: Master) -> None:
     with nep.node("b") as node:
         sub = node.new_sub("t")
         code = "import nep\nnep.node('a').new_pub('t').publish(1)\nprint('there')\ninput()"

@@ -41,7 +41,7 @@ def make(master: Master) -> Iterator[Nodes]:
 
 
 @pytest.mark.parametrize("backend", BACKENDS)
-def test_nodes_of_one_back_end_are_spun_in_one_thread(make: Nodes, backend: str) -> None:
+def test_nodes_of_one_back_end_spin_in_one_thread(make: Nodes, backend: str) -> None:
     nodes = [make(f"n{n}", backend) for n in range(3)]
     out = make("out", backend)
     got: list[tuple[int, object]] = []
@@ -66,7 +66,7 @@ def test_nodes_of_one_back_end_are_spun_in_one_thread(make: Nodes, backend: str)
         assert [payload for each, payload in got if each == n] == list(range(100))
 
 
-def test_nodes_of_all_back_ends_answer_each_other_in_one_thread(make: Nodes) -> None:
+def test_nodes_of_all_back_ends_exchange_messages_in_one_thread(make: Nodes) -> None:
     """A message goes from back end to back end, a hundred times around: each hop is a wait that was woken."""
     nodes = [make(f"n{n}", backend) for n, backend in enumerate(BACKENDS)]
     subs = []
@@ -88,7 +88,7 @@ def test_nodes_of_all_back_ends_answer_each_other_in_one_thread(make: Nodes) -> 
     assert hops == [n % 4 for n in range(401)]
 
 
-def test_it_waits_and_does_not_look_again_and_again(make: Nodes, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_spin_blocks_without_busy_waiting(make: Nodes, monkeypatch: pytest.MonkeyPatch) -> None:
     waits: list[float] = []
     real = shared_wait.SharedWait.wait
 
@@ -107,7 +107,7 @@ def test_it_waits_and_does_not_look_again_and_again(make: Nodes, monkeypatch: py
 
 
 @pytest.mark.parametrize("backend", BACKENDS)
-def test_a_node_that_is_stopped_leaves_and_the_others_go_on(make: Nodes, backend: str) -> None:
+def test_stopped_node_leaves_the_spin_and_the_others_continue(make: Nodes, backend: str) -> None:
     first, second = make("first", backend), make("second", "memory" if backend != "memory" else "zeromq")
     ran: list[str] = []
 
@@ -131,7 +131,9 @@ def test_a_node_that_is_stopped_leaves_and_the_others_go_on(make: Nodes, backend
     assert ran == ["first"]
 
 
-def test_servers_answer_calls_too(make: Nodes, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_servers_answer_calls_during_a_spin_of_several_nodes(
+    make: Nodes, monkeypatch: pytest.MonkeyPatch
+) -> None:
     """A wait without a wake takes an hour."""
     monkeypatch.setattr("nep.nodes.executor.SLICE_S", 3600.0)
     nodes = [make("a", "zeromq"), make("b", "memory")]
@@ -149,7 +151,7 @@ def test_servers_answer_calls_too(make: Nodes, monkeypatch: pytest.MonkeyPatch) 
 
 
 @pytest.mark.parametrize("how", ["stop_spin", "close"])
-def test_it_ends_when_all_are_stopped_or_closed_by_others(make: Nodes, how: str) -> None:
+def test_spin_ends_when_all_nodes_are_stopped_or_closed_by_other_threads(make: Nodes, how: str) -> None:
     nodes = [make(f"n{n}", backend) for n, backend in enumerate(BACKENDS)]
     spinning = threading.Event()
     for node in nodes:
@@ -165,7 +167,7 @@ def test_it_ends_when_all_are_stopped_or_closed_by_others(make: Nodes, how: str)
     assert not thread.is_alive()
 
 
-def test_what_others_make_meanwhile_runs_too(make: Nodes) -> None:
+def test_timers_and_callbacks_added_by_other_threads_run(make: Nodes) -> None:
     first, second = make("first", "zeromq"), make("second", "memory")
     spinning, got = threading.Event(), threading.Event()
     timer = first.new_timer(0.001, spinning.set)
@@ -181,7 +183,7 @@ def test_what_others_make_meanwhile_runs_too(make: Nodes) -> None:
     assert not thread.is_alive()
 
 
-def test_what_a_callback_raises_comes_out_and_nothing_else_is_lost(make: Nodes) -> None:
+def test_exception_in_a_callback_propagates_and_loses_no_other_message(make: Nodes) -> None:
     nodes = [make("a", "zeromq"), make("b", "memory")]
     got: list[object] = []
 
@@ -206,7 +208,7 @@ def test_what_a_callback_raises_comes_out_and_nothing_else_is_lost(make: Nodes) 
     assert sorted(map(str, got)) == ["bad", "good", "good", "last"]
 
 
-def test_a_callback_may_close_its_node_and_spin_another(make: Nodes) -> None:
+def test_callback_can_close_its_node_and_spin_another(make: Nodes) -> None:
     first, second = make("first", "zeromq"), make("second", "zenoh")
     ran: list[str] = []
 
@@ -229,7 +231,7 @@ def test_a_callback_may_close_its_node_and_spin_another(make: Nodes) -> None:
     nep.spin(first, second, timeout_s=0.01)
 
 
-def test_what_is_no_node_is_refused(make: Nodes) -> None:
+def test_spin_rejects_invalid_nodes_and_timeouts(make: Nodes) -> None:
     node = make("a", "memory")
     for wrong in ((), (None,), (node, "b")):
         with pytest.raises(ValueError, match=r"spin .*one or more nodes"):
@@ -242,7 +244,7 @@ def test_what_is_no_node_is_refused(make: Nodes) -> None:
     nep.spin(node, node)
 
 
-def test_a_callback_of_a_loop_is_refused_before_its_message_is_lost(make: Nodes) -> None:
+def test_coroutine_callback_is_rejected_by_spin_before_its_message_is_lost(make: Nodes) -> None:
     node = make("a", "memory")
     got: list[object] = []
 
@@ -264,7 +266,7 @@ def test_a_callback_of_a_loop_is_refused_before_its_message_is_lost(make: Nodes)
     node.spin(0.0)
 
 
-def test_one_that_cannot_be_polled_is_looked_at(make: Nodes) -> None:
+def test_back_end_without_poll_support_is_checked_periodically(make: Nodes) -> None:
     """Also a back end of somebody else, that is older than `enter_wait`."""
 
     class Older:
@@ -280,7 +282,7 @@ def test_one_that_cannot_be_polled_is_looked_at(make: Nodes) -> None:
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="Windows does not fork")
-def test_a_callback_may_fork(master: Master) -> None:
+def test_callback_can_fork(master: Master) -> None:
     code = """
     import os, sys, nep
     nodes = [nep.node("a"), nep.node("b", "memory")]
@@ -306,7 +308,7 @@ def test_a_callback_may_fork(master: Master) -> None:
         assert program.end()[1] == ""
 
 
-def test_two_threads_may_spin_the_same_nodes(make: Nodes) -> None:
+def test_two_threads_can_spin_the_same_nodes(make: Nodes) -> None:
     nodes = [make("a", "zeromq"), make("b", "memory")]
     got: list[object] = []
     lock = threading.Lock()
@@ -331,7 +333,9 @@ def test_two_threads_may_spin_the_same_nodes(make: Nodes) -> None:
     assert sorted(got) == list(range(500))  # type: ignore[type-var]
 
 
-def test_without_room_for_one_more_file_it_says_so(make: Nodes, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_spin_without_free_file_descriptors_raises_too_many_files_error(
+    make: Nodes, monkeypatch: pytest.MonkeyPatch
+) -> None:
     nodes = [make("a", "zeromq"), make("b", "memory")]
 
     def no_room() -> None:
@@ -356,7 +360,7 @@ def test_without_room_for_one_more_file_it_says_so(make: Nodes, monkeypatch: pyt
         loop.close()
 
 
-def test_a_descriptor_that_cannot_be_polled_is_looked_at(
+def test_descriptor_that_cannot_be_polled_is_checked_periodically(
     make: Nodes, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     sub = make("a", "zeromq").new_sub("t")

@@ -30,7 +30,7 @@ def read(sub: nep.Subscriber, most: int) -> list[object]:
 
 
 @pytest.mark.parametrize("published", [0, 1, 3, 4, 10])
-def test_a_late_subscriber_gets_the_last_ones_in_order_then_what_follows(make: Make, published: int) -> None:
+def test_late_subscriber_receives_history_in_order_then_live_messages(make: Make, published: int) -> None:
     pub = make("a").new_pub("topic", history=3)
     early = make("early").new_sub("topic")
     for n in range(published):
@@ -45,7 +45,7 @@ def test_a_late_subscriber_gets_the_last_ones_in_order_then_what_follows(make: M
     assert read(late_again, min(3, published + 1)) == [*range(published), "live"][-3:]
 
 
-def test_what_is_published_before_anybody_subscribes_is_kept(make: Make) -> None:
+def test_messages_published_before_any_subscription_are_in_the_history(make: Make) -> None:
     pub = make("a").new_pub("topic", history=100)
     for n in range(250):
         pub.publish(n)
@@ -72,7 +72,7 @@ def test_latched_is_a_history_of_one(make: Make) -> None:
     assert all(topics[pub.topic].publishers[0].latched for pub in pubs)
 
 
-def test_none_twice_none_missing_while_it_is_published_all_the_time(make: Make) -> None:
+def test_history_has_no_duplicates_or_gaps_during_continuous_publishing(make: Make) -> None:
     """Subscribers come in the middle of a stream: what each gets begins `history` before, without a gap."""
     pub = make("a").new_pub("topic", history=50)
     others = make("b")
@@ -110,7 +110,7 @@ def test_none_twice_none_missing_while_it_is_published_all_the_time(make: Make) 
         thread.join(30.0)
 
 
-def test_each_publisher_of_a_topic_has_its_own(make: Make) -> None:
+def test_each_publisher_of_a_topic_has_its_own_history(make: Make) -> None:
     pubs = [make(f"p{n}").new_pub("topic", history=2) for n in range(3)]
     for number in range(5):
         for n, pub in enumerate(pubs):
@@ -120,7 +120,7 @@ def test_each_publisher_of_a_topic_has_its_own(make: Make) -> None:
         assert [each for each in got if each[0] == n] == [[n, 3], [n, 4]]  # type: ignore[index]
 
 
-def test_pictures_and_large_messages_are_kept(make: Make) -> None:
+def test_history_keeps_pictures_and_large_messages(make: Make) -> None:
     node = make("a")
     pictures = [np.full((90, 120, 3), n, np.uint8) for n in range(100)]
     pub = node.new_pub("camera", "image", history=80)
@@ -134,7 +134,9 @@ def test_pictures_and_large_messages_are_kept(make: Make) -> None:
     assert sub.lost == 0
 
 
-def test_the_bytes_are_bounded_and_the_newest_stays(make: Make, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_history_is_bounded_in_bytes_and_keeps_the_newest(
+    make: Make, monkeypatch: pytest.MonkeyPatch
+) -> None:
     monkeypatch.setattr(History.__init__, "__defaults__", (1_000_000,))
     pub = make("a").new_pub("topic", "bytes", history=1000)
     for n in range(10):
@@ -145,7 +147,7 @@ def test_the_bytes_are_bounded_and_the_newest_stays(make: Make, monkeypatch: pyt
     assert [len(each) for each in read(make("c").new_sub("topic", "bytes"), 1)] == [8_000_000]  # type: ignore[arg-type]
 
 
-def test_a_sink_and_keep_latest_take_part(make: Make) -> None:
+def test_history_reaches_sinks_and_keep_latest_subscribers(make: Make) -> None:
     pub = make("a").new_pub("topic", history=10)
     for n in range(20):
         pub.publish(n)
@@ -161,7 +163,7 @@ def test_a_sink_and_keep_latest_take_part(make: Make) -> None:
         _ok, last = latest.listen(timeout_s=30.0)
 
 
-def test_what_is_refused(make: Make) -> None:
+def test_invalid_history_lengths_are_rejected(make: Make) -> None:
     node = make("a")
     for wrong in (-1, 1001, 2**64, True, 1.5, "3", None, float("nan")):
         with pytest.raises(ValueError, match=r"history is .*; give a whole number from 0 to 1000"):
@@ -169,7 +171,7 @@ def test_what_is_refused(make: Make) -> None:
     assert node.new_pub("topic", history=0).count == 0
 
 
-def test_a_back_end_without_says_so(make: Make, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_back_end_without_history_rejects_it(make: Make, monkeypatch: pytest.MonkeyPatch) -> None:
     node = make("a")
     monkeypatch.setattr("nep.backends.base.Backend.has_history", False, raising=False)
     object.__setattr__(node._backend, "has_history", False)
@@ -180,14 +182,14 @@ def test_a_back_end_without_says_so(make: Make, monkeypatch: pytest.MonkeyPatch)
         object.__setattr__(node._backend, "has_history", True)
 
 
-def test_the_original_wire_has_none() -> None:
+def test_original_wire_rejects_history() -> None:
     with nep.node("a") as node:
         direct = node.direct(port=9999)
         with pytest.raises(ValueError, match=r"original wire .*history"):
             node.new_pub("topic", "json", direct, history=2)
 
 
-def test_the_history_of_a_program_that_is_killed_is_gone_and_of_its_successor_there(master: Master) -> None:
+def test_history_ends_with_a_killed_program_and_its_successor_has_its_own(master: Master) -> None:
     code = """
     import sys, nep
     pub = nep.node("a").new_pub("t", history=3)
@@ -211,7 +213,7 @@ def test_the_history_of_a_program_that_is_killed_is_gone_and_of_its_successor_th
 # ---- its parts
 
 
-def test_the_newest_stay() -> None:
+def test_history_evicts_the_oldest_beyond_its_limits() -> None:
     history: History[int] = History(3, 100)
     for n in range(5):
         history.add(n, 10)
@@ -230,7 +232,7 @@ def _remote(history: int) -> RemotePublisher:
     return RemotePublisher(PublisherRecord(5, "t", "json", "json", history=history), "n", "name")
 
 
-def test_what_comes_before_the_echo_is_left_out_only_where_it_comes_again(
+def test_messages_before_the_echo_are_skipped_only_if_the_history_repeats_them(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     now = [100.0]

@@ -29,7 +29,7 @@ class Named(TypedDict):
     name: str
 
 
-def test_typed_and_untyped_programs_understand_each_other(make: Make) -> None:
+def test_typed_and_untyped_programs_exchange_messages(make: Make) -> None:
     a, b = make("a"), make("b")
     typed, untyped, text = b.new_sub("t", Twist), b.new_sub("t"), b.new_sub("t", "geometry_msgs/Twist")
     a.new_pub("t", Twist).publish(Twist(Vector3(0.5), Vector3(z=-1)))
@@ -43,7 +43,7 @@ def test_typed_and_untyped_programs_understand_each_other(make: Make) -> None:
     assert typed.listen() == (False, None)
 
 
-def test_the_graph_has_its_name(make: Make) -> None:
+def test_graph_has_the_type_name(make: Make) -> None:
     a, b = make("a"), make("b")
     pub, sub = a.new_pub("t", Twist), b.new_sub("t", Count)
     assert (pub.msg_type, sub.msg_type) == ("geometry_msgs/Twist", "Count")
@@ -55,7 +55,7 @@ def test_the_graph_has_its_name(make: Make) -> None:
     assert (message.msg_type, message.codec, message.topic) == ("geometry_msgs/Twist", "json", "t")
 
 
-def test_messages_are_typed_in_every_way_of_reading(make: Make) -> None:
+def test_every_way_of_reading_returns_typed_payloads(make: Make) -> None:
     a, b = make("a"), make("b")
     sub, latest = b.new_sub("t", Count), b.new_sub("t", Count, keep="latest")
     sunk: queue.SimpleQueue[object] = queue.SimpleQueue()
@@ -89,7 +89,7 @@ def test_messages_are_typed_in_every_way_of_reading(make: Make) -> None:
     eventually(lambda: latest.listen(timeout_s=30.0) == (True, Count(7)))
 
 
-def test_callbacks_get_typed_payloads_and_typed_messages(make: Make) -> None:
+def test_callbacks_receive_typed_payloads_and_typed_messages(make: Make) -> None:
     a, b = make("a"), make("b")
     got: list[object] = []
 
@@ -113,7 +113,7 @@ def test_callbacks_get_typed_payloads_and_typed_messages(make: Make) -> None:
     assert [each for each in got if isinstance(each, tuple)] == [(1, Count(1)), (2, Count(2))]
 
 
-def test_coroutines_and_several_nodes_get_typed_payloads(make: Make) -> None:
+def test_coroutines_and_multi_node_spins_receive_typed_payloads(make: Make) -> None:
     a, b = make("a"), make("b")
     got: list[object] = []
 
@@ -132,7 +132,7 @@ def test_coroutines_and_several_nodes_get_typed_payloads(make: Make) -> None:
     assert got == [Count(1), Count(2)]
 
 
-def test_what_does_not_fit_is_skipped_told_and_forgotten(
+def test_message_of_a_mismatching_type_is_skipped_and_reported(
     make: Make, caplog: pytest.LogCaptureFixture
 ) -> None:
     a, b = make("a"), make("b")
@@ -156,7 +156,7 @@ def test_what_does_not_fit_is_skipped_told_and_forgotten(
 
 
 @pytest.mark.parametrize("is_heard", [True, False])
-def test_a_payload_of_a_wrong_type_is_an_error_heard_or_unheard(make: Make, is_heard: bool) -> None:
+def test_payload_of_a_wrong_type_raises_with_and_without_a_subscriber(make: Make, is_heard: bool) -> None:
     a, b = make("a"), make("b")
     if is_heard:
         b.new_sub("t")
@@ -171,7 +171,7 @@ def test_a_payload_of_a_wrong_type_is_an_error_heard_or_unheard(make: Make, is_h
     assert (pub.refused, pub.count, named.refused) == (0, 0, 0)
 
 
-def test_what_is_wrong_inside_is_refused_and_told_with_its_place(make: Make) -> None:
+def test_invalid_field_is_rejected_with_its_path(make: Make) -> None:
     a, b = make("a"), make("b")
     sub, pub = b.new_sub("t", Pose), a.new_pub("t", Pose)
     pub.publish(Pose(orientation=Quaternion(w="one")))
@@ -188,7 +188,7 @@ def test_what_is_wrong_inside_is_refused_and_told_with_its_place(make: Make) -> 
     assert sub.listen(timeout_s=30.0)[1].position.y == 1.0
 
 
-def test_a_dict_is_checked_and_arrives(make: Make) -> None:
+def test_dict_is_validated_and_arrives_typed(make: Make) -> None:
     a, b = make("a"), make("b")
     sub, pub = b.new_sub("t", Named), a.new_pub("t", Named)
     pub.publish({"name": "x", "more": 1})
@@ -200,7 +200,7 @@ def test_a_dict_is_checked_and_arrives(make: Make) -> None:
     assert sub.listen(timeout_s=30.0) == (True, {"name": "x"})
 
 
-def test_whoever_comes_late_and_wildcards_get_typed_payloads(make: Make) -> None:
+def test_late_and_wildcard_subscribers_receive_typed_payloads(make: Make) -> None:
     a, b = make("a"), make("b")
     a.new_pub("/x/t", Count, latched=True).publish(Count(5, "m"))
     for topic in ("/x/t", "/*/t"):
@@ -210,7 +210,7 @@ def test_whoever_comes_late_and_wildcards_get_typed_payloads(make: Make) -> None
         assert (message.payload, message.topic, message.is_latched) == (Count(5, "m"), "/x/t", True)
 
 
-def test_a_large_scan_arrives_and_infinity_is_nan(make: Make) -> None:
+def test_large_scan_arrives_with_infinity_as_nan(make: Make) -> None:
     a, b = make("a"), make("b")
     sub, pub = b.new_sub("t", LaserScan), a.new_pub("t", LaserScan)
     ranges = [n / 7 for n in range(100_000)]
@@ -230,7 +230,7 @@ def test_many_messages_keep_their_order(make: Make) -> None:
     assert [sub.listen(timeout_s=30.0)[1].n for _n in range(2000)] == list(range(2000))
 
 
-def test_a_closed_subscriber_says_so(make: Make) -> None:
+def test_closed_subscriber_raises_closed_error(make: Make) -> None:
     a = make("a")
     sub = a.new_sub("t", Count)
     with pytest.raises(ValueError, match="timeout_s is -1"):
@@ -243,7 +243,7 @@ def test_a_closed_subscriber_says_so(make: Make) -> None:
         sub.listen()
 
 
-def test_another_program_without_types_reads_it(master: Master) -> None:
+def test_untyped_program_reads_typed_messages(master: Master) -> None:
     program = """
         import nep
         with nep.node("other") as node:

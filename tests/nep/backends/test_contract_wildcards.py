@@ -41,7 +41,7 @@ def read(sub: nep.Subscriber, most: int) -> list[tuple[str, object]]:
     return got
 
 
-def test_topics_that_match_are_heard_also_those_that_come_later(make: Make) -> None:
+def test_pattern_receives_matching_topics_including_later_ones(make: Make) -> None:
     node, other = make("a"), make("b")
     before = [node.new_pub(f"/robot/{name}/camera") for name in ("ann", "bob")]
     others = [node.new_pub(topic) for topic in ("/robot/camera", "/robot/ann/camera/raw", "/room/ann/camera")]
@@ -63,7 +63,7 @@ def test_topics_that_match_are_heard_also_those_that_come_later(make: Make) -> N
     assert (sub.topic, sub.received, sub.lost, sub.refused) == ("/robot/*/camera", 4, 0, 0)
 
 
-def test_the_first_message_of_a_publisher_that_comes_later_is_not_lost(make: Make) -> None:
+def test_first_message_of_a_later_publisher_is_not_lost(make: Make) -> None:
     sub, node = make("b").new_sub("/robot/**"), make("a")
     for n in range(20):
         with node.new_pub(f"/robot/{n}/x") as pub:
@@ -73,7 +73,7 @@ def test_the_first_message_of_a_publisher_that_comes_later_is_not_lost(make: Mak
     assert sub.lost == 0
 
 
-def test_order_is_kept_on_each_topic_and_counters_are_sums(make: Make) -> None:
+def test_order_is_kept_per_topic_and_counters_are_summed(make: Make) -> None:
     sub, node = make("b").new_sub("t/*"), make("a")
     pubs = [node.new_pub(f"t/{n}") for n in range(3)]
     for number in range(300):
@@ -85,7 +85,7 @@ def test_order_is_kept_on_each_topic_and_counters_are_sums(make: Make) -> None:
     assert (sub.received, sub.lost) == (900, 0)
 
 
-def test_a_callback_is_given_the_message_with_its_own_topic(make: Make) -> None:
+def test_callback_receives_the_message_with_its_own_topic(make: Make) -> None:
     node, other = make("b"), make("a")
     got: list[tuple[str, str, object]] = []
 
@@ -102,7 +102,7 @@ def test_a_callback_is_given_the_message_with_its_own_topic(make: Make) -> None:
     assert sorted(got) == [("/a/b/words", "my/words", ["long"]), ("words", "string", "short")]
 
 
-def test_spin_of_several_nodes_a_loop_and_a_sink(make: Make) -> None:
+def test_patterns_work_with_multi_node_spin_async_spin_and_sinks(make: Make) -> None:
     node, other, out = make("b"), make("c"), make("a")
     got: list[object] = []
     sunk: list[tuple[str, object]] = []
@@ -138,7 +138,7 @@ def test_spin_of_several_nodes_a_loop_and_a_sink(make: Make) -> None:
     assert (got, sunk) == ([1], [("x/1", 1), ("x/2", 2)])
 
 
-def test_what_is_latched_comes_and_a_full_inbox_drops_the_oldest(make: Make) -> None:
+def test_latched_messages_arrive_and_a_full_inbox_drops_the_oldest(make: Make) -> None:
     node = make("a")
     for name in ("a", "b"):
         pub = node.new_pub(f"state/{name}", latched=True)
@@ -158,7 +158,7 @@ def test_what_is_latched_comes_and_a_full_inbox_drops_the_oldest(make: Make) -> 
     assert latest.lost == 0
 
 
-def test_two_patterns_and_a_plain_name_hear_the_same_topic_each_for_itself(make: Make) -> None:
+def test_patterns_and_plain_subscribers_receive_the_same_topic_independently(make: Make) -> None:
     other, node = make("b"), make("a")
     subs = [other.new_sub(topic) for topic in ("a/*/c", "**", "a/b/c", "a/b/*", "*")]
     pub = node.new_pub("a/b/c")
@@ -174,7 +174,7 @@ def test_two_patterns_and_a_plain_name_hear_the_same_topic_each_for_itself(make:
         subs[0].listen()
 
 
-def test_a_star_inside_a_level_is_a_letter_and_so_is_one_without_wildcards(make: Make) -> None:
+def test_star_inside_a_level_or_with_wildcards_disabled_is_literal(make: Make) -> None:
     other, node = make("b"), make("a")
     inside, plain = other.new_sub("a*b"), other.new_sub("x/*", wildcards=False)
     star, letter, named = node.new_pub("a*b"), node.new_pub("aXb"), node.new_pub("x/*")
@@ -187,7 +187,7 @@ def test_a_star_inside_a_level_is_a_letter_and_so_is_one_without_wildcards(make:
     assert plain.listen() == (False, {})
 
 
-def test_closing_ends_who_waits_and_is_forgotten(make: Make) -> None:
+def test_close_wakes_waiting_readers_and_unregisters_the_pattern(make: Make) -> None:
     node, other = make("b"), make("a")
     pub = other.new_pub("a/b")
     sub = node.new_sub("a/*")
@@ -207,7 +207,7 @@ def test_closing_ends_who_waits_and_is_forgotten(make: Make) -> None:
     eventually(lambda: "a/*" not in other.graph().patterns)
 
 
-def test_bad_bytes_and_the_graph(make: Make) -> None:
+def test_undecodable_messages_are_skipped_and_the_graph_lists_the_pattern(make: Make) -> None:
     node, other = make("b"), make("a")
     sub = node.new_sub("a/*")
     pub = other.new_pub("a/b")
@@ -226,7 +226,7 @@ def test_bad_bytes_and_the_graph(make: Make) -> None:
     assert [each.id for each in other.graph().topics["a/*"].subscribers] == [exact.id]
 
 
-def test_a_back_end_without_says_so(make: Make) -> None:
+def test_back_end_without_wildcards_rejects_them(make: Make) -> None:
     node = make("a")
     object.__setattr__(node._backend, "has_patterns", False)
     try:
@@ -237,14 +237,14 @@ def test_a_back_end_without_says_so(make: Make) -> None:
         object.__setattr__(node._backend, "has_patterns", True)
 
 
-def test_a_direct_connection_takes_the_name_as_it_is() -> None:
+def test_direct_connection_takes_the_topic_name_literally() -> None:
     with nep.node("a") as node:
         assert not is_pattern_for(node._backend, "a/*", node.direct(port=9999))
         assert is_pattern_for(node._backend, "a/*", node.hybrid())
 
 
 @pytest.mark.parametrize("backend", ["zeromq", "zenoh"])
-def test_publishers_that_are_killed_come_back(master: Master, backend: str) -> None:
+def test_restarted_publishers_are_received_after_a_kill(master: Master, backend: str) -> None:
     place = place_for(backend, master.address)
     code = """
     import sys, nep
@@ -262,7 +262,7 @@ def test_publishers_that_are_killed_come_back(master: Master, backend: str) -> N
                 program.process.kill()
 
 
-def test_a_master_that_is_started_again_knows_it(master: Master) -> None:
+def test_pattern_is_registered_again_at_a_restarted_master(master: Master) -> None:
     port = master.address
     with nep.node("b", master=port) as node, nep.node("a", master=port) as other:
         sub = node.new_sub("r/*")
@@ -280,7 +280,7 @@ def test_a_master_that_is_started_again_knows_it(master: Master) -> None:
 
 
 @pytest.mark.parametrize("backend", ["zeromq", "nanomsg"])
-def test_a_master_that_is_older_is_named(
+def test_older_master_without_wildcards_is_reported(
     master: Master, monkeypatch: pytest.MonkeyPatch, backend: str
 ) -> None:
     real = Graph.apply
@@ -298,7 +298,7 @@ def test_a_master_that_is_older_is_named(
         node.new_sub("r/x")
 
 
-def test_topics_that_end_are_left(master: Master) -> None:
+def test_ended_topics_are_unsubscribed(master: Master) -> None:
     with nep.node("b") as node, nep.node("a") as other:
         sub = node.new_sub("r/*")
         members = sub._transport._members  # type: ignore[attr-defined]
@@ -312,7 +312,7 @@ def test_topics_that_end_are_left(master: Master) -> None:
 
 @pytest.mark.skipif(sys.platform == "win32", reason="Windows does not fork")
 @pytest.mark.parametrize("backend", ["memory", "zeromq"])
-def test_in_a_child_it_is_closed(master: Master, backend: str) -> None:
+def test_subscriber_is_closed_in_a_forked_child(master: Master, backend: str) -> None:
     code = """
     import os, sys, nep
     node = nep.node("a", sys.argv[1])
@@ -360,13 +360,13 @@ def test_in_a_child_it_is_closed(master: Master, backend: str) -> None:
         ("/".join(["**", "a"] * 40), "/".join(["a"] * 99 + ["b"]), False),
     ],
 )
-def test_what_matches(pattern: str, topic: str, is_match: bool) -> None:
+def test_pattern_matches_topics(pattern: str, topic: str, is_match: bool) -> None:
     assert matches(pattern, topic) is is_match
     assert is_pattern(pattern)
 
 
 @pytest.mark.parametrize("topic", ["a*b", "/robot/*x", "***", "/a/b", "", "a/**b"])
-def test_what_is_no_pattern(topic: str) -> None:
+def test_plain_topics_are_not_patterns(topic: str) -> None:
     assert not is_pattern(topic)
 
 
@@ -374,7 +374,7 @@ def test_what_is_no_pattern(topic: str) -> None:
     "pattern", ["/robot/*/camera", "/robot/**", "**", "*", "**/camera", "a/**/b/*/c", "/*"]
 )
 @pytest.mark.parametrize("topic", ["/robot/a/camera", "/robot", "/a", "camera", "a/b/x/c", "a/x y/b/ü/c"])
-def test_zenoh_hears_all_that_matches(pattern: str, topic: str) -> None:
+def test_zenoh_key_expressions_cover_every_matching_topic(pattern: str, topic: str) -> None:
     zenoh = pytest.importorskip("zenoh")
     heard = zenoh.KeyExpr(data_keys(pattern)).intersects(zenoh.KeyExpr(data_key(topic)))
     assert heard or not matches(pattern, topic)
@@ -383,7 +383,7 @@ def test_zenoh_hears_all_that_matches(pattern: str, topic: str) -> None:
     assert topic_of(data_key(topic)) == topic_of(hello_key(topic, 7)) == topic
 
 
-def test_an_index_forgets_what_nobody_needs() -> None:
+def test_pattern_index_removes_unused_entries() -> None:
     index: PatternIndex[str] = PatternIndex()
     index.add_topic("a/1")
     index.add("a/*", 1, "n", ["a/1", "b/1"])
@@ -412,7 +412,7 @@ def _pattern(number: int, each: int) -> AddSubscriber:
     return AddSubscriber(node, SubscriberRecord(id_from(node.key, each), f"t{each}/*", "json", each, True))
 
 
-def test_whoever_registers_too_many_is_refused() -> None:
+def test_registrations_beyond_the_limit_are_rejected() -> None:
     graph = Graph(1, 0.0, learn_s=0.0)
 
     def ask(request: AddSubscriber | AddPublisher, number: int) -> object:

@@ -28,7 +28,7 @@ def refused(do):
 """
 
 
-def test_at_the_limit_new_publishers_are_refused_and_those_there_work(master: Master) -> None:
+def test_new_publishers_are_rejected_at_the_file_limit_and_existing_ones_work(master: Master) -> None:
     code = (
         FEW
         + """
@@ -67,7 +67,7 @@ print(sub.listen(timeout_s=30.0))
         assert program.process.returncode == 0
 
 
-def test_with_no_file_left_at_all_nothing_ends(master: Master) -> None:
+def test_existing_endpoints_survive_without_free_file_descriptors(master: Master) -> None:
     """The program itself has opened all that it may; what is there goes on, the rest is refused."""
     code = (
         FEW
@@ -110,7 +110,7 @@ print(node.new_sub("own").listen(), [each for each in node.graph().topics])
             assert not late.is_closed
 
 
-def test_a_hundred_subscribers_of_a_program_with_few_files(master: Master) -> None:
+def test_publisher_with_few_files_survives_a_hundred_subscribers(master: Master) -> None:
     """libzmq accepts what it can; the publisher is not ended, and goes on with those who reach it."""
     code = (
         FEW
@@ -159,7 +159,7 @@ sys.stdin.read()
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="only Linux has local names")
-def test_a_publisher_gives_up_its_local_name_when_files_are_short(master: Master) -> None:
+def test_publisher_closes_its_local_socket_when_files_are_short(master: Master) -> None:
     """libzmq ends the program when it cannot accept there; by TCP it only makes others wait."""
     code = (
         FEW
@@ -188,7 +188,7 @@ def local_names(program: Program) -> list[str]:
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="counts files as Linux does")
-def test_a_gateway_without_files_refuses_originals_and_goes_on(tmp_path: Path) -> None:
+def test_gateway_without_free_files_rejects_originals_and_survives(tmp_path: Path) -> None:
     code = (
         FEW
         + """

@@ -37,7 +37,7 @@ def node() -> Iterator[nep.Node]:
 @pytest.mark.parametrize("wire", ["original", "native"])
 @pytest.mark.parametrize("mode", ["one2many", "many2one"])
 @pytest.mark.parametrize("subscriber_first", [True, False])
-def test_both_ends_without_a_master(
+def test_direct_connection_works_in_every_mode_and_start_order_without_a_master(
     node: nep.Node, port: int, wire: str, mode: str, subscriber_first: bool
 ) -> None:
     conf = node.direct("127.0.0.1", str(port), mode, wire=wire)  # type: ignore[arg-type]
@@ -69,7 +69,7 @@ def test_both_ends_without_a_master(
         ("B", "msgpack", {"a": 1}, b"\x81\xa1a\x01"),
     ],
 )
-def test_frames_as_a_plain_zeromq_program_sees_them(
+def test_frames_match_what_a_plain_zeromq_program_receives(
     node: nep.Node, port: int, generation: str, msg_type: str, payload: object, frame: bytes
 ) -> None:
     with zmq.Context() as context, context.socket(zmq.SUB) as plain:
@@ -85,7 +85,7 @@ def test_frames_as_a_plain_zeromq_program_sees_them(
         assert plain.recv_multipart() == [frame]
 
 
-def test_both_forms_are_received_and_other_topics_are_not(node: nep.Node, port: int) -> None:
+def test_both_framings_are_received_and_other_topics_ignored(node: nep.Node, port: int) -> None:
     with zmq.Context() as context, context.socket(zmq.XPUB) as plain:
         plain.setsockopt(zmq.LINGER, 0)
         plain.bind(f"tcp://127.0.0.1:{port}")
@@ -102,7 +102,7 @@ def test_both_forms_are_received_and_other_topics_are_not(node: nep.Node, port: 
         assert sub.listen(timeout_s=30.0) == (True, 5)
 
 
-def test_pictures_are_base64_of_a_jpeg(node: nep.Node, port: int) -> None:
+def test_pictures_are_sent_as_base64_of_a_jpeg(node: nep.Node, port: int) -> None:
     picture = np.full((24, 32, 3), 90, np.uint8)
     conf = node.direct(port=port, mode="many2one")
     with zmq.Context() as context, context.socket(zmq.PUB) as plain:
@@ -117,7 +117,7 @@ def test_pictures_are_base64_of_a_jpeg(node: nep.Node, port: int) -> None:
         assert np.abs(got.astype(int) - 90).max() < 3  # type: ignore[attr-defined]
 
 
-def test_framing_both_ways() -> None:
+def test_frames_round_trip_in_both_generations() -> None:
     file = cv2.imencode(".jpg", np.zeros((8, 8, 3), np.uint8))[1].tobytes()
     for generation in ("A", "B"):
         for msg_type, codec in [
@@ -135,7 +135,7 @@ def test_framing_both_ways() -> None:
         from_frame("cam", "image", "image", b"cam !!!")
 
 
-def test_a_port_that_is_taken(node: nep.Node, port: int) -> None:
+def test_taken_port_raises_address_in_use_error(node: nep.Node, port: int) -> None:
     conf = node.direct(port=port)
     node.new_pub("t", "json", conf)
     with pytest.raises(nep.AddressInUseError, match=f"'127.0.0.1:{port}' is in use"):
@@ -163,7 +163,7 @@ def test_many_to_many_connects_to_both_ports_of_a_proxy(node: nep.Node, port: in
         assert sub.listen(timeout_s=30.0) == (True, 1)
 
 
-def test_what_cannot_be() -> None:
+def test_invalid_direct_connections_are_rejected() -> None:
     with nep.node("n", "memory") as node:
         with pytest.raises(nep.NepError, match="unknown mode 'one2one'; did you mean 'one2many'"):
             node.direct(mode="one2one")

@@ -30,7 +30,9 @@ def ends() -> Iterator[tuple[socket.socket, socket.socket]]:
         yield near, far
 
 
-def test_a_connection_is_ended_only_while_it_is_the_same(ends: tuple[socket.socket, socket.socket]) -> None:
+def test_connection_is_shut_down_only_if_its_peer_is_unchanged(
+    ends: tuple[socket.socket, socket.socket],
+) -> None:
     near, far = ends
     peer = near.getpeername()
     FarConnection(near.fileno(), (peer[0], peer[1] + 1)).end()
@@ -41,7 +43,7 @@ def test_a_connection_is_ended_only_while_it_is_the_same(ends: tuple[socket.sock
 
 
 @pytest.mark.parametrize("kind", ["closed", "file", "pipe"])
-def test_a_number_that_is_no_connection_any_more_does_no_harm(kind: str) -> None:
+def test_descriptor_that_is_no_longer_a_connection_is_ignored(kind: str) -> None:
     ours, theirs = os.pipe()
     with Path(os.devnull).open("rb") as file:
         fd = {"closed": ours, "file": file.fileno(), "pipe": theirs}[kind]
@@ -60,7 +62,7 @@ class Connection(FarConnection):
         ENDED.append(self.fd)
 
 
-def test_a_hello_over_another_connection_ends_the_one_before() -> None:
+def test_hello_over_another_connection_closes_the_previous_one() -> None:
     ENDED.clear()
     subscriptions = Subscriptions("t", 7)
     one, two = (Connection(number, ("10.0.0.1", number)) for number in (1, 2))
@@ -76,7 +78,7 @@ def test_a_hello_over_another_connection_ends_the_one_before() -> None:
     assert ENDED == [1], "no hello to this publisher"
 
 
-def test_only_connections_to_other_computers_get_an_end() -> None:
+def test_only_connections_to_other_computers_get_keep_alive() -> None:
     with zmq.Context() as context, context.socket(zmq.XPUB) as socket_:
         seen = []
         for host in ("127.0.0.1", "0.0.0.0", "127.0.0.1"):

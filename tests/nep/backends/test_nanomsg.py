@@ -32,7 +32,9 @@ def node() -> Iterator[nep.Node]:
 
 @pytest.mark.parametrize("mode", ["one2many", "many2one"])
 @pytest.mark.parametrize("subscriber_first", [True, False])
-def test_both_ends_without_a_master(node: nep.Node, port: int, mode: str, subscriber_first: bool) -> None:
+def test_direct_connection_works_in_every_mode_and_start_order_without_a_master(
+    node: nep.Node, port: int, mode: str, subscriber_first: bool
+) -> None:
     conf = node.direct("127.0.0.1", port, mode)
     if subscriber_first:
         sub = node.new_sub("t", "json", conf)
@@ -47,7 +49,7 @@ def test_both_ends_without_a_master(node: nep.Node, port: int, mode: str, subscr
 
 
 @pytest.mark.skipif(shutil.which("nanocat") is None, reason="nanocat is missing (Debian: nanomsg-utils)")
-def test_nanocat_hears_and_is_heard(node: nep.Node, port: int) -> None:
+def test_messages_are_exchanged_with_nanocat(node: nep.Node, port: int) -> None:
     pub = node.new_pub("t", "json", node.direct(port=port))
     told = ["nanocat", "--sub", "--connect-local", str(port), "--subscribe", "t ", "--raw"]
     with subprocess.Popen(told, stdout=subprocess.PIPE) as cat:
@@ -64,7 +66,7 @@ def test_nanocat_hears_and_is_heard(node: nep.Node, port: int) -> None:
         cat.terminate()
 
 
-def test_a_large_message_is_warned_of_once(
+def test_large_message_warning_is_logged_once(
     node: nep.Node, port: int, caplog: pytest.LogCaptureFixture
 ) -> None:
     conf = node.direct(port=port, mode="many2one")
@@ -76,7 +78,7 @@ def test_a_large_message_is_warned_of_once(
     assert len(re.findall("'t' has 1048577 bytes.*libnanomsg.* 1048576 bytes", caplog.text)) == 1
 
 
-def test_what_cannot_be(node: nep.Node, port: int) -> None:
+def test_invalid_direct_connections_are_rejected(node: nep.Node, port: int) -> None:
     with pytest.raises(nep.NepError, match=r"'nanomsg' .*'many2many'.*'one2many'"):
         node.new_pub("t", "json", node.direct(port=port, mode="many2many"))
     with pytest.raises(nep.NepError, match="wire='native'"):
@@ -88,7 +90,7 @@ def test_what_cannot_be(node: nep.Node, port: int) -> None:
         node.new_pub("t", "json", node.direct(port=port))
 
 
-def test_without_pynng_one_sentence_says_what_to_install() -> None:
+def test_missing_pynng_is_reported_with_the_install_command() -> None:
     def missing(_name: str) -> object:
         raise ImportError
 
@@ -96,12 +98,12 @@ def test_without_pynng_one_sentence_says_what_to_install() -> None:
         library(missing)  # type: ignore[arg-type]
 
 
-def test_who_does_not_ask_for_it_does_not_import_pynng() -> None:
+def test_pynng_is_not_imported_unless_requested() -> None:
     code = "import sys, nep; nep.node('a').close(); sys.exit('pynng' in sys.modules)"
     assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0
 
 
-def test_subscribers_of_the_two_back_ends_leave_each_other_s_publishers_alone(
+def test_nanomsg_and_zeromq_subscribers_ignore_publishers_of_the_other_back_end(
     master: Master, caplog: pytest.LogCaptureFixture
 ) -> None:
     with nep.node("a", "nanomsg") as ours, nep.node("b", "zeromq") as theirs:
@@ -116,7 +118,7 @@ def test_subscribers_of_the_two_back_ends_leave_each_other_s_publishers_alone(
     assert "of 'b': it is not an endpoint of 'nanomsg'" in caplog.text
 
 
-def test_hellos_whose_connection_never_comes_make_room_for_others(master: Master) -> None:
+def test_stale_hellos_are_evicted(master: Master) -> None:
     with nep.node("a", "nanomsg") as node:
         publisher = node.new_pub("t")._transport
         publisher._hellos = {f"127.0.0.1:{number}": number for number in range(10_000)}

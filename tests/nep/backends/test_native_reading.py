@@ -27,7 +27,7 @@ def node(master: Master) -> Iterator[nep.Node]:
         yield made
 
 
-def test_a_received_picture_is_passed_on_and_still_readable(node: nep.Node, master: Master) -> None:
+def test_received_picture_can_be_forwarded_and_stays_readable(node: nep.Node, master: Master) -> None:
     data = os.urandom(300_000)
     with nep.node("relay", master=master.address) as relay:
         there, back = relay.new_sub("there", "bytes"), relay.new_pub("back", "bytes")
@@ -45,7 +45,7 @@ def test_a_received_picture_is_passed_on_and_still_readable(node: nep.Node, mast
         assert message.data == data
 
 
-def test_a_view_of_wider_items_is_sent_as_its_bytes(node: nep.Node) -> None:
+def test_memoryview_of_wider_items_is_sent_as_its_bytes(node: nep.Node) -> None:
     sub, pub = node.new_sub("wide", "bytes"), node.new_pub("wide", "bytes")
     for size in (8, 80_000):
         data = os.urandom(size)
@@ -56,7 +56,7 @@ def test_a_view_of_wider_items_is_sent_as_its_bytes(node: nep.Node) -> None:
 
 
 @pytest.mark.usefixtures("patient")
-def test_whoever_subscribes_while_messages_stream_is_greeted(node: nep.Node, master: Master) -> None:
+def test_subscriber_that_joins_a_stream_completes_its_handshake(node: nep.Node, master: Master) -> None:
     pub = node.new_pub("stream", "bytes")
     is_over = threading.Event()
 
@@ -81,7 +81,7 @@ def test_whoever_subscribes_while_messages_stream_is_greeted(node: nep.Node, mas
 
 
 @pytest.mark.usefixtures("patient")
-def test_whoever_subscribes_just_after_a_burst_is_greeted(node: nep.Node, master: Master) -> None:
+def test_subscriber_that_joins_after_a_burst_completes_its_handshake(node: nep.Node, master: Master) -> None:
     pub = node.new_pub("burst", "bytes")
     with nep.node("late", master=master.address) as late:
         for number in range(1, 11):
@@ -94,7 +94,7 @@ def test_whoever_subscribes_just_after_a_burst_is_greeted(node: nep.Node, master
 
 
 @pytest.mark.usefixtures("patient")
-def test_a_reader_that_waits_in_its_socket_keeps_no_publisher_waiting(node: nep.Node, master: Master) -> None:
+def test_blocking_reader_does_not_delay_a_new_publisher(node: nep.Node, master: Master) -> None:
     sub, first = node.new_sub("many", "bytes"), node.new_pub("many", "bytes")
     heard: list[bytes] = []
     is_over = threading.Event()
@@ -129,7 +129,7 @@ def test_a_reader_that_waits_in_its_socket_keeps_no_publisher_waiting(node: nep.
     assert sub.lost == 0
 
 
-def test_what_a_reader_leaves_is_taken_by_the_node(node: nep.Node) -> None:
+def test_messages_left_by_a_reader_are_moved_to_the_inbox_by_the_node(node: nep.Node) -> None:
     sub, pub = node.new_sub("left", "bytes"), node.new_pub("left", "bytes")
     for _ in range(3):  # a reader that gets one message after the other
         pub.publish(b"x")
@@ -142,7 +142,7 @@ def test_what_a_reader_leaves_is_taken_by_the_node(node: nep.Node) -> None:
     assert sum(sub.receive(30.0) is not None for _ in range(2999)) == 2999
 
 
-def test_closing_does_not_wait_for_a_reader(node: nep.Node) -> None:
+def test_close_does_not_wait_for_a_reader(node: nep.Node) -> None:
     sub, pub = node.new_sub("ends", "bytes"), node.new_pub("ends", "bytes")
     ended = threading.Event()
 
@@ -180,14 +180,14 @@ print("stands")
 
 
 @pytest.mark.parametrize("size", [1000, 20_000])
-def test_subscribers_that_come_and_go_end_no_program(master: Master, size: int) -> None:
+def test_frequent_subscribing_and_unsubscribing_does_not_crash_the_program(master: Master, size: int) -> None:
     """It did: libzmq does not stand another high-water mark while a connection is closing."""
     for _ in range(2):
         with running(COMING_AND_GOING, master.address, str(size)) as program:
             assert program.line() == "stands"
 
 
-def test_a_stream_of_large_messages_goes_on_and_on(node: nep.Node, master: Master) -> None:
+def test_stream_of_large_messages_does_not_stall(node: nep.Node, master: Master) -> None:
     """More than may be under way, over several renewals: nothing that happens then may stop it."""
     with nep.node("other", master=master.address) as other:
         pub, sub = node.new_pub("on", "bytes"), other.new_sub("on", "bytes")
@@ -199,7 +199,7 @@ def test_a_stream_of_large_messages_goes_on_and_on(node: nep.Node, master: Maste
         assert sub.lost == 0
 
 
-def test_a_sink_may_make_what_it_needs(node: nep.Node) -> None:
+def test_sink_can_open_publishers_and_subscribers(node: nep.Node) -> None:
     heard: list[object] = []
 
     def sink(_messages: object) -> None:
@@ -222,7 +222,7 @@ def context() -> Iterator[zmq.Context[zmq.Socket[bytes]]]:
     made.destroy(0)
 
 
-def test_a_filter_without_a_hello_gets_messages_of_three_parts(
+def test_subscription_without_hello_receives_three_part_messages(
     node: nep.Node, context: zmq.Context[zmq.Socket[bytes]]
 ) -> None:
     pub = node.new_pub("open", "bytes")
@@ -236,7 +236,7 @@ def test_a_filter_without_a_hello_gets_messages_of_three_parts(
     assert pub.subscribers == 0  # nobody who said hello
 
 
-def test_a_publisher_that_has_another_port_is_followed(context: zmq.Context[zmq.Socket[bytes]]) -> None:
+def test_publisher_with_a_changed_port_is_reconnected(context: zmq.Context[zmq.Socket[bytes]]) -> None:
     """So after a master's `--listen` was off and on again: the same address, another port."""
     spec = SubscriberSpec(5, "t", "bytes", Hybrid("x", "many2many"), None)
     sub = SubSocket(context.socket(zmq.SUB), spec)

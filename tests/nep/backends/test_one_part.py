@@ -60,7 +60,9 @@ def heard(pub: nep.Publisher, socket: zmq.Socket[bytes], payload: bytes, parts: 
     eventually(comes)
 
 
-def test_whoever_says_so_gets_one_part_while_nobody_else_listens(node: nep.Node, stranger: Stranger) -> None:
+def test_capable_subscriber_receives_single_part_messages_while_no_other_subscribes(
+    node: nep.Node, stranger: Stranger
+) -> None:
     pub = node.new_pub("t", "bytes")
     hello = wire.hello_part(next(IDS), "t", one_part=True)
     able = stranger("t", b"t\0", hello)
@@ -79,7 +81,7 @@ def test_whoever_says_so_gets_one_part_while_nobody_else_listens(node: nep.Node,
 
 
 @pytest.mark.parametrize("filter_", [b"", b"t", b"t\0"], ids=["everything", "a prefix", "the topic"])
-def test_a_debugger_that_says_nothing_gets_three_parts(
+def test_subscriber_without_hello_receives_three_parts(
     node: nep.Node, stranger: Stranger, filter_: bytes
 ) -> None:
     pub = node.new_pub("t", "bytes")
@@ -96,7 +98,9 @@ def test_a_debugger_that_says_nothing_gets_three_parts(
     heard(pub, stranger("t", b"t\0", hello), b"one again", 1)
 
 
-def test_coming_and_going_and_other_topics_change_nothing(node: nep.Node, stranger: Stranger) -> None:
+def test_other_subscribers_and_topics_do_not_change_single_part_delivery_afterwards(
+    node: nep.Node, stranger: Stranger
+) -> None:
     pub = node.new_pub("t", "bytes")
     stays = wire.hello_part(next(IDS), "t", one_part=True)
     able = stranger("t", b"t\0", stays)
@@ -111,7 +115,7 @@ def test_coming_and_going_and_other_topics_change_nothing(node: nep.Node, strang
 
 
 @pytest.mark.parametrize("size", [0, 1, 8_191, 8_192, 16_383, 16_384, 70_000])
-def test_every_size_arrives_as_it_was(node: nep.Node, size: int) -> None:
+def test_every_payload_size_round_trips(node: nep.Node, size: int) -> None:
     sub, pub = node.new_sub("t", "bytes"), node.new_pub("t", "bytes")
     payload = bytes(range(256)) * (size // 256 + 1)
     for data in (payload[:size], memoryview(payload)[:size], payload[:size]):

@@ -84,7 +84,7 @@ def check_corrected(message: Message, shift_s: float) -> None:
     assert -uncertainty_s <= latency_s < 1.0
 
 
-def test_another_computers_clock_is_compared_and_corrected() -> None:
+def test_clock_of_another_computer_is_compared_and_corrected() -> None:
     shift_s = -86_400.0 * 400
     with Master("127.0.0.1:0", learn_s=0.0) as master, nep.node("here", master=master.address) as node:
         sub = node.new_sub("/far", keep="latest")
@@ -104,7 +104,7 @@ def test_another_computers_clock_is_compared_and_corrected() -> None:
             check_corrected(heard(sub, is_near), 3.7)
 
 
-def test_one_computer_has_one_clock() -> None:
+def test_programs_on_one_computer_share_a_clock() -> None:
     with (
         Master("127.0.0.1:0", learn_s=0.0) as master,
         nep.node("here", master=master.address) as node,
@@ -128,7 +128,7 @@ def test_a_message_without_time_has_no_latency() -> None:
     assert message.latency_uncertainty_s is None
 
 
-def test_a_message_that_nobody_compared_says_so() -> None:
+def test_message_without_clock_comparison_has_latency_without_uncertainty() -> None:
     message = Message("t", b"1", "json", "json", stamp_ns=time.time_ns() - 10**9)
     latency_s = message.latency_s
     assert latency_s is not None
@@ -137,7 +137,7 @@ def test_a_message_that_nobody_compared_says_so() -> None:
     assert message.latency_s == latency_s, "it is that of the first look"
 
 
-def test_messages_in_one_process_have_one_clock() -> None:
+def test_messages_in_one_process_share_a_clock() -> None:
     with nep.node("memory", transport="memory") as node:
         sub, pub = node.new_sub("m"), node.new_pub("m")
         pub.publish({"x": 1})
@@ -172,7 +172,7 @@ def test_typed_messages_have_the_same_latency() -> None:
         ({}, ("x", 2)),
     ],
 )
-def test_a_master_that_talks_nonsense_of_clocks_is_counted_and_heard_on(
+def test_invalid_clock_data_of_a_master_is_counted_and_ignored(
     clocks: object, times: object, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(Clocks, "differences", lambda *_args: clocks)
@@ -189,7 +189,7 @@ def test_a_master_that_talks_nonsense_of_clocks_is_counted_and_heard_on(
         assert session._clock.offset() is None
 
 
-def test_differences_are_those_that_were_told_last() -> None:
+def test_latest_reported_clock_difference_is_used() -> None:
     far = RemotePublisher(PublisherRecord(7, "t", "json", "json", ("tcp://10.0.0.9:1",)), "n", "far", "far")
     sources = PublisherTracker()
     source = sources.add_listed(far)
@@ -214,7 +214,7 @@ def test_differences_are_those_that_were_told_last() -> None:
         ("", "", False),
     ],
 )
-def test_who_does_not_say_where_it_is_is_judged_by_its_address(
+def test_publisher_without_computer_id_is_located_by_its_address(
     endpoint: str, told: str | None, is_here: bool
 ) -> None:
     endpoints = (endpoint,) if endpoint else ()
@@ -223,7 +223,7 @@ def test_who_does_not_say_where_it_is_is_judged_by_its_address(
     assert (PublisherTracker().add_listed(far).clock.difference is SAME_CLOCK) is is_here
 
 
-def test_a_computer_is_known_by_what_it_does_not_tell(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_computer_id_does_not_reveal_the_machine_identifier(monkeypatch: pytest.MonkeyPatch) -> None:
     assert len(computer_id()) == 16
     assert computer.clock_name() not in computer_id()
     monkeypatch.setattr(computer, "_NAME_QUERIES", {})

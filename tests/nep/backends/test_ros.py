@@ -29,7 +29,7 @@ def ros(debian: None, tmp_path: Path) -> Iterator[str]:
         yield address
 
 
-def test_the_contract_holds(debian: None) -> None:
+def test_ros_back_end_passes_the_contract(debian: None) -> None:
     command = [sys.executable, "-m", "pytest", "-q", "-n0", "tests/nep/backends/ros_contract.py"]
     environment = {key: value for key, value in os.environ.items() if not key.startswith(("PYTEST_", "ROS_"))}
     ended = subprocess.run(
@@ -69,7 +69,7 @@ sys.stdin.readline()
 )
 
 
-def test_nep_hears_a_program_of_ros(ros: str) -> None:
+def test_nep_receives_messages_from_a_ros_program(ros: str) -> None:
     words = ["/text:string", "json:json", "/bytes:bytes", "/pose:geometry_msgs/PoseStamped", "/pose:json"]
     with running(ROS_SPEAKS, **told(ros)) as speaker:
         assert speaker.line() == "ready"
@@ -116,7 +116,7 @@ with nep.node("speaker", "ros1") as node:
 """
 
 
-def test_a_program_of_ros_that_was_there_hears_the_first_message(ros: str) -> None:
+def test_existing_ros_subscriber_receives_the_first_message(ros: str) -> None:
     with running(ROS_HEARS, **told(ros)) as hearer:
         assert hearer.line() == "ready"
         with running(NEP_SPEAKS, **told(ros)) as speaker:
@@ -147,7 +147,7 @@ for n in range(3):
 """
 
 
-def test_the_paper_s_listing_4_between_two_programs_that_end_by_themselves(ros: str) -> None:
+def test_listing_4_of_the_paper_works_between_two_programs_that_exit_cleanly(ros: str) -> None:
     with running(LISTING_4, **told(ros)) as hearer:
         assert hearer.line() == "ready"
         with running(LISTING_2, **told(ros)) as speaker:
@@ -190,7 +190,7 @@ node.close()
 )
 
 
-def test_raw_pictures_of_ros_are_read_in_every_layout(ros: str) -> None:
+def test_raw_ros_pictures_are_decoded_in_every_layout(ros: str) -> None:
     pytest.importorskip("cv2")
     with running(PICTURES, **told(ros)) as program:
         for expected in (
@@ -247,7 +247,7 @@ node.close()
 )
 
 
-def test_programs_of_ros_get_pictures(ros: str) -> None:
+def test_ros_programs_receive_pictures(ros: str) -> None:
     pytest.importorskip("cv2")
     with running(FRAMES, **told(ros)) as program:
         assert program.line() == "jpeg True True"
@@ -273,7 +273,7 @@ print(logging.getLoggerClass().__name__, logging.getLogger().handlers, logging.g
 """
 
 
-def test_without_a_word_of_the_user_it_listens_on_loopback_and_leaves_the_log_alone(ros: str) -> None:
+def test_default_is_loopback_and_logging_is_left_unchanged(ros: str) -> None:
     with running(LISTENS, ADDRESS=ros) as program:
         assert program.line() == "['127.0.0.1']"
         assert program.line() == "Logger [] 30"
@@ -281,7 +281,7 @@ def test_without_a_word_of_the_user_it_listens_on_loopback_and_leaves_the_log_al
         assert program.process.returncode == 0
 
 
-def test_without_a_master_a_sentence_says_what_to_start(debian: None) -> None:
+def test_missing_ros_master_is_reported_with_the_command_to_start_it(debian: None) -> None:
     address = f"127.0.0.1:{free_port()}"
     with (
         nep.node("n", "ros", master=f"http://{address}/", wait_s=0.2) as node,
@@ -295,7 +295,7 @@ def test_without_a_master_a_sentence_says_what_to_start(debian: None) -> None:
         node.graph(0.2)
 
 
-def test_what_cannot_be(ros: str) -> None:
+def test_unsupported_options_and_types_are_rejected(ros: str) -> None:
     with nep.node("n", "ros", master=ros) as node:
         with pytest.raises(nep.NepError, match=r"'ros' .*direct connections"):
             node.new_pub("topic", "json", node.direct())
@@ -305,7 +305,7 @@ def test_what_cannot_be(ros: str) -> None:
             node.new_pub("topic", "geometry_msgs/Twisst")
 
 
-def test_without_rospy_one_sentence_says_what_to_install() -> None:
+def test_missing_rospy_is_reported_with_the_install_command() -> None:
     def missing(_name: str) -> object:
         raise ImportError
 
@@ -315,7 +315,7 @@ def test_without_rospy_one_sentence_says_what_to_install() -> None:
         load_rospy(missing)  # type: ignore[arg-type]
 
 
-def test_who_does_not_ask_for_it_does_not_import_it() -> None:
+def test_rospy_is_not_imported_unless_requested() -> None:
     code = (
         "import sys, nep; nep.node('a').close(); names = 'rospy', 'xmlrpc', 'nep.backends.ros.transport'; "
         "sys.exit(any(each in sys.modules for each in names))"
@@ -323,7 +323,7 @@ def test_who_does_not_ask_for_it_does_not_import_it() -> None:
     assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0
 
 
-def test_only_what_belongs_to_ros_is_found_beside_the_environment(tmp_path: Path) -> None:
+def test_finder_imports_only_ros_packages_from_outside_the_environment(tmp_path: Path) -> None:
     for name in ("rospy", "numpy_of_debian", "my_msgs", "turtle"):
         (tmp_path / name).mkdir()
         (tmp_path / name / "__init__.py").touch()
@@ -353,7 +353,7 @@ with nep.node("hearer", "ros") as node:
 """
 
 
-def test_what_was_published_is_delivered_when_the_program_just_ends(ros: str) -> None:
+def test_published_messages_are_delivered_when_the_program_exits(ros: str) -> None:
     with running(HEARS_MUCH, **told(ros)) as hearer:
         assert hearer.line() == "ready"
         with running(MUCH, **told(ros)) as speaker:
@@ -375,7 +375,7 @@ print(time.monotonic() - started < 20)
 """
 
 
-def test_a_master_that_hangs_keeps_no_program_from_ending(debian: None, tmp_path: Path) -> None:
+def test_hung_ros_master_does_not_prevent_a_program_from_exiting(debian: None, tmp_path: Path) -> None:
     with ros_master(tmp_path) as address, running(HUNG, **told(address)) as program:
         assert program.line() == "ready"
         (master,) = [

@@ -83,7 +83,7 @@ def why_no_fast_dds() -> str:
         pytest.param("ros2_history_inside.py", "", marks=pytest.mark.long),
     ],
 )
-def test_in_a_network_of_its_own(file: str, chosen: str) -> None:
+def test_ros2_back_end_passes_the_contract_in_an_isolated_network(file: str, chosen: str) -> None:
     pytest.importorskip("cyclonedds", reason=NEEDS)
     pytest.importorskip("rosbags", reason=NEEDS)
     if reason := why_not() or (why_no_fast_dds() if chosen == "fast" else ""):
@@ -115,7 +115,7 @@ def test_in_a_network_of_its_own(file: str, chosen: str) -> None:
 # ---- names and the environment
 
 
-def test_names() -> None:
+def test_topic_and_service_names_round_trip_to_dds_names() -> None:
     assert dds_topic("chatter") == dds_topic("/chatter") == "rt/chatter"
     for node_id in ("0123456789abcdef", "f123456789abcde0"):
         place = f"/nep/parameters/{node_id}"  # ROS 2 has no names with a digit behind a "/"
@@ -141,14 +141,14 @@ def test_names() -> None:
 
 
 @pytest.mark.parametrize("said", ["-1", "233", "1.0", "9" * 5000, "\u0661", "x"])
-def test_domains_that_are_none(said: str) -> None:
+def test_invalid_domains_are_rejected(said: str) -> None:
     with pytest.raises(nep.NepError, match="set it to a number from 0 to 232"):
         domain(None, {"ROS_DOMAIN_ID": said})
     with pytest.raises(nep.NepError, match=r"ROS 2 domain.* 0 to 232"):
         domain(said, {})
 
 
-def test_a_domain_is_what_the_node_is_told_else_the_environment_s() -> None:
+def test_domain_of_the_node_overrides_the_environment() -> None:
     assert domain("7", {"ROS_DOMAIN_ID": "5"}) == domain(" 007 ", {}) == "7"
     assert domain(None, {"ROS_DOMAIN_ID": "232"}) == "232"
     assert domain("", {}) == domain(None, {"ROS_DOMAIN_ID": ""}) == "0"
@@ -156,7 +156,7 @@ def test_a_domain_is_what_the_node_is_told_else_the_environment_s() -> None:
         domain(5, {})  # type: ignore[arg-type]
 
 
-def test_only_this_computer_is_reached_unless_it_is_said() -> None:
+def test_discovery_is_loopback_only_unless_configured() -> None:
     assert is_loopback_only({})
     assert is_loopback_only({"ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST"})
     assert is_loopback_only({"ROS_LOCALHOST_ONLY": "1", "ROS_AUTOMATIC_DISCOVERY_RANGE": "SUBNET"})
@@ -181,7 +181,7 @@ def test_only_this_computer_is_reached_unless_it_is_said() -> None:
 # ---- what is missing, and other back ends
 
 
-def test_without_the_packages_one_sentence_says_what_to_install(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_missing_packages_are_reported_with_the_install_command(monkeypatch: pytest.MonkeyPatch) -> None:
     def missing(_name: str) -> object:
         raise ImportError
 
@@ -191,7 +191,7 @@ def test_without_the_packages_one_sentence_says_what_to_install(monkeypatch: pyt
             library(missing)  # type: ignore[operator]
 
 
-def test_a_computer_that_has_no_wheels_is_told_what_to_build(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_platform_without_wheels_is_told_what_to_build(monkeypatch: pytest.MonkeyPatch) -> None:
     def missing(_name: str) -> object:
         raise ImportError
 
@@ -201,13 +201,13 @@ def test_a_computer_that_has_no_wheels_is_told_what_to_build(monkeypatch: pytest
         dds(missing)  # type: ignore[arg-type]
 
 
-def test_who_does_not_ask_for_it_does_not_import_its_packages() -> None:
+def test_ros2_packages_are_not_imported_unless_requested() -> None:
     code = "import sys, nep; nep.node('a', 'memory').close(); "
     code += "sys.exit(bool({'cyclonedds', 'rosbags'} & set(sys.modules)))"
     assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0
 
 
-def test_its_other_names() -> None:
+def test_back_end_name_is_case_insensitive() -> None:
     assert backend_named("ROS2") is backend_named("ros2")
 
 
@@ -230,13 +230,13 @@ def alerts(writers: list[Party], readers: list[Party]) -> dict[str, str]:
     return {each.id: each.sentence for each in mismatches("t", writers, readers)}
 
 
-def test_who_fits_is_no_alert() -> None:
+def test_compatible_endpoints_raise_no_alert() -> None:
     writers = [party("a", typehash="RIHS01_1"), party("b", is_latched=True)]
     readers = [party("c", typehash="RIHS01_1"), party("d", is_reliable=False)]
     assert alerts(writers, readers) == alerts([], readers) == alerts(writers, []) == {}
 
 
-def test_mismatches_are_alerts_in_plain_words() -> None:
+def test_incompatible_endpoints_raise_alerts_in_plain_words() -> None:
     heard = "“c” does not receive “t” from “a”: it requests "
     assert alerts([party("a", is_reliable=False)], [party("c")]) == {
         "ros2-reliability:t": heard + "“reliable”, but the publisher offers “best effort”"
@@ -256,7 +256,7 @@ def test_mismatches_are_alerts_in_plain_words() -> None:
     assert "“n0”, “n1”, “n10” and 97 more" in said
 
 
-def test_the_second_reader_of_a_subscriber_is_no_alert() -> None:
+def test_second_reader_of_a_subscriber_raises_no_alert() -> None:
     readers = [party("c", nepid="1", is_latched=latched) for latched in (True, False)]
     for order in (readers, readers[::-1]):
         assert alerts([party("a"), party("b", is_latched=True)], order) == {}
@@ -271,14 +271,14 @@ def types() -> MessageTypes:
     return MessageTypes("jazzy")
 
 
-def test_every_type_that_is_known_comes_back_from_its_bytes(types: MessageTypes) -> None:
+def test_every_known_type_round_trips(types: MessageTypes) -> None:
     assert len(types.names) > 150
     for name in types.names:
         empty = types.encode(name, {})
         assert types.encode(name, types.decode(name, empty)) == empty
 
 
-def test_hashes_are_those_of_ros_2(types: MessageTypes) -> None:
+def test_type_hashes_match_those_of_ros_2(types: MessageTypes) -> None:
     """As real ROS 2 told them; `Gid` has a `char`, which rosbags takes for a type of its own."""
     string = "RIHS01_df668c740482bbd48fb39d76a70dfd4bd59db1288021743503259e948f6b1a18"
     info = "RIHS01_91a0593bacdcc50ea9bdcf849a938b128412cc1ea821245c663bcd26f83c295e"
@@ -320,7 +320,7 @@ def test_hashes_are_those_of_ros_2(types: MessageTypes) -> None:
         ),
     ],
 )
-def test_what_does_not_fit_is_named_with_its_place(
+def test_invalid_value_is_rejected_with_its_path(
     types: MessageTypes, name: str, payload: object, sentence: str
 ) -> None:
     with pytest.raises(nep.EncodeError, match=sentence) as caught:
@@ -344,13 +344,13 @@ def test_what_does_not_fit_is_named_with_its_place(
         ("std_msgs/msg/Float64MultiArray", [0.5, float("-inf")]),
     ],
 )
-def test_extremes_travel(types: MessageTypes, name: str, value: object) -> None:
+def test_extreme_values_round_trip(types: MessageTypes, name: str, value: object) -> None:
     decoded = types.decode(name, types.encode(name, {"data": value}))
     assert isinstance(decoded, dict)
     assert decoded["data"] == value
 
 
-def test_nan_travels_and_arrays_of_numpy_are_taken(types: MessageTypes) -> None:
+def test_nan_and_numpy_arrays_round_trip(types: MessageTypes) -> None:
     np = pytest.importorskip("numpy")
     name = "sensor_msgs/msg/LaserScan"
     ranges = np.array([1.0, np.nan, np.inf])
@@ -361,14 +361,14 @@ def test_nan_travels_and_arrays_of_numpy_are_taken(types: MessageTypes) -> None:
 
 
 @pytest.mark.parametrize("cut", range(0, 60, 3))
-def test_bytes_that_are_cut_off_are_no_message(types: MessageTypes, cut: int) -> None:
+def test_truncated_bytes_raise_decode_error(types: MessageTypes, cut: int) -> None:
     name = "sensor_msgs/msg/JointState"
     whole = types.encode(name, {"name": ["a", "b"], "position": [1.0, 2.0]})
     with pytest.raises(nep.DecodeError):
         types.decode(name, whole[:cut])
 
 
-def test_definitions_that_cannot_be(types: MessageTypes, tmp_path: Path) -> None:
+def test_invalid_definitions_are_rejected(types: MessageTypes, tmp_path: Path) -> None:
     types.add("mine/Arm", "float64[2] joints\n")
     types.add("mine/msg/Arm", "float64[2] joints\n")  # the same again
     with pytest.raises(nep.NepError, match=r"'mine/msg/Arm' .*other fields"):
@@ -384,12 +384,14 @@ def test_definitions_that_cannot_be(types: MessageTypes, tmp_path: Path) -> None
     assert "mine/msg/Leg" not in types.names
 
 
-def test_wide_strings_are_refused_in_one_sentence(types: MessageTypes) -> None:
+def test_wide_strings_are_rejected(types: MessageTypes) -> None:
     with pytest.raises(nep.NepError, match=r"'mine/msg/Wide' .*'a' .*wstring.*'ros2'"):
         types.add("mine/Wide", "wstring a\n")
 
 
-def test_a_folder_s_wrong_file_is_told_when_it_is_asked_for(types: MessageTypes, tmp_path: Path) -> None:
+def test_invalid_file_in_a_definition_folder_is_reported_when_its_type_is_used(
+    types: MessageTypes, tmp_path: Path
+) -> None:
     for name, text in {
         "Good": "int8 a\nfolder/Also b\n",
         "Also": "bool[2] c\n",
@@ -408,7 +410,7 @@ def test_a_folder_s_wrong_file_is_told_when_it_is_asked_for(types: MessageTypes,
         types.checked("folder/Uses")
 
 
-def test_every_kind_of_field_comes_back(types: MessageTypes) -> None:
+def test_every_kind_of_field_round_trips(types: MessageTypes) -> None:
     types.add("mine/Inner", "float32[2] f\nuint64 u\nbyte[] raw\nstring<=3[<=2] s\n")
     types.add("mine/Outer", "int8 first\nmine/Inner[2] two\nmine/Inner[] more\nbool[] flags\nbool[3] three\n")
     inner = {"f": [float("-inf"), 0.0], "u": 2**64 - 1, "raw": b"\x80\xff", "s": ["", "é"]}
@@ -430,7 +432,7 @@ def test_every_kind_of_field_comes_back(types: MessageTypes) -> None:
         ({"three": [True] * 4}, "'three' has 4 items; give 3"),
     ],
 )
-def test_bounds_of_arrays_and_texts_are_kept(types: MessageTypes, payload: object, sentence: str) -> None:
+def test_array_and_string_bounds_are_enforced(types: MessageTypes, payload: object, sentence: str) -> None:
     types.add("mine/Inner", "float32[2] f\nuint64 u\nbyte[] raw\nstring<=3[<=2] s\n")
     types.add("mine/Outer", "int8 first\nmine/Inner[2] two\nmine/Inner[] more\nbool[] flags\nbool[3] three\n")
     with pytest.raises(nep.EncodeError, match=sentence):
@@ -438,13 +440,13 @@ def test_bounds_of_arrays_and_texts_are_kept(types: MessageTypes, payload: objec
 
 
 @pytest.mark.parametrize(("shape", "count"), [((2, 3), 2), ((), 0)])
-def test_an_array_has_one_dimension(types: MessageTypes, shape: tuple[int, ...], count: int) -> None:
+def test_multidimensional_array_is_rejected(types: MessageTypes, shape: tuple[int, ...], count: int) -> None:
     np = pytest.importorskip("numpy")
     with pytest.raises(nep.EncodeError, match=rf"'data' .*{count} dimensions.*'ravel\(\)'"):
         types.encode("sensor_msgs/msg/Image", {"data": np.zeros(shape, np.uint8)})
 
 
-def test_bytes_of_a_stranger_are_a_message_or_a_decode_error(types: MessageTypes) -> None:
+def test_corrupted_bytes_are_decoded_or_raise_decode_error(types: MessageTypes) -> None:
     """What is said of the graph, and a few others, with all kinds of damage."""
     chance = random.Random(1)
     names = ["rmw_dds_common/msg/ParticipantEntitiesInfo", "sensor_msgs/msg/Image", "tf2_msgs/msg/TFMessage"]
@@ -467,7 +469,7 @@ def test_bytes_of_a_stranger_are_a_message_or_a_decode_error(types: MessageTypes
     assert refused > 300
 
 
-def test_a_release_that_is_none() -> None:
+def test_unknown_ros_distribution_is_rejected() -> None:
     pytest.importorskip("rosbags", reason=NEEDS)
     with pytest.raises(nep.NepError, match="ROS_DISTRO is 'jazy', which rosbags does not know; did you mean"):
         MessageTypes("jazy")
@@ -481,11 +483,11 @@ def test_a_release_that_is_none() -> None:
         b"\0\1\0\0\2\0\0\0ab", b"\0\1\0\0\0\0\0\0\0\0\0\0\xff\xff\xff\xff",
     ],
 )  # fmt: skip
-def test_what_is_no_message_is_refused(msg_type: str, cdr: bytes) -> None:
+def test_invalid_message_is_rejected(msg_type: str, cdr: bytes) -> None:
     pytest.importorskip("rosbags", reason=NEEDS)
     with pytest.raises(WireError):
         mapping_for(msg_type).unpack(cdr)
 
 
-def test_texts_of_a_computer_with_the_other_order_of_bytes_are_read() -> None:
+def test_strings_in_the_other_byte_order_are_decoded() -> None:
     assert bytes(mapping_for("string").unpack(b"\0\0\0\0\0\0\0\3ab\0")) == b"ab"

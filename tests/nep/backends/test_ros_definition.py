@@ -68,12 +68,12 @@ PAYLOAD: dict[str, object] = {
 }  # fmt: skip
 
 
-def test_a_map_becomes_bytes_and_the_same_map() -> None:
+def test_dict_round_trips() -> None:
     assert ALL.decode(ALL.encode(PAYLOAD)) == PAYLOAD
     assert not ALL.has_header
 
 
-def test_what_is_left_out_is_zero_or_empty() -> None:
+def test_omitted_fields_are_zero_or_empty() -> None:
     made = ALL.decode(ALL.encode({}))
     assert made["letters"] == b"\0\0\0"
     assert (made["words"], made["points"], made["text"], made["at"]) == (
@@ -115,13 +115,13 @@ def test_what_is_left_out_is_zero_or_empty() -> None:
         ([], "publish a 'dict' with its fields 'flag', 'i8'"),
     ],
 )  # fmt: skip
-def test_what_does_not_fit_is_named_by_its_path(payload: object, sentence: str) -> None:
+def test_invalid_value_is_rejected_with_its_path(payload: object, sentence: str) -> None:
     with pytest.raises(nep.EncodeError) as raised:
         ALL.encode(payload)
     assert f"as 'own/All'; {sentence}" in str(raised.value)
 
 
-def test_numpy_and_seconds_are_taken() -> None:
+def test_numpy_values_and_float_seconds_are_accepted() -> None:
     made = ALL.decode(
         ALL.encode({
             "i8": np.int8(-3), "f32": np.float64(0.25), "flag": np.bool_(True), "at": 1.5, "span": -1.5,
@@ -134,7 +134,7 @@ def test_numpy_and_seconds_are_taken() -> None:
     assert (made["data"], made["numbers"], made["letters"]) == (b"\0\1\2", [5, -6], b"xyz")
 
 
-def test_every_cut_is_told_and_nothing_else_is_raised() -> None:
+def test_truncated_or_oversized_bytes_raise_decode_error() -> None:
     whole = ALL.encode(PAYLOAD)
     for size in range(len(whole)):
         with pytest.raises(nep.DecodeError, match="cannot decode"):
@@ -145,12 +145,12 @@ def test_every_cut_is_told_and_nothing_else_is_raised() -> None:
 
 @given(st.binary(max_size=300))
 @settings(max_examples=300, deadline=None)
-def test_any_bytes_become_a_map_or_a_decode_error(data: bytes) -> None:
+def test_any_bytes_decode_to_a_dict_or_raise_decode_error(data: bytes) -> None:
     with contextlib.suppress(nep.DecodeError):
         ALL.decode(data)
 
 
-def test_lengths_that_nobody_can_have_take_no_memory() -> None:
+def test_impossible_lengths_allocate_no_memory() -> None:
     empty = parse("a/A", "B[] all\n" + "=" * 80 + "\nMSG: a/B\n")
     assert empty.decode(struct.pack("<I", 3)) == {"all": [{}, {}, {}]}
     with pytest.raises(nep.DecodeError, match=r"'all' .*more nested messages"):
@@ -163,7 +163,7 @@ def test_lengths_that_nobody_can_have_take_no_memory() -> None:
         fixed.decode(bytes(100))
 
 
-def test_messages_that_hold_each_other_a_million_times_end() -> None:
+def test_exponentially_nested_definition_is_rejected() -> None:
     line = "=" * 80
     levels = "".join(f"{line}\nMSG: a/L{n}\nL{n + 1} a\nL{n + 1} b\nL{n + 1} c\n" for n in range(25))
     bomb = parse("a/L", f"L0 a\n{levels}{'=' * 80}\nMSG: a/L25\n")
@@ -179,7 +179,7 @@ def test_messages_that_hold_each_other_a_million_times_end() -> None:
         ("B b", "B"), ("\0", "\\x00"),
     ],
 )  # fmt: skip
-def test_definitions_that_cannot_be(text: str, part: str) -> None:
+def test_invalid_definitions_are_rejected(text: str, part: str) -> None:
     with pytest.raises(nep.NepError, match=f"'a/A' .*'{re.escape(part)}'"):
         parse("a/A", text)
 
@@ -192,12 +192,12 @@ def test_definitions_that_cannot_be(text: str, part: str) -> None:
         ("image", "sensor_msgs/CompressedImage"), ("geometry_msgs/Twist", "geometry_msgs/Twist"),
     ],
 )  # fmt: skip
-def test_what_carries_what(msg_type: str, ros_type: str) -> None:
+def test_message_types_map_to_ros_types(msg_type: str, ros_type: str) -> None:
     assert ros_type_of(msg_type) == ros_type
     assert is_ros_type(msg_type) == (msg_type == ros_type)
 
 
-def test_bodies_that_are_no_such_message_are_refused() -> None:
+def test_bodies_of_other_messages_are_rejected() -> None:
     read = unpacker("json", "std_msgs/String", "").unpack
     assert read(memoryview(to_ros("std_msgs/String", "json", Encoded(b"{}"))))[0] == b"{}"
     for wrong in (b"", b"\1\0\0", b"\5\0\0\0ab", b"\1\0\0\0ab"):
@@ -211,18 +211,18 @@ def test_bodies_that_are_no_such_message_are_refused() -> None:
     assert bytes(read(memoryview(labelled))[0]) == b"yz", "the data begins where data_offset says"
 
 
-def test_picture_that_cannot_be_read_is_refused() -> None:
+def test_undecodable_picture_is_rejected() -> None:
     for data in (b"\xff\xd8\xff", b"\x89PNG\r\n\x1a\n"):
         with pytest.raises(nep.EncodeError):
             to_ros("sensor_msgs/CompressedImage", "image", Encoded(data))
 
 
-def test_an_extension_has_no_room() -> None:
+def test_extension_is_rejected_for_ros_types() -> None:
     with pytest.raises(WireError, match="a 'std_msgs/String' can't carry an extension"):
         to_ros("std_msgs/String", "json", Encoded(b"{}", {"a": 1}))
 
 
-def test_only_packages_of_messages_are_imported(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_only_message_packages_are_imported(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     skip_without_ros()
     for name, folder in (("of_no_ros", ""), ("of_no_ros_either", "messages"), ("of_my_own", "msg")):
         (tmp_path / name / folder).mkdir(parents=True)
@@ -240,7 +240,7 @@ def test_only_packages_of_messages_are_imported(tmp_path: Path, monkeypatch: pyt
     assert {each for each in sys.modules if each.startswith("of_")} == {"of_my_own", "of_my_own.msg"}
 
 
-def test_the_bytes_are_those_of_genpy() -> None:
+def test_encoded_bytes_match_genpy() -> None:
     skip_without_ros()
     from nep.backends.ros.library import library
 

@@ -42,7 +42,7 @@ def ros(tmp_path: Path) -> Iterator[str]:
         yield address
 
 
-def test_a_master_that_was_started_anew_gets_to_know_everybody_again(tmp_path: Path) -> None:
+def test_nodes_register_again_at_a_restarted_ros_master(tmp_path: Path) -> None:
     skip_without_ros()
     address = f"127.0.0.1:{free_port()}"
     with running(SPEAKS, **told(address)) as speaker, running(HEARS, **told(address)) as early:
@@ -81,7 +81,7 @@ node.close()
 SAME_NAME = "import nep; nep.node('second', 'ros').new_pub('topic'); print('ready'); input()"
 
 
-def test_a_node_whose_name_another_takes_says_so_instead_of_waiting(ros: str) -> None:
+def test_node_replaced_by_another_of_its_name_raises_instead_of_waiting(ros: str) -> None:
     with running(SHUT_DOWN, "__name:=same", **told(ros)) as first:
         assert first.line() == "ready"
         with running(SAME_NAME, "__name:=same", **told(ros)) as second:
@@ -106,7 +106,7 @@ node.spin()
 """
 
 
-def test_ctrl_c_ends_a_program_that_spins_and_unregisters_it(ros: str) -> None:
+def test_ctrl_c_ends_a_spinning_program_and_unregisters_it(ros: str) -> None:
     with running(INTERRUPTED, **told(ros)) as program, nep.node("n", "ros", master=ros) as node:
         assert program.line() == "ready"
         assert len(node.graph().topics["/topic"].subscribers) == 1
@@ -145,7 +145,7 @@ with nep.node("hearer", "ros") as node:
 """
 
 
-def test_a_subscriber_that_hangs_costs_bounded_memory_and_drops_are_counted(ros: str) -> None:
+def test_hung_subscriber_uses_bounded_memory_and_drops_are_counted(ros: str) -> None:
     with running(SLOW, **told(ros)) as hearer:
         assert hearer.line() == "ready"
         with running(TOO_MUCH, **told(ros)) as speaker:
@@ -163,7 +163,7 @@ def test_a_subscriber_that_hangs_costs_bounded_memory_and_drops_are_counted(ros:
             speaker.end()
 
 
-def test_a_subscriber_that_is_killed_costs_the_others_nothing(ros: str) -> None:
+def test_killed_subscriber_does_not_affect_the_others(ros: str) -> None:
     with running(SPEAKS, **told(ros)) as speaker:
         assert speaker.line() == "ready"
         with running(HEARS, **told(ros)) as other:
@@ -213,7 +213,7 @@ print(pub.subscribers, [each[:4] for each in pub.missing])
 """
 
 
-def test_other_versions_of_a_message_are_refused_on_both_sides(ros: str) -> None:
+def test_different_versions_of_a_message_are_rejected_on_both_sides(ros: str) -> None:
     with running(LIES, **told(ros)) as liar:
         assert liar.line() == "ready"
         with running(HEARS_LIES, **told(ros)) as hearer:
@@ -238,7 +238,7 @@ print(sub.listen(timeout_s=60.0), came.wait(60.0), rospy.get_name())
 )
 
 
-def test_a_program_may_start_rospy_itself_and_hear_the_same_topic(ros: str) -> None:
+def test_program_can_use_rospy_itself_and_subscribe_to_the_same_topic(ros: str) -> None:
     with running(BOTH, **told(ros)) as program:
         assert program.line() == "(True, 'both') True /own"
         program.end()
@@ -263,7 +263,7 @@ for _each in range(2):
         ("999.1.2.3", "ROS_IP is '999.1.2.3'; set it to the IP address of this computer"),
     ],
 )
-def test_where_this_computer_is(ros: str, own: str, said: str) -> None:
+def test_own_address_follows_the_ros_environment(ros: str, own: str, said: str) -> None:
     with running(OWN_ADDRESS, **{**told(ros), "ROS_IP": own}) as program:
         assert program.line() == program.line() == said
         assert program.end() == ("", "")
@@ -276,7 +276,9 @@ def test_where_this_computer_is(ros: str, own: str, said: str) -> None:
         ("https://h", "h:11311"), ("http://127.0.0.1:11311", "127.0.0.1:11311"),
     ],
 )  # fmt: skip
-def test_where_the_master_is(given: str, address: str, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_master_address_is_parsed_from_argument_and_environment(
+    given: str, address: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
     assert address_of(given) == address
     monkeypatch.setenv("ROS_MASTER_URI", given)
     assert address_of(None) == address
@@ -285,13 +287,13 @@ def test_where_the_master_is(given: str, address: str, monkeypatch: pytest.Monke
 @pytest.mark.parametrize(
     "given", ["http://", "http://h:99999", "h:x", "http://[::1", ":11311", "http://h:0/", " ", "a b"]
 )
-def test_what_is_no_address_of_a_master(given: str, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_invalid_master_address_is_rejected(given: str, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("ROS_MASTER_URI", given)
     with pytest.raises(nep.NepError, match=r"address"):
         nep.node("n", "ros")
 
 
-def test_without_a_word_it_is_on_this_computer(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_default_master_address_is_this_computer(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.delenv("ROS_MASTER_URI", raising=False)
     assert address_of(None) == "127.0.0.1:11311"
     monkeypatch.setenv("ROS_MASTER_URI", "")
@@ -309,7 +311,7 @@ class Connection:
         self._queue = queue
 
 
-def test_room_is_made_by_number_and_by_bytes_for_each_connection() -> None:
+def test_queues_are_trimmed_by_count_and_bytes_per_connection() -> None:
     few, many = Connection(3, [b"a", b"b", b"c"]), Connection(100, [bytes(10)] * 5)
     assert QueueRoom().make([few, many], 1) == 1
     assert (few._queue, len(many._queue)) == ([b"b", b"c"], 5)
@@ -323,13 +325,13 @@ def test_room_is_made_by_number_and_by_bytes_for_each_connection() -> None:
     assert room.make([Connection(100, [])], 2**40) == 0
 
 
-def test_a_definition_with_another_checksum_is_not_taken() -> None:
+def test_definition_with_another_checksum_is_rejected() -> None:
     assert unpacker("json", "std_msgs/String", "", "992ce8a1687cec8c8bd883ec73ca41d1").msg_type == "json"
     with pytest.raises(nep.NepError, match="its 'sensor_msgs/Image' has other fields"):
         unpacker("image", "sensor_msgs/Image", "uint8 data", "0" * 32)
 
 
-def test_depth_that_ros_compressed_is_read() -> None:
+def test_compressed_depth_of_ros_is_decoded() -> None:
     np, cv2 = pytest.importorskip("numpy"), pytest.importorskip("cv2")
     depth = np.arange(12, dtype=np.uint16).reshape(3, 4) * 5000
     png = cv2.imencode(".png", depth)[1].tobytes()

@@ -30,7 +30,7 @@ def ros(tmp_path: Path) -> Iterator[str]:
         yield address
 
 
-def test_the_contract_holds() -> None:
+def test_ros_services_pass_the_contract() -> None:
     skip_without_ros()
     command = [sys.executable, "-m", "pytest", "-q", "-n0", "tests/nep/backends/ros_services_contract.py"]
     environment = {key: value for key, value in os.environ.items() if not key.startswith(("PYTEST_", "ROS_"))}
@@ -91,7 +91,7 @@ print(sorted(node.graph().services))
 """
 
 
-def test_nep_calls_a_program_of_ros(ros: str) -> None:
+def test_nep_calls_a_ros_server(ros: str) -> None:
     with running(SERVES, **told(ros)) as server:
         assert server.line() == "ready"
         with running(CALLS, **told(ros)) as client:
@@ -150,7 +150,7 @@ call("/wrong", Trigger)
 )
 
 
-def test_a_program_of_ros_calls_nep(ros: str) -> None:
+def test_ros_client_calls_a_nep_server(ros: str) -> None:
     with running(NEP_SERVES, **told(ros)) as server:
         assert server.line() == "ready"
         with running(ROS_CALLS, **told(ros)) as client:
@@ -198,7 +198,7 @@ print(future.result(60.0))
 """
 
 
-def test_a_server_that_dies_is_told_and_the_next_one_is_found(ros: str) -> None:
+def test_killed_server_is_reported_and_its_successor_is_found(ros: str) -> None:
     with running(DIES, **told(ros)) as server, running(ASKS, **told(ros)) as client:
         assert server.line() == "ready"
         assert (client.line(), client.line(), server.line()) == ("answer", "waits", "asked")
@@ -212,7 +212,7 @@ def test_a_server_that_dies_is_told_and_the_next_one_is_found(ros: str) -> None:
             client.end()
 
 
-def test_nep_call_is_what_the_file_of_that_name_says() -> None:
+def test_nep_call_type_matches_its_srv_file() -> None:
     json, msgpack = CODECS["json"], CODECS["msgpack"]
     body = NEP_CALL.body_of_call(json, b'{"a":1}', 1.5)
     assert body == struct.pack("<HII", 1, 1500, 7) + b'{"a":1}'
@@ -229,7 +229,7 @@ def test_nep_call_is_what_the_file_of_that_name_says() -> None:
         NEP_CALL.call_in(b"\1")
 
 
-def test_a_type_of_ros_has_bytes_and_nan_with_msgpack() -> None:
+def test_ros_service_type_carries_bytes_and_nan_with_msgpack() -> None:
     kind = ServiceType(
         "a/B", parse("a/BRequest", "uint8[] data\nfloat64 x"), parse("a/BResponse", "uint8[] data")
     )
@@ -269,7 +269,7 @@ node.close()
 SAME_NAME = "import nep; nep.node('second', 'ros').new_pub('topic'); print('ready'); input()"
 
 
-def test_a_server_whose_node_s_name_another_takes_says_so_instead_of_waiting(ros: str) -> None:
+def test_server_whose_node_name_is_taken_raises_instead_of_waiting(ros: str) -> None:
     with running(SHUT_DOWN, "__name:=same", **told(ros)) as first:
         assert first.line() == "ready"
         with running(SAME_NAME, "__name:=same", **told(ros)) as second:
@@ -297,7 +297,7 @@ for line in sys.stdin:
 
 
 @pytest.mark.skipif(not hasattr(signal, "SIGSTOP"), reason="there are no signals that stop")
-def test_a_server_that_hangs_holds_nobody_up(ros: str) -> None:
+def test_call_to_a_hung_server_raises_no_server_error_and_works_after_it_resumes(ros: str) -> None:
     with running(DIES, **told(ros)) as server, running(OBEYS, **told(ros)) as client:
         assert server.line() == "ready"
         client.say("60 1")
@@ -310,7 +310,7 @@ def test_a_server_that_hangs_holds_nobody_up(ros: str) -> None:
         assert client.line() == "answer"
 
 
-def test_a_master_that_was_started_anew_gets_to_know_the_services(tmp_path: Path) -> None:
+def test_services_register_again_at_a_restarted_ros_master(tmp_path: Path) -> None:
     skip_without_ros()
     address = f"127.0.0.1:{free_port()}"
     with running(DIES, **told(address)) as server, running(OBEYS, **told(address)) as client:

@@ -86,7 +86,7 @@ def in_memory(message: nep.Message) -> bool:
     return hasattr(message.data.obj, "held")
 
 
-def test_a_large_payload_is_read_where_it_was_written(node: nep.Node) -> None:
+def test_large_payload_is_read_from_shared_memory_without_a_copy(node: nep.Node) -> None:
     sub, pub = node.new_sub("t", "bytes"), node.new_pub("t", "bytes")
     for _ in range(begin(pub)):
         assert sub.receive(LONG_S) is not None
@@ -102,7 +102,7 @@ def test_a_large_payload_is_read_where_it_was_written(node: nep.Node) -> None:
 
 
 @pytest.mark.parametrize("size", [0, 1, SHARED_BYTES - 1, SHARED_BYTES, 2**20, 2**20 + 1, 9_000_000])
-def test_every_size_arrives_whole_and_in_order(node: nep.Node, size: int) -> None:
+def test_every_size_arrives_complete_and_in_order(node: nep.Node, size: int) -> None:
     sub, pub = node.new_sub("t", "bytes"), node.new_pub("t", "bytes")
     for _ in range(begin(pub)):
         sub.receive(LONG_S)
@@ -113,7 +113,7 @@ def test_every_size_arrives_whole_and_in_order(node: nep.Node, size: int) -> Non
     assert sub.lost == 0
 
 
-def test_thirty_pictures_in_a_burst_all_arrive(master: Master, node: nep.Node) -> None:
+def test_burst_of_thirty_pictures_arrives_completely(master: Master, node: nep.Node) -> None:
     pub = node.new_pub("frames", "bytes")
     with running(LISTENER, master.address) as listener:
         assert listener.line() == "listens"
@@ -128,7 +128,9 @@ def test_thirty_pictures_in_a_burst_all_arrive(master: Master, node: nep.Node) -
         assert listener.line() == f"lost 0 received {begun + 31}"
 
 
-def test_who_cannot_share_gets_the_same_through_the_socket(master: Master, node: nep.Node) -> None:
+def test_subscriber_without_shared_memory_receives_the_same_through_the_socket(
+    master: Master, node: nep.Node
+) -> None:
     sub, pub = node.new_sub("frames", "bytes"), node.new_pub("frames", "bytes")
     with running(LISTENER, master.address, NEP_SHARED_MEMORY="0") as listener:
         assert listener.line() == "listens"
@@ -148,7 +150,7 @@ def test_who_cannot_share_gets_the_same_through_the_socket(master: Master, node:
     assert message.payload == data
 
 
-def test_a_debugger_that_says_no_hello_gets_payloads_and_everybody_with_it(
+def test_subscriber_without_hello_receives_payloads_and_so_do_the_others(
     master: Master, node: nep.Node
 ) -> None:
     sub, pub = node.new_sub("t", "bytes"), node.new_pub("t", "bytes")
@@ -188,7 +190,7 @@ def test_payloads_outlive_the_publisher_the_subscriber_and_both_nodes(master: Ma
     assert message.payload == b"\7" * LARGE
 
 
-def test_a_picture_shares_its_memory_and_cannot_be_written_to(node: nep.Node) -> None:
+def test_received_picture_is_a_read_only_view_of_shared_memory(node: nep.Node) -> None:
     sub, pub = node.new_sub("t", "image"), node.new_pub("t", "image")
     frame = np.arange(720 * 1280 * 3, dtype=np.uint8).reshape(720, 1280, 3)
     count = 0
@@ -209,7 +211,7 @@ def test_a_picture_shares_its_memory_and_cannot_be_written_to(node: nep.Node) ->
     assert int(picture[5, 5, 1]) == np.arange(720 * 1280 * 3, dtype=np.uint8).reshape(720, 1280, 3)[5, 5, 1]
 
 
-def test_a_loan_is_published_without_being_copied(node: nep.Node) -> None:
+def test_loan_is_published_without_a_copy(node: nep.Node) -> None:
     sub, pub = node.new_sub("t", "image"), node.new_pub("t", "image")
     assert pub.loan((480, 640, 3)).shape == (480, 640, 3)  # nobody shares: an array as any other
     while not readers(pub):
@@ -232,7 +234,7 @@ def test_a_loan_is_published_without_being_copied(node: nep.Node) -> None:
     assert float(sub.listen(timeout_s=LONG_S)[1][7, 7]) == 1.5
 
 
-def test_a_loan_larger_than_all_before_is_published_whole(node: nep.Node) -> None:
+def test_loan_larger_than_all_previous_ones_is_published_completely(node: nep.Node) -> None:
     sub, pub = node.new_sub("t", "image"), node.new_pub("t", "image")
     while not readers(pub):
         pub.publish(nep.raw_image(np.zeros((480, 640, 3), np.uint8)))
@@ -246,7 +248,7 @@ def test_a_loan_larger_than_all_before_is_published_whole(node: nep.Node) -> Non
     assert sub.lost == 0
 
 
-def test_loans_that_are_never_published_come_back(node: nep.Node) -> None:
+def test_unpublished_loans_are_released(node: nep.Node) -> None:
     sub, pub = node.new_sub("t", "image"), node.new_pub("t", "image")
     while not readers(pub):
         pub.publish(nep.raw_image(np.zeros((480, 640, 3), np.uint8)))
@@ -259,7 +261,7 @@ def test_loans_that_are_never_published_come_back(node: nep.Node) -> None:
     assert transport.lend(480 * 640 * 3) is not None
 
 
-def test_a_loan_of_a_closed_publisher_stays_readable_and_is_refused(node: nep.Node) -> None:
+def test_loan_of_a_closed_publisher_stays_readable_but_cannot_be_published(node: nep.Node) -> None:
     sub, pub = node.new_sub("t", "image"), node.new_pub("t", "image")
     while not readers(pub):
         pub.publish(nep.raw_image(np.zeros((480, 640, 3), np.uint8)))
@@ -275,7 +277,7 @@ def test_a_loan_of_a_closed_publisher_stays_readable_and_is_refused(node: nep.No
         pub.loan(5)
 
 
-def test_larger_payloads_get_larger_memory(node: nep.Node) -> None:
+def test_segment_grows_for_larger_payloads(node: nep.Node) -> None:
     sub, pub = node.new_sub("t", "bytes"), node.new_pub("t", "bytes")
     for size in (LARGE, 3_000_000, 17_000_000):
         pub.publish(bytes(size))
@@ -294,7 +296,7 @@ def test_larger_payloads_get_larger_memory(node: nep.Node) -> None:
     assert (message.size_bytes, sub.lost) == (70_000_000, 0)
 
 
-def test_who_keeps_all_gets_copies_and_the_publisher_keeps_its_slots(node: nep.Node) -> None:
+def test_reader_that_keeps_all_messages_gets_copies_and_does_not_exhaust_slots(node: nep.Node) -> None:
     sub, pub = node.new_sub("t", "bytes"), node.new_pub("t", "bytes")
     for _ in range(begin(pub)):
         sub.receive(LONG_S)
@@ -314,7 +316,7 @@ def test_who_keeps_all_gets_copies_and_the_publisher_keeps_its_slots(node: nep.N
     assert in_memory(message)
 
 
-def test_small_payloads_that_are_wanted_as_bytes_take_no_slots(node: nep.Node) -> None:
+def test_small_payloads_are_copied_and_hold_no_slots(node: nep.Node) -> None:
     sub, pub = node.new_sub("t", "bytes"), node.new_pub("t", "bytes")
     size = shared_memory._COPIED_BYTES
     for _ in range(begin(pub, size=size)):
@@ -337,7 +339,7 @@ def test_small_payloads_that_are_wanted_as_bytes_take_no_slots(node: nep.Node) -
     assert in_memory(message), "larger ones stay where they are until somebody wants them"
 
 
-def test_who_reads_late_gets_what_was_sent_and_losses_are_counted(node: nep.Node) -> None:
+def test_late_reader_receives_correct_payloads_and_losses_are_counted(node: nep.Node) -> None:
     sub = node.new_sub("t", "bytes", max_messages=20)
     pub = node.new_pub("t", "bytes")
     begun = begin(pub)
@@ -354,7 +356,7 @@ def test_who_reads_late_gets_what_was_sent_and_losses_are_counted(node: nep.Node
     assert sub.received + (sub.lost or 0) == begun + 300
 
 
-def test_the_memory_of_a_killed_publisher_goes_when_the_next_program_shares() -> None:
+def test_memory_of_a_killed_publisher_is_removed_by_the_next_program() -> None:
     code = """
         import sys, time
         from nep.backends.zeromq.shared.memory import SharedWriter
@@ -386,7 +388,7 @@ def _files() -> list[str]:
     return [each.name for each in Path(_MEMORY).glob("nep_*") if "global" not in each.name]
 
 
-def test_slots_of_a_killed_reader_come_back() -> None:
+def test_slots_of_a_killed_reader_are_released() -> None:
     code = """
         import sys
         from nep.backends.zeromq.shared.memory import SharedReader
@@ -415,7 +417,7 @@ def test_slots_of_a_killed_reader_come_back() -> None:
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="Windows does not fork")
-def test_a_child_that_ends_takes_nothing_of_its_parent_with_it(master: Master) -> None:
+def test_exiting_forked_child_does_not_release_memory_of_its_parent(master: Master) -> None:
     code = """
         import gc, os, sys
         import nep
@@ -452,9 +454,7 @@ def test_a_child_that_ends_takes_nothing_of_its_parent_with_it(master: Master) -
         assert program.end() == ("", "")
 
 
-def test_without_the_library_all_goes_through_the_socket(
-    node: nep.Node, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_missing_library_falls_back_to_the_socket(node: nep.Node, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(shared_memory, "_MODULE", "no_such_library")
     monkeypatch.setattr(shared_memory, "_process", shared_memory._Process())
     sub, pub = node.new_sub("t", "bytes"), node.new_pub("t", "bytes")
@@ -467,7 +467,7 @@ def test_without_the_library_all_goes_through_the_socket(
     assert not shared_memory.can_share()
 
 
-def test_without_room_all_goes_through_the_socket(node: nep.Node, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_full_memory_falls_back_to_the_socket(node: nep.Node, monkeypatch: pytest.MonkeyPatch) -> None:
     sub, pub = node.new_sub("t", "bytes"), node.new_pub("t", "bytes")
     for _ in range(begin(pub)):
         sub.receive(LONG_S)
@@ -485,7 +485,7 @@ def test_without_room_all_goes_through_the_socket(node: nep.Node, monkeypatch: p
     assert in_memory(message)
 
 
-def test_a_folder_of_somebody_else_is_not_used(monkeypatch: pytest.MonkeyPatch, tmp_path: Any) -> None:
+def test_invalid_runtime_folder_is_rejected(monkeypatch: pytest.MonkeyPatch, tmp_path: Any) -> None:
     (tmp_path / "nep-shared").write_text("a file")
     monkeypatch.setenv("XDG_RUNTIME_DIR", str(tmp_path))
     with pytest.raises(OSError, match="nep-shared"):
@@ -493,7 +493,7 @@ def test_a_folder_of_somebody_else_is_not_used(monkeypatch: pytest.MonkeyPatch, 
 
 
 @pytest.mark.parametrize("part", [b"", b"\0" * 7, struct.pack("<Q", 2**64 - 1), struct.pack("<Q", 1)])
-def test_what_names_no_payload_is_counted(node: nep.Node, part: bytes) -> None:
+def test_reference_to_a_missing_payload_is_counted(node: nep.Node, part: bytes) -> None:
     """Somebody sends the flag, and there is no memory: refused, or lost, and the next one is heard."""
     context: zmq.Context[zmq.Socket[bytes]] = zmq.Context()
     stranger = context.socket(zmq.PUB)
@@ -518,12 +518,12 @@ def test_what_names_no_payload_is_counted(node: nep.Node, part: bytes) -> None:
         context.term()
 
 
-def test_memory_that_is_not_there_cannot_be_opened() -> None:
+def test_opening_missing_memory_raises_lookup_error() -> None:
     with pytest.raises(LookupError):
         SharedReader(next(_ids), 1)
 
 
-def test_payloads_that_were_overwritten_are_lost_and_the_next_is_found() -> None:
+def test_overwritten_payloads_are_lost_and_the_next_one_is_read() -> None:
     writer = SharedWriter(next(_ids))
     assert writer.prepare(2**20)
     reader = SharedReader(writer._publisher, 1)

@@ -61,13 +61,13 @@ def test_no_message_is_lost_if_the_first_one_arrives() -> None:
     assert (sources.received, sources.lost) == (1, 0)
 
 
-def test_a_message_without_a_valid_number_does_not_make_losses_negative() -> None:
+def test_message_without_a_valid_number_does_not_make_losses_negative() -> None:
     sources = new_publisher()
     sources.count_message(5, 0, is_alone=False)
     assert sources.lost == 0
 
 
-def test_losses_grow_with_each_renewal_while_the_publisher_is_not_reached() -> None:
+def test_losses_grow_with_each_renewal_while_the_publisher_is_unreachable() -> None:
     sources = new_publisher()
     sources.expect_up_to(5, 100)
     assert sources.lost == 0
@@ -77,7 +77,7 @@ def test_losses_grow_with_each_renewal_while_the_publisher_is_not_reached() -> N
     assert sources.lost == 250
 
 
-def test_a_message_that_was_counted_as_lost_and_comes_late_is_counted_as_received() -> None:
+def test_late_message_already_counted_as_lost_is_counted_as_received() -> None:
     sources = new_publisher()
     sources.expect_up_to(5, 2)
     sources.expect_up_to(5, 2)
@@ -95,7 +95,7 @@ def test_messages_older_than_the_history_are_lost() -> None:
     assert (sources.received, sources.lost) == (3, 7)
 
 
-def test_a_history_that_arrives_after_its_messages_were_promised_is_received() -> None:
+def test_history_that_arrives_after_a_renewal_is_counted_as_received() -> None:
     sources = new_publisher(history=3)
     sources.expect_up_to(5, 9)
     sources.expect_up_to(5, 9)
@@ -106,7 +106,7 @@ def test_a_history_that_arrives_after_its_messages_were_promised_is_received() -
     assert (sources.received, sources.lost) == (3, 7)
 
 
-def test_a_pattern_that_is_not_registered_yet_expects_nothing_of_a_new_publisher() -> None:
+def test_unregistered_pattern_expects_no_messages_of_a_new_publisher() -> None:
     sockets: list[SubSocket] = []
 
     def new_readable(spec: SubscriberSpec) -> SubSocket:
@@ -128,7 +128,7 @@ def test_a_pattern_that_is_not_registered_yet_expects_nothing_of_a_new_publisher
     io.close()
 
 
-def test_a_publisher_that_was_there_before_counts_from_its_first_received_message() -> None:
+def test_existing_publisher_is_counted_from_its_first_received_message() -> None:
     sources = PublisherTracker()
     sources.expect_up_to(5, 100)
     sources.expect_up_to(5, 100)
@@ -137,7 +137,7 @@ def test_a_publisher_that_was_there_before_counts_from_its_first_received_messag
     assert (sources.received, sources.lost) == (1, 0)
 
 
-def test_an_impossible_first_number_is_rejected_and_counts_nothing() -> None:
+def test_impossible_first_number_is_rejected_and_not_counted() -> None:
     sources = new_publisher()
     assert not sources.advance_to(5, GAP_MAX + 1)
     assert sources.lost == 0
@@ -174,9 +174,7 @@ class UnreachablePublisher:
 
 
 @pytest.mark.parametrize("topic", ["t", "*"])
-def test_all_messages_of_a_new_publisher_that_cannot_be_reached_are_lost(
-    closed_port: str, topic: str
-) -> None:
+def test_all_messages_of_an_unreachable_new_publisher_are_lost(closed_port: str, topic: str) -> None:
     with Master("127.0.0.1:0") as master, nep.node("s", master=master.address) as node:
         subscriber = node.new_sub(topic)
         with attacker_at(master) as connection:

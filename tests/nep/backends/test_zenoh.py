@@ -97,7 +97,7 @@ def ask(peer: Program, text: str) -> str:
 # ---- programs that meet
 
 
-def test_two_programs_meet_without_a_master(make: Make, place: str) -> None:
+def test_two_programs_connect_without_a_master(make: Make, place: str) -> None:
     with running(PEER, place) as peer:
         peer_id = peer.line()
         node = make("here")
@@ -122,7 +122,7 @@ def test_two_programs_meet_without_a_master(make: Make, place: str) -> None:
         assert sub.lost == 0
 
 
-def test_rates_are_known_after_two_looks(make: Make) -> None:
+def test_rate_is_known_after_two_polls(make: Make) -> None:
     node = make("a")
     pub = node.new_pub("t")
     assert node.graph().topics["t"].rate_hz is None
@@ -136,7 +136,7 @@ def test_rates_are_known_after_two_looks(make: Make) -> None:
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="nobody is killed so there")
-def test_a_killed_program_vanishes_and_a_new_one_meets_those_that_are_left(make: Make, place: str) -> None:
+def test_killed_program_is_removed_and_its_successor_connects_to_the_rest(make: Make, place: str) -> None:
     here = make("here")
     pub = here.new_pub("to/peer")
     with running(PEER, place) as peer:
@@ -153,7 +153,7 @@ def test_a_killed_program_vanishes_and_a_new_one_meets_those_that_are_left(make:
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="nobody is halted so there")
-def test_a_halted_subscriber_costs_half_a_second_and_is_named(
+def test_halted_subscriber_delays_a_publisher_by_half_a_second_and_is_named(
     make: Make, place: str, caplog: pytest.LogCaptureFixture
 ) -> None:
     here, other = make("here"), make("other")
@@ -178,7 +178,7 @@ def test_a_halted_subscriber_costs_half_a_second_and_is_named(
         peer.signal(signal.SIGCONT)
 
 
-def test_what_was_published_before_the_end_arrives(place: str, make: Make) -> None:
+def test_messages_published_before_exit_arrive(place: str, make: Make) -> None:
     sub = make("here").new_sub("t", "bytes")
     code = f"""
     import nep
@@ -193,7 +193,7 @@ def test_what_was_published_before_the_end_arrives(place: str, make: Make) -> No
     assert sub.lost == 0
 
 
-def test_large_and_empty_payloads(make: Make) -> None:
+def test_large_and_empty_payloads_arrive(make: Make) -> None:
     sub, pub = make("b").new_sub("t", "bytes"), make("a").new_pub("t", "bytes", latched=True)
     for payload in (b"", bytes(8 * 2**20), b"\0"):
         pub.publish(payload)
@@ -203,7 +203,7 @@ def test_large_and_empty_payloads(make: Make) -> None:
 
 
 @pytest.mark.parametrize("topic", ["*", "**", "a/**/b", "$*", "a//b", "/", "@a", "#?%", "x" * 200, "ü" * 100])
-def test_every_topic_has_a_key_of_its_own(make: Make, topic: str) -> None:
+def test_every_topic_maps_to_a_unique_key(make: Make, topic: str) -> None:
     node, other = make("a"), make("b")
     sub, stranger = node.new_sub(topic), node.new_sub("a")
     pub = other.new_pub(topic)
@@ -217,7 +217,7 @@ def test_every_topic_has_a_key_of_its_own(make: Make, topic: str) -> None:
 
 
 @pytest.mark.parametrize("word", ["", "%", "a/b", "*", "é 漢", "x" * 1000])
-def test_tokens_say_what_was_written(word: str) -> None:
+def test_liveliness_tokens_round_trip(word: str) -> None:
     node = NodeRecord("0123456789abcdef", word, word, 4711, word, word, since_ns=5)
     pub = PublisherRecord(2**64 - 1, word, word, word, (keys.data_key(word),), latched=True)
     sub = SubscriberRecord(1, word, word)
@@ -242,11 +242,11 @@ def test_tokens_say_what_was_written(word: str) -> None:
         "other/v1/live/n/sub/1/t/json",
     ],
 )
-def test_what_is_no_token_is_none(key: str) -> None:
+def test_invalid_liveliness_tokens_are_ignored(key: str) -> None:
     assert keys.parse_live(key) is None
 
 
-def test_what_a_stranger_puts_or_answers_is_refused_and_counted(
+def test_invalid_puts_and_replies_are_rejected_and_counted(
     make: Make, port: int, caplog: pytest.LogCaptureFixture, place: str
 ) -> None:
     node = make("a")
@@ -283,7 +283,7 @@ def test_what_a_stranger_puts_or_answers_is_refused_and_counted(
 # ---- places
 
 
-def test_places(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_place_is_taken_from_argument_or_configuration_variable(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.delenv(CONFIG_VARIABLE, raising=False)
     assert place_name() == place_name("") == "local"
     for given in ("local/lab", "tcp/192.0.2.1:7447", "tls/a.b:1,tcp/c:2", "/etc/zenoh.json5"):
@@ -305,7 +305,7 @@ def test_places(monkeypatch: pytest.MonkeyPatch) -> None:
         nep.node("a", "zenoh", master=5)  # type: ignore[arg-type]
 
 
-def test_direct_connections_make_no_sense(make: Make) -> None:
+def test_direct_connections_are_rejected(make: Make) -> None:
     node = make("a")
     with pytest.raises(nep.NepError, match=r"'zenoh' .*direct connections.*omit the configuration"):
         node.new_pub("t", "json", node.direct(port=7000))
@@ -313,7 +313,7 @@ def test_direct_connections_make_no_sense(make: Make) -> None:
         node.new_sub("t", "json", node.direct(port=7000))
 
 
-def test_no_router_and_no_file_are_told(port: int, tmp_path: Path) -> None:
+def test_missing_router_and_invalid_configuration_file_are_reported(port: int, tmp_path: Path) -> None:
     with nep.node("a", "zenoh", master=f"tcp/127.0.0.1:{port}", wait_s=0.2) as node:
         with pytest.raises(nep.NepError, match=f"'tcp/127.0.0.1:{port}': .*router"):
             node.new_pub("t")
@@ -329,7 +329,7 @@ def test_no_router_and_no_file_are_told(port: int, tmp_path: Path) -> None:
             node.new_sub("t")
 
 
-def test_nothing_listens_but_at_loopback(place: str) -> None:
+def test_only_loopback_sockets_are_opened(place: str) -> None:
     import psutil
 
     before = set(psutil.Process().net_connections())
@@ -341,7 +341,7 @@ def test_nothing_listens_but_at_loopback(place: str) -> None:
         assert not [each for each in opened if each.type == socket.SOCK_DGRAM]
 
 
-def test_files_of_programs_that_ended_are_deleted(place: str, tmp_path: Path) -> None:
+def test_rendezvous_files_of_ended_programs_are_deleted(place: str, tmp_path: Path) -> None:
     meeting = Rendezvous(place.removeprefix("local/"))
     own = meeting.add(1234)
     with subprocess.Popen([sys.executable, "-c", ""]) as ended:
@@ -356,7 +356,7 @@ def test_files_of_programs_that_ended_are_deleted(place: str, tmp_path: Path) ->
     assert meeting.entries() == []
 
 
-def test_a_folder_that_is_no_folder(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+def test_invalid_rendezvous_folder_is_reported(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     (tmp_path / "nep-zenoh").touch()
     monkeypatch.setenv("XDG_RUNTIME_DIR", str(tmp_path))
     with (
@@ -376,7 +376,7 @@ def router(port: int, more: str = "", protocol: str = "tcp") -> str:
     )
 
 
-def test_a_router_joins_programs_and_may_be_started_again(make: Make, port: int) -> None:
+def test_router_joins_programs_and_can_be_restarted(make: Make, port: int) -> None:
     where = f"tcp/127.0.0.1:{port}"
     with running(ROUTER, router(port)) as first:
         first.line()
@@ -404,7 +404,7 @@ def test_a_router_joins_programs_and_may_be_started_again(make: Make, port: int)
                 eventually(lambda: pub.subscribers == 0)
 
 
-def test_a_configuration_file_of_the_user_s(
+def test_user_configuration_file_is_used(
     make: Make, port: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     file = tmp_path / "zenoh.json5"
@@ -432,7 +432,7 @@ def test_a_configuration_file_of_the_user_s(
 # ---- the library, and forks
 
 
-def test_without_zenoh_one_sentence_says_what_to_install() -> None:
+def test_missing_zenoh_is_reported_with_the_install_command() -> None:
     def missing(_name: str) -> object:
         raise ImportError
 
@@ -440,13 +440,13 @@ def test_without_zenoh_one_sentence_says_what_to_install() -> None:
         library(missing)  # type: ignore[arg-type]
 
 
-def test_who_does_not_ask_for_it_does_not_import_zenoh() -> None:
+def test_zenoh_is_not_imported_unless_requested() -> None:
     code = "import sys, nep; nep.node('a').close(); sys.exit('zenoh' in sys.modules)"
     assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0
 
 
 @pytest.mark.skipif(not hasattr(os, "fork"), reason="there are no forks here")
-def test_a_forked_child_is_told_and_ends_and_holds_nothing(place: str, make: Make) -> None:
+def test_forked_child_raises_exits_and_holds_no_resources(place: str, make: Make) -> None:
     code = f"""
     import os, sys, nep
     def say(it):  # whole lines at once: parent and child have one output
@@ -484,7 +484,7 @@ def test_a_forked_child_is_told_and_ends_and_holds_nothing(place: str, make: Mak
         child.kill()
 
 
-def test_sessions_that_open_at_once_all_meet(make: Make) -> None:
+def test_sessions_opened_simultaneously_all_connect(make: Make) -> None:
     import threading
 
     nodes = [make(f"n{n}") for n in range(6)]
@@ -504,7 +504,7 @@ def test_sessions_that_open_at_once_all_meet(make: Make) -> None:
     assert nodes[0].new_pub("t").subscribers == 6
 
 
-def test_a_close_during_receive_and_one_while_a_session_opens(make: Make) -> None:
+def test_close_during_receive_and_during_session_open_raises_closed_error(make: Make) -> None:
     import threading
 
     node = make("a")

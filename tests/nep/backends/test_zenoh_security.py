@@ -154,7 +154,7 @@ def make(lab: Lab) -> Iterator[Make]:
         node.close()
 
 
-def test_with_certificates_all_is_as_without(make: Make) -> None:
+def test_messages_are_exchanged_with_certificates(make: Make) -> None:
     sub = make("a").new_sub("secret")
     other = make("b")
     pub = other.new_pub("secret", latched=True)
@@ -168,7 +168,7 @@ def test_with_certificates_all_is_as_without(make: Make) -> None:
     assert {each.name for each in other.graph().nodes.values()} == {"a", "b", "c", "d"}
 
 
-def test_nothing_readable_is_on_the_way(lab: Lab) -> None:
+def test_traffic_is_encrypted(lab: Lab) -> None:
     """Who looks at what a node sends before it is answered sees a handshake of TLS."""
     with socket.create_server(("127.0.0.1", 0)) as listening:
         listening.settimeout(LONG_S)
@@ -195,7 +195,7 @@ def test_nothing_readable_is_on_the_way(lab: Lab) -> None:
 @pytest.mark.parametrize(
     ("certificate", "authority"), [("", "authority"), ("stranger", "authority"), ("robot", "stranger")]
 )
-def test_who_is_not_trusted_is_refused_in_a_sentence(lab: Lab, certificate: str, authority: str) -> None:
+def test_untrusted_peer_is_rejected_with_a_message(lab: Lab, certificate: str, authority: str) -> None:
     """Without a certificate, with one that nobody signed, and where the router's own is not trusted."""
     with nep.node("a", "zenoh", master=lab.master(certificate, authority), wait_s=1.0) as node:
         for make in (lambda: node.new_pub("open"), lambda: node.new_client("open"), node.graph):
@@ -204,7 +204,7 @@ def test_who_is_not_trusted_is_refused_in_a_sentence(lab: Lab, certificate: str,
 
 
 @pytest.mark.parametrize("protocol", ["tls", "tcp"])
-def test_an_endpoint_alone_has_no_certificate(lab: Lab, protocol: str) -> None:
+def test_endpoint_without_certificate_is_rejected(lab: Lab, protocol: str) -> None:
     where = lab.endpoint.replace("tls/", f"{protocol}/")
     with (
         nep.node("a", "zenoh", master=where, wait_s=0.2) as node,
@@ -213,7 +213,7 @@ def test_an_endpoint_alone_has_no_certificate(lab: Lab, protocol: str) -> None:
         node.new_sub("open")
 
 
-def test_certificates_that_are_not_there_are_told(lab: Lab) -> None:
+def test_missing_certificate_files_are_reported(lab: Lab) -> None:
     with (
         nep.node("a", "zenoh", master=lab.master("missing"), wait_s=1.0) as node,
         pytest.raises(nep.NepError, match=r"\.json5': "),
@@ -221,7 +221,7 @@ def test_certificates_that_are_not_there_are_told(lab: Lab) -> None:
         node.new_sub("open")
 
 
-def test_a_topic_that_is_denied_is_silent_and_its_losses_are_known_at_the_end(make: Make) -> None:
+def test_denied_topic_delivers_nothing_and_its_losses_are_known_at_the_end(make: Make) -> None:
     """As docs/zenoh.md says: a router tells nobody that it denies something."""
     robot, guest = make("robot"), make("guest", "guest")
     secret, opened = guest.new_sub("secret"), guest.new_sub("open")
@@ -246,7 +246,7 @@ def test_a_topic_that_is_denied_is_silent_and_its_losses_are_known_at_the_end(ma
     assert wanted.received == 0
 
 
-def test_a_service_that_is_denied_is_told_at_the_call(make: Make) -> None:
+def test_denied_service_is_reported_at_the_call(make: Make) -> None:
     robot, guest = make("robot"), make("guest", "guest")
     seen = []
     for name in ("secret", "open"):

@@ -33,7 +33,7 @@ def board(clock: Clock) -> nep.Blackboard:
     return nep.Blackboard(clock=clock)
 
 
-def test_what_is_put_is_read(board: nep.Blackboard) -> None:
+def test_stored_values_are_read_back(board: nep.Blackboard) -> None:
     board.put("human.1.position", [1, 2, 3])
     board["human.1"] = {"name": "Ada", "face": {"size": 4}}
     assert board["human.1.position"] == [1, 2, 3]
@@ -50,7 +50,7 @@ def test_what_is_put_is_read(board: nep.Blackboard) -> None:
     assert isinstance(raised.value, KeyError)
 
 
-def test_each_key_has_its_age(board: nep.Blackboard, clock: Clock) -> None:
+def test_each_key_has_its_own_age(board: nep.Blackboard, clock: Clock) -> None:
     board.put("a.x", 1)
     clock.now += 2
     board.put("a.y", 2)
@@ -66,7 +66,7 @@ def test_each_key_has_its_age(board: nep.Blackboard, clock: Clock) -> None:
     assert board.age_s("a.x") == 0, "told again it is young again"
 
 
-def test_a_clock_that_goes_back_makes_nothing_younger_than_now(board: nep.Blackboard, clock: Clock) -> None:
+def test_clock_set_back_gives_no_negative_age(board: nep.Blackboard, clock: Clock) -> None:
     board.put("a", 1, lives_s=5)
     clock.now -= 100
     assert board.age_s("a") == 0
@@ -93,13 +93,13 @@ def test_a_clock_that_goes_back_makes_nothing_younger_than_now(board: nep.Blackb
         b"\0",
     ],
 )
-def test_any_value_is_kept(board: nep.Blackboard, value: object) -> None:
+def test_any_value_type_is_stored_unchanged(board: nep.Blackboard, value: object) -> None:
     board.put("x", value)
     assert board["x"] == value
     assert type(board["x"]) is type(value)
 
 
-def test_nan_is_kept_and_is_no_change_of_nan(board: nep.Blackboard) -> None:
+def test_nan_is_stored_and_repeated_nan_is_not_a_change(board: nep.Blackboard) -> None:
     seen: list[nep.BlackboardChange] = []
     board.on_change("x", seen.append)
     for value in (math.nan, float("nan"), math.inf, -math.inf):
@@ -119,7 +119,7 @@ def test_values_are_copies(board: nep.Blackboard) -> None:
     assert board.get("x") == [1, {"a": [2]}]
 
 
-def test_a_value_that_becomes_a_map_and_back(board: nep.Blackboard) -> None:
+def test_value_can_become_a_map_and_a_value_again(board: nep.Blackboard) -> None:
     seen: list[tuple[str, str]] = []
     board.on_change("**", lambda change: seen.append((change.key, change.cause)))
     board.put("a", 1)
@@ -163,7 +163,7 @@ def test_a_value_that_becomes_a_map_and_back(board: nep.Blackboard) -> None:
         ("\x1b[2J\n", ("\x1b[2J\n",)),
     ],
 )
-def test_keys_as_they_are_written(board: nep.Blackboard, text: str, names: tuple[str, ...]) -> None:
+def test_key_text_round_trips(board: nep.Blackboard, text: str, names: tuple[str, ...]) -> None:
     assert parse_key(text) == names
     assert parse_key(key_text(names)) == names
     board.put(names, 7)
@@ -191,14 +191,14 @@ def test_keys_as_they_are_written(board: nep.Blackboard, text: str, names: tuple
         (["a"], "'list'"),
     ],
 )
-def test_keys_that_cannot_be(board: nep.Blackboard, key: str, named: str) -> None:
+def test_invalid_keys_are_rejected(board: nep.Blackboard, key: str, named: str) -> None:
     for use in (board.get, board.age_s, board.remove, lambda each: board.put(each, 1)):
         with pytest.raises(nep.BadKeyError, match=named):
             use(key)
     assert len(board) == 0
 
 
-def test_patterns(board: nep.Blackboard) -> None:
+def test_keys_are_found_by_pattern(board: nep.Blackboard) -> None:
     for key in ("human.1.position", "human.1.face.size", "human.2.position", "human", "object.1.position"):
         board.put(key, 1)
     assert board.keys() == ["human", "object.1.position"], "a value takes the place of what is below it"
@@ -214,7 +214,7 @@ def test_patterns(board: nep.Blackboard) -> None:
     assert board.keys("human.1.position.**") == ["human.1.position"]
 
 
-def test_what_is_not_told_again_is_forgotten(board: nep.Blackboard, clock: Clock) -> None:
+def test_value_expires_unless_it_is_updated(board: nep.Blackboard, clock: Clock) -> None:
     seen: list[tuple[str, str, object, object]] = []
     board.on_change("**", lambda each: seen.append((each.key, each.cause, each.value, each.entry.value)))
     board.put("touched.head", 1, lives_s=3)
@@ -237,7 +237,7 @@ def test_what_is_not_told_again_is_forgotten(board: nep.Blackboard, clock: Clock
     ]
 
 
-def test_a_shorter_life_and_a_longer_one(board: nep.Blackboard, clock: Clock) -> None:
+def test_lifetime_can_be_shortened_extended_and_removed(board: nep.Blackboard, clock: Clock) -> None:
     board.put("x", 1, lives_s=100)
     board.put("x", 2, lives_s=1)
     clock.now += 1
@@ -253,7 +253,7 @@ def test_a_shorter_life_and_a_longer_one(board: nep.Blackboard, clock: Clock) ->
     assert board["x"] == 6
 
 
-def test_lives_of_keys_that_are_gone_take_no_room(clock: Clock) -> None:
+def test_expiry_entries_of_evicted_keys_are_removed(clock: Clock) -> None:
     board = nep.Blackboard(clock=clock, max_keys=10)
     for number in range(5_000):
         board.put(f"x.{number}", 1, lives_s=1e6)
@@ -265,7 +265,7 @@ def test_lives_of_keys_that_are_gone_take_no_room(clock: Clock) -> None:
     assert len(board) == 0
 
 
-def test_there_is_a_most_of_keys_and_of_bytes(clock: Clock) -> None:
+def test_keys_and_bytes_are_bounded(clock: Clock) -> None:
     seen: list[str] = []
     board = nep.Blackboard(clock=clock, max_keys=2)
     board.on_change("**", lambda change: seen.append(f"{change.cause} {change.key}"))
@@ -293,7 +293,7 @@ def test_there_is_a_most_of_keys_and_of_bytes(clock: Clock) -> None:
             nep.Blackboard(max_keys=wrong)  # type: ignore[arg-type]
 
 
-def test_a_hundred_thousand_keys(clock: Clock) -> None:
+def test_hundred_thousand_keys_are_supported(clock: Clock) -> None:
     board = nep.Blackboard(clock=clock)
     board.put("all", {str(number): {"x": number} for number in range(100_000)})
     assert len(board) == 100_000
@@ -306,7 +306,7 @@ def test_a_hundred_thousand_keys(clock: Clock) -> None:
     assert board.bytes < 2_000
 
 
-def test_values_that_are_too_deep_or_hold_themselves(board: nep.Blackboard) -> None:
+def test_too_deep_or_recursive_values_are_rejected(board: nep.Blackboard) -> None:
     loop: list[object] = []
     loop.append(loop)
     round_: dict[str, object] = {}
@@ -326,7 +326,7 @@ def test_values_that_are_too_deep_or_hold_themselves(board: nep.Blackboard) -> N
     assert len(board) == 1
 
 
-def test_maps_with_numbers_and_other_things_as_names(board: nep.Blackboard) -> None:
+def test_maps_with_non_string_keys_are_stored(board: nep.Blackboard) -> None:
     board.put("x", {1: "one", "two": 2})
     assert board["x.1"] == "one"
     board.put("y", {None: 1, (1, 2): 3})
@@ -336,7 +336,7 @@ def test_maps_with_numbers_and_other_things_as_names(board: nep.Blackboard) -> N
     assert "z" not in board
 
 
-def test_a_change_is_another_value_or_type(board: nep.Blackboard) -> None:
+def test_change_is_reported_for_another_value_or_type(board: nep.Blackboard) -> None:
     seen: list[object] = []
     end = board.on_change("x", lambda change: seen.append(change.value))
     for value in (1, 1, True, 1.0, "1", "1", [1], [1], None, None):
@@ -350,7 +350,7 @@ def test_a_change_is_another_value_or_type(board: nep.Blackboard) -> None:
     assert len(seen) == 6
 
 
-def test_a_callback_that_raises_costs_no_other_change(board: nep.Blackboard) -> None:
+def test_callback_that_raises_does_not_lose_other_changes(board: nep.Blackboard) -> None:
     seen: list[object] = []
 
     def callback(change: nep.BlackboardChange) -> None:
@@ -368,7 +368,7 @@ def test_a_callback_that_raises_costs_no_other_change(board: nep.Blackboard) -> 
     assert seen == [1, "other 1", "other 2", 3, "other 3"]
 
 
-def test_a_callback_that_puts_is_not_called_for_ever(board: nep.Blackboard) -> None:
+def test_callback_that_writes_its_own_key_does_not_loop_forever(board: nep.Blackboard) -> None:
     board.on_change("x", lambda change: board.put("x", change.value + 1))  # type: ignore[operator]
     board.put("x", 0)
     assert board.deliver() == 1
@@ -376,7 +376,7 @@ def test_a_callback_that_puts_is_not_called_for_ever(board: nep.Blackboard) -> N
     assert board["x"] == 2
 
 
-def test_changes_that_nobody_takes_are_bounded() -> None:
+def test_undelivered_changes_are_bounded() -> None:
     board = nep.Blackboard(max_bytes=100_000)
     board.on_change("x", lambda _change: None)
     for number in range(12_000):
@@ -390,7 +390,7 @@ def test_changes_that_nobody_takes_are_bounded() -> None:
     assert board._pending_bytes == 0
 
 
-def test_waiting_for_a_value(board: nep.Blackboard) -> None:
+def test_wait_for_returns_on_a_matching_value_or_times_out(board: nep.Blackboard) -> None:
     assert_waits(board, lambda: board.wait_for("x.y", timeout_s=30.0), lambda: board.put("x", {"y": 1}), 1)
     assert_waits(board, lambda: board.wait_for("n", lambda n: n > 2, 30.0), lambda: board.put("n", 3), 3)  # type: ignore[operator]
     board.put("n", 1)
@@ -416,7 +416,7 @@ def assert_waits(
     assert found == [value]
 
 
-def test_closing_ends_who_waits(board: nep.Blackboard) -> None:
+def test_close_wakes_a_waiting_thread(board: nep.Blackboard) -> None:
     raised = threading.Event()
     waits = threading.Event()
 
@@ -440,7 +440,7 @@ def test_closing_ends_who_waits(board: nep.Blackboard) -> None:
         board.wait_for("y")
 
 
-def test_many_threads(board: nep.Blackboard) -> None:
+def test_concurrent_reads_and_writes_are_consistent(board: nep.Blackboard) -> None:
     wrong: list[object] = []
     done = threading.Event()
 
@@ -473,12 +473,12 @@ def test_many_threads(board: nep.Blackboard) -> None:
     assert board["own"] == {"a": 299, "b": 299, "c": 299}
 
 
-def test_without_a_node_nothing_is_watched(board: nep.Blackboard) -> None:
+def test_watch_without_a_node_is_rejected(board: nep.Blackboard) -> None:
     with pytest.raises(nep.NepError, match="has no node"):
         board.watch("/x")
 
 
-def test_a_board_that_is_forgotten_is_freed(clock: Clock) -> None:
+def test_unreferenced_board_is_freed(clock: Clock) -> None:
     import weakref
 
     board = nep.Blackboard(clock=clock)
@@ -489,7 +489,7 @@ def test_a_board_that_is_forgotten_is_freed(clock: Clock) -> None:
     assert seen() is None
 
 
-def test_a_coroutine_function_is_refused_where_nobody_awaits_it() -> None:
+def test_coroutine_callback_without_event_loop_is_rejected() -> None:
     async def changed(_change: object) -> None: ...
 
     with pytest.raises(ValueError, match="callback is a coroutine function"):

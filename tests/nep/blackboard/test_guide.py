@@ -28,7 +28,7 @@ def _programs() -> dict[str, tuple[str, list[str]]]:
 
 
 @pytest.mark.parametrize("head", sorted(_programs()))
-def test_the_program_prints_what_is_said(master: Master, head: str) -> None:
+def test_guide_program_prints_the_documented_output(master: Master, head: str) -> None:
     program, said = _programs()[head]
     with running(program, NEP_MASTER=master.address) as example:
         printed, errors = example.end()
@@ -36,11 +36,11 @@ def test_the_program_prints_what_is_said(master: Master, head: str) -> None:
     assert printed.splitlines() == said
 
 
-def test_each_program_is_tried() -> None:
+def test_every_guide_program_is_tested() -> None:
     assert len(_programs()) == _GUIDE.count("```python") == 4
 
 
-def test_what_the_tables_name_is_there() -> None:
+def test_methods_named_in_the_guide_exist() -> None:
     names = set(re.findall(r"`board\.(\w+)", _GUIDE))
     assert {"watch", "put", "get", "age_s", "on_change"} <= names
     assert [name for name in names if not hasattr(nep.Blackboard(), name)] == []

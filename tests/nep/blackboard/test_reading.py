@@ -43,7 +43,7 @@ def read(reading: MessageReading, payload: object, topic: str = "/perception/hum
         ({"data": '{"primitive":"touched","input":{"head":1}}'}, {"head": 1}, ""),
     ],
 )
-def test_perceptions_of_rize(payload: object, values: object, robot: str) -> None:
+def test_rize_perceptions_are_parsed(payload: object, values: object, robot: str) -> None:
     found = perception_in(payload)
     assert found is not None
     assert (found.values, found.robot) == (values, robot)
@@ -66,11 +66,11 @@ def test_perceptions_of_rize(payload: object, values: object, robot: str) -> Non
         {"data": 5},
     ],
 )
-def test_what_is_no_perception(payload: object) -> None:
+def test_other_payloads_are_not_perceptions(payload: object) -> None:
     assert perception_in(payload) is None
 
 
-def test_a_perception_goes_to_the_root_or_below_a_key() -> None:
+def test_perception_is_stored_at_the_root_or_below_a_key() -> None:
     seen = {"primitive": "touched", "input": {"head": 1}, "robot": "Pepper"}
     assert read(MessageReading(), seen) == {"touched.head": 1}
     assert read(MessageReading("{robot}"), seen) == {"Pepper.touched.head": 1}
@@ -78,7 +78,7 @@ def test_a_perception_goes_to_the_root_or_below_a_key() -> None:
     assert read(MessageReading(), {**seen, "primitive": "a.b"}) == {"a.b.head": 1}
 
 
-def test_maps_go_where_the_topic_or_the_key_says() -> None:
+def test_maps_are_stored_below_the_topic_or_the_key() -> None:
     payload = {"1": {"position": [1, 2], "face": {}}, "count": 1}
     assert read(MessageReading(), payload) == {
         "perception.humans.1.position": [1, 2],
@@ -90,7 +90,7 @@ def test_maps_go_where_the_topic_or_the_key_says() -> None:
     assert read(MessageReading(), 5, "/") == {"topic": 5}
 
 
-def test_fields_that_are_kept_and_renamed() -> None:
+def test_fields_are_selected_and_renamed() -> None:
     payload = {"pose": {"x": 1, "y": 2}, "name": "Ada", "rest": [0]}
     assert read(MessageReading("h", ["pose.x", "name", "none"]), payload) == {"h.pose.x": 1, "h.name": "Ada"}
     assert read(MessageReading("h", {"pose": "at", "name": "is.called"}), payload) == {
@@ -108,7 +108,7 @@ def test_fields_that_are_kept_and_renamed() -> None:
         MessageReading("")
 
 
-def test_names_that_are_fields_of_the_message() -> None:
+def test_key_placeholders_are_filled_from_message_fields() -> None:
     reading = MessageReading("human.{id}", ["position"])
     assert read(reading, {"id": 7, "position": 1}) == {"human.7.position": 1}
     assert read(reading, [{"id": "a.b", "position": 1}, {"id": 2, "position": 2}]) == {
@@ -143,7 +143,9 @@ NOW, WALL_NS = 50.0, 1_800_000_000_000_000_000
         (None, False, 0.0, "arrival"),  # the original wire has no stamps
     ],
 )
-def test_from_when_an_age_counts(on_the_way_s: float | None, is_latched: bool, age_s: float, by: str) -> None:
+def test_age_counts_from_the_time_stamp_or_the_arrival(
+    on_the_way_s: float | None, is_latched: bool, age_s: float, by: str
+) -> None:
     stamp_ns = None if on_the_way_s is None else WALL_NS - int(on_the_way_s * 1e9)
     message = Message("/x", b"1", "json", "json", stamp_ns=stamp_ns)
     message.kind = kind_of("/x", "json", "json", is_latched=is_latched)
@@ -172,7 +174,7 @@ def kept(board: nep.Blackboard, message: Message, lives_s: float = math.inf) -> 
     board._store_message(message, found, lives_s)
 
 
-def test_an_older_message_of_another_writer_does_not_win() -> None:
+def test_older_message_of_another_publisher_does_not_overwrite_a_newer_one() -> None:
     walls = Walls()
     board = nep.Blackboard(clock=lambda: walls.now, wall_clock_ns=lambda: walls.wall_ns)
     kept(board, walls.message(b"1", 1, 2.0))
@@ -188,7 +190,7 @@ def test_an_older_message_of_another_writer_does_not_win() -> None:
     assert board["v"] == 6, "what was put has no stamp to compare"
 
 
-def test_our_wall_clock_jumps_and_ages_do_not() -> None:
+def test_ages_are_unaffected_by_wall_clock_jumps() -> None:
     walls = Walls()
     board = nep.Blackboard(clock=lambda: walls.now, wall_clock_ns=lambda: walls.wall_ns)
     kept(board, walls.message(b"1", 1, 2.0))
@@ -206,7 +208,7 @@ def test_our_wall_clock_jumps_and_ages_do_not() -> None:
     assert board["v"] == 3, "what is there is of the future now: it wins over nothing"
 
 
-def test_what_has_lived_already_is_not_shown() -> None:
+def test_expired_message_is_not_stored() -> None:
     walls = Walls()
     board = nep.Blackboard(clock=lambda: walls.now, wall_clock_ns=lambda: walls.wall_ns)
     kept(board, walls.message(b"1", 1, 3.0), lives_s=3.0)

@@ -53,7 +53,7 @@ def ask(other: nep.Node, board: nep.Blackboard) -> Ask:
     return call
 
 
-def test_set_get_and_keys(ask: Ask, board: nep.Blackboard) -> None:
+def test_set_get_and_keys_services(ask: Ask, board: nep.Blackboard) -> None:
     assert ask("set", key="human.1", value={"name": "é", "at": [1, None]}) == {"set": 1}
     assert ask("set", values={"a": 1, r"b\.c": True}, lives_s=1000) == {"set": 2}
     assert board["human.1"] == {"name": "é", "at": [1, None]}
@@ -78,7 +78,7 @@ def test_set_get_and_keys(ask: Ask, board: nep.Blackboard) -> None:
     assert ask("get", pattern="**", max_age_s=0) == {"entries": [], "more": 0}
 
 
-def test_what_cannot_be_done_is_a_sentence(ask: Ask, board: nep.Blackboard, other: nep.Node) -> None:
+def test_invalid_request_is_rejected_with_a_message(ask: Ask, board: nep.Blackboard, other: nep.Node) -> None:
     refusals: dict[str, tuple[str, Mapping[str, object]]] = {
         "'key' and 'value'": ("set", {}),
         "'key' and 'value', or": ("set", {"key": "a"}),
@@ -100,7 +100,7 @@ def test_what_cannot_be_done_is_a_sentence(ask: Ask, board: nep.Blackboard, othe
     assert len(board) == 0
 
 
-def test_values_that_json_has_not(ask: Ask, board: nep.Blackboard) -> None:
+def test_values_that_json_lacks_are_converted(ask: Ask, board: nep.Blackboard) -> None:
     board.put("nan", float("nan"))
     board.put("huge", 10**5000)
     board.put("bytes", b"\xff")
@@ -117,7 +117,7 @@ def test_values_that_json_has_not(ask: Ask, board: nep.Blackboard) -> None:
     assert ask("get", key="half")["value"] == r"'\ud800'"
 
 
-def test_an_answer_is_bounded(ask: Ask, board: nep.Blackboard) -> None:
+def test_reply_is_bounded(ask: Ask, board: nep.Blackboard) -> None:
     board.put("x", {str(number): number for number in range(12_000)})
     answer = ask("get")
     assert (len(answer["entries"]), answer["more"]) == (10_000, 2_000)
@@ -130,7 +130,7 @@ def test_an_answer_is_bounded(ask: Ask, board: nep.Blackboard) -> None:
     assert 1 <= len(answer["entries"]) < 6
 
 
-def test_changes_are_told(ask: Ask, board: nep.Blackboard, other: nep.Node) -> None:
+def test_changes_are_published(ask: Ask, board: nep.Blackboard, other: nep.Node) -> None:
     sub = other.new_sub("/blackboard/changes")
     ask("set", key="a", value=1)
     ask("set", key="a", value=1)
@@ -146,7 +146,7 @@ def test_changes_are_told(ask: Ask, board: nep.Blackboard, other: nep.Node) -> N
     ]
 
 
-def test_what_boards_tell_of_themselves_is_not_kept_by_wildcards(
+def test_wildcard_watch_ignores_change_topics_of_blackboards(
     ask: Ask, board: nep.Blackboard, other: nep.Node
 ) -> None:
     """Two that watch everything would tell each other of each other for ever."""

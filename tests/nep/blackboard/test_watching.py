@@ -34,7 +34,7 @@ def make(request: pytest.FixtureRequest, master: Master) -> Iterator[Make]:
         node.close()
 
 
-def test_what_is_published_is_known_without_spinning(make: Make) -> None:
+def test_published_values_are_stored_without_spinning(make: Make) -> None:
     board = nep.Blackboard(make("watcher"))
     watch = board.watch("/perception/humans", key="human", fields=["1", "2"])
     pub = make("camera").new_pub("/perception/humans", "json")
@@ -55,7 +55,7 @@ def test_what_is_published_is_known_without_spinning(make: Make) -> None:
     assert board["human.1.position"] == [3, 4], "what came stays"
 
 
-def test_perceptions_as_rize_has_them(make: Make) -> None:
+def test_rize_perceptions_are_stored(make: Make) -> None:
     board = nep.Blackboard(make("watcher"))
     board.watch("/blackboard")
     pub = make("pepper").new_pub("/blackboard", "json")
@@ -66,7 +66,7 @@ def test_perceptions_as_rize_has_them(make: Make) -> None:
     assert entry.robot == "Pepper"
 
 
-def test_what_cannot_be_read_costs_nothing_else(make: Make, caplog: pytest.LogCaptureFixture) -> None:
+def test_undecodable_messages_are_skipped(make: Make, caplog: pytest.LogCaptureFixture) -> None:
     board = nep.Blackboard(make("watcher"))
     watch = board.watch("/x", key="h.{id}")
     pub = make("camera").new_pub("/x", "json")
@@ -92,7 +92,7 @@ def test_what_cannot_be_read_costs_nothing_else(make: Make, caplog: pytest.LogCa
     assert "on '/x'" in caplog.text
 
 
-def test_large_messages(make: Make) -> None:
+def test_value_larger_than_the_byte_limit_is_rejected_and_others_are_stored(make: Make) -> None:
     board = nep.Blackboard(make("watcher"), max_bytes=2_000_000)
     watch = board.watch("/x", key="x")
     pub = make("camera").new_pub("/x", "json")
@@ -103,7 +103,7 @@ def test_large_messages(make: Make) -> None:
     assert re.match(r"'x\.large' .* 2000000 ", watch.problem)
 
 
-def test_wildcards_and_two_writers(make: Make) -> None:
+def test_wildcard_watch_stores_values_of_two_publishers(make: Make) -> None:
     board = nep.Blackboard(make("watcher"))
     board.watch("/robot/*/touch")
     one, two = make("one").new_pub("/robot/a/touch"), make("two").new_pub("/robot/b/touch")
@@ -121,7 +121,7 @@ def test_wildcards_and_two_writers(make: Make) -> None:
     assert same["touch.head"] == 99
 
 
-def test_changes_come_in_the_thread_that_spins(make: Make) -> None:
+def test_change_callbacks_run_in_the_spinning_thread(make: Make) -> None:
     node = make("watcher")
     board = nep.Blackboard(node)
     board.watch("/touch", key="touched", lives_s=0.2)
@@ -141,7 +141,7 @@ def test_changes_come_in_the_thread_that_spins(make: Make) -> None:
     assert seen == [("new", 1, own), ("expired", None, own)]
 
 
-def test_what_a_callback_raises_comes_out_of_spin(make: Make) -> None:
+def test_exception_in_a_callback_propagates_from_spin(make: Make) -> None:
     node = make("watcher")
     board = nep.Blackboard(node)
     seen: list[object] = []
@@ -161,7 +161,7 @@ def test_what_a_callback_raises_comes_out_of_spin(make: Make) -> None:
     assert seen == [2]
 
 
-def test_a_node_that_is_closed_ends_who_waits(make: Make) -> None:
+def test_closed_node_wakes_a_waiting_thread(make: Make) -> None:
     node = make("watcher")
     board = nep.Blackboard(node)
     board.watch("/x")
@@ -188,7 +188,7 @@ def test_a_node_that_is_closed_ends_who_waits(make: Make) -> None:
     board.close()
 
 
-def test_what_cannot_be_watched(make: Make) -> None:
+def test_invalid_watches_are_rejected(make: Make) -> None:
     board = nep.Blackboard(make("watcher"))
     with pytest.raises(nep.BadTopicError):
         board.watch("")
@@ -208,7 +208,7 @@ def test_what_cannot_be_watched(make: Make) -> None:
 
 
 @pytest.mark.skipif(not hasattr(os, "fork"), reason="Windows does not fork")
-def test_in_a_child_values_stay_and_nothing_is_watched(master: Master) -> None:
+def test_forked_child_keeps_values_but_watches_nothing(master: Master) -> None:
     code = """
     import os, threading, nep
     node = nep.node("robot")

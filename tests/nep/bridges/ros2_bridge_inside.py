@@ -38,7 +38,7 @@ def ask(robot, what):
     return robot.line()
 
 
-def test_a_bridge_stands_beside_a_robot_of_ros_2():
+def test_bridge_joins_a_ros_2_robot():
     with nets("zeromq") as (a,), running(ROBOT) as robot:
         assert robot.line() == "ready"
         topics = (
@@ -72,7 +72,7 @@ def test_a_bridge_stands_beside_a_robot_of_ros_2():
                 assert sub.receive(60.0) is not None, what
 
 
-def test_a_topic_both_ways_does_not_echo_and_json_passes_as_text():
+def test_bidirectional_topic_does_not_echo_and_json_is_sent_as_text():
     with nets("zeromq") as (a,), nep.node("other", "ros2") as other:
         told = BridgeConfiguration(
             "lab", side_of("zeromq", a.master), side_of("ros2"), (topic("/chat", b_type="json"),)

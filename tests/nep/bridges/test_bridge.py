@@ -43,7 +43,7 @@ def pair(request):
         yield found
 
 
-def test_all_that_is_published_is_received_and_all_that_is_received_is_sent_in_order(pair):
+def test_every_published_message_is_forwarded_in_order(pair):
     a, b = pair
     with bridged(a, b, topic("/count", "other/name", "a->b")) as bridge:
         sub = b.node("hears").new_sub("other/name")
@@ -58,7 +58,7 @@ def test_all_that_is_published_is_received_and_all_that_is_received_is_sent_in_o
         assert counts.bytes == sum(len(str(number)) for number in range(2000))
 
 
-def test_both_ways_nothing_comes_back_to_who_said_it(pair):
+def test_bidirectional_topic_does_not_echo_to_its_sender(pair):
     a, b = pair
     with bridged(a, b, topic("/chat")) as bridge:
         on_a, on_b = a.node("a"), b.node("b")
@@ -81,7 +81,7 @@ def test_both_ways_nothing_comes_back_to_who_said_it(pair):
     ("msg_type", "payload"),
     [("json", {"a": [1, None]}), ("string", "grüß"), ("bytes", b"\0\xff"), ("msgpack", {"b": b"x"})],
 )
-def test_what_both_sides_have_passes_as_the_same_bytes_and_type(pair, msg_type, payload):
+def test_shared_types_keep_bytes_and_type(pair, msg_type, payload):
     a, b = pair
     with bridged(a, b, topic("/t", direction="b->a")):
         sub = a.node("a").new_sub("/t", msg_type)
@@ -90,7 +90,7 @@ def test_what_both_sides_have_passes_as_the_same_bytes_and_type(pair, msg_type, 
         assert (message.payload, message.codec, message.msg_type) == (payload, msg_type, msg_type)
 
 
-def test_a_picture_keeps_its_bytes_and_shape():
+def test_picture_keeps_its_bytes_and_shape():
     with nets("memory", "zeromq") as (a, b), bridged(a, b, topic("/camera")):
         sub, direct = b.node("b").new_sub("/camera", "image"), a.node("c").new_sub("/camera", "image")
         picture = np.arange(4 * 6 * 3, dtype=np.uint8).reshape(4, 6, 3)
@@ -101,14 +101,14 @@ def test_a_picture_keeps_its_bytes_and_shape():
         assert came.payload.shape == (4, 6, 3)
 
 
-def test_a_large_message_passes():
+def test_large_message_is_forwarded():
     with nets("memory", "zeromq") as (a, b), bridged(a, b, topic("/big")):
         sub = b.node("b").new_sub("/big", "bytes")
         a.node("a").new_pub("/big", "bytes").publish(bytes(8_000_000))
         assert sub.receive(30.0).size_bytes == 8_000_000
 
 
-def test_a_type_of_its_own_stays_that_type():
+def test_named_type_is_preserved():
     with nets("zeromq", "memory") as (a, b), bridged(a, b, topic("/robot/description")):
         sub = b.node("b").new_sub("/robot/description")
         a.node("a").new_pub("/robot/description", "robot/description").publish({"v": 1})
@@ -116,7 +116,7 @@ def test_a_type_of_its_own_stays_that_type():
 
 
 @pytest.mark.parametrize("soon_s", [0.05, 0.5])
-def test_a_topic_that_others_publish_there_keeps_its_one_type(monkeypatch, soon_s):
+def test_bridge_adopts_the_type_of_other_publishers_of_the_topic(monkeypatch, soon_s):
     """However lately the bridge has looked who is there: the type is decided by a look after the message."""
     monkeypatch.setattr("nep.programs.bridges.side._EARLY_POLL_S", soon_s)
     with nets("memory", "zeromq") as (a, b), bridged(a, b, topic("/t")) as bridge:
@@ -133,7 +133,7 @@ def test_a_topic_that_others_publish_there_keeps_its_one_type(monkeypatch, soon_
         assert sub.receive(30.0).payload == "text"
 
 
-def test_a_type_that_only_the_other_back_end_knows_is_taken_from_who_waits_there(twist_side):
+def test_type_known_only_to_the_other_back_end_is_taken_from_its_subscribers(twist_side):
     import nep
 
     with nets("zeromq") as (a,), nep.node("robot", "ros-like", master="lab") as robot:
@@ -157,7 +157,7 @@ def test_a_type_that_only_the_other_back_end_knows_is_taken_from_who_waits_there
             assert hears.received == 0
 
 
-def test_a_back_end_with_types_of_its_own_is_subscribed_by_the_type_that_somebody_publishes(twist_side):
+def test_typed_back_end_is_subscribed_with_the_published_type(twist_side):
     import nep
 
     with nets("zeromq") as (a,), nep.node("robot", "ros-like", master="lab") as robot:
@@ -177,7 +177,7 @@ def test_a_back_end_with_types_of_its_own_is_subscribed_by_the_type_that_somebod
             )
 
 
-def test_a_picture_of_a_back_end_s_own_type_is_a_picture_elsewhere(twist_side):
+def test_picture_of_a_back_end_specific_type_is_forwarded_as_a_picture(twist_side):
     import nep
 
     with nets("zeromq") as (a,), nep.node("robot", "ros-like", master="lab") as robot:
@@ -193,7 +193,7 @@ def test_a_picture_of_a_back_end_s_own_type_is_a_picture_elsewhere(twist_side):
             assert (message.codec, message.msg_type, message.payload.shape) == ("image", "image", (4, 6, 3))
 
 
-def test_a_text_is_no_map_and_stays_a_text(twist_side):
+def test_string_is_not_converted_to_a_map_type(twist_side):
     import nep
 
     with nets("zeromq") as (a,), nep.node("robot", "ros-like", master="lab") as robot:
@@ -206,7 +206,7 @@ def test_a_text_is_no_map_and_stays_a_text(twist_side):
             assert (message.payload, message.msg_type) == ("hello", "string")
 
 
-def test_a_type_that_nobody_has_there_is_said_once_and_its_messages_wait(twist_side, caplog):
+def test_unknown_target_type_is_reported_once_and_its_messages_wait(twist_side, caplog):
     with nets("zeromq") as (a,):
         wanted = topic("/t", direction="a->b")
         told = BridgeConfiguration("t", side_of(a.backend, a.master), twist_side, (wanted, topic("/good")))
@@ -264,7 +264,7 @@ def twist_side(monkeypatch):
     return SideConfiguration(backend, "lab", "ros-like:lab")
 
 
-def test_types_that_differ_are_converted_by_their_payload():
+def test_differing_types_are_converted_through_the_payload():
     with (
         nets("memory", "zeromq") as (a, b),
         bridged(a, b, topic("/t", a_type="msgpack", b_type="json")) as bridge,
@@ -280,7 +280,7 @@ def test_types_that_differ_are_converted_by_their_payload():
         assert settled(route(bridge, "a", "/t"), 1).failed == 0
 
 
-def test_what_cannot_be_converted_is_counted_with_its_reason_and_an_alert(caplog):
+def test_conversion_failure_is_counted_with_its_reason_and_an_alert(caplog):
     with (
         nets("memory", "zeromq") as (a, b),
         bridged(a, b, topic("/t", direction="a->b", b_type="string"), topic("/other")) as bridge,
@@ -308,7 +308,7 @@ def test_what_cannot_be_converted_is_counted_with_its_reason_and_an_alert(caplog
         assert other.listen(timeout_s=30.0) == (True, 1)
 
 
-def test_what_cannot_be_read_is_counted_too():
+def test_undecodable_message_is_counted_as_failed():
     with (
         nets("memory", "memory") as (a, b),
         bridged(a, b, topic("/t", direction="a->b", b_type="msgpack")) as bridge,
@@ -322,7 +322,7 @@ def test_what_cannot_be_read_is_counted_too():
         assert counts.problem.startswith("cannot decode 5 bytes as 'json'")
 
 
-def test_bytes_that_are_no_json_pass_where_nobody_has_to_read_them():
+def test_invalid_json_is_forwarded_if_no_conversion_is_needed():
     with nets("memory", "zeromq") as (a, b), bridged(a, b, topic("/t")):
         sub = b.node("b").new_sub("/t")
         a.node("a").new_pub("/t").publish_bytes(b"{oops")
@@ -332,7 +332,7 @@ def test_bytes_that_are_no_json_pass_where_nobody_has_to_read_them():
 # ---- latched
 
 
-def test_what_is_latched_stays_latched_for_who_comes_later(pair):
+def test_latched_message_stays_latched_for_late_subscribers(pair):
     a, b = pair
     pub = a.node("robot").new_pub("/description", latched=True)
     pub.publish({"v": 1})
@@ -345,7 +345,7 @@ def test_what_is_latched_stays_latched_for_who_comes_later(pair):
         assert b.node("later").new_sub("/description").receive(30.0).payload == {"v": 2}
 
 
-def test_each_publisher_s_latched_message_is_kept_and_goes_with_it(monkeypatch):
+def test_latched_message_of_each_publisher_is_kept_until_the_publisher_ends(monkeypatch):
     monkeypatch.setattr("nep.programs.bridges.route._PUBLISHER_EXPIRY_S", 0.0)
     with nets("memory", "memory") as (a, b), bridged(a, b, topic("/robots")) as bridge:
         pubs = [a.node(f"robot{n}").new_pub("/robots", latched=True) for n in range(3)]
@@ -360,7 +360,7 @@ def test_each_publisher_s_latched_message_is_kept_and_goes_with_it(monkeypatch):
         assert sorted(taken(b.node("later").new_sub("/robots"), 2)) == [0, 2]
 
 
-def test_latched_and_other_messages_of_one_topic_both_pass():
+def test_latched_and_other_messages_of_one_topic_are_both_forwarded():
     with nets("memory", "zeromq") as (a, b), bridged(a, b, topic("/t")):
         sub, node = b.node("b").new_sub("/t"), a.node("a")
         node.new_pub("/t", latched=True).publish("kept")
@@ -372,7 +372,7 @@ def test_latched_and_other_messages_of_one_topic_both_pass():
 # ---- patterns
 
 
-def test_a_pattern_renames_every_topic_that_it_matches(pair):
+def test_pattern_renames_every_matching_topic(pair):
     a, b = pair
     with bridged(a, b, topic("/robot/*", "ros/*/now", "a->b")) as bridge:
         on_a, on_b = a.node("a"), b.node("b")
@@ -388,7 +388,7 @@ def test_a_pattern_renames_every_topic_that_it_matches(pair):
         assert {each.end.topic for each in bridge.routes} == {"ros/arm/now", "ros/leg/now"}
 
 
-def test_a_pattern_both_ways_finds_topics_of_both_and_never_its_own():
+def test_bidirectional_pattern_finds_topics_of_both_sides_but_not_its_own():
     with nets("memory", "zeromq") as (a, b), bridged(a, b, topic("/a/**", "/b/**")) as bridge:
         on_a, on_b = a.node("a"), b.node("b")
         says_a, says_b = on_a.new_pub("/a/x/y"), on_b.new_pub("/b/z")
@@ -403,7 +403,7 @@ def test_a_pattern_both_ways_finds_topics_of_both_and_never_its_own():
         assert ways == {("a", "/a/x/y"), ("b", "/b/z")}
 
 
-def test_a_topic_whose_name_has_a_star_is_that_topic_and_no_pattern():
+def test_topic_name_that_contains_a_star_is_matched_literally():
     with nets("memory", "zeromq") as (a, b), bridged(a, b, topic("/r/**", "/s/**", "a->b")) as bridge:
         on_a, on_b = a.node("a"), b.node("b")
         pubs = [on_a.new_pub(name) for name in ("/r/*", "/r/x")]
@@ -417,7 +417,7 @@ def test_a_topic_whose_name_has_a_star_is_that_topic_and_no_pattern():
         assert silent(hears)
 
 
-def test_a_topic_that_is_named_is_not_matched_again():
+def test_explicitly_named_topic_is_not_matched_by_a_pattern():
     with (
         nets("memory", "memory") as (a, b),
         bridged(a, b, topic("/**", "/all/**"), topic("/named", "/own")) as bridge,
@@ -429,7 +429,7 @@ def test_a_topic_that_is_named_is_not_matched_again():
         assert {each.end.topic for each in bridge.routes if each.origin.side == "a"} == {"/own", "/all/found"}
 
 
-def test_what_a_pattern_found_is_let_go_when_nobody_publishes_it_and_found_again(monkeypatch):
+def test_pattern_route_closes_when_idle_and_reopens(monkeypatch):
     monkeypatch.setattr("nep.programs.bridges.bridge.IDLE_S", 0.0)
     with nets("memory", "zeromq") as (a, b), bridged(a, b, topic("/r/*", "/s/*"), topic("/named")) as bridge:
         on_a, on_b = a.node("a"), b.node("b")
@@ -447,7 +447,7 @@ def test_what_a_pattern_found_is_let_go_when_nobody_publishes_it_and_found_again
         assert hears.lost == 0
 
 
-def test_patterns_have_a_bound(monkeypatch, caplog):
+def test_pattern_routes_are_bounded(monkeypatch, caplog):
     monkeypatch.setattr("nep.programs.bridges.bridge.MAX_ROUTES", 2)
     with nets("memory", "memory") as (a, b), bridged(a, b, topic("/**", "/all/**")) as bridge:
         node = a.node("a")
@@ -460,7 +460,7 @@ def test_patterns_have_a_bound(monkeypatch, caplog):
 # ---- who is not there
 
 
-def test_a_network_that_is_not_there_is_waited_for_and_said_and_the_rest_works(caplog):
+def test_unavailable_network_is_reported_and_awaited_while_the_rest_works(caplog):
     with Master("127.0.0.1:0", learn_s=0.0) as first:
         address = first.address
     with nets("memory") as (a,):
@@ -488,7 +488,7 @@ def test_a_network_that_is_not_there_is_waited_for_and_said_and_the_rest_works(c
                 assert sub.listen(timeout_s=30.0) == (True, "now")
 
 
-def test_more_than_there_is_room_for_is_dropped_and_counted(monkeypatch):
+def test_messages_beyond_the_backlog_limit_are_dropped_and_counted(monkeypatch):
     monkeypatch.setattr("nep.programs.bridges.route.MAX_BACKLOG_MESSAGES", 10)
     with Master("127.0.0.1:0", learn_s=0.0) as first:
         address = first.address
@@ -505,7 +505,7 @@ def test_more_than_there_is_room_for_is_dropped_and_counted(monkeypatch):
             assert (counts.waiting, counts.dropped, counts.sent) == (10, 15, 0)
 
 
-def test_a_route_that_cannot_be_served_does_not_stop_the_others(caplog):
+def test_failed_route_does_not_stop_the_others(caplog):
     class Bad:
         """A node of whom one topic is refused."""
 
@@ -536,7 +536,7 @@ def test_a_route_that_cannot_be_served_does_not_stop_the_others(caplog):
             bridge.close()
 
 
-def test_a_publisher_that_comes_with_another_type_is_heard_by_that_type():
+def test_publisher_of_another_type_is_subscribed_with_its_type():
     with nets("memory", "memory") as (a, b), bridged(a, b, topic("/t", direction="a->b")) as bridge:
         watcher = a.node("watcher")
         assert watcher.graph().topics["/t"].msg_type == "json"
@@ -551,7 +551,7 @@ def test_a_publisher_that_comes_with_another_type_is_heard_by_that_type():
 # ---- what others see, and the end
 
 
-def test_the_graph_shows_the_bridge_and_its_counts_are_published_on_both_sides(pair):
+def test_graph_shows_the_bridge_and_counts_are_published_on_both_sides(pair):
     a, b = pair
     with bridged(a, b, topic("/t")) as bridge:
         on_a, on_b = a.node("a"), b.node("b")
@@ -571,7 +571,7 @@ def test_the_graph_shows_the_bridge_and_its_counts_are_published_on_both_sides(p
             assert [each["backend"] for each in status["sides"]] == [a.backend, b.backend]
 
 
-def test_closing_delivers_what_came_and_may_be_done_twice(pair):
+def test_close_delivers_received_messages_and_is_idempotent(pair):
     a, b = pair
     sub, pub = b.node("b").new_sub("/t"), a.node("a").new_pub("/t")
     with bridged(a, b, topic("/t")) as bridge:
@@ -583,7 +583,7 @@ def test_closing_delivers_what_came_and_may_be_done_twice(pair):
     assert bridge.routes[0].counts().sent == 500
 
 
-def test_closing_while_a_network_is_waited_for_ends_soon():
+def test_close_while_waiting_for_a_network_returns_soon():
     with nets("memory") as (a,):
         away = Net("memory")
         away.backend, away.master = "zeromq", "127.0.0.1:9"
@@ -592,7 +592,7 @@ def test_closing_while_a_network_is_waited_for_ends_soon():
         assert not bridge.wait_until_ready(None), "closed"
 
 
-def test_a_back_end_or_type_that_is_not_there_is_said_at_once():
+def test_unknown_back_end_or_identical_sides_are_rejected():
     with pytest.raises(NepError, match="unknown back end 'zeromk'; did you mean 'zeromq'"):
         side_of("zeromk")
     with nets("memory") as (a,), pytest.raises(NepError, match="both sides are the network"):

@@ -62,7 +62,7 @@ def way(report, side):
     return next(each for each in report["routes"] if each["from"]["side"] == side)
 
 
-def test_between_processes_every_message_is_accounted_for(file, nodes):
+def test_every_message_between_processes_is_accounted_for(file, nodes):
     on_a, on_b = nodes
     path = file('[[topics]]\na = "/count"\nb = "zenoh/count"\n[[topics]]\na = "/thin"\nmax_rate_hz = 0.001\n')
     with running(COMMAND, "bridge", path, "--json") as program:
@@ -100,7 +100,7 @@ def test_between_processes_every_message_is_accounted_for(file, nodes):
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="signals")
-def test_ctrl_c_ends_it_without_a_word_and_its_nodes_are_gone(file, nodes):
+def test_ctrl_c_exits_silently_and_removes_the_bridge_nodes(file, nodes):
     on_a, on_b = nodes
     with running(COMMAND, "bridge", file('[[topics]]\na = "/t"\n')) as program:
         heads = "topic rate received sent lost thinned failed dropped waiting returned"
@@ -124,7 +124,7 @@ def test_ctrl_c_ends_it_without_a_word_and_its_nodes_are_gone(file, nodes):
             )
 
 
-def test_plain_output_has_a_line_for_what_has_changed(file, nodes):
+def test_plain_output_prints_a_line_per_change(file, nodes):
     on_a, on_b = nodes
     with running(COMMAND, "bridge", file('[[topics]]\na = "/t"\nb = "/u"\ndirection = "a->b"\n')) as program:
         program.line()
@@ -140,7 +140,7 @@ def test_plain_output_has_a_line_for_what_has_changed(file, nodes):
         assert figures == ["3", "3", "0", "0", "0", "0", "0", "0"]
 
 
-def test_one_line_joins_one_topic(nodes, master, place):
+def test_command_line_form_joins_one_topic(nodes, master, place):
     on_a, on_b = nodes
     words = (f"zmq@{master.address}:/chatter", f"Zenoh@{place}:")
     with running(COMMAND, "bridge", *words, "--direction", "b->a", "--rate", "100", "--json") as program:
@@ -152,7 +152,7 @@ def test_one_line_joins_one_topic(nodes, master, place):
         assert name in {each.name for each in on_a.graph().nodes.values()}
 
 
-def test_a_master_that_is_not_there_yet_is_waited_for(file, place):
+def test_master_that_starts_later_is_waited_for(file, place):
     with Master("127.0.0.1:0", learn_s=0.0) as first:
         address = first.address
     path = file('[[topics]]\na = "/t"\ndirection = "b->a"\n', address)
@@ -218,7 +218,7 @@ class OnTerminal:
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="terminals of Unix")
-def test_on_a_terminal_a_table_stands_in_its_place_and_warnings_above_it(file, nodes):
+def test_terminal_table_updates_in_place_with_warnings_above(file, nodes):
     on_a, _on_b = nodes
     topics = '[[topics]]\na = "/t"\ndirection = "a->b"\nb_type = "string"\n[[topics]]\na = "/[/red][bold]"\n'
     shown = OnTerminal("bridge", file(topics))
@@ -258,7 +258,7 @@ def test_on_a_terminal_a_table_stands_in_its_place_and_warnings_above_it(file, n
         (("missing.toml", "--rate", "3"), "--direction and --rate can't be used with a file"),
     ],
 )  # fmt: skip
-def test_what_cannot_be_joined_is_one_sentence(words, said):
+def test_invalid_endpoints_are_reported_in_one_sentence(words, said):
     with running(COMMAND, "bridge", *words) as program:
         out, err = program.end()
         assert (program.process.returncode, out) == (1, "")
@@ -268,14 +268,14 @@ def test_what_cannot_be_joined_is_one_sentence(words, said):
 
 
 @pytest.mark.parametrize("rate", ["0", "-1", "nan", "inf", "1e300"])
-def test_a_rate_that_is_none_is_refused(rate):
+def test_invalid_rate_is_rejected(rate):
     with running(COMMAND, "bridge", "zeromq:/t", "zenoh:/t", "--rate", rate) as program:
         _out, err = program.end()
         assert program.process.returncode == 2
         assert "use messages per second" in re.sub(r"[\s│]+", " ", err)
 
 
-def test_a_file_is_checked_without_joining_anything(file):
+def test_check_option_validates_a_file_without_connecting(file):
     path = file(
         '[[topics]]\na = "/t"\nmax_rate_hz = 5\n[[topics]]\na = "/r/*"\nb = "/s/*"\ndirection = "b->a"\n'
     )

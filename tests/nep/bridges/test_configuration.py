@@ -29,7 +29,7 @@ def error(text):
     return str(caught.value)
 
 
-def test_a_file_says_all_that_a_bridge_may_be_told():
+def test_every_side_option_is_parsed():
     told = read(
         """
         name = "robots"
@@ -54,7 +54,7 @@ def test_a_file_says_all_that_a_bridge_may_be_told():
     assert told.node_name("b") == "bridge-robots-to-zeromq"
 
 
-def test_a_topic_says_all_that_it_may_be_told():
+def test_every_topic_option_is_parsed():
     (told,) = read(
         f'{SIDES}[[topics]]\na = "/a/*"\nb = "b/*/x"\ndirection = "b->a"\nmax_rate_hz = 2\ntype = "json"\n'
         'b_type = "string"\n'
@@ -64,13 +64,13 @@ def test_a_topic_says_all_that_it_may_be_told():
     assert (told.direction, told.origins, told.max_rate_hz, told.is_pattern) == ("b->a", ("b",), 2.0, True)
 
 
-def test_without_a_name_it_is_called_as_its_file(tmp_path):
+def test_default_name_is_the_file_name(tmp_path):
     path = tmp_path / "my lab.toml"
     path.write_text("\ufeff" + SIDES + ONE, encoding="utf-8")
     assert read_configuration(path).name == "my lab"
 
 
-def test_the_example_is_right_where_its_back_ends_are(monkeypatch):
+def test_example_file_is_valid(monkeypatch):
     """ROS may not be there: the words are looked at, not what is installed."""
     text = EXAMPLE.replace('backend = "ros"', 'backend = "zenoh"')
     told = read(text)
@@ -122,13 +122,13 @@ def test_the_example_is_right_where_its_back_ends_are(monkeypatch):
         (SIDES + '[[topics]]\na = "/t"\n' * 1001, "'lab.toml', topics: there are more than 1000"),
     ],
 )  # fmt: skip
-def test_what_is_wrong_is_said_with_its_line_and_key(text, said):
+def test_invalid_configuration_is_rejected_with_line_and_key(text, said):
     found = error(text)
     assert said in found
     assert "\n" not in found
 
 
-def test_words_of_a_back_end_for_quality_are_known(monkeypatch):
+def test_qos_values_of_the_back_end_are_accepted(monkeypatch):
     from dataclasses import replace
 
     told = replace(memory.BACKEND, qos=("reliable", "sensor"))
@@ -158,7 +158,7 @@ NUL = "character" if sys.platform == "win32" else "byte"  # as Python says it th
         ),
     ],
 )
-def test_a_file_that_is_none_is_said(tmp_path, make, said):
+def test_unreadable_file_is_reported(tmp_path, make, said):
     with pytest.raises(NepError) as caught:
         read_configuration(make(tmp_path / "lab.toml"))
     assert said in str(caught.value)
@@ -216,7 +216,7 @@ def reads_or_says(text):
 
 @settings(max_examples=400, deadline=None)
 @given(st.dictionaries(words, values, max_size=4))
-def test_any_toml_is_a_configuration_or_a_sentence(table):
+def test_any_toml_is_parsed_or_rejected_with_a_message(table):
     reads_or_says("".join(f"{toml(key)} = {toml(value)}\n" for key, value in table.items()))
 
 
@@ -225,21 +225,21 @@ def test_any_toml_is_a_configuration_or_a_sentence(table):
     st.lists(st.dictionaries(words, scalars, max_size=4), min_size=1, max_size=3),
     st.dictionaries(words, scalars),
 )
-def test_any_topics_and_sides_are_a_configuration_or_a_sentence(topics, side):
+def test_any_topics_and_sides_are_parsed_or_rejected_with_a_message(topics, side):
     head = f'topics = {toml(topics)}\na = {toml({"backend": "zeromq", **side})}\nb.backend = "zenoh"\n'
     reads_or_says(head)
 
 
 @settings(max_examples=300, deadline=None)
 @given(st.text(max_size=200))
-def test_any_text_is_a_configuration_or_a_sentence(text):
+def test_any_text_is_parsed_or_rejected_with_a_message(text):
     reads_or_says(text)
     reads_or_says(SIDES + ONE + text)
 
 
 @settings(max_examples=300, deadline=None)
 @given(st.text(max_size=30), st.text(max_size=30))
-def test_any_two_words_are_a_configuration_or_a_sentence(a, b):
+def test_any_two_endpoints_are_parsed_or_rejected_with_a_message(a, b):
     for pair in ((a, b), (f"zeromq:{a}", f"zenoh:{b}"), (f"zeromq@{a}:/t", f"zenoh@{b}:/t")):
         with suppress(NepError):
             assert isinstance(join_line(*pair, name="1"), BridgeConfiguration)
@@ -257,7 +257,7 @@ def test_any_two_words_are_a_configuration_or_a_sentence(a, b):
         ("/x", "/x", ""), ("/ü*", "/üß", "ß"),
     ],
 )  # fmt: skip
-def test_a_wildcard_stands_for_a_part(pattern, topic, part):
+def test_wildcard_captures_part_of_a_topic(pattern, topic, part):
     end = TopicEnd(pattern)
     assert end.part_in(topic) == part
     if part:
@@ -266,7 +266,7 @@ def test_a_wildcard_stands_for_a_part(pattern, topic, part):
 
 @settings(max_examples=300, deadline=None)
 @given(st.sampled_from(["/a/*", "/*/b", "x**", "**/y", "*"]), st.text("ab/xy*", min_size=1, max_size=8))
-def test_what_is_put_in_is_found_again(pattern, part):
+def test_wildcard_substitution_round_trips(pattern, part):
     end = TopicEnd(pattern)
     found = end.part_in(end.with_part(part))
     assert found == ("" if end.wildcard == "*" and "/" in part else part)
@@ -281,13 +281,13 @@ def test_what_is_put_in_is_found_again(pattern, part):
         ("memory:/a@b", "zenoh:/a:b", ("memory", "/a@b", "local", "/a:b")),
     ],
 )  # fmt: skip
-def test_a_line_says_where_and_what(monkeypatch, a, b, found):
+def test_endpoint_argument_is_parsed_into_master_and_topic(monkeypatch, a, b, found):
     monkeypatch.delenv("NEP_MASTER", raising=False)
     told = join_line(a, b, name="1")
     assert (told.a.master, told.topics[0].a.name, told.b.master, told.topics[0].b.name) == found
 
 
-def test_a_network_that_ends_at_the_computer_or_process_has_that_in_its_name():
+def test_local_network_name_includes_the_computer_or_process():
     import os
     import platform
 

@@ -37,7 +37,7 @@ RINGS = [("zeromq", "memory"), ("zeromq", "nanomsg"), ("zenoh", "memory")]
 
 
 @pytest.mark.parametrize("backends", RINGS, ids="-".join)
-def test_two_bridges_between_the_same_networks_end_with_one_copy_each(backends):
+def test_two_bridges_between_the_same_networks_deliver_one_copy_each(backends):
     with (
         nets(*backends) as (a, b),
         bridged(a, b, topic("/t"), name="one") as one,
@@ -60,7 +60,7 @@ def test_two_bridges_between_the_same_networks_end_with_one_copy_each(backends):
             assert (counts.received, counts.returned) == (0, 20), "those that the other bridge brought"
 
 
-def test_three_bridges_in_a_ring_bring_each_message_once_by_each_way():
+def test_three_bridges_in_a_ring_deliver_each_message_once_per_direction():
     with nets("zeromq", "memory", "zenoh") as (a, b, c), ExitStack() as opened:
         ring = [
             opened.enter_context(bridged(x, y, topic("/t"), name=name))
@@ -77,7 +77,7 @@ def test_three_bridges_in_a_ring_bring_each_message_once_by_each_way():
         assert all(silent(each) for each in hears)
 
 
-def test_three_bridges_in_a_ring_one_way_stop_where_it_began():
+def test_three_one_way_bridges_in_a_ring_stop_at_the_origin():
     with nets("memory", "zeromq", "memory") as (a, b, c), ExitStack() as opened:
         ring = [
             opened.enter_context(bridged(x, y, topic("/t", direction="a->b"), name=name))
@@ -91,7 +91,7 @@ def test_three_bridges_in_a_ring_one_way_stop_where_it_began():
         assert ring[0].routes[0].counts().returned == 1
 
 
-def test_a_ring_within_one_bridge_stops():
+def test_loop_within_one_bridge_stops():
     with (
         nets("memory", "zeromq") as (a, b),
         bridged(
@@ -106,7 +106,7 @@ def test_a_ring_within_one_bridge_stops():
         assert all(silent(each) for each in hears)
 
 
-def test_a_chain_of_bridges_carries_on():
+def test_chain_of_bridges_forwards_messages():
     with (
         nets("zeromq", "memory", "nanomsg") as (a, b, c),
         bridged(a, b, topic("/t"), name="one"),
@@ -121,7 +121,7 @@ def test_a_chain_of_bridges_carries_on():
         assert [each.partition(":")[0] for each in trail.networks] == ["zeromq", "memory", "nanomsg"]
 
 
-def test_names_that_differ_for_one_network_are_still_stopped_by_the_bridge_s_id():
+def test_loop_is_stopped_by_bridge_id_if_network_names_differ():
     """Both bridges call each network another name, as two computers do."""
     with nets("memory", "zeromq") as (a, b):
 
@@ -188,7 +188,7 @@ def nameless_side(request, monkeypatch):
 NAMED = {"memory": memory.BACKEND}
 
 
-def test_without_signs_of_origin_an_echo_is_known_by_its_bytes(nameless_side):
+def test_echo_is_recognised_by_its_bytes_if_the_network_carries_no_trail(nameless_side):
     import nep
 
     with nets("memory") as (a,):
@@ -212,7 +212,7 @@ def test_without_signs_of_origin_an_echo_is_known_by_its_bytes(nameless_side):
             assert sum(each.refused for each in there._publishers.values()) <= 1, "it is tried only once"
 
 
-def test_two_bridges_over_a_network_without_signs_end_too(nameless_side):
+def test_two_bridges_over_a_network_without_trails_do_not_loop(nameless_side):
     import nep
 
     with nets("memory") as (a,), ExitStack() as opened:
@@ -239,7 +239,7 @@ def test_two_bridges_over_a_network_without_signs_end_too(nameless_side):
 # ---- other bridges between the same networks
 
 
-def test_where_nothing_keeps_trails_one_of_two_bridges_lets_go_until_the_other_has_ended(monkeypatch, caplog):
+def test_one_of_two_bridges_without_trails_yields_until_the_other_has_ended(monkeypatch, caplog):
     import nep
 
     monkeypatch.setattr("nep.programs.bridges.other_bridges._EXPIRY_S", 3.0)
@@ -276,7 +276,7 @@ def test_where_nothing_keeps_trails_one_of_two_bridges_lets_go_until_the_other_h
         assert taken(hears_there, 1) == ["again"]
 
 
-def test_a_second_bridge_between_the_same_networks_is_said_once(caplog):
+def test_second_bridge_between_the_same_networks_is_reported_once(caplog):
     with (
         nets("zeromq", "memory") as (a, b),
         bridged(a, b, topic("/t"), topic("/u"), name="one"),
@@ -287,7 +287,7 @@ def test_a_second_bridge_between_the_same_networks_is_said_once(caplog):
         assert "'/t' and" not in caplog.text
 
 
-def test_bridges_of_other_topics_or_networks_are_no_rivals(caplog):
+def test_bridges_of_other_topics_or_networks_do_not_conflict(caplog):
     with (
         nets("zeromq", "memory", "memory") as (a, b, c),
         bridged(a, b, topic("/t"), name="one") as one,
@@ -309,7 +309,7 @@ STATUS = {
 }
 
 
-def test_another_bridge_is_one_that_was_heard_on_both_sides_lately():
+def test_other_bridge_counts_only_if_seen_recently_on_both_sides():
     known = OtherBridges("own")
     known.add_status("b", STATUS, 0.0)
     assert known.between(0.0) == []
@@ -327,7 +327,7 @@ def test_another_bridge_is_one_that_was_heard_on_both_sides_lately():
         {**STATUS, "side": []}, {**STATUS, "id": "own"},
     ],
 )  # fmt: skip
-def test_whatever_else_is_told_there_is_no_bridge(status):
+def test_invalid_bridge_status_is_ignored(status):
     known = OtherBridges("own")
     for side in ("a", "b"):
         known.add_status(side, status, 0.0)
@@ -344,14 +344,14 @@ def test_whatever_else_is_told_there_is_no_bridge(status):
         [{"from": {"side": "a", "topic": 1}, "to": {"topic": "/u"}}], [[]] * 100_000,
     ],
 )  # fmt: skip
-def test_strange_routes_are_none(routes):
+def test_invalid_routes_in_a_bridge_status_are_ignored(routes):
     known = OtherBridges("own")
     known.add_status("a", {**STATUS, "routes": routes}, 0.0)
     known.add_status("b", {**STATUS, "side": "b"}, 0.0)
     assert known.between(0.0)[0].ways == frozenset()
 
 
-def test_others_have_a_bound():
+def test_known_bridges_are_bounded():
     known = OtherBridges("own")
     for number in range(1000):
         for side in ("a", "b"):
@@ -362,7 +362,7 @@ def test_others_have_a_bound():
 # ---- trails and echoes alone
 
 
-def test_a_trail_says_where_a_message_may_go():
+def test_trail_determines_where_a_message_may_be_forwarded():
     trail = Trail().carried("a", "b", "one")
     assert trail == Trail(("a", "b"), ("one",))
     assert not trail.may_go("a", "two")
@@ -372,7 +372,7 @@ def test_a_trail_says_where_a_message_may_go():
     assert read_trail({TRAIL_KEY: trail.to_plain()}) == trail
 
 
-def test_a_trail_has_an_end():
+def test_trail_length_is_limited():
     trail = Trail()
     for number in range(MAX_HOPS):
         assert trail.may_go(f"n{number + 1}", f"b{number}")
@@ -387,13 +387,13 @@ def test_a_trail_has_an_end():
         {"networks": ["x" * 10**6], "bridges": [b"x"]}, {"networks": ["n"] * 10**5, "bridges": ["b"] * 10**5},
     ],
 )  # fmt: skip
-def test_whatever_somebody_else_writes_there_is_read_without_harm(found):
+def test_foreign_trail_data_is_parsed_safely(found):
     trail = read_trail({TRAIL_KEY: found})
     assert len(trail.networks) <= MAX_HOPS + 2
     assert len(trail.bridges) <= MAX_HOPS + 2
 
 
-def test_a_message_with_a_strange_trail_passes():
+def test_message_with_an_invalid_trail_is_forwarded():
     with nets("memory", "zeromq") as (a, b), bridged(a, b, topic("/t")):
         sub = b.node("b").new_sub("/t")
         a.node("a").new_pub("/t").publish_bytes(b"1", {TRAIL_KEY: ["oops"], "mine": 7})
@@ -402,7 +402,7 @@ def test_a_message_with_a_strange_trail_passes():
         assert len(read_trail(message.extension).bridges) == 1
 
 
-def test_an_echo_is_known_once_for_each_time_and_not_for_ever():
+def test_echo_is_recognised_once_per_sent_message_until_it_expires():
     echoes = Echoes()
     echoes.sent(b"x", 0.0)
     echoes.sent(b"x", 1.0)
@@ -417,7 +417,7 @@ def test_an_echo_is_known_once_for_each_time_and_not_for_ever():
     assert not echoes.is_echo(b"x", 10.0), "nothing is remembered any more"
 
 
-def test_echoes_have_a_bound():
+def test_echo_memory_is_bounded():
     echoes = Echoes()
     for number in range(10_000):
         echoes.sent(str(number).encode(), 0.0)

@@ -43,7 +43,7 @@ def test_bridge_moves_no_robot_under_another_name(direction):
             assert told.received == 0
 
 
-def test_bridge_carries_to_a_robot_that_is_allowed_and_patterns_to_no_other():
+def test_bridge_forwards_to_an_allowed_robot_and_patterns_reach_no_other():
     with nets("memory", "memory") as (a, b):
         rover, fido = b.node("robots"), b.node("others")
         told, other = describe(rover, "Rover", "/r/Rover/go"), describe(fido, "Fido", "/r/Fido/go")
@@ -59,7 +59,7 @@ def test_bridge_carries_to_a_robot_that_is_allowed_and_patterns_to_no_other():
             assert other.received == 0
 
 
-def test_command_line_refuses_what_moves_a_robot_before_it_joins(type_in, tmp_path):
+def test_command_rejects_topics_that_move_a_robot_before_connecting(type_in, tmp_path):
     with nets("nanomsg", "zeromq") as (a, b):
 
         def bridge(target: str, *words: str, msg_type: str = "json"):

@@ -16,7 +16,7 @@ THREE = [("memory", "zeromq"), ("zeromq", "zenoh"), ("nanomsg", "memory")]
 
 
 @pytest.mark.parametrize("pair", THREE, ids="-".join)
-def test_of_a_burst_the_first_and_the_newest_pass_and_the_others_are_thinned(pair):
+def test_rate_limit_forwards_first_and_newest_message_of_a_burst(pair):
     with nets(*pair) as (a, b), bridged(a, b, topic("/t", max_rate_hz=0.5)) as bridge:
         sub, pub = b.node("b").new_sub("/t"), a.node("a").new_pub("/t")
         started = time.monotonic()
@@ -29,7 +29,7 @@ def test_of_a_burst_the_first_and_the_newest_pass_and_the_others_are_thinned(pai
         assert silent(sub)
 
 
-def test_a_topic_that_is_slower_than_the_limit_passes_whole():
+def test_topic_below_the_rate_limit_is_forwarded_completely():
     with nets("memory", "memory") as (a, b), bridged(a, b, topic("/t", max_rate_hz=1e6)) as bridge:
         sub, pub, never = b.node("b").new_sub("/t"), a.node("a").new_pub("/t"), threading.Event()
         for number in range(50):
@@ -40,7 +40,7 @@ def test_a_topic_that_is_slower_than_the_limit_passes_whole():
         assert taken(sub, 1) == [0]
 
 
-def test_each_way_and_topic_has_its_own_limit():
+def test_each_direction_and_topic_has_its_own_rate_limit():
     with (
         nets("memory", "memory") as (a, b),
         bridged(a, b, topic("/slow", max_rate_hz=0.001), topic("/free")) as bridge,
@@ -58,7 +58,7 @@ def test_each_way_and_topic_has_its_own_limit():
             assert (counts.sent, counts.thinned, counts.waiting) == (1, 18, 1)
 
 
-def test_what_waits_for_its_turn_goes_when_the_bridge_is_closed():
+def test_message_held_by_the_rate_limit_is_sent_on_close():
     with nets("memory", "zeromq") as (a, b):
         sub, pub = b.node("b").new_sub("/t"), a.node("a").new_pub("/t")
         with bridged(a, b, topic("/t", max_rate_hz=0.001)) as bridge:
@@ -71,7 +71,7 @@ def test_what_waits_for_its_turn_goes_when_the_bridge_is_closed():
         assert (counts.sent, counts.thinned, counts.waiting) == (2, 8, 0)
 
 
-def test_what_is_latched_stays_so_when_it_is_thinned():
+def test_latched_message_stays_latched_under_a_rate_limit():
     with nets("memory", "memory") as (a, b), bridged(a, b, topic("/t", max_rate_hz=2)) as bridge:
         pub = a.node("a").new_pub("/t", latched=True)
         for number in range(10):
@@ -83,21 +83,21 @@ def test_what_is_latched_stays_so_when_it_is_thinned():
 # ---- the limit and the pacer alone
 
 
-def test_a_limit_lets_through_as_many_as_it_says():
+def test_rate_limit_passes_the_configured_rate():
     limit = Limit(10.0)
     passed = [now / 1000 for now in range(10_000) if limit.has_room(now / 1000)]
     assert 100 <= len(passed) <= 101
     assert min(later - earlier for earlier, later in itertools.pairwise(passed)) > 0.089
 
 
-def test_a_limit_saves_nothing_up():
+def test_rate_limit_does_not_accumulate_unused_capacity():
     limit = Limit(10.0)
     assert limit.has_room(0.0)
     assert [limit.has_room(100.0 + n / 1000) for n in range(5)] == [True, False, False, False, False]
     assert limit.next_at == pytest.approx(100.09)
 
 
-def test_a_pacer_calls_in_the_order_of_time_and_no_more_when_closed():
+def test_pacer_calls_in_time_order_and_stops_when_closed():
     pacer, called, done = Pacer("test-pace"), [], threading.Event()
     now = time.monotonic()
     pacer.call_at(now + 3600.0, lambda: called.append("never"))

@@ -16,7 +16,7 @@ HERE = Path(__file__).parent
 
 @pytest.mark.slow
 @pytest.mark.timeout(300)
-def test_in_a_network_of_its_own() -> None:
+def test_ros_2_bridge_tests_pass_in_an_isolated_network() -> None:
     pytest.importorskip("cyclonedds", reason=NEEDS)
     pytest.importorskip("rosbags", reason=NEEDS)
     if reason := why_not():

@@ -55,7 +55,7 @@ def when(program, is_met):
     return next(each for each in reports(program) if is_met(each))
 
 
-def test_one_line_stands_beside_a_robot_and_nothing_is_said_twice(ros: str, master: Master) -> None:
+def test_command_line_bridge_joins_a_robot_without_duplicates(ros: str, master: Master) -> None:
     words = (f"zeromq@{master.address}:/chat", f"ros@{ros}:")
     with running(ROBOT, **told(ros)) as robot, nep.node("person", master=master.address) as person:
         assert robot.line() == "ready"
@@ -102,7 +102,9 @@ direction = "b->a"
 """
 
 
-def test_a_file_joins_types_names_and_what_is_latched(ros: str, master: Master, tmp_path: Path) -> None:
+def test_configuration_file_bridges_types_names_and_latched_messages(
+    ros: str, master: Master, tmp_path: Path
+) -> None:
     path = tmp_path / "lab.toml"
     path.write_text(FILE.format(zeromq=master.address, ros=ros), encoding="utf-8")
     with running(ROBOT, **told(ros)) as robot, nep.node("person", master=master.address) as person:
@@ -128,7 +130,7 @@ def test_a_file_joins_types_names_and_what_is_latched(ros: str, master: Master, 
             assert odom.receive(30.0).payload["twist"]["linear"] == {"x": 0.0, "y": 0.0, "z": 0.0}
 
 
-def test_a_ros_master_that_comes_later_is_waited_for(master: Master, tmp_path: Path) -> None:
+def test_ros_master_that_starts_later_is_waited_for(master: Master, tmp_path: Path) -> None:
     skip_without_ros()
     address = f"127.0.0.1:{free_port()}"
     words = (f"zeromq@{master.address}:/chat", f"ros@{address}:")

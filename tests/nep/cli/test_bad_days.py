@@ -47,7 +47,7 @@ def alone(script: str, *, up: bool) -> subprocess.CompletedProcess[str]:
     )
 
 
-def test_without_any_network_but_the_loopback_everything_works():
+def test_everything_works_with_only_the_loopback_interface():
     done = alone(
         """
         NEP master 2>master.log & master=$!
@@ -64,7 +64,7 @@ def test_without_any_network_but_the_loopback_everything_works():
     assert "Traceback" not in done.stdout + done.stderr
 
 
-def test_with_the_loopback_down_the_doctor_says_so_and_nobody_falls_over():
+def test_disabled_loopback_is_reported_by_the_doctor_and_nothing_crashes():
     done = alone(
         """
         NEP doctor --json
@@ -86,7 +86,7 @@ def test_with_the_loopback_down_the_doctor_says_so_and_nobody_falls_over():
     assert "Traceback" not in done.stderr
 
 
-def test_with_no_port_free_a_node_says_so():
+def test_node_without_a_free_port_reports_it():
     code = """
 import nep
 with nep.Master("127.0.0.1:7780", learn_s=0.0), nep.node("many") as node:
@@ -120,7 +120,7 @@ def run(*arguments: str, **environment: str) -> subprocess.CompletedProcess[str]
     )
 
 
-def test_a_master_names_the_foreign_program_that_holds_its_port():
+def test_master_names_the_foreign_program_that_holds_its_port():
     with socket.socket() as held:
         held.bind(("127.0.0.1", 0))
         held.listen(8)
@@ -134,7 +134,7 @@ def test_a_master_names_the_foreign_program_that_holds_its_port():
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="Windows keeps permissions in another way")
-def test_the_doctor_names_the_state_folder_that_takes_no_file(tmp_path):
+def test_doctor_reports_an_unwritable_state_folder(tmp_path):
     (tmp_path / "file").touch()
     done = run("doctor", "--json", NEP_STATE_DIR=str(tmp_path / "file" / "state"), NEP_MASTER="127.0.0.1:1")
     (found,) = [each for each in json.loads(done.stdout) if each["id"].startswith("folder:")]
@@ -143,18 +143,18 @@ def test_the_doctor_names_the_state_folder_that_takes_no_file(tmp_path):
     assert done.returncode == 2
 
 
-def test_an_address_that_is_none_is_a_sentence():
+def test_invalid_master_address_is_reported():
     done = run("node", "list", NEP_MASTER="no address at all")
     assert done.returncode == 1
     assert done.stderr.startswith("nep: 'no address at all:7780' is not an address of a master; write it as")
 
 
-def test_the_sentence_for_any_port_names_the_computer():
+def test_address_in_use_error_for_any_port_names_the_host():
     assert str(AddressInUseError("127.0.0.1:*")).startswith("no port of '127.0.0.1' is free; ")
     assert str(AddressInUseError("127.0.0.1:5")).startswith("'127.0.0.1:5' is in use by another program; ")
 
 
-def test_alerts_are_told_when_they_come_change_and_go():
+def test_alerts_are_reported_when_raised_changed_and_resolved():
     changes = AlertChanges()
     first, other = Alert("a", "one"), Alert("a", "two")
     assert changes.update(GraphView(1, 1, alerts=(first,))) == ([first], [])

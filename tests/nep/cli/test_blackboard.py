@@ -48,7 +48,7 @@ def started(*arguments: str) -> Iterator[subprocess.Popen[str]]:
         process.communicate()
 
 
-def test_it_keeps_topics_and_shows_them(master: Master, run: TypeIn) -> None:
+def test_blackboard_command_watches_topics_and_shows_values(master: Master, run: TypeIn) -> None:
     with started("/blackboard", "human=/perception/humans", "/other/*") as process, nep.node("robot") as node:
         board = node.new_client("blackboard/get", timeout_s=30.0)
         node.new_pub("/blackboard").publish({"primitive": "touched", "input": {"head": 1}, "robot": "Pepper"})
@@ -79,7 +79,7 @@ def test_it_keeps_topics_and_shows_them(master: Master, run: TypeIn) -> None:
             assert process.wait(60.0) == 0
 
 
-def test_names_and_lives(master: Master, run: TypeIn) -> None:
+def test_name_and_lifetime_options(master: Master, run: TypeIn) -> None:
     with started("--name", "home", "--lives", "0.05", "--max-keys", "5"), nep.node("robot") as node:
         told = node.new_sub("/home/changes")
         pub = node.new_pub("/blackboard")
@@ -93,7 +93,7 @@ def test_names_and_lives(master: Master, run: TypeIn) -> None:
         assert json.loads(run("show", "--name", "home", "--json").stdout) == []
 
 
-def test_what_is_wrong_is_a_sentence(master: Master, run: TypeIn) -> None:
+def test_invalid_arguments_are_reported_in_one_sentence(master: Master, run: TypeIn) -> None:
     nobody = run("show", "--name", "nobody", "--timeout", "0.2")
     assert (nobody.returncode, nobody.stdout) == (1, "")
     assert "no blackboard 'nobody' is running; start one with 'nep blackboard'" in nobody.stderr
@@ -117,14 +117,14 @@ def test_what_is_wrong_is_a_sentence(master: Master, run: TypeIn) -> None:
         assert "the service that replied is not a blackboard" in odd.stderr
 
 
-def test_without_a_master(run: TypeIn) -> None:
+def test_missing_master_is_reported(run: TypeIn) -> None:
     done = run("--master", "127.0.0.1:1")
     assert done.returncode == 1
     assert "no master replied at '127.0.0.1:1'" in done.stderr
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="a program of Windows cannot be sent Ctrl+C alone")
-def test_ctrl_c_ends_it(master: Master) -> None:
+def test_ctrl_c_exits_with_130(master: Master) -> None:
     with started() as process:
         process.send_signal(signal.SIGINT)
         assert process.wait(60.0) == 130

@@ -109,7 +109,9 @@ def talking(node: nep.Node) -> Iterator[None]:
 @pytest.mark.parametrize(
     "words", [("topic", "echo", "flood"), ("topic", "echo", "flood", "--json"), ("log",)], ids="-".join
 )
-def test_who_stopped_the_output_misses_nothing_else(master: nep.Master, words: tuple[str, ...]) -> None:
+def test_paused_terminal_output_does_not_affect_other_topics(
+    master: nep.Master, words: tuple[str, ...]
+) -> None:
     with nep.node("talker") as node, shown(*words, master=master.address) as command, talking(node):
         eventually(lambda: "number" in command.look(), LONG_S)
         command.stop_it()
@@ -130,7 +132,7 @@ def test_who_stopped_the_output_misses_nothing_else(master: nep.Master, words: t
 @pytest.mark.parametrize(
     "words", [("topic", "echo", "flood", "no.such.field"), ("topic", "echo", "flood", "number")]
 )
-def test_an_interrupt_ends_what_nobody_reads(master: nep.Master, words: tuple[str, ...]) -> None:
+def test_interrupt_ends_a_command_with_blocked_output(master: nep.Master, words: tuple[str, ...]) -> None:
     with nep.node("talker") as node, shown(*words, master=master.address) as command, talking(node):
         eventually(lambda: "#" in command.look() or "number" in command.text, LONG_S)
         command.stop_it()
@@ -138,7 +140,7 @@ def test_an_interrupt_ends_what_nobody_reads(master: nep.Master, words: tuple[st
         assert command.process.wait(LONG_S) == 130
 
 
-def test_a_master_whose_output_was_stopped_serves_on() -> None:
+def test_master_with_blocked_output_keeps_serving() -> None:
     with nep.master("127.0.0.1:0", learn_s=0.0) as free:
         address = free.address
     with shown("master", "--no-gateway", master=address) as command:

@@ -100,20 +100,20 @@ def running_master(address):
         yield master
 
 
-def test_help_is_in_plain_words_and_names_all_commands():
+def test_help_lists_all_commands():
     shown = run("--help").stdout
     assert all(word in shown for word in ("master", "node", "topic"))
     assert all(word in run("topic", "--help").stdout for word in ("list", "echo", "pub"))
 
 
-def test_the_version_is_that_of_the_package():
+def test_version_option_prints_the_package_version():
     assert run("--version").stdout == f"nep {nep.__version__}\n"
     told = re.search(r'^__version__ = "(.+)"$', (REPOSITORY / "nep" / "version.py").read_text(), re.MULTILINE)
     assert told is not None
     assert nep.__version__ == told[1]
 
 
-def test_the_master_can_be_named_before_and_behind_the_command(running_master, monkeypatch, type_in):
+def test_master_option_is_accepted_before_and_after_the_command(running_master, monkeypatch, type_in):
     monkeypatch.setenv("NEP_MASTER", "127.0.0.1:1")
     for words in (
         ("--master", running_master.address, "topic", "list"),
@@ -125,13 +125,13 @@ def test_the_master_can_be_named_before_and_behind_the_command(running_master, m
     )
 
 
-def test_a_command_that_is_typed_here_leaves_the_environment_to_others(type_in):
+def test_command_does_not_modify_the_environment(type_in):
     before = dict(os.environ)
     assert type_in("--master", "nosuchhost.invalid:7781", "topic", "list").returncode == 1
     assert dict(os.environ) == before
 
 
-def test_a_name_that_no_computer_has_is_the_right_sentence(type_in):
+def test_unknown_host_name_is_reported(type_in):
     done = type_in("--master", "nosuchhost.invalid:7781", "topic", "list")
     assert done.returncode == 1
     assert done.stderr.startswith("nep: unknown computer 'nosuchhost.invalid'; ")
@@ -143,7 +143,7 @@ def test_a_name_that_no_computer_has_is_the_right_sentence(type_in):
     )
 
 
-def test_a_type_that_is_wrong_is_warned_of(running_master, type_in):
+def test_mismatching_message_type_is_warned_about(running_master, type_in):
     with nep.node("talker") as node:
         node.new_pub("/odom")
         done = type_in("topic", "pub", "/odom", "text", "--type", "string")
@@ -152,7 +152,7 @@ def test_a_type_that_is_wrong_is_warned_of(running_master, type_in):
     assert "did you mean 'string'?" in type_in("topic", "pub", "new", "1", "--type", "strng").stderr
 
 
-def test_lines_that_are_no_utf8_are_a_sentence(running_master):
+def test_non_utf_8_input_is_rejected_with_its_position(running_master):
     done = subprocess.run(
         [sys.executable, "-m", "nep", "topic", "pub", "t", "-"],
         input=b'{"n": 1}\n\xff\xfe\n',
@@ -165,14 +165,14 @@ def test_lines_that_are_no_utf8_are_a_sentence(running_master):
     assert done.stderr.startswith(b"nep: byte 1 of line 2 is not valid UTF-8; ")
 
 
-def test_a_wrong_command_is_a_sentence_and_code_2():
+def test_unknown_command_exits_with_code_2():
     done = run("topic", "frobnicate")
     assert done.returncode == 2
     assert "frobnicate" in done.stderr
     assert "Traceback" not in done.stderr
 
 
-def test_without_a_master_each_command_says_how_to_start_one(address, type_in):
+def test_missing_master_is_reported_with_the_start_command(address, type_in):
     for command in (("node", "list"), ("topic", "list"), ("topic", "echo", "t"), ("topic", "pub", "t", "1")):
         done = type_in(*command)
         assert done.returncode == 1
@@ -183,7 +183,7 @@ def test_without_a_master_each_command_says_how_to_start_one(address, type_in):
         assert not done.stdout
 
 
-def test_lists_are_tables_for_people_and_json_for_programs(running_master, type_in):
+def test_lists_are_tables_or_json(running_master, type_in):
     with nep.node("Pepper") as node, nep.node("page") as other:
         pub = node.new_pub("/Pepper/battery")
         with other.new_sub("/Pepper/battery"):
@@ -200,13 +200,13 @@ def test_lists_are_tables_for_people_and_json_for_programs(running_master, type_
         }
 
 
-def test_empty_lists_say_what_will_fill_them(running_master, type_in):
+def test_empty_lists_explain_how_to_fill_them(running_master, type_in):
     assert "no topics" in type_in("topic", "list").stderr
     assert "no nodes" in type_in("node", "list").stderr
     assert json.loads(type_in("topic", "list", "--json").stdout) == []
 
 
-def test_what_is_published_by_hand_arrives(running_master):
+def test_topic_pub_delivers_the_message(running_master):
     with nep.node("listener") as node, node.new_sub("t") as sub:
         done = run("topic", "pub", "t", '{"message": "Grüße"}')
         assert done.returncode == 0
@@ -218,13 +218,13 @@ def test_what_is_published_by_hand_arrives(running_master):
         assert [sub.listen(timeout_s=LONG_S)[1] for _ in range(5)] == [7] * 5
 
 
-def test_the_type_is_the_one_that_the_topic_has(running_master, type_in):
+def test_topic_pub_uses_the_type_of_the_topic(running_master, type_in):
     with nep.node("listener") as node, node.new_sub("words", "string") as sub:
         assert type_in("topic", "pub", "words", "no JSON at all").returncode == 0
         assert sub.listen(timeout_s=LONG_S) == (True, "no JSON at all")
 
 
-def test_bad_input_is_a_sentence_and_code_1(running_master, type_in):
+def test_invalid_input_exits_with_code_1(running_master, type_in):
     done = type_in("topic", "pub", "t", "no JSON at all")
     assert (done.returncode, done.stdout) == (1, "")
     assert done.stderr.startswith("nep: 'no JSON at all' is not JSON; ")
@@ -233,7 +233,7 @@ def test_bad_input_is_a_sentence_and_code_1(running_master, type_in):
     assert type_in("topic", "pub", "t", "1", "--rate", "0").returncode == 2
 
 
-def test_echo_writes_one_json_object_a_line(running_master):
+def test_echo_writes_one_json_object_per_line(running_master):
     with nep.node("talker") as node:
         node.new_pub("t", latched=True).publish({"n": 1})
         record = json.loads(run("topic", "echo", "t", "--count", "1", "--json").stdout)
@@ -241,13 +241,13 @@ def test_echo_writes_one_json_object_a_line(running_master):
         assert '{"n":1}' in run("topic", "echo", "t", "-n", "1").stdout
 
 
-def test_echo_ends_when_nothing_comes_for_so_long(running_master, type_in):
+def test_echo_exits_when_its_timeout_expires(running_master, type_in):
     done = type_in("topic", "echo", "t", "--timeout", "0.2")
     assert done.returncode == 1
     assert "timed out after 0.2 s while waiting for a message on 't'" in done.stderr
 
 
-def test_ctrl_c_ends_everything_at_once_with_130_and_no_traceback(running_master, start):
+def test_ctrl_c_ends_every_command_with_130_and_no_traceback(running_master, start):
     with nep.node("talker") as node:
         pub = node.new_pub("t")
         echo = start("topic", "echo", "t", "--json")
@@ -264,13 +264,13 @@ def test_ctrl_c_ends_everything_at_once_with_130_and_no_traceback(running_master
             assert "bort" not in err
 
 
-def test_a_latched_message_reaches_who_comes_later(running_master, start):
+def test_latched_message_reaches_a_late_subscriber(running_master, start):
     start("topic", "pub", "late", '{"n": 1}', "--latched").wait_says("Ctrl+C")
     with nep.node("listener") as node, node.new_sub("late") as sub:
         assert sub.listen(timeout_s=LONG_S) == (True, {"n": 1})
 
 
-def test_a_reader_that_has_enough_is_no_error(running_master, start):
+def test_closed_output_pipe_is_not_an_error(running_master, start):
     with nep.node("talker") as node:
         pub = node.new_pub("t")
         echo = start("topic", "echo", "t", "--json")
@@ -283,7 +283,7 @@ def test_a_reader_that_has_enough_is_no_error(running_master, start):
         assert "Traceback" not in echo.process.stderr.read()
 
 
-def test_a_master_runs_until_ctrl_c_and_a_second_one_is_refused(address, start):
+def test_master_runs_until_ctrl_c_and_a_second_one_is_rejected(address, start):
     port = address.rpartition(":")[2]
     first = start("master", "--port", port, "--no-gateway")
     assert address in first.wait_says("master at")
@@ -297,7 +297,7 @@ def test_a_master_runs_until_ctrl_c_and_a_second_one_is_refused(address, start):
     assert not nep.is_running(address, 0.3)
 
 
-def test_a_master_ends_when_its_owner_is_gone_and_nobody_needs_it(address, start):
+def test_master_exits_when_its_owner_has_ended_and_no_node_needs_it(address, start):
     owner = subprocess.Popen([sys.executable, "-c", "input()"], stdin=subprocess.PIPE)
     master = start("master", "--no-gateway", "--owner-pid", str(owner.pid))
     master.wait_says("master at")
@@ -308,7 +308,7 @@ def test_a_master_ends_when_its_owner_is_gone_and_nobody_needs_it(address, start
     assert master.process.wait(LONG_S) == 0
 
 
-def test_a_master_serves_this_computer_only_unless_it_is_told(monkeypatch, type_in):
+def test_master_listens_on_other_addresses_only_with_the_listen_option(monkeypatch, type_in):
     monkeypatch.setenv("NEP_MASTER", "192.168.1.7:7780")
     done = type_in("master", "--no-gateway")
     assert done.returncode == 1
@@ -316,7 +316,7 @@ def test_a_master_serves_this_computer_only_unless_it_is_told(monkeypatch, type_
 
 
 @pytest.mark.skipif(sys.platform == "darwin", reason="macOS answers at one loopback address only")
-def test_a_master_that_listens_says_what_others_type_and_warns(address, start):
+def test_master_with_listen_option_prints_the_address_for_others_and_warns(address, start):
     port = address.rpartition(":")[2]
     master = start("master", "--port", port, "--no-gateway", "--listen", "127.0.0.2")
     assert address in master.wait_says("master at")
@@ -329,12 +329,12 @@ def test_a_master_that_listens_says_what_others_type_and_warns(address, start):
     assert "'203.0.113.77' is not an address of this computer" in refused.stderr
 
 
-def test_the_command_starts_without_loading_rich():
+def test_command_starts_without_importing_rich():
     code = "import sys, nep.cli.app; sys.exit(any(name.split('.')[0] == 'rich' for name in sys.modules))"
     assert subprocess.run([sys.executable, "-c", code], env=environment(), check=False).returncode == 0
 
 
-def test_a_command_line_imports_its_own_command_alone():
+def test_command_line_imports_only_its_own_command():
     code = (
         "import sys\n"
         "from nep.cli.app import run\n"
@@ -356,7 +356,7 @@ def test_a_command_line_imports_its_own_command_alone():
         (("topic", "pub", "t", "1", "--type", "a" * 300), "(300 characters)'; use at most 200 characters"),
     ],
 )
-def test_what_cannot_be_is_told_before_a_master_is_looked_for(words, sentence, type_in):
+def test_invalid_arguments_are_rejected_before_connecting_to_a_master(words, sentence, type_in):
     done = type_in(*words)
     assert done.returncode == 2
     assert sentence in " ".join(done.stderr.replace("│", " ").split())

@@ -50,34 +50,34 @@ def robot(master):
 
 
 @pytest.mark.parametrize("shell", ["bash", "fish"])
-def test_topics_are_offered(robot, shell):
+def test_topics_are_completed(robot, shell):
     assert complete(shell, "nep topic echo /o") == ["/odd", "/odom"]
 
 
-def test_zsh_too(robot):
+def test_zsh_completion_works(robot):
     assert complete("zsh", "nep topic hz /o") == ["/odd", "/odom"]
 
 
-def test_a_topic_that_stands_there_already_is_not_offered_again(robot):
+def test_topic_already_on_the_command_line_is_not_completed_again(robot):
     assert complete("bash", "nep topic hz /odom /o") == ["/odd"]
 
 
-def test_fields_of_the_topic_are_offered(robot):
+def test_fields_of_the_topic_are_completed(robot):
     assert complete("bash", "nep topic echo /odom po") == ["pose.x", "pose.y"]
     assert complete("bash", "nep topic echo /odom j") == ["joints[0]", "joints[1]"]
 
 
-def test_topics_and_types_are_offered_to_info_and_find(robot):
+def test_topics_and_types_are_completed_for_info_and_find(robot):
     assert complete("bash", "nep topic info /odo") == ["/odom"]
     assert complete("bash", "nep topic find s") == ["string"]
 
 
-def test_nodes_and_levels_are_offered(robot):
+def test_nodes_and_levels_are_completed(robot):
     assert complete("bash", "nep log --node P") == ["Pepper"]
     assert complete("bash", "nep log --level w") == ["warning"]
 
 
-def test_without_a_master_nothing_is_offered_and_soon(monkeypatch):
+def test_completion_without_a_master_is_empty_and_returns_at_once(monkeypatch):
     monkeypatch.setenv("NEP_MASTER", "127.0.0.1:1")
     assert complete("bash", "nep topic echo /o") == []
     line = SimpleNamespace(params={}, find_root=lambda: SimpleNamespace(params={}))
@@ -88,7 +88,7 @@ def test_without_a_master_nothing_is_offered_and_soon(monkeypatch):
         assert complete("bash", "nep topic echo /o") == []
 
 
-def test_more_topics_are_offered_behind_the_first_and_asking_leaves_no_trace(robot, master):
+def test_second_topic_is_completed_and_queries_leave_no_alert(robot, master):
     assert complete("bash", "nep topic echo /odom /o") == ["/odd"]
     assert complete("bash", "nep topic echo /odom po") == ["pose.x", "pose.y"]
     assert not master.view().alerts

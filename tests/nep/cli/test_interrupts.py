@@ -65,7 +65,7 @@ def imports_of(*words):
 
 
 @pytest.mark.parametrize("words", [("--version",), ("topic", "hz", "--help")])
-def test_while_it_begins(words):
+def test_interrupt_during_startup_exits_with_130(words):
     many = imports_of(*words)
     assert many > 100, "it shows what happens while much is imported"
     for at in (1, 2, 5, many // 4, many // 2, 3 * many // 4, many):
@@ -74,13 +74,13 @@ def test_while_it_begins(words):
         assert done.returncode == 130, at
 
 
-def test_the_package_is_no_time_in_which_a_traceback_can_come():
+def test_package_import_leaves_no_time_for_a_traceback():
     loaded = "import sys; old = set(sys.modules); import nep.cli; print(*set(sys.modules) - old)"
     new = {name for name in python(loaded).stdout.decode().split() if not name.startswith("importlib")}
     assert new <= {"nep", "nep.cli", "__future__", "warnings"}
 
 
-def test_while_the_interpreter_ends():
+def test_interrupt_during_interpreter_shutdown_exits_with_130():
     done = python(
         "import atexit, os, signal, sys; from nep.cli import main\n"
         "def interrupt():\n"  # of Python: 3.10 looks for signals only between its own instructions
@@ -93,7 +93,7 @@ def test_while_the_interpreter_ends():
     assert done.stdout.decode().strip() == f"nep {nep.__version__}"
 
 
-def test_once_more_ends_what_is_still_saying_goodbye():
+def test_second_interrupt_ends_a_command_during_cleanup():
     done = python(
         "import os, signal; from nep.cli.interrupts import ask_first\n"
         "ask_first()\n"
@@ -105,7 +105,7 @@ def test_once_more_ends_what_is_still_saying_goodbye():
 
 
 @pytest.mark.parametrize("kept", ["SIG_IGN", "SIG_DFL"])
-def test_who_started_it_decides(kept):
+def test_inherited_signal_handling_is_preserved(kept):
     done = python(
         f"import os, signal; from nep.cli.interrupts import ask_first, end_at_once\n"
         f"signal.signal(signal.SIGINT, signal.{kept})\n"
@@ -115,7 +115,7 @@ def test_who_started_it_decides(kept):
     assert done.returncode == 0, done.stderr
 
 
-def test_every_request_to_end_is_carried_out_once_and_nohup_is_respected():
+def test_every_termination_signal_is_handled_once_and_nohup_is_respected():
     done = python(
         "import os, signal\n"
         "from nep.cli.interrupts import call_first, leave_when_told\n"
@@ -138,7 +138,7 @@ def test_every_request_to_end_is_carried_out_once_and_nohup_is_respected():
 # ---- the package, which is imported before anything can be said of Ctrl+C
 
 
-def test_every_name_of_the_package_is_there_and_is_the_one_that_checkers_see():
+def test_lazy_exports_match_those_seen_by_type_checkers():
     tree = ast.parse(Path(nep.__file__).read_text(encoding="utf-8"))
     seen = {
         (each.name, statement.module)
@@ -157,7 +157,7 @@ def test_every_name_of_the_package_is_there_and_is_the_one_that_checkers_see():
     assert nep.master is nep.Master
 
 
-def test_what_import_nep_alone_always_gave():
+def test_import_nep_provides_all_public_names():
     done = python(
         "import nep\n"
         "assert 'errors' not in vars(nep)\n"
@@ -170,7 +170,7 @@ def test_what_import_nep_alone_always_gave():
     assert done.returncode == 0, done.stderr
 
 
-def test_all_is_there_at_the_end_of_python_where_nothing_can_be_imported():
+def test_public_names_are_available_during_interpreter_shutdown():
     done = python(
         "import sys, nep; node = nep.Node\n"
         "class Last:\n"
@@ -180,12 +180,12 @@ def test_all_is_there_at_the_end_of_python_where_nothing_can_be_imported():
     assert (done.stdout, done.stderr) == (b"ClosedError\n", b"")
 
 
-def test_a_package_that_is_missing_is_named():
+def test_missing_package_is_named():
     done = python("import sys; sys.modules['zmq'] = None\nimport nep\nnep.node")
     assert b"ModuleNotFoundError: " in done.stderr
 
 
-def test_an_interrupt_in_the_middle_of_a_finalizer_comes_again(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_interrupt_during_a_finalizer_is_raised_again(monkeypatch: pytest.MonkeyPatch) -> None:
     """Python prints what a finalizer raises, and goes on: the command would not end."""
 
     class Interrupted:

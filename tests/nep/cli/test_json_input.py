@@ -19,14 +19,14 @@ def error_of(text: str, **named) -> str:
     return str(raised.value)
 
 
-def test_incomplete_json_is_an_error_at_its_end_without_advice_about_quotes():
+def test_incomplete_json_error_names_its_end_without_advice_about_quotes():
     said = error_of('{"fix": {"lat": 35.7}', other_types=True)
     assert "line 1, column 22" in said
     assert "quotes" not in said
     assert "--type" not in said
 
 
-def test_nan_is_an_error_that_names_msgpack_and_msgpack_takes_it():
+def test_nan_error_suggests_msgpack_which_accepts_it():
     assert error_of('{"lat": NaN}', other_types=True).endswith("use null, or use --type msgpack")
     assert "--type" not in error_of('{"lat": NaN}')
     value = value_of('{"lat": NaN}', "msgpack")
@@ -34,11 +34,11 @@ def test_nan_is_an_error_that_names_msgpack_and_msgpack_takes_it():
     assert math.isnan(value["lat"])
 
 
-def test_a_second_value_is_an_error_at_its_line_of_the_input():
+def test_second_json_value_is_an_error_with_its_position():
     assert "line 2, column 9" in error_of('{"a": 2}{"a": 3}', first_line=2)
 
 
-def test_a_file_is_named_with_the_line_in_it(tmp_path):
+def test_json_error_in_a_file_names_the_file_and_line(tmp_path):
     file = tmp_path / "pose.json"
     file.write_text('\ufeff{\n"a": 1,\n}', "utf-8")
     with pytest.raises(NepError, match=r"pose\.json' .* line 2, column 7"):
@@ -47,7 +47,7 @@ def test_a_file_is_named_with_the_line_in_it(tmp_path):
 
 
 @pytest.mark.parametrize("text", ["hello", "it's 5 o'clock", 'say "hi"', "$HOME", "Grüße", "\x1b[31m"])
-def test_advice_about_quotes_is_json_when_the_shell_has_read_it(text, monkeypatch):
+def test_quoting_advice_is_valid_json_after_shell_parsing(text, monkeypatch):
     monkeypatch.setattr("os.name", "posix")
     said = error_of(text, other_types=True)
     assert "--type string" in said

@@ -38,20 +38,20 @@ def busy(master):
         thread.join()
 
 
-def test_records_are_lines_for_people(busy, capfd):
+def test_records_are_printed_as_lines(busy, capfd):
     log("warning", "Pepper", 1, busy)
     (line,) = capfd.readouterr().out.splitlines()
     assert line.split()[1:] == ["warning", "Pepper", "the", "battery", "is", "low"]
 
 
-def test_records_are_json_for_programs_and_what_is_none_is_told(busy, capfdbinary):
+def test_records_are_printed_as_json_and_undecodable_messages_reported(busy, capfdbinary):
     log("info", None, 4, busy, as_json=True)
     records = [json.loads(line) for line in capfdbinary.readouterr().out.splitlines()]
     assert {record["text"] for record in records} >= {"not mine", "quiet", "the battery is low"}
     assert any("cannot decode" in record["text"] for record in records)
 
 
-def test_who_comes_late_sees_the_last_errors_first_and_each_once(master, capfd):
+def test_late_start_shows_the_last_errors_first_and_each_once(master, capfd):
     with nep.node("Pepper") as robot, nep.node("other") as other:
         robot.log.error("the brake is hot\n12:00:00 error  forged\x1b[2J")
         robot.log.info("fine")
@@ -68,7 +68,7 @@ def test_who_comes_late_sees_the_last_errors_first_and_each_once(master, capfd):
         assert "on fire" in capfd.readouterr().out
 
 
-def test_an_error_that_comes_while_one_looks_is_shown_once(busy, capfd):
+def test_error_logged_during_the_command_is_shown_once(busy, capfd):
     log("error", "other", 1, busy)
     with nep.node("looker", master=busy) as looker:  # it is kept a moment after it was told
         eventually(lambda: LAST_ERRORS_TOPIC in looker.graph().topics)
@@ -78,12 +78,12 @@ def test_an_error_that_comes_while_one_looks_is_shown_once(busy, capfd):
     assert capfd.readouterr().out.count("not mine") == 2
 
 
-def test_a_wrong_level_is_a_sentence():
+def test_unknown_level_is_rejected_with_a_suggestion():
     with pytest.raises(typer.BadParameter, match=r"unknown level 'eror'; did you mean 'error'\?"):
         log("eror")
 
 
-def test_a_master_logs_its_alerts_and_when_they_are_resolved():
+def test_master_logs_its_alerts_and_their_resolution():
     with (
         nep.Master("127.0.0.1:0", learn_s=0.0, attachments=[AlertLog()]) as master,
         nep.node("page", master=master.address) as page,

@@ -40,7 +40,7 @@ PAYLOAD = {
         "not (pose.x > 2 or state == 'idle')",
     ],
 )
-def test_a_message_that_matches_passes(text):
+def test_matching_message_passes(text):
     assert MessageFilter(text).matches(PAYLOAD)
 
 
@@ -48,11 +48,11 @@ def test_a_message_that_matches_passes(text):
     "text",
     ["pose.x > 2", "nowhere > 1", "nowhere != 1", "state > 1", "1 in pose.x", "none", "joints[7] == 1"],
 )
-def test_a_message_that_does_not_match_is_left_out(text):
+def test_message_that_does_not_match_is_filtered_out(text):
     assert not MessageFilter(text).matches(PAYLOAD)
 
 
-def test_m_is_a_payload_that_is_no_map():
+def test_m_refers_to_a_payload_that_is_not_a_map():
     assert MessageFilter("m > 3").matches(4)
     assert MessageFilter("m[0] == 1").matches([1])
     assert not MessageFilter("x > 3").matches("text")
@@ -82,7 +82,7 @@ def test_m_is_a_payload_that_is_no_map():
         "x == \x00",
     ],
 )
-def test_anything_else_is_an_error_or_a_condition_that_is_safe(text):
+def test_unsupported_expression_is_rejected_or_evaluated_safely(text):
     if text.startswith("not "):
         assert not MessageFilter(text).matches(PAYLOAD)
         return
@@ -91,6 +91,6 @@ def test_anything_else_is_an_error_or_a_condition_that_is_safe(text):
 
 
 @given(st.text(max_size=40))
-def test_any_text_is_a_filter_or_an_error(text):
+def test_any_text_is_a_filter_or_raises_nep_error(text):
     with contextlib.suppress(NepError):
         MessageFilter(text).matches(PAYLOAD)

@@ -22,7 +22,7 @@ def robot(master):
         yield node
 
 
-def test_info_has_the_program_and_topics_with_types(robot, type_in):
+def test_info_shows_the_program_and_topics_with_types(robot, type_in):
     code, out, _err = type_in("node", "info", robot.id)
     assert code == 0
     assert out.startswith(f"node: Pepper\nid: {robot.id}\n")
@@ -34,14 +34,14 @@ def test_info_has_the_program_and_topics_with_types(robot, type_in):
         assert part in out
 
 
-def test_info_by_name_has_every_node_of_that_name(robot, type_in):
+def test_info_by_name_lists_every_node_of_that_name(robot, type_in):
     records = json.loads(type_in("node", "info", "Pepper", "--json")[1])
     mine = next(each for each in records if each["id"] == robot.id)
     assert len(records) == 2
     assert mine["publishes"] == {"/odom": "robot/odometry"}
 
 
-def test_an_unknown_node_is_an_error_with_the_nearest_name(robot, type_in):
+def test_unknown_node_is_an_error_with_the_nearest_name(robot, type_in):
     code, out, err = type_in("node", "info", "Peper\x1b")
     assert (code, out) == (1, "")
     assert "did you mean 'Pepper'?" in err

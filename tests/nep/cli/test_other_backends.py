@@ -66,7 +66,7 @@ def test_an_unknown_back_end_is_an_error(type_in):
         ("topic", "echo", "t", "--filter", "\x1b[31m\nx +"),
     ],
 )
-def test_names_in_errors_can_not_control_the_terminal_or_forge_a_line(words, type_in):
+def test_names_in_errors_cannot_control_the_terminal_or_forge_a_line(words, type_in):
     code, out, err = type_in(*words)
     assert (code in {1, 2}, out) == (True, "")
     assert "\x1b" not in err

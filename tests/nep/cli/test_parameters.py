@@ -49,7 +49,7 @@ def test_list_get_and_set(node: nep.Node, run: TypeIn) -> None:
     assert run("get", node.id, "mode", "--json").stdout.strip() == '"run"'
 
 
-def test_what_is_refused_is_a_sentence(node: nep.Node, run: TypeIn) -> None:
+def test_rejected_changes_are_reported_in_one_sentence(node: nep.Node, run: TypeIn) -> None:
     refused = run("set", "robot", "speed", "9")
     assert (refused.returncode, refused.stdout) == (1, "")
     assert "the parameter 'speed' cannot be 9; the maximum is 2" in refused.stderr
@@ -60,7 +60,7 @@ def test_what_is_refused_is_a_sentence(node: nep.Node, run: TypeIn) -> None:
     assert node.parameters["word"] == "5", "a text stays one"
 
 
-def test_to_a_file_and_back(node: nep.Node, run: TypeIn, tmp_path: Path) -> None:
+def test_dump_and_load_round_trip(node: nep.Node, run: TypeIn, tmp_path: Path) -> None:
     file = tmp_path / "robot.json"
     assert run("dump", "robot", str(file)).returncode == 0
     assert json.loads(file.read_text()) == {"speed": 0.5, "mode": "walk", "serial": "7"}
@@ -79,7 +79,7 @@ def test_to_a_file_and_back(node: nep.Node, run: TypeIn, tmp_path: Path) -> None
     assert run("dump", "robot", str(tmp_path / "no" / "folder")).returncode == 1
 
 
-def test_watching_shows_what_is_and_each_change_once(node: nep.Node) -> None:
+def test_watch_shows_current_values_and_each_change_once(node: nep.Node) -> None:
     watching = Running("param", "watch", "robot")
     try:
         lines = iter(watching.process.stdout.readline, "")
@@ -97,7 +97,7 @@ def test_watching_shows_what_is_and_each_change_once(node: nep.Node) -> None:
         watching.close()
 
 
-def test_watching_one_ends_when_its_node_does_or_in_time(node: nep.Node, run: TypeIn) -> None:
+def test_watch_of_one_parameter_ends_with_its_node_or_at_the_timeout(node: nep.Node, run: TypeIn) -> None:
     assert (
         run("watch", "robot", "mode", "--json", "--count", "1").stdout == '{"name":"mode","value":"walk"}\n'
     )

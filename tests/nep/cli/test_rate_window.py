@@ -20,7 +20,7 @@ from nep.messages.message import arrived as new_arrived
 from nep.messages.message import kind_of
 
 
-def test_gaps_are_those_of_the_publishers_clock():
+def test_intervals_are_measured_with_the_publisher_clock():
     window = RateWindow(10.0)
     for number, stamp in enumerate((0.0, 0.1, 0.2, 0.4)):
         window.add(5.0 + number * 0.005, stamp, 10)  # they arrived in one heap
@@ -31,7 +31,7 @@ def test_gaps_are_those_of_the_publishers_clock():
     assert found.std_s == pytest.approx(0.0471, abs=1e-3)
 
 
-def test_without_stamps_the_arrival_counts_and_order_does_not():
+def test_intervals_without_stamps_use_arrival_times_and_ignore_order():
     window = RateWindow(10.0)
     for arrived in (1.0, 2.0, 3.0):
         window.add(arrived, None, 10)
@@ -42,7 +42,7 @@ def test_without_stamps_the_arrival_counts_and_order_does_not():
     assert mixed.frequency(5.0).rate_hz == pytest.approx(1.0)
 
 
-def test_what_is_older_than_the_window_counts_no_more():
+def test_messages_older_than_the_window_are_not_counted():
     window = RateWindow(2.0)
     for arrived in range(10):
         window.add(float(arrived), None, 100)
@@ -52,7 +52,7 @@ def test_what_is_older_than_the_window_counts_no_more():
     assert window.traffic(100.0) is None
 
 
-def test_bytes_a_second_and_sizes():
+def test_bandwidth_and_message_sizes_are_measured():
     window = RateWindow(10.0)
     for arrived, size in ((0.0, 900), (1.0, 100), (2.0, 300)):
         window.add(arrived, None, size)
@@ -61,7 +61,7 @@ def test_bytes_a_second_and_sizes():
     assert (found.min_bytes, found.max_bytes, found.messages) == (100, 900, 3)
 
 
-def test_one_message_is_no_rate_and_a_flood_is_bounded():
+def test_single_message_has_no_rate_and_the_window_is_bounded():
     window = RateWindow(10.0)
     window.add(0.0, None, 1)
     assert (window.frequency(0.0), window.traffic(0.0)) == (None, None)
@@ -70,7 +70,7 @@ def test_one_message_is_no_rate_and_a_flood_is_bounded():
     assert window.frequency(0.2).messages == MAX_MESSAGES
 
 
-def test_gaps_have_the_unit_that_fits():
+def test_interval_is_formatted_with_a_suitable_unit():
     assert [gap(each) for each in (2.5, 0.0204, 0.000_31)] == ["2.5 s", "20.4 ms", "310 us"]
 
 
@@ -103,7 +103,7 @@ def test_hz_reports_each_topic_as_a_line_of_json(published, capfdbinary):
         assert (line["lost"], line["messages"]) == (0, line["total"])
 
 
-def test_bw_reports_sizes_to_people(published, capsys):
+def test_bw_prints_sizes_as_a_table(published, capsys):
     bw(["words"], 10.0, 1, published, as_json=False)
     shown = capsys.readouterr()
     head, line = shown.out.splitlines()
@@ -113,15 +113,15 @@ def test_bw_reports_sizes_to_people(published, capsys):
     assert "Ctrl+C" in shown.err
 
 
-def test_a_topic_that_is_not_there_is_waited_for_with_the_nearest_name(published, capsys):
-    with pytest.raises(WaitTimeoutError, match="timed out after 0\\.5 s while waiting for .*'/odm'"):
+def test_missing_topic_is_waited_for_with_the_nearest_name(published, capsys):
+    with pytest.raises(WaitTimeoutError, match=r"timed out after 0\.5 s while waiting for .*'/odm'"):
         hz(["/odm"], 10.0, 0, published, timeout_s=0.5)
     assert "'/odm' has no publisher yet; did you mean '/odom'? waiting" in capsys.readouterr().err
     with pytest.raises(BadTopicError):
         bw(["bad topic"], 10.0, 1, published)
 
 
-def test_what_comes_later_is_measured(master, capsys, monkeypatch):
+def test_topic_that_appears_later_is_measured(master, capsys, monkeypatch):
     ended = threading.Event()
 
     def publish_late(node):
@@ -145,7 +145,7 @@ def test_what_comes_later_is_measured(master, capsys, monkeypatch):
     assert "'/odom' has no publisher yet; waiting" in shown.err
 
 
-def test_ages_are_told_of_what_arrived_lately():
+def test_delay_covers_recent_messages():
     window = AgeWindow(10.0)
     assert window.delay(0.0) is None
     window.add_age(0.0, 99.0, 1)
@@ -155,7 +155,7 @@ def test_ages_are_told_of_what_arrived_lately():
     assert window.total == 4
 
 
-def test_ages_from_before_the_clocks_were_compared_do_not_count():
+def test_ages_from_before_the_clock_comparison_are_excluded():
     window = AgeWindow(10.0)
     window.add_age(1.0, 3600.0, 1)
     window.add_age(2.0, 0.25, 1, 0.001)
@@ -179,7 +179,7 @@ def test_ages_from_before_the_clocks_were_compared_do_not_count():
         (0.0, 0.0004, "0 us"),
     ],
 )
-def test_an_age_below_zero_within_the_uncertainty_is_under_it(age_s, uncertainty_s, words):
+def test_negative_age_within_the_uncertainty_is_shown_as_below_it(age_s, uncertainty_s, words):
     assert age(age_s, uncertainty_s) == words
 
 
@@ -206,7 +206,7 @@ def test_delays_are_shown_with_their_uncertainty(capsys):
     assert "not compared" not in shown.err
 
 
-def test_clocks_that_nobody_compared_are_named_once(capsys):
+def test_missing_clock_comparison_is_reported_once(capsys):
     report = _Told((3600.0, None)).report
     for _ in range(5):
         report._show("t")
@@ -247,7 +247,7 @@ class _FakeClock:
         self.now += seconds
 
 
-def test_published_messages_keep_the_rate_and_skip_turns_missed_during_a_stall():
+def test_published_messages_keep_the_rate_and_skip_slots_missed_during_a_stall():
     clock, sent = _FakeClock(), []
 
     def send():

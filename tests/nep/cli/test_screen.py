@@ -25,7 +25,7 @@ from nep.protocol.graph_view import Alert, SubscriberInfo, TopicInfo
     ("value", "text"),
     [(None, UNKNOWN), (0.0, "0.0 /s"), (29.97, "30.0 /s"), (123.4, "123 /s"), (45_000.0, "45000 /s")],
 )
-def test_rates(value, text):
+def test_rates_are_formatted(value, text):
     assert rate(value) == text
 
 
@@ -41,18 +41,18 @@ def test_rates(value, text):
         (2e10, "20.0 GB"),
     ],
 )
-def test_sizes(value, text):
+def test_sizes_are_formatted(value, text):
     assert size(value) == text
 
 
 @pytest.mark.parametrize(
     ("seconds", "text"), [(-1, "0 s"), (59, "59 s"), (300, "5 min"), (7200, "2.0 h"), (200_000, "2.3 d")]
 )
-def test_durations(seconds, text):
+def test_durations_are_formatted(seconds, text):
     assert duration(seconds) == text
 
 
-def test_a_table_has_a_head_and_a_row_for_each(capsys):
+def test_table_has_a_header_and_one_row_per_entry(capsys):
     show_table(
         [TextColumn("topic"), TextColumn("rate", "right")],
         [("/camera", "30.0 /s"), ("[red]odd[/red]", UNKNOWN)],
@@ -63,7 +63,7 @@ def test_a_table_has_a_head_and_a_row_for_each(capsys):
     assert any("[red]odd[/red]" in line for line in lines)
 
 
-def test_a_long_table_is_laid_out_as_straight_as_a_short_one(capsys):
+def test_long_table_is_aligned_like_a_short_one(capsys):
     columns = [TextColumn("topic"), TextColumn("rate", "right")]
     rows = [(f"/robot{number}", f"{number}.0 /s") for number in range(1000)]
     show_table(columns, rows)
@@ -76,7 +76,7 @@ def test_a_long_table_is_laid_out_as_straight_as_a_short_one(capsys):
     assert "lines" in capsys.readouterr().out
 
 
-def test_topics_are_never_folded_on_a_narrow_terminal(monkeypatch, capsys):
+def test_topics_are_never_wrapped_on_a_narrow_terminal(monkeypatch, capsys):
     monkeypatch.setenv("COLUMNS", "72")
     monkeypatch.setenv("FORCE_COLOR", "1")
     columns = [
@@ -93,13 +93,13 @@ def test_topics_are_never_folded_on_a_narrow_terminal(monkeypatch, capsys):
     assert "30.0 /s" in out
 
 
-def test_nothing_is_folded_for_a_file_or_a_program(monkeypatch, capsys):
+def test_output_to_a_file_or_pipe_is_not_wrapped(monkeypatch, capsys):
     monkeypatch.setenv("COLUMNS", "40")
     show_table([TextColumn("topic"), TextColumn("publishers")], [("t" * 50, "p" * 50)])
     assert "p" * 50 in capsys.readouterr().out
 
 
-def test_alerts_go_beside_the_results_with_what_to_do(capsys):
+def test_alerts_are_printed_to_stderr_with_advice(capsys):
     show_alerts([Alert("port:7000", "Port 7000 is taken", "Close that program.")])
     captured = capsys.readouterr()
     assert not captured.out
@@ -107,7 +107,7 @@ def test_alerts_go_beside_the_results_with_what_to_do(capsys):
     assert "Close that program." in captured.err
 
 
-def test_an_error_is_one_sentence_on_the_error_stream(capsys):
+def test_error_is_one_sentence_on_stderr(capsys):
     say_error("no master answers")
     captured = capsys.readouterr()
     assert (captured.out, captured.err) == ("", "nep: no master answers\n")
@@ -120,7 +120,7 @@ def test_json_is_one_line_also_with_bytes_number_keys_and_nan(capfdbinary):
     assert json.loads(line) == {"1": "00ff", "a": None, "text": "Grüße\n日本"}
 
 
-def test_a_terminal_too_narrow_for_a_table_gets_the_rows_one_below_the_other(monkeypatch):
+def test_terminal_too_narrow_for_a_table_shows_rows_as_blocks(monkeypatch):
     class Terminal(io.StringIO):
         encoding = "utf-8"
 
@@ -147,7 +147,7 @@ WIDE = [("/日本語カメラ", "1"), ("/e\u0301te\u0301", "2"), ("/😀😀", "
 
 
 @pytest.mark.parametrize("rows", [WIDE, WIDE * 60], ids=["short", "long"])
-def test_columns_stand_below_each_other_whatever_the_script(rows, capsys):
+def test_columns_are_aligned_for_every_script(rows, capsys):
     show_table(
         [TextColumn("topic"), TextColumn("rate"), TextColumn("lost", "right")], [(*row, "9") for row in rows]
     )
@@ -159,7 +159,7 @@ def test_columns_stand_below_each_other_whatever_the_script(rows, capsys):
     assert len(starts) == 1
 
 
-def test_a_wide_name_is_whole_where_it_has_room(capsys, monkeypatch):
+def test_wide_characters_are_not_truncated_if_they_fit(capsys, monkeypatch):
     monkeypatch.setattr("sys.stdout.isatty", lambda: True)
     monkeypatch.setenv("COLUMNS", "30")
     show_table(

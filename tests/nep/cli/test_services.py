@@ -40,7 +40,7 @@ def rows(out):
     return [line.split() for line in out.splitlines()]
 
 
-def test_the_list_has_servers_clients_and_counts(arm, type_in):
+def test_list_has_servers_clients_and_counts(arm, type_in):
     code, out, err = type_in("service", "list")
     assert (code, err) == (0, "")
     assert [SERVICE, "arm", "page", "2", "1"] in rows(out)
@@ -49,14 +49,14 @@ def test_the_list_has_servers_clients_and_counts(arm, type_in):
     assert isinstance(told["servers"][0]["id"], str)
 
 
-def test_no_services_are_a_sentence_and_an_empty_list(master, type_in):
+def test_empty_service_list_is_explained(master, type_in):
     code, out, err = type_in("service", "list")
     assert (code, out) == (0, "")
     assert "no services" in err
     assert type_in("service", "list", "--json")[:2] == (0, "[]\n")
 
 
-def test_topics_and_services_are_listed_apart(arm, type_in):
+def test_topics_and_services_are_listed_separately(arm, type_in):
     assert SERVICE not in type_in("topic", "list")[1]
     assert json.loads(type_in("topic", "list", "--json")[1]) == []
     nodes = {each["name"]: each for each in json.loads(type_in("node", "list", "--json")[1])}
@@ -89,14 +89,14 @@ def test_info_type_and_find_of_a_service(arm, type_in):
     assert "'std_srvs/SetBool'" in err
 
 
-def test_two_servers_are_told_with_the_list(arm, type_in):
+def test_two_servers_of_a_service_are_reported_with_the_list(arm, type_in):
     with nep.node("other") as node:
         node.new_server(SERVICE, lambda request: request, threads=1)
         assert "has 2 servers" in type_in("service", "list")[2]
         assert "has 2 servers" in type_in("service", "info", SERVICE)[2]
 
 
-def test_a_call_writes_the_answer(arm, type_in, tmp_path):
+def test_call_prints_the_reply(arm, type_in, tmp_path):
     assert type_in("service", "call", SERVICE, '{"joint": 1}') == (0, '{"asked":{"joint":1}}\n', "")
     assert type_in("service", "call", SERVICE) == (0, '{"asked":{}}\n', "")
     assert type_in("service", "call", SERVICE, "[1, null]", "--json") == (0, '{"asked":[1,null]}\n', "")
@@ -105,7 +105,7 @@ def test_a_call_writes_the_answer(arm, type_in, tmp_path):
     assert json.loads(type_in("service", "call", SERVICE, f"@{file}")[1]) == {"asked": "grüß"}
 
 
-def test_what_goes_wrong_is_one_sentence(arm, type_in, tmp_path):
+def test_errors_are_reported_in_one_sentence(arm, type_in, tmp_path):
     for words, sentence in (
         ((SERVICE, '"bad"'), f"the server of '{SERVICE}' failed: LookupError: no such joint"),
         (
@@ -128,7 +128,7 @@ def test_what_goes_wrong_is_one_sentence(arm, type_in, tmp_path):
     assert type_in("service", "info", "bad name")[0] == 1
 
 
-def test_no_master_is_a_sentence(monkeypatch, type_in):
+def test_missing_master_is_reported(monkeypatch, type_in):
     monkeypatch.setenv("NEP_MASTER", "127.0.0.1:1")
     for words in (("list",), ("call", SERVICE)):
         code, out, err = type_in("service", *words)
@@ -136,7 +136,7 @@ def test_no_master_is_a_sentence(monkeypatch, type_in):
         assert "127.0.0.1:1" in err
 
 
-def test_a_call_waits_for_a_server_that_comes(master, type_in):
+def test_call_waits_for_a_server_that_starts_later(master, type_in):
     made = []
 
     def come():
@@ -151,7 +151,7 @@ def test_a_call_waits_for_a_server_that_comes(master, type_in):
     made[0].close()
 
 
-def test_names_are_completed(arm, master):
+def test_service_names_are_completed(arm, master):
     class Context:
         params = {"master": master.address}  # noqa: RUF012 - as typer has it
 
@@ -159,7 +159,7 @@ def test_names_are_completed(arm, master):
     assert complete_service(Context(), "/leg") == []
 
 
-def test_services_of_another_back_end_are_seen_and_called(type_in, monkeypatch):
+def test_services_of_another_back_end_are_listed_and_called(type_in, monkeypatch):
     monkeypatch.setenv("NEP_MASTER", "127.0.0.1:1")  # of another back end: no place of this one
     monkeypatch.setenv("NEP_ZENOH_CONFIG", place_for("zenoh", ""))
     place = place_for("zenoh", "")

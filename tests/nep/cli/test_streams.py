@@ -72,7 +72,7 @@ COMMANDS = (
 
 
 @pytest.mark.parametrize("page", CODE_PAGES)
-def test_every_command_says_everything_in_every_code_page(talkers, page):
+def test_every_command_prints_everything_in_every_code_page(talkers, page):
     given = "\n".join("\t".join(words) for words in COMMANDS)
     done = subprocess.run(
         [sys.executable, "-c", EACH],
@@ -96,7 +96,7 @@ def test_every_command_says_everything_in_every_code_page(talkers, page):
 
 
 @pytest.mark.skipif(os.name != "posix", reason="Windows gives words as letters, not as bytes")
-def test_words_that_came_in_another_alphabet_are_utf8_all_the_same(monkeypatch):
+def test_arguments_in_another_encoding_are_read_as_utf_8(monkeypatch):
     monkeypatch.setattr("sys.argv", ["nep", "Gr\udcc3\udcb6\udcc3\udc9fe", "plain", "Größe"])
     assert words_given() == ["Größe", "plain", "Größe"]
 
@@ -121,7 +121,7 @@ FULL = Path("/dev/full")
     [("--help",), ("topic", "list"), ("topic", "list", "--json"), ("topic", "echo", TOPIC, "--csv", "said")],
 )
 @pytest.mark.parametrize("unbuffered", ["", "1"])
-def test_a_full_disk_is_a_sentence(talkers, words, unbuffered):
+def test_full_disk_is_reported(talkers, words, unbuffered):
     env = {"PYTHONUNBUFFERED": unbuffered}  # containers set it
     with FULL.open("w") as full, command(*words, stdout=full, env=env) as running:
         said = running.stderr.read().decode()
@@ -130,7 +130,7 @@ def test_a_full_disk_is_a_sentence(talkers, words, unbuffered):
 
 
 @pytest.mark.skipif(not FULL.exists(), reason="/dev/full is a device of Linux")
-def test_an_error_stream_that_is_full_changes_nothing(talkers):
+def test_full_error_stream_does_not_fail_the_command(talkers):
     with FULL.open("w") as full:
         done = subprocess.run(
             [sys.executable, "-m", "nep", "topic", "pub", "new", "1"],
@@ -158,7 +158,7 @@ OUT = "nep: can't write the output: it is closed\n"
         ("2>&-", "topic echo nobody --timeout 0.1", 1, ""), ("2>&-", "topic pub new 1", 0, ""),
     ],
 )  # fmt: skip
-def test_streams_that_were_closed_before(talkers, closed, words, code, said):
+def test_closed_standard_streams_are_handled(talkers, closed, words, code, said):
     big = talkers.new_pub("big", latched=True)
     big.publish({"long": "x" * 100_000})
     done = subprocess.run(
@@ -172,7 +172,7 @@ def test_streams_that_were_closed_before(talkers, closed, words, code, said):
 
 
 @pytest.mark.parametrize("words", [("--help",), ("topic", "list"), ("topic", "echo", TOPIC), ("log",)])
-def test_a_reader_that_leaves_ends_it_without_a_word(talkers, words):
+def test_closed_output_pipe_ends_the_command_silently(talkers, words):
     running = command(*words, stdout=subprocess.PIPE)
     running.stdout.close()
     ended = threading.Event()
@@ -200,7 +200,7 @@ def test_a_reader_that_leaves_ends_it_without_a_word(talkers, words):
     assert "Exception" not in said
 
 
-def test_sentences_beside_the_results_never_end_a_command(monkeypatch):
+def test_failure_to_print_a_notice_does_not_end_a_command(monkeypatch):
     class Gone(io.StringIO):
         def write(self, text):
             raise BrokenPipeError(errno.EPIPE, "gone")
@@ -211,7 +211,7 @@ def test_sentences_beside_the_results_never_end_a_command(monkeypatch):
     show_alerts([Alert("a", "three", "four")])
 
 
-def test_a_full_disk_is_a_sentence_also_when_more_came_than_a_buffer_holds(talkers):
+def test_full_disk_is_reported_also_for_more_output_than_a_buffer(talkers):
     if not FULL.exists():
         pytest.skip("/dev/full is a device of Linux")
     big = talkers.new_pub("big", latched=True)

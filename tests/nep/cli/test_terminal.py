@@ -45,7 +45,7 @@ def stuck() -> Iterator[Stuck]:
     made.may_go_on.set()
 
 
-def test_who_writes_never_waits_and_what_was_left_out_is_told(stuck: Stuck) -> None:
+def test_write_never_blocks_and_dropped_output_is_reported(stuck: Stuck) -> None:
     terminal = Terminal(stuck, max_characters=100)
     terminal.write("first\n")
     assert stuck.begins.wait(5.0)
@@ -63,14 +63,14 @@ def test_who_writes_never_waits_and_what_was_left_out_is_told(stuck: Stuck) -> N
     terminal.close()
 
 
-def test_a_text_larger_than_the_room_is_written_when_nothing_waits() -> None:
+def test_text_larger_than_the_buffer_is_written_when_nothing_is_pending() -> None:
     stream = io.StringIO()
     with Terminal(stream, max_characters=10) as terminal:
         terminal.write("x" * 50)
     assert stream.getvalue() == "x" * 50
 
 
-def test_all_is_written_before_it_closes() -> None:
+def test_all_output_is_written_before_close() -> None:
     stream = io.StringIO()
     with Terminal(stream) as terminal:
         for n in range(500):
@@ -79,7 +79,7 @@ def test_all_is_written_before_it_closes() -> None:
     terminal.close()
 
 
-def test_draining_waits_for_what_was_written_and_not_for_ever(stuck: Stuck) -> None:
+def test_drain_waits_for_pending_output_up_to_the_timeout(stuck: Stuck) -> None:
     terminal = Terminal(stuck)
     assert terminal.drain(0.0)
     terminal.write("last words\n")
@@ -91,7 +91,7 @@ def test_draining_waits_for_what_was_written_and_not_for_ever(stuck: Stuck) -> N
     terminal.close()
 
 
-def test_no_stream_and_a_dead_one_are_stood() -> None:
+def test_missing_or_broken_stream_is_tolerated() -> None:
     with Terminal(None) as nowhere:
         assert nowhere.write("x") == 1
         assert not nowhere.isatty()
@@ -103,7 +103,7 @@ def test_no_stream_and_a_dead_one_are_stood() -> None:
         assert terminal.write("y\n") == 2
 
 
-def test_what_the_stream_has_no_letters_for_is_written_all_the_same(tmp_path: Path) -> None:
+def test_unencodable_characters_are_escaped(tmp_path: Path) -> None:
     path = tmp_path / "out"
     with path.open("w", encoding="ascii") as stream, Terminal(stream) as terminal:
         terminal.write("● “é”\n")
@@ -111,7 +111,7 @@ def test_what_the_stream_has_no_letters_for_is_written_all_the_same(tmp_path: Pa
 
 
 @pytest.mark.skipif(not hasattr(os, "set_blocking"), reason="Windows has it from Python 3.12 on")
-def test_a_pipe_that_somebody_made_non_blocking_gets_everything() -> None:
+def test_non_blocking_pipe_receives_all_output() -> None:
     reading, writing = os.pipe()
     os.set_blocking(writing, False)
     text = "x" * 300_000 + "\n"
@@ -124,7 +124,7 @@ def test_a_pipe_that_somebody_made_non_blocking_gets_everything() -> None:
     assert got.decode() == text
 
 
-def test_a_record_moves_no_cursor() -> None:
+def test_control_characters_in_log_records_are_escaped() -> None:
     record = logging.LogRecord("n\x1b[2J", logging.INFO, "f", 1, "two\nlines \x9b31m %s", ("\u202ex",), None)
     assert LineFormatter("%(name)s: %(message)s").format(record) == "n\\x1b[2J: two\nlines \\x9b31m \\u202ex"
 
@@ -159,7 +159,7 @@ def master_writing_to(writing: int, state: Path, reading: int) -> tuple[subproce
 
 
 @ON_LINUX
-def test_a_master_whose_terminal_is_blocked_serves_on_and_ends(tmp_path: Path) -> None:
+def test_master_with_a_blocked_terminal_keeps_serving_and_exits(tmp_path: Path) -> None:
     reading, writing = os.pipe()
     fcntl.fcntl(writing, fcntl.F_SETPIPE_SZ, 4096)
     process, address = master_writing_to(writing, tmp_path, reading)
@@ -184,7 +184,7 @@ def test_a_master_whose_terminal_is_blocked_serves_on_and_ends(tmp_path: Path) -
 
 
 @pytest.mark.parametrize("ends", [False, True])
-def test_a_terminal_that_gets_no_thread_keeps_what_it_is_given(
+def test_output_is_kept_if_no_writer_thread_can_be_started(
     monkeypatch: pytest.MonkeyPatch, ends: bool
 ) -> None:
     """As at the interpreter's end from 3.12 on; whoever writes, or ends it, must not be hit."""
@@ -204,7 +204,7 @@ def test_a_terminal_that_gets_no_thread_keeps_what_it_is_given(
 
 
 @pytest.mark.skipif(not hasattr(os, "fork"), reason="Windows has no fork")
-def test_a_forked_child_writes_to_the_terminal_too() -> None:
+def test_forked_child_can_write_to_the_terminal() -> None:
     """Its parent's thread is not there: what it says would wait for ever."""
     code = """
     import os, sys

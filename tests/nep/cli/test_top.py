@@ -33,7 +33,7 @@ def graph(*topics: TopicInfo) -> GraphView:
     return GraphView(1, 1, {each.id: each for each in (NODE, OTHER)}, {each.name: each for each in topics})
 
 
-def test_the_largest_is_first_and_what_is_not_known_last() -> None:
+def test_largest_values_are_listed_first_and_unknown_ones_last() -> None:
     found = graph(topic("/none"), topic("/slow", 1.0, 9), topic("/nan", math.nan), topic("/fast", 100.0, 0))
     assert [each.name for each in topic_rows(found)] == ["/fast", "/slow", "/nan", "/none"]
     assert topic_rows(found, order=TopicOrder.LOST)[0].name == "/slow"
@@ -53,12 +53,12 @@ def test_the_largest_is_first_and_what_is_not_known_last() -> None:
         ("/robot/**", ["/robot/1/camera"]),
     ],
 )
-def test_a_pattern_or_a_part_of_a_name(pattern: str, names: list[str]) -> None:
+def test_rows_are_filtered_by_pattern_or_substring(pattern: str, names: list[str]) -> None:
     found = graph(topic("/robot/1/camera"), topic("/odom"))
     assert [each.name for each in topic_rows(found, pattern)] == names
 
 
-def test_nodes_have_the_sum_of_what_they_publish_and_the_busiest_is_first() -> None:
+def test_nodes_show_the_sum_of_their_publishers_and_the_busiest_is_first() -> None:
     found = graph(
         topic("/a", publishers=(PUBLISHER, replace(PUBLISHER, id=2, rate_hz=None))),
         topic("/b", publishers=(replace(PUBLISHER, rate_hz=5.0), replace(PUBLISHER, node_id="gone"))),
@@ -66,7 +66,9 @@ def test_nodes_have_the_sum_of_what_they_publish_and_the_busiest_is_first() -> N
     assert [(node.name, hz) for node, hz in node_rows(found)] == [("arm", None), ("camera", 35.0)]
 
 
-def test_a_table_for_a_file_and_a_line_for_programs(master: Master, type_in: TypeIn) -> None:
+def test_output_is_a_table_for_a_file_and_a_json_line_with_the_json_option(
+    master: Master, type_in: TypeIn
+) -> None:
     node = nep.Node("teller")
     publisher = node.new_pub("/odom", "json")
     node.new_sub("/odom", "json")
@@ -85,13 +87,13 @@ def test_a_table_for_a_file_and_a_line_for_programs(master: Master, type_in: Typ
     node.close()
 
 
-def test_a_wrong_address_is_a_sentence(type_in: TypeIn) -> None:
+def test_unreachable_address_is_reported(type_in: TypeIn) -> None:
     done = type_in("top", "--count", "1", "--master", "127.0.0.1:1")
     assert done.returncode == 1
     assert "127.0.0.1:1" in done.stderr
 
 
-def test_a_master_that_goes_is_told_and_the_last_figures_stay(
+def test_lost_master_is_reported_and_the_last_figures_stay(
     monkeypatch: pytest.MonkeyPatch, type_in: TypeIn
 ) -> None:
     with Master("127.0.0.1:0", learn_s=0.0) as master:
@@ -112,7 +114,7 @@ def test_a_master_that_goes_is_told_and_the_last_figures_stay(
     assert sum(line.startswith("/odom") for line in done.stdout.splitlines()) == 2
 
 
-def test_in_a_terminal_it_fits_says_what_is_left_out_and_marks_new_losses(
+def test_terminal_view_fits_reports_hidden_rows_and_marks_new_losses(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     monkeypatch.setenv("LINES", "20")

@@ -22,7 +22,7 @@ def robot(master):
             yield pub
 
 
-def test_info_names_each_node(robot, type_in):
+def test_info_lists_each_node(robot, type_in):
     code, out, _err = type_in("topic", "info", "/odom")
     assert code == 0
     assert "type: robot/odometry\ncodec: json\nlatched: yes\n" in out
@@ -31,7 +31,7 @@ def test_info_names_each_node(robot, type_in):
     assert any(row[:2] == ["page", "subscribes"] for row in rows)
 
 
-def test_info_for_programs_has_the_names_of_the_nodes(robot, type_in):
+def test_json_info_has_the_node_names(robot, type_in):
     code, out, _err = type_in("topic", "info", "/odom", "--json")
     record = json.loads(out)
     assert code == 0
@@ -42,7 +42,7 @@ def test_info_for_programs_has_the_names_of_the_nodes(robot, type_in):
     assert [each["node"] for each in record["subscribers"]] == ["page"]
 
 
-def test_the_type_of_a_topic_and_the_topics_of_a_type(robot, type_in):
+def test_type_of_a_topic_and_topics_of_a_type_are_printed(robot, type_in):
     assert type_in("topic", "type", "/odom")[:2] == (0, "robot/odometry\n")
     assert json.loads(type_in("topic", "type", "/words", "--json")[1]) == {
         "topic": "/words",
@@ -53,7 +53,7 @@ def test_the_type_of_a_topic_and_the_topics_of_a_type(robot, type_in):
     assert json.loads(type_in("topic", "find", "robot/odometry", "--json")[1]) == ["/odom"]
 
 
-def test_what_nobody_has_is_a_sentence_with_the_near_name(robot, type_in):
+def test_unknown_topic_or_type_is_reported_with_the_nearest_name(robot, type_in):
     sentence = "no topic '/odmo'; did you mean '/odom'? 'nep topic list' shows all topics"
     for command in ("info", "type"):
         assert type_in("topic", command, "/odmo") == (1, "", f"nep: {sentence}\n")
@@ -64,7 +64,7 @@ def test_what_nobody_has_is_a_sentence_with_the_near_name(robot, type_in):
     assert json.loads(type_in("topic", "find", "strng", "--json")[1]) == []
 
 
-def test_delay_tells_the_age_of_what_arrives(robot, type_in):
+def test_delay_reports_the_age_of_arriving_messages(robot, type_in):
     code, out, _err = type_in("topic", "delay", "/odom", "-n", "1", "--json")
     record = json.loads(out)
     assert code == 0
@@ -73,7 +73,7 @@ def test_delay_tells_the_age_of_what_arrives(robot, type_in):
     assert record["std_s"] == 0.0
 
 
-def test_delay_waits_for_what_nobody_publishes(master, type_in):
+def test_delay_waits_for_a_topic_without_publisher(master, type_in):
     code, out, err = type_in("topic", "delay", "/t", "--timeout", "0")
     assert code == 1
     assert "'/t' has no publisher yet" in err

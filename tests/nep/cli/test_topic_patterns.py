@@ -26,23 +26,23 @@ from tests.nep.cli.test_command import Running
         ("/x*", []),
     ],
 )
-def test_what_a_pattern_matches(pattern, topics):
+def test_pattern_matches_topics(pattern, topics):
     known = ["/odom", "/a", "/a/odom", "/a/b/odom", "words", "w.rds"]
     assert [each for each in known if matches(pattern, each)] == topics
 
 
-def test_a_pattern_of_many_stars_takes_no_time():
+def test_pattern_of_many_stars_is_matched_quickly():
     assert not matches("/**" * 60 + "/x", "/a" * 60)
 
 
 @pytest.mark.parametrize(
     ("word", "is_one"), [("/a/*", True), ("a?", True), ("/a", False), ('["*"]', False), ("a[3].*", False)]
 )
-def test_fields_are_no_patterns(word, is_one):
+def test_field_paths_are_not_patterns(word, is_one):
     assert is_pattern(word) is is_one
 
 
-def test_each_topic_is_new_once_and_a_pattern_without_any_is_said_once(capfd):
+def test_each_new_topic_is_reported_once_and_a_pattern_without_matches_once(capfd):
     with nep.node("n", "memory", master="patterns") as node:
         node.new_pub("/a/odom")
         node.new_sub("/b/odom")
@@ -55,7 +55,7 @@ def test_each_topic_is_new_once_and_a_pattern_without_any_is_said_once(capfd):
     assert capfd.readouterr().err.count("no topic matches '/none/*' yet") == 1
 
 
-def test_echo_shows_topics_that_match_and_come_later(master):
+def test_echo_shows_matching_topics_that_appear_later(master):
     echo = Running("topic", "echo", "/*/odom", "--json", "--count", "2")
     try:
         assert "no topic matches '/*/odom' yet" in echo.wait_says("matches")

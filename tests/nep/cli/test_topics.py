@@ -20,7 +20,7 @@ def record_of(given, capfdbinary):
     return json.loads(capfdbinary.readouterr().out)
 
 
-def test_a_record_has_all_that_a_message_has(capfdbinary):
+def test_record_has_all_message_metadata(capfdbinary):
     assert record_of(message('{"a":"Grüße"}'.encode()), capfdbinary) == {
         "topic": "t",
         "msg_type": "json",
@@ -33,14 +33,14 @@ def test_a_record_has_all_that_a_message_has(capfdbinary):
     }
 
 
-def test_a_picture_is_told_by_its_shape_and_not_decoded(capfdbinary):
+def test_picture_is_shown_by_its_shape_without_decoding(capfdbinary):
     given = message(
         b"\xff\xd8\xff no picture", "image", extension={"shape": [240, 320, 3], "encoding": "jpeg"}
     )
     assert record_of(given, capfdbinary)["payload"] == {"shape": [240, 320, 3], "encoding": "jpeg"}
 
 
-def test_what_cannot_be_decoded_is_told_as_bytes_with_the_reason(capfdbinary):
+def test_undecodable_payload_is_shown_as_bytes_with_the_reason(capfdbinary):
     record = record_of(message(b"{oops"), capfdbinary)
     assert record["bytes"] == b"{oops".hex()
     assert "cannot decode" in record["error"]
@@ -60,7 +60,7 @@ def test_what_cannot_be_decoded_is_told_as_bytes_with_the_reason(capfdbinary):
         (message(b"{oops"), "5 B, not valid json: 7b 6f 6f 70 73"),
     ],
 )
-def test_people_see_one_line_a_message(given, shown, capsys):
+def test_message_is_printed_on_one_line(given, shown, capsys):
     Lines()(given)
     out = capsys.readouterr().out
     assert out.count("\n") == 1
@@ -68,7 +68,7 @@ def test_people_see_one_line_a_message(given, shown, capsys):
     assert shown in out
 
 
-def test_what_is_longer_than_the_screen_is_laid_out(capsys):
+def test_message_longer_than_the_screen_is_indented(capsys):
     Lines()(message(json.dumps({"words": ["message"] * 40}).encode()))
     lines = capsys.readouterr().out.splitlines()
     assert len(lines) > 40
@@ -85,16 +85,16 @@ def test_what_is_longer_than_the_screen_is_laid_out(capsys):
         ("Grüße", "bytes", "Grüße".encode()),
     ],
 )
-def test_the_type_decides_what_a_text_stands_for(text, msg_type, value):
+def test_argument_is_parsed_according_to_the_message_type(text, msg_type, value):
     assert value_of(text, msg_type) == value
 
 
-def test_text_that_is_no_json_says_what_to_do():
+def test_invalid_json_error_suggests_the_string_type():
     with pytest.raises(NepError, match=r"'hello' is not JSON; .* --type string"):
         value_of("hello", "json")
 
 
-def test_a_file_can_be_published(tmp_path):
+def test_payload_is_read_from_a_file(tmp_path):
     file = tmp_path / "data"
     file.write_bytes(b'{"a": 1}')
     assert value_of(f"@{file}", "json") == {"a": 1}
@@ -106,13 +106,13 @@ def test_a_file_can_be_published(tmp_path):
 
 
 @pytest.mark.skipif(not Path("/dev/zero").exists(), reason="/dev/zero is a device of Unix")
-def test_a_device_without_end_is_no_file(monkeypatch):
+def test_endless_device_is_rejected_as_payload_file(monkeypatch):
     monkeypatch.setattr("nep.cli.publish._MAX_FILE_BYTES", 1000)
     with pytest.raises(EncodeError, match=r"larger than 1\.0 kB"):
         value_of("@/dev/zero", "bytes")
 
 
-def test_publishing_waits_for_the_number_of_subscribers(capsys):
+def test_publish_waits_for_the_requested_number_of_subscribers(capsys):
     class _Publisher:
         counts = iter([0, 0, 1, 1, 2])
 

@@ -25,20 +25,20 @@ OURS = ("nep", "topic", "echo", "pub", "hz", "list", "root", "payload", "count",
     ],
 )  # fmt: skip
 @pytest.mark.usefixtures("pseudo")
-def test_what_is_wrong_with_a_command_line_is_translated(line: str) -> None:
+def test_command_line_errors_are_translated(line: str) -> None:
     done = CliRunner().invoke(app, line.split(), env={"COLUMNS": "400"})
     assert done.exit_code == 2
     (said,) = [row for row in done.output.splitlines() if row.startswith("│")]
     assert untranslated(said, *OURS, "ecko", "xyz", "abc", "extra", "x", "n", "master", "TOPIC") == []
 
 
-def test_what_typer_never_said_stays() -> None:
+def test_unknown_message_is_not_translated() -> None:
     assert translated("Something else entirely.") == "Something else entirely."
     assert translated("Missing argument '{x}'.") == "Missing argument '{x}'."
 
 
 @pytest.mark.parametrize("line", ["--help", "topic --help", "topic echo --help"])
-def test_the_whole_help_is_spanish(line: str) -> None:
+def test_entire_help_is_translated_to_spanish(line: str) -> None:
     """As a program: typer makes some of its words when it is imported."""
     environ = {**os.environ, "NEP_LANG": "es", "COLUMNS": "200", "PYTHONIOENCODING": "utf-8"}
     done = subprocess.run(
@@ -52,7 +52,7 @@ def test_the_whole_help_is_spanish(line: str) -> None:
         assert english not in done.stdout
 
 
-def test_in_english_it_is_as_typer_says_it() -> None:
+def test_english_help_matches_typer() -> None:
     done = CliRunner().invoke(app, ["topic", "--help"])
     assert "Usage: nep topic [OPTIONS] COMMAND [ARGS]..." in done.output
     assert "Show this message and exit." in done.output

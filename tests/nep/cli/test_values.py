@@ -32,7 +32,7 @@ ANYTHING = st.recursive(
 
 
 @given(ANYTHING)
-def test_whatever_was_decoded_becomes_json_that_can_be_read(value):
+def test_every_decoded_value_becomes_valid_json(value):
     json.loads(json_of(value))
     assert "\n" not in json_of(value).decode()
     assert presented(value, whole=True) is not None
@@ -50,25 +50,25 @@ def test_whatever_was_decoded_becomes_json_that_can_be_read(value):
         ({b"\x01": 1}, '{"01":1}'),
     ],
 )
-def test_what_a_terminal_shows(value, shown):
+def test_value_is_presented_for_the_terminal(value, shown):
     assert presented(value, whole=False) == shown
 
 
-def test_many_fields_are_counted_and_all_of_them_are_there_when_asked_for():
+def test_many_fields_are_abbreviated_and_all_shown_on_request():
     many = {f"field{number}": number for number in range(10_000)}
     shown = presented(many, whole=False)
     assert shown.endswith('"field99":99,"…":"9900 more"}')
     assert json.loads(presented(many, whole=True)) == many
 
 
-def test_letters_that_a_terminal_obeys_are_json_all_the_same():
+def test_control_characters_are_escaped_in_json():
     value = {"a\x9b": "\x7f\u202e\u2028"}
     data = json_of(value)
     assert data.isascii()
     assert json.loads(data) == value
 
 
-def test_ids_are_texts_wherever_they_are():
+def test_ids_are_converted_to_strings_at_every_level():
     assert ids_as_text({"id": 2**60, "publishers": ({"id": 7, "count": 7},), "name": "x"}) == {
         "id": str(2**60), "publishers": [{"id": "7", "count": 7}], "name": "x",
     }  # fmt: skip
@@ -88,7 +88,7 @@ def test_ids_are_texts_wherever_they_are():
         Message("t", b"1", "json", "json", stamp_ns=2**64 - 1, seq=2**64 - 1),
     ],
 )
-def test_no_message_ends_a_command(message, capsys):
+def test_hostile_message_does_not_end_a_command(message, capsys):
     show_record(message)
     Lines()(message)
     out = capsys.readouterr().out
@@ -96,7 +96,7 @@ def test_no_message_ends_a_command(message, capsys):
     assert "\x1b" not in out
 
 
-def test_a_text_of_lines_cannot_look_like_another_message(capsys):
+def test_multiline_text_cannot_forge_another_message(capsys):
     Lines()(Message("t", b"one\n12:00:00.000  #9  forged\x1b[2J", "string", "string"))
     lines = capsys.readouterr().out.splitlines()
     assert lines[1] == "    12:00:00.000  #9  forged\\x1b[2J"
@@ -112,7 +112,7 @@ class Terminal(io.StringIO):
 
 
 @pytest.mark.parametrize("more", [{}, {"NO_COLOR": "1"}, {"TERM": "dumb"}, {"COLUMNS": "20"}])
-def test_a_terminal_gets_what_fits_and_all_of_it_with_full(monkeypatch, more):
+def test_terminal_output_is_truncated_unless_full_is_requested(monkeypatch, more):
     for name, value in {"TERM": "xterm", "COLUMNS": "100", **more}.items():
         monkeypatch.setenv(name, value)
     monkeypatch.setattr("sys.stdout", screen := Terminal())
@@ -135,7 +135,7 @@ def robots(master):
         yield node, master.address
 
 
-def test_two_topics_are_shown_together_by_name(robots, capsys):
+def test_two_topics_are_shown_with_their_names(robots, capsys):
     _, address = robots
     echo("/a", ["/b"], 2, 5.0, address)
     lines = sorted(line.split("  ", 1)[1] for line in capsys.readouterr().out.splitlines())
@@ -146,7 +146,7 @@ def test_two_topics_are_shown_together_by_name(robots, capsys):
     assert sorted(row.split(",", 1)[1] for row in rows) == ["/a,1", "/b,2"]
 
 
-def test_which_words_are_topics_and_which_are_fields(robots, capsys):
+def test_arguments_are_distinguished_as_topics_or_fields(robots, capsys):
     node, _ = robots
     graph = node.graph()
     assert topics_and_fields("/a", ["x", "/b", "joints[0]", "/later"], graph) == (
@@ -158,7 +158,7 @@ def test_which_words_are_topics_and_which_are_fields(robots, capsys):
     assert topics_and_fields("/a", [".battery"], graph) == (["/a"], [".battery"])
 
 
-def test_what_was_lost_between_is_said(master, capsys):
+def test_lost_messages_are_reported(master, capsys):
     with nep.node("talker") as node:
         pub = node.new_pub("t")
         running = threading.Thread(target=echo, args=("t", None, 2, 10.0, master.address))
@@ -174,7 +174,7 @@ def test_what_was_lost_between_is_said(master, capsys):
     assert "3 messages of 't' were lost" in capsys.readouterr().err
 
 
-def test_a_topic_that_goes_away_or_has_another_name_now_is_said(master, capsys):
+def test_removed_or_renamed_topic_is_reported(master, capsys):
     with nep.node("talker") as node:
         pub = node.new_pub("/odom", latched=True)
         pub.publish(1)

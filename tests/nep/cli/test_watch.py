@@ -56,7 +56,7 @@ class Talker:
         self._node.close()
 
 
-def test_an_alarm_is_a_line_and_calls_a_service(master, type_in, file) -> None:
+def test_alarm_is_printed_and_calls_a_service(master, type_in, file) -> None:
     asked = []
     name = file({"id": "near", "when": BELOW, "do": ["banner", "sound", {"call": "brake", "with": {"n": 1}}]})
     with Talker(master.address, "/distance", {"range": 0.3}) as node:
@@ -70,7 +70,9 @@ def test_an_alarm_is_a_line_and_calls_a_service(master, type_in, file) -> None:
     assert "\a" not in done.stderr  # no terminal
 
 
-def test_alarms_are_json_for_programs_and_what_only_studio_can_do_is_said(master, type_in, file) -> None:
+def test_alarms_are_printed_as_json_and_actions_only_studio_supports_are_reported(
+    master, type_in, file
+) -> None:
     name = file({"id": "near", "when": BELOW, "do": ["stop"]})
     with Talker(master.address, "/distance", {"range": 0.3}):
         done = type_in("watch", name, "-n", "1", "--master", master.address, "--json")
@@ -82,7 +84,7 @@ def test_alarms_are_json_for_programs_and_what_only_studio_can_do_is_said(master
     assert "need Studio and are skipped: stop all robots" in plain.stderr
 
 
-def test_an_alarm_keeps_the_last_seconds_by_whoever_has_them(master, type_in, file) -> None:
+def test_alarm_saves_the_last_seconds_through_any_available_flight_recorder(master, type_in, file) -> None:
     asked = []
 
     def keep(request: object) -> object:
@@ -102,7 +104,7 @@ def test_an_alarm_keeps_the_last_seconds_by_whoever_has_them(master, type_in, fi
     assert told[1] == "nothing saved: 'nep recording ring' is not running"
 
 
-def test_a_message_is_sent_and_a_typo_is_told(master, type_in, file) -> None:
+def test_message_is_published_and_a_misspelt_topic_reported(master, type_in, file) -> None:
     name = file(
         {"when": BELOW, "do": [{"send": "/say", "message": {"say": "near"}}]},
         {"when": {"topic": "/distanse", "is": "silent"}},
@@ -138,7 +140,7 @@ def test_alarm_moves_no_robot_that_was_not_allowed(master, type_in, file) -> Non
         eventually(lambda: told == [{"op": "invoke"}])
 
 
-def test_alarm_does_not_move_a_robot_that_came_later(master, type_in, file) -> None:
+def test_alarm_does_not_move_a_robot_that_connected_later(master, type_in, file) -> None:
     name = file({"when": BELOW, "do": [{"send": "/orders", "message": {"op": "invoke"}}]})
     told: list[list[object]] = []
 
@@ -158,7 +160,7 @@ def test_alarm_does_not_move_a_robot_that_came_later(master, type_in, file) -> N
     assert told == [[]]
 
 
-def test_a_master_that_is_away_is_waited_for(type_in, file, monkeypatch) -> None:
+def test_lost_master_is_waited_for(type_in, file, monkeypatch) -> None:
     with Master("127.0.0.1:0") as first:
         address = first.address
     name = file({"when": {"node": "lidar", "is": "comes"}}, {"when": BELOW})
@@ -199,7 +201,9 @@ def test_a_master_that_is_away_is_waited_for(type_in, file, monkeypatch) -> None
         (("BAD",), 1, "line 1 of"),
     ],
 )
-def test_how_it_ends_without_a_network(type_in, file, words, code: int, said: str) -> None:
+def test_command_exits_with_an_error_without_network_or_valid_rules(
+    type_in, file, words, code: int, said: str
+) -> None:
     made = {
         "FILE": lambda: file({"when": BELOW}),
         "OFF": lambda: file({"on": False, "when": BELOW}),
@@ -210,12 +214,12 @@ def test_how_it_ends_without_a_network(type_in, file, words, code: int, said: st
     assert said in done.stderr
 
 
-def test_the_example_is_printed(type_in) -> None:
+def test_example_is_printed(type_in) -> None:
     assert type_in("watch", "--example").stdout == EXAMPLE
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="a program of Windows cannot be sent Ctrl+C alone")
-def test_ctrl_c_ends_it_quietly(master, file) -> None:
+def test_ctrl_c_ends_the_command_quietly(master, file) -> None:
     begin = "import sys\nfrom nep.cli import main\nsys.argv[1:1] = ['watch']\nmain()"
     with nep.node("talker") as node:
         publisher = node.new_pub("/distance", "json")

@@ -37,7 +37,7 @@ def test_command_prints_outcomes_and_exits_with_0(capsys: pytest.CaptureFixture[
     assert outcome["section"] == "docs/wire.md#node"
 
 
-def test_command_exits_with_1_for_a_rule_that_failed(capsys: pytest.CaptureFixture[str]) -> None:
+def test_command_exits_with_1_for_a_failed_rule(capsys: pytest.CaptureFixture[str]) -> None:
     answers = (
         "import json, sys\n"
         "for line in sys.stdin:\n"
@@ -54,9 +54,7 @@ def test_command_exits_with_1_for_a_rule_that_failed(capsys: pytest.CaptureFixtu
 @pytest.mark.parametrize(
     "command", [["/there/is/none"], [sys.executable, "-c", "print('no JSON')"], [sys.executable, "-c", ""]]
 )
-def test_adapter_that_cannot_be_used_exits_with_2(
-    command: list[str], capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_unusable_adapter_exits_with_2(command: list[str], capsys: pytest.CaptureFixture[str]) -> None:
     with pytest.raises(typer.Exit) as exited:
         wire.check(command, ["node-record"])
     assert exited.value.exit_code == 2

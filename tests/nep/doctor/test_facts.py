@@ -33,7 +33,7 @@ def foreign():
         yield held.getsockname()[1]
 
 
-def test_a_master_of_this_computer_is_found_with_its_process(master):
+def test_local_master_is_found_with_its_process(master):
     with nep.node("Pepper") as node:
         node.new_pub("/odom")
         began = time.monotonic()
@@ -48,7 +48,7 @@ def test_a_master_of_this_computer_is_found_with_its_process(master):
     assert Path(facts.nep_file) == Path(nep.__file__).parent
 
 
-def test_who_holds_the_port_is_found(foreign):
+def test_process_that_holds_the_port_is_found(foreign):
     facts = collect_facts(f"127.0.0.1:{foreign}")
     assert facts.view is None
     assert facts.master_port.holder.pid == os.getpid()
@@ -56,7 +56,7 @@ def test_who_holds_the_port_is_found(foreign):
     assert not processes.is_free(foreign)
 
 
-def test_a_free_port_is_free():
+def test_free_port_is_reported_as_free():
     with socket.socket() as probe:
         probe.bind(("127.0.0.1", 0))
         port = probe.getsockname()[1]
@@ -73,7 +73,7 @@ def installed(environment: Path, version: str, place: str = "lib/python3.11/site
 
 
 @pytest.mark.parametrize("place", ["lib/python3.11/site-packages", "Lib/site-packages"])
-def test_a_version_is_read_from_the_environment_of_a_program(tmp_path, place):
+def test_version_is_read_from_the_environment_of_a_program(tmp_path, place):
     info = installed(tmp_path, "0.0.9", place)
     os.utime(info / "METADATA", (1000, 1000))
     assert installs.install_in(tmp_path) == installs.Install("0.0.9", 1000.0, str(tmp_path))
@@ -81,7 +81,7 @@ def test_a_version_is_read_from_the_environment_of_a_program(tmp_path, place):
     assert installs.install_in(tmp_path) is None
 
 
-def test_an_environment_without_or_with_two_tells_no_version(tmp_path):
+def test_environment_with_no_or_two_installations_has_no_version(tmp_path):
     assert installs.install_in(tmp_path) is None
     installed(tmp_path, "0.0.9")
     installed(tmp_path, "0.1.0")
@@ -99,16 +99,16 @@ def test_an_environment_without_or_with_two_tells_no_version(tmp_path):
         ([], "", "/usr"),
     ],
 )
-def test_the_environment_of_a_program_is_found(command, active, environment):
+def test_environment_of_a_program_is_found(command, active, environment):
     found = installs.environment_of(command, "/usr/bin/python3.11", "/home/me", active)
     assert found == Path(environment)
 
 
-def test_a_program_of_an_installer_tells_no_environment():
+def test_installer_package_has_no_python_environment():
     assert installs.environment_of(["nep-studio"], "/opt/nep-studio", "/") is None
 
 
-def test_the_version_of_a_running_master_is_gathered(tmp_path, master, monkeypatch):
+def test_version_of_a_running_master_is_collected(tmp_path, master, monkeypatch):
     asked = []
     known = installs.Install("0.0.9", 1000.0, str(tmp_path))
     monkeypatch.setattr(installs, "install_of", lambda pid: asked.append(pid) or known)
@@ -117,18 +117,18 @@ def test_the_version_of_a_running_master_is_gathered(tmp_path, master, monkeypat
     assert collect_facts("127.0.0.1:1").master_install is None
 
 
-def test_a_program_that_has_ended_tells_no_version():
+def test_ended_program_has_no_version():
     done = subprocess.Popen([sys.executable, "-c", ""])
     done.wait()
     assert installs.install_of(done.pid) is None
 
 
-def test_a_far_masters_port_is_not_looked_for_here():
+def test_port_of_a_remote_master_is_not_checked_locally():
     assert collect_facts("192.0.2.1:7780").master_port is None
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="Windows keeps permissions in another way")
-def test_folders_that_take_no_files_say_why(tmp_path):
+def test_unwritable_folders_are_reported_with_the_reason(tmp_path):
     file = tmp_path / "file"
     file.touch()
     facts = collect_facts("127.0.0.1:1", folders=[("Settings", tmp_path / "new"), ("Work", file / "below")])
@@ -139,14 +139,14 @@ def test_folders_that_take_no_files_say_why(tmp_path):
     assert list(tmp_path.iterdir()) == [file]
 
 
-def test_a_file_that_hides_the_package_is_found(tmp_path):
+def test_file_that_shadows_the_package_is_found(tmp_path):
     assert collect_facts("127.0.0.1:1", here=tmp_path).shadow == ""
     (tmp_path / "nep.py").touch()
     assert collect_facts("127.0.0.1:1", here=tmp_path).shadow == str(tmp_path / "nep.py")
     assert collect_facts("127.0.0.1:1", here=REPOSITORY).shadow == ""
 
 
-def test_loopback_works_here():
+def test_loopback_check_passes():
     assert loopback_problem() == ""
 
 
@@ -161,11 +161,11 @@ def test_loopback_works_here():
         ([], False),
     ],
 )
-def test_a_master_is_known_by_its_command(command, is_master):
+def test_master_process_is_recognised_by_its_command_line(command, is_master):
     assert processes.is_master_command(command) is is_master
 
 
-def test_the_command_ends_with_its_verdict(foreign, capfdbinary):
+def test_exit_code_is_the_worst_severity(foreign, capfdbinary):
     with pytest.raises(typer.Exit) as ended:
         doctor(f"127.0.0.1:{foreign}", as_json=True)
     assert ended.value.exit_code == 2
@@ -173,7 +173,7 @@ def test_the_command_ends_with_its_verdict(foreign, capfdbinary):
     assert (first["id"], first["severity"]) == ("master:foreign", "error")
 
 
-def test_people_see_a_sentence_and_the_next_step(foreign):
+def test_text_output_has_a_sentence_and_the_next_step(foreign):
     done = subprocess.run(
         [sys.executable, "-m", "nep", "doctor", "--master", f"127.0.0.1:{foreign}"],
         capture_output=True,
@@ -190,7 +190,7 @@ def test_people_see_a_sentence_and_the_next_step(foreign):
     assert lines[2].strip() == f"nep master --port {foreign + 1}"
 
 
-def test_what_hinders_a_master_is_one_finding(foreign, master):
+def test_obstacle_to_starting_a_master_is_one_finding(foreign, master):
     one = start_obstacle(f"127.0.0.1:{foreign}")
     assert one is not None
     assert one.id == "master:foreign"
@@ -203,7 +203,7 @@ def test_what_hinders_a_master_is_one_finding(foreign, master):
     assert start_obstacle(f"127.0.0.1:{free}") is None
 
 
-def test_connections_that_a_killed_program_left_do_not_hold_its_port():
+def test_lingering_connections_of_a_killed_program_do_not_hold_its_port():
     with socket.create_server(("127.0.0.1", 0)) as server, socket.socket() as client:
         address = server.getsockname()
         client.connect(address)
@@ -214,7 +214,7 @@ def test_connections_that_a_killed_program_left_do_not_hold_its_port():
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="Windows has no such limit")
-def test_programs_with_nodes_are_looked_at_for_their_files(master):
+def test_programs_with_nodes_are_checked_for_their_open_files(master):
     code = """
     import resource, sys, nep
     resource.setrlimit(resource.RLIMIT_NOFILE, (256, 256))
@@ -231,7 +231,7 @@ def test_programs_with_nodes_are_looked_at_for_their_files(master):
         assert found.limit == 256 or sys.platform == "darwin"
 
 
-def test_who_listens_at_another_address_of_a_port_does_not_hold_it_at_loopback():
+def test_listener_on_another_address_of_a_port_does_not_hold_it_on_loopback():
     listens = psutil.CONN_LISTEN
     for order in (1, -1):
         sockets = [
@@ -242,7 +242,7 @@ def test_who_listens_at_another_address_of_a_port_does_not_hold_it_at_loopback()
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="its python.exe may be a launcher of another process")
-def test_a_program_that_was_typed_into_the_command_line_is_not_named_by_its_text():
+def test_program_passed_on_the_command_line_is_not_named_by_its_source():
     text = "import sys; print(flush=True); sys.stdin.read()"
     with subprocess.Popen(
         [sys.executable, "-c", text], stdin=subprocess.PIPE, stdout=subprocess.PIPE

@@ -61,7 +61,7 @@ def found(severity=None, **changes):
     return {each.id: each for each in made if severity is None or each.severity == severity}
 
 
-def test_a_healthy_computer_has_no_warning():
+def test_healthy_computer_has_no_warning():
     made = findings(HEALTHY)
     assert worst(made) == 0
     assert found()["master"].sentence == (
@@ -72,12 +72,13 @@ def test_a_healthy_computer_has_no_warning():
     )
 
 
-def test_a_master_of_another_version_is_told_with_its_mend():
+def test_master_of_another_version_is_reported_with_a_fix():
     versions = {"NEP Studio": "0.2.0"}
     older = Install("0.1.0", NOW - 90_000, "/opt/old")
     one = found(versions=versions, master_install=older)["master:version"]
     assert one.sentence == (
-        "The master at 127.0.0.1:7780 (process 41) belongs to NEP Studio 0.1.0 (/opt/old); this is 0.2.0. New features and fixes may not work with it."
+        "The master at 127.0.0.1:7780 (process 41) belongs to NEP Studio 0.1.0 (/opt/old); this is "
+        "0.2.0. New features and fixes may not work with it."
     )
     assert (one.severity, one.command) == ("warning", "kill 41")
     assert one.mend.startswith("Stop it. If Studio is open, it starts a new master")
@@ -85,7 +86,7 @@ def test_a_master_of_another_version_is_told_with_its_mend():
     assert there.command == "taskkill /F /PID 41"
 
 
-def test_a_master_from_before_the_installation_is_told():
+def test_master_started_before_the_installation_is_reported():
     versions = {"NEP Studio": "0.2.0"}
     one = found(versions=versions, master_install=Install("0.2.0", NOW - 60, "/here"))["master:version"]
     assert "was started before NEP Studio 0.2.0 was installed" in one.sentence
@@ -94,20 +95,20 @@ def test_a_master_from_before_the_installation_is_told():
 
 
 @pytest.mark.parametrize("changes", [{}, {"versions": {"NEP Studio": "(not installed)"}}, {"view": None}])
-def test_nothing_is_said_of_a_version_that_is_not_known(changes):
+def test_unknown_version_is_not_reported(changes):
     known = {"versions": {"NEP Studio": "0.2.0"}, "master_install": Install("0.1.0", NOW, "/opt/old")}
     known = known | changes if changes else {"versions": {"NEP Studio": "0.2.0"}}
     assert "master:version" not in found(**known)
 
 
-def test_no_master_says_how_to_start_one():
+def test_missing_master_is_reported_with_the_start_command():
     one = found(view=None, master_port=PortFact(7780, "", False))["master:none"]
     assert (one.severity, one.command) == ("error", "nep master")
     other = found(view=None, address="127.0.0.1:9", master_port=PortFact(9, "", False))["master:none"]
     assert other.command == "nep master --port 9"
 
 
-def test_a_master_is_not_told_to_be_started_at_an_address_of_the_network():
+def test_no_start_command_is_suggested_for_a_network_address():
     made = found(view=None, address="10.0.0.5:7780", master_port=PortFact(7780, "", False))
     assert made["master:network"].command == ""
     assert "127.0.0.1:7780" in made["master:network"].mend
@@ -131,7 +132,7 @@ def test_a_master_is_not_told_to_be_started_at_an_address_of_the_network():
         ("", "10.0.0.5 responds at port 7780, but the master does not.", "another program uses that port"),
     ],
 )
-def test_a_master_on_another_computer_that_does_not_answer_is_told_by_how(reach, sentence, mend):
+def test_unreachable_remote_master_is_reported_with_the_kind_of_failure(reach, sentence, mend):
     made = found(view=None, address="10.0.0.5:7780", master_port=None, reach=reach)
     one = made["master:unreached"]
     assert (one.severity, one.command) == ("error", "")  # it can't be started from here
@@ -140,7 +141,7 @@ def test_a_master_on_another_computer_that_does_not_answer_is_told_by_how(reach,
     assert "master:none" not in made
 
 
-def test_a_master_whose_name_nobody_knows_is_not_told_to_be_started():
+def test_no_start_command_is_suggested_for_an_unknown_host():
     made = found(view=None, address="lap.top:7780", master_port=None, is_known=False)
     assert (
         made["master:unknown"].sentence
@@ -150,7 +151,7 @@ def test_a_master_whose_name_nobody_knows_is_not_told_to_be_started():
     assert "master:none" not in made
 
 
-def test_a_foreign_program_on_the_masters_port_is_named_with_the_way_out():
+def test_foreign_program_on_the_master_port_is_named_with_a_workaround():
     one = found(view=None, master_port=PortFact(7780, "", True, OTHER))["master:foreign"]
     assert one.sentence == "“python3 server.py” (process 77) uses port 7780 but is not a master."
     assert "7781" in one.mend
@@ -159,7 +160,7 @@ def test_a_foreign_program_on_the_masters_port_is_named_with_the_way_out():
     assert "unknown program uses port 7780" in unknown.sentence
 
 
-def test_a_master_that_hangs_or_is_slow():
+def test_hung_or_slow_master_is_reported():
     hung = found(view=None, master_port=PortFact(7780, "", True, MASTER))["master:hung"]
     assert hung.command == "kill 41"
     windows = found(view=None, master_port=PortFact(7780, "", True, MASTER), platform="win32")["master:hung"]
@@ -167,7 +168,7 @@ def test_a_master_that_hangs_or_is_slow():
     assert found(answered_s=0.8)["master:slow"].severity == "warning"
 
 
-def test_two_masters_are_told_with_their_ports():
+def test_two_masters_are_reported_with_their_ports():
     second = ProcessFact(50, "nep", is_master=True)
     one = found(masters=((MASTER, 7780), (second, None)))["master:several"]
     assert "port 7780 (process 41), process 50" in one.sentence
@@ -181,7 +182,7 @@ def about_ports(**changes):
     return {id: each for id, each in found(**changes).items() if id.startswith("port")}
 
 
-def test_taken_ports_of_the_originals_are_one_warning_that_names_who_holds_them():
+def test_taken_gateway_ports_are_one_warning_that_names_the_programs():
     made = about_ports(ports=originals_ports(OTHER, OTHER, OTHER))
     assert list(made) == ["ports:taken"]
     one = made["ports:taken"]
@@ -197,7 +198,7 @@ def test_taken_ports_of_the_originals_are_one_warning_that_names_who_holds_them(
     assert single.sentence == "Port 50000, where some ask, is in use by “python3 server.py” (process 77)."
 
 
-def test_another_master_on_a_port_is_not_the_one_that_is_asked():
+def test_gateway_port_held_by_another_master_is_reported():
     second = ProcessFact(50, "python3 nep", is_master=True)
     made = about_ports(ports=originals_ports(second, MASTER, numbers=(7000, 50000)))
     assert "another master (process 50)" in made["ports:taken"].sentence
@@ -205,7 +206,7 @@ def test_another_master_on_a_port_is_not_the_one_that_is_asked():
 
 
 @pytest.mark.parametrize("gateway", [True, False])
-def test_a_master_holds_a_port_of_an_unknown_process_unless_it_says_that_it_does_not(gateway):
+def test_port_of_an_unknown_process_counts_as_the_masters_unless_it_has_an_alert(gateway):
     nodes = [node("gateway", "gateway")] if gateway else []
     told = view(*nodes, alerts=[Alert("port:50000", "taken")])
     made = about_ports(view=told, ports=originals_ports(None, None, numbers=(7000, 50000)))
@@ -223,22 +224,22 @@ def test_airplay_is_named_on_macos(holder):
     assert "AirDrop & Handoff" in made["ports:airplay"].mend
 
 
-def test_another_program_on_port_7000_of_a_mac_is_not_airplay():
+def test_other_program_on_port_7000_of_a_mac_is_not_called_airplay():
     made = found(platform="darwin", ports=(PortFact(7000, "", True, OTHER),))
     assert "python3 server.py" in made["ports:taken"].sentence
 
 
-def test_a_master_without_gateway_and_a_wish_for_none():
+def test_disabled_gateway_is_not_a_warning():
     one = found(ports=(PortFact(7000, "where old programs ask", False),))["ports:free"]
     assert (one.severity, one.mend) == ("info", "The master was started without its gateway.")
     assert list(about_ports(joins_originals=False)) == ["ports"]
 
 
-def test_the_kill_channel_is_only_told():
+def test_kill_channel_is_reported_as_information_only():
     assert found(ports=(PortFact(12345, "", True, OTHER),))["port:12345"].severity == "info"
 
 
-def test_the_original_package_beside_ours_is_an_error_with_the_command():
+def test_installed_original_package_is_an_error_with_a_command():
     one = found(packages=(PackageFact("nep", "0.5.4.8", "/somewhere"),))["package:nep"]
     assert one.severity == "error"
     assert "nep 0.5.4.8" in one.sentence
@@ -263,7 +264,7 @@ OTHER_JS = PackageFact("nep-js", "0.1.1", "/home/me/robot/node_modules/nep-js", 
         ((OTHER_JS, OUR_JS), "warning", f'npm uninstall --prefix "{Path("/home/me/robot")}" nep-js'),
     ],
 )
-def test_foreign_nep_js_that_hides_ours_is_a_warning(packages, severity, command):
+def test_foreign_nep_js_that_shadows_ours_is_a_warning(packages, severity, command):
     one = found(node_packages=packages)["package:nep-js"]
     assert (one.severity, one.command) == (severity, command)
     assert packages[0].place in one.sentence
@@ -278,7 +279,7 @@ def test_original_package_of_the_terminals_python_is_reported():
     assert "/usr/lib/python3/dist-packages" in one.sentence
 
 
-def test_few_files_say_for_how_many_topics_that_is():
+def test_low_file_limit_is_reported_with_the_number_of_topics_it_allows():
     one = found(files=FileFact(256, 10_240))["files"]
     assert one.severity == "warning"
     assert "12 topics" in one.sentence
@@ -288,14 +289,14 @@ def test_few_files_say_for_how_many_topics_that_is():
     assert "files" not in found(files=FileFact(None, None))
 
 
-def test_a_program_with_nearly_all_its_files_open_is_told():
+def test_program_near_its_file_limit_is_reported():
     made = found(programs=(ProgramFact(7, "Pepper", 250, 256), ProgramFact(8, "Rover", 90, 256)))
     assert "“Pepper” has 250 of at most 256 files open" in made["files:7"].sentence
     assert (made["files:7"].severity, made["files:7"].command) == ("warning", "ulimit -n 8192")
     assert "files:8" not in made
 
 
-def test_originals_are_named_and_those_that_cannot_be_served_are_errors():
+def test_originals_are_named_and_unsupported_versions_are_errors():
     made = found(
         view=view(node("rize", "A"), node("camera", "B"), node("bad", "0.5.4.7"), node("g", "gateway"))
     )
@@ -307,7 +308,7 @@ def test_originals_are_named_and_those_that_cannot_be_served_are_errors():
     assert "0.5.4.8 or 0.5.4.5" in made["original:bad"].mend
 
 
-def test_what_the_master_noticed_is_told_once():
+def test_alerts_of_the_master_are_reported_once():
     alerts = [
         Alert("name:x", "2 programs are named “x”", "Give each a name."),
         Alert("port:7000", "taken"),
@@ -317,7 +318,7 @@ def test_what_the_master_noticed_is_told_once():
     assert "port:7000" not in made  # the doctor looks who holds it
 
 
-def test_folders_clocks_and_the_loopback():
+def test_folders_clocks_and_loopback_problems_are_reported():
     assert found(folders=(FolderFact("/state", "Settings", "permission denied"),))[
         "folder:/state"
     ].sentence == ("Settings can't be saved in /state: permission denied.")
@@ -327,13 +328,13 @@ def test_folders_clocks_and_the_loopback():
     assert (one.severity, one.command) == ("error", "ip link set lo up")
 
 
-def test_the_worst_comes_first_and_decides_the_exit_code():
+def test_findings_are_sorted_by_severity_and_the_worst_sets_the_exit_code():
     made = findings(replace(HEALTHY, view=None, master_port=PortFact(7780, "", False), shadow="x"))
     assert [each.severity for each in made][:2] == ["error", "warning"]
     assert worst(made) == 2
 
 
-def test_the_report_is_plain_text_with_mends():
+def test_report_is_plain_text_with_fixes():
     made = findings(replace(HEALTHY, view=None, master_port=PortFact(7780, "", False)))
     lines = report(made).splitlines()
     assert lines[:3] == [
@@ -344,7 +345,7 @@ def test_the_report_is_plain_text_with_mends():
     assert to_plain(made)[0]["id"] == "master:none"
 
 
-def test_every_sentence_ends_like_one():
+def test_every_finding_is_a_complete_sentence():
     for each in (*findings(HEALTHY), *found(view=None, master_port=None, shadow="/x").values()):
         assert each.sentence.endswith(".")
         assert each.sentence[0].isupper() or each.sentence[0] in "“/"

@@ -35,7 +35,7 @@ def publisher(**changes):
     return {"publishers": (replace(CAMERA, **changes),)}
 
 
-def test_a_publisher_that_is_silent_is_told_with_since_when_and_what_it_offers():
+def test_silent_publisher_is_reported_with_its_duration_and_alternatives():
     (one,) = found().values()
     at = time.strftime("%H:%M:%S", time.localtime(NOW - 4))
     assert (one.id, one.severity, one.instead) == ("topic:silent:camera_driver", "error", "")
@@ -51,7 +51,7 @@ def test_a_publisher_that_is_silent_is_told_with_since_when_and_what_it_offers()
     assert at in one.mend
 
 
-def test_a_name_that_nobody_publishes_is_told_with_the_one_that_is_meant():
+def test_unpublished_topic_is_reported_with_the_intended_name():
     one = found(topic="/robot/deph", publishers=())["topic:near"]
     assert one.sentence == "/robot/deph has no publisher."
     assert one.mend == "Did you mean /robot/depth? Its publishers send 60 messages per second."
@@ -70,17 +70,17 @@ def test_a_name_that_nobody_publishes_is_told_with_the_one_that_is_meant():
         ("/", None),
     ],
 )
-def test_which_name_is_meant(missed, meant):
+def test_intended_topic_name_is_found(missed, meant):
     assert meant_topic(missed, ["/camera", "/robot/depth"]) == meant
 
 
-def test_what_ends_alike_is_meant_only_when_there_is_one():
+def test_topic_with_the_same_ending_is_suggested_only_if_unique():
     assert meant_topic("/pose", ["/left/pose", "/right/pose"]) in {"/left/pose", "/right/pose", None}
     assert meant_topic("/pose", []) is None
     assert meant_topic("/pose", ["/pose"]) is None
 
 
-def test_who_is_not_there_at_all():
+def test_missing_publisher_is_reported_with_the_published_topics():
     nobody = found(topic="/speech", publishers=(), is_shared=False, address="127.0.0.1:7780")
     assert nobody["topic:nobody"].mend.endswith(
         "Topics published now: /once, /robot/camera and /robot/depth."
@@ -117,18 +117,21 @@ def test_who_is_not_there_at_all():
         ),
         (
             "unknown",
-            "“camera_driver” publishes at 10.0.0.7:41000 (lab), but this computer has no route to that address.",
+            (
+                "“camera_driver” publishes at 10.0.0.7:41000 (lab), but this computer has no route to that "
+                "address."
+            ),
             "network",
         ),
     ],
 )
-def test_an_address_that_is_not_reached(reach, sentence, mend):
+def test_unreachable_publisher_address_is_reported(reach, sentence, mend):
     (one,) = found(**publisher(endpoint="tcp://10.0.0.7:41000", reach=reach)).values()
     assert (one.id, one.severity, one.sentence) == ("topic:address:camera_driver", "error", sentence)
     assert mend in one.mend
 
 
-def test_versions_that_do_not_fit():
+def test_incompatible_versions_are_reported():
     (one,) = found(**publisher(generation="0.5.4.6")).values()
     assert (one.id, one.command) == ("topic:version:camera_driver", "pip install nep==0.5.4.8")
     (wire,) = found(refused=12, **publisher(last_s=NOW)).values()
@@ -138,27 +141,29 @@ def test_versions_that_do_not_fit():
     assert "camera_driver (lab)" in wire.mend
 
 
-def test_what_comes_and_can_or_cannot_be_read():
+def test_received_messages_are_reported_as_readable_or_unreadable():
     assert [each.severity for each in found(received=1, **publisher(last_s=NOW)).values()] == ["ok"]
     bad = found(received=1, unreadable="it is not valid JSON", **publisher(last_s=NOW))["topic:unreadable"]
     assert bad.sentence == "Messages on /robot/camera arrive but can't be read: it is not valid JSON."
     blocked = found(**publisher(last_s=NOW))["topic:blocked"]
-    assert blocked.sentence.startswith("camera_driver (lab) sends /robot/camera, but no messages were received")
+    assert blocked.sentence.startswith(
+        "camera_driver (lab) sends /robot/camera, but no messages were received"
+    )
 
 
-def test_what_the_master_noticed_of_the_topic_is_an_error_here():
+def test_alert_of_the_master_about_the_topic_is_an_error():
     alert = Alert("type:/robot/camera", "The topic “/robot/camera” has 2 types", "Use the same type.")
     one = found(received=1, alerts=(alert,))["type:/robot/camera"]
     assert (one.severity, one.sentence[-1], one.mend) == ("error", ".", "Use the same type.")
 
 
-def test_a_name_that_no_topic_can_have(master):
+def test_invalid_topic_name_is_reported(master):
     for name in ("two words", "", "x" * 300, "a{b"):
         (one,) = topic_findings(collect_topic(name, master.address))
         assert (one.id, one.severity) == ("topic:name", "error")
 
 
-def test_addresses_are_tried(monkeypatch):
+def test_endpoint_reachability_is_checked(monkeypatch):
     with socket.socket() as server:
         server.bind(("127.0.0.1", 0))
         place = f"tcp://127.0.0.1:{server.getsockname()[1]}"
@@ -172,7 +177,7 @@ def test_addresses_are_tried(monkeypatch):
         assert reach_of("tcp://10.255.255.1:80") == reach
 
 
-def test_real_topics(master):
+def test_published_topics_of_a_running_master_are_diagnosed(master):
     with nep.node("arm", master=master.address) as node:
         node.new_pub("/arm/pose").publish({"x": 1})
         numbers = node.new_pub("/arm/raw")
@@ -192,7 +197,7 @@ def test_real_topics(master):
         assert "master" in {each.id for each in near}
 
 
-def test_a_topic_that_cannot_be_decoded(master):
+def test_undecodable_topic_is_reported(master):
     with nep.node("arm", master=master.address) as node:
         node.new_pub("/pose", latched=True).publish_bytes(b"{no json")
         facts = collect_topic("/pose", master.address)
@@ -202,7 +207,7 @@ def test_a_topic_that_cannot_be_decoded(master):
     assert "arm (" in one.mend
 
 
-def test_without_a_master_there_is_nothing_to_tell_of_a_topic():
+def test_topic_is_not_diagnosed_without_a_master():
     with socket.socket() as probe:
         probe.bind(("127.0.0.1", 0))
         address = f"127.0.0.1:{probe.getsockname()[1]}"
@@ -212,7 +217,7 @@ def test_without_a_master_there_is_nothing_to_tell_of_a_topic():
     assert not any(id.startswith("topic") for id in told)
 
 
-def test_the_command_takes_a_topic(master, capsys):
+def test_command_accepts_a_topic(master, capsys):
     with pytest.raises(typer.Exit) as ended:
         doctor(master.address, as_json=True, topic="/no/such")
     told = json.loads(capsys.readouterr().out)

@@ -79,7 +79,7 @@ def test_original_nep_of_the_terminals_python_is_found(environment, info):
 
 
 @needs_posix
-def test_packages_of_the_user_count_only_outside_of_virtual_environments(environment):
+def test_user_packages_count_only_outside_virtual_environments(environment):
     site = original(environment.parent / "home" / ".local", "nep-0.5.4.8.dist-info")
     assert looked_up(environment) == PackageFact("nep", "0.5.4.8", str(site), is_ours=False)
     (environment / "pyvenv.cfg").touch()
@@ -87,7 +87,7 @@ def test_packages_of_the_user_count_only_outside_of_virtual_environments(environ
 
 
 @needs_posix
-def test_packages_of_another_python_version_are_not_imported(environment):
+def test_packages_of_another_python_version_are_ignored(environment):
     python = environment / "bin" / "python3"
     python.rename(environment / "bin" / "python3.12")
     python.symlink_to("python3.12")

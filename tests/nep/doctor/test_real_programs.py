@@ -46,7 +46,7 @@ def topic_found(address: str) -> list[str]:
     return [each.id for each in topic_findings(facts) if each.severity == "error"]
 
 
-def test_a_publisher_that_only_its_own_computer_reaches(own: str) -> None:
+def test_publisher_reachable_only_from_its_own_computer_is_reported(own: str) -> None:
     with Master("0.0.0.0:0", learn_s=0.0) as master:
         port = port_of(master.address)
         with running(SENDER, NEP_MASTER=f"127.0.0.1:{port}") as program:
@@ -58,7 +58,7 @@ def test_a_publisher_that_only_its_own_computer_reaches(own: str) -> None:
     assert "“arm” can be reached only from its own computer" in found.sentence
 
 
-def test_a_publisher_that_was_killed_is_not_reached_any_more(master: Master) -> None:
+def test_killed_publisher_is_unreachable(master: Master) -> None:
     with running(SENDER) as program:
         assert program.line() == "there"
         with nep.node("ear", master=master.address) as node:
@@ -73,7 +73,7 @@ def test_a_publisher_that_was_killed_is_not_reached_any_more(master: Master) -> 
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="elsewhere a full queue refuses")
-def test_a_place_that_answers_nobody_is_a_timeout() -> None:
+def test_unanswered_endpoint_is_a_timeout() -> None:
     with socket.socket() as full:
         full.bind(("127.0.0.2", 0))
         full.listen(0)
@@ -89,7 +89,7 @@ def test_a_place_that_answers_nobody_is_a_timeout() -> None:
                 each.close()
 
 
-def test_a_master_that_serves_this_computer_only_does_not_hang(master: Master, own: str) -> None:
+def test_master_without_listen_option_is_not_reported_as_hung(master: Master, own: str) -> None:
     found = {each.id: each for each in diagnose(f"{own}:{port_of(master.address)}", "/arm/pose")}
     assert "master:hung" not in found
     assert found["master:closed"].severity == "error"
@@ -97,7 +97,7 @@ def test_a_master_that_serves_this_computer_only_does_not_hang(master: Master, o
     assert "master" in {each.id for each in diagnose(master.address)}
 
 
-def test_at_an_address_of_the_network_no_master_is_started(master: Master, own: str) -> None:
+def test_no_master_can_be_started_at_a_network_address(master: Master, own: str) -> None:
     closed = start_obstacle(f"{own}:{port_of(master.address)}")
     assert closed is not None
     assert closed.id == "master:closed"
@@ -111,7 +111,7 @@ def test_at_an_address_of_the_network_no_master_is_started(master: Master, own: 
     assert f"127.0.0.1:{free}" in nobody.mend
 
 
-def test_it_tells_what_is_found_so_far_and_comes_to_the_same_end(master: Master) -> None:
+def test_progress_reports_lead_to_the_same_final_result(master: Master) -> None:
     told = []
     found = diagnose(master.address, "/arm/pose", tell=lambda *each: told.append(each))
     done = [done for _found, done, _count in told]

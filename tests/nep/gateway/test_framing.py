@@ -41,11 +41,11 @@ JSON_VALUES = st.recursive(
         (50000, "images", "bare"),
     ],
 )
-def test_the_port_and_the_type_decide_the_framing(port, msg_type, framing):
+def test_framing_is_determined_by_port_and_type(port, msg_type, framing):
     assert framing_of(port, msg_type) == framing
 
 
-def test_types_that_the_originals_invented_travel_as_json():
+def test_message_types_of_the_originals_map_to_json_string_and_image():
     assert [codec_of(name) for name in ("json", "dictionary", "dict", "string", "image", "images")] == [
         "json",
         "json",
@@ -56,39 +56,39 @@ def test_types_that_the_originals_invented_travel_as_json():
     ]
 
 
-def test_prefixed_json_is_the_topic_a_space_and_the_datum():
+def test_prefixed_json_is_the_topic_a_space_and_the_payload():
     shape = Shape("t", "prefixed", "json")
     assert shape.read(b't {"a":1}') == b'{"a":1}'
     assert shape.write(b'{"a":1}') == b't {"a":1}'
 
 
-def test_a_list_and_a_text_are_read_where_the_originals_could_not():
+def test_lists_and_strings_are_decoded_from_prefixed_json():
     shape = Shape("t", "prefixed", "json")
     assert shape.read(b"t [1,2]") == b"[1,2]"
     assert shape.read(b't "x"') == b'"x"'
 
 
-def test_prefixed_json_without_its_prefix_is_still_read():
+def test_prefixed_json_without_its_prefix_is_decoded():
     assert Shape("t", "prefixed", "json").read(b'{"a":1}') == b'{"a":1}'
 
 
-def test_a_frame_of_another_topic_is_refused():
+def test_frame_of_another_topic_is_rejected():
     with pytest.raises(FrameError, match="does not begin with the topic"):
         Shape("t", "prefixed", "string").read(b"t2 hello")
 
 
-def test_a_string_keeps_its_spaces_and_letters():
+def test_string_round_trips_with_spaces_and_unicode():
     text = "  zwei  Wörter — 日本 😀 ".encode()
     for framing in ("prefixed", "bare"):
         shape = Shape("t", framing, "string")
         assert shape.read(shape.write(text)) == text
 
 
-def test_a_bare_string_that_begins_like_its_topic_is_a_string():
+def test_bare_string_that_starts_with_its_topic_is_not_stripped():
     assert Shape("t", "bare", "string").read(b"t is a letter") == b"t is a letter"
 
 
-def test_a_picture_is_base64_outside_and_jpeg_inside():
+def test_picture_frame_is_a_base64_encoded_jpeg():
     jpeg = bytes(range(256))
     for framing, prefix in (("prefixed", b"cam "), ("bare", b"")):
         shape = Shape("cam", framing, "image")
@@ -97,19 +97,19 @@ def test_a_picture_is_base64_outside_and_jpeg_inside():
         assert shape.read(frame) == jpeg
 
 
-def test_a_picture_that_is_no_base64_is_refused():
+def test_picture_with_invalid_base64_is_rejected():
     with pytest.raises(FrameError, match="base64"):
         Shape("cam", "bare", "image").read(b"****")
 
 
-def test_nan_becomes_null_because_strict_readers_refuse_it():
+def test_nan_is_converted_to_null_for_strict_readers():
     assert json.loads(Shape("t", "bare", "json").read(b'{"a": NaN, "b": [-Infinity, 1]}')) == {
         "a": None,
         "b": [None, 1],
     }
 
 
-def test_whether_numbers_were_lost_can_be_told():
+def test_numbers_replaced_by_null_are_detected():
     shape = Shape("t", "prefixed", "json")
     for said, is_lost in (
         (b'{"a": NaN}', True),
@@ -121,11 +121,11 @@ def test_whether_numbers_were_lost_can_be_told():
         assert lost_numbers(frame, shape.read(frame)) is is_lost
 
 
-def test_the_word_nan_in_a_text_stays():
+def test_word_nan_in_a_string_is_unchanged():
     assert json.loads(Shape("t", "bare", "json").read(b'{"a": "NaN"}')) == {"a": "NaN"}
 
 
-def test_nep_0546_and_0547_are_recognised_by_what_they_send():
+def test_nep_0546_and_0547_are_recognised_by_their_frames():
     shape = Shape("t", "bare", "json")
     for frame, version in ((b't {"a":1}', "0.5.4.6"), (json.dumps(json.dumps({"a": 1})).encode(), "0.5.4.7")):
         with pytest.raises(FrameError) as caught:
@@ -133,7 +133,7 @@ def test_nep_0546_and_0547_are_recognised_by_what_they_send():
         assert caught.value.version == version
 
 
-def test_a_plain_text_as_json_is_not_taken_for_nep_0547():
+def test_plain_json_string_is_not_mistaken_for_nep_0547():
     assert Shape("t", "bare", "json").read(b'"hello"') == b'"hello"'
 
 
@@ -143,7 +143,7 @@ def test_nep_0546_is_recognised_by_its_filter():
     assert not Shape("t", "prefixed", "json").is_from_0546(b"t")
 
 
-def test_a_filter_wants_a_line_when_it_can_match_a_frame():
+def test_filter_matches_a_line_if_it_can_match_a_frame():
     prefixed, bare = Shape("test", "prefixed", "json"), Shape("test", "bare", "json")
     assert prefixed.wants(b"test")
     assert prefixed.wants(b"")
@@ -153,19 +153,19 @@ def test_a_filter_wants_a_line_when_it_can_match_a_frame():
 
 
 @given(JSON_VALUES, st.text(alphabet="abe1n ü日", min_size=1, max_size=3))
-def test_shielding_never_changes_what_is_said(value, topic):
+def test_shielding_never_changes_the_value(value, topic):
     data = json.dumps(value, ensure_ascii=False).encode()
     assert json.loads(shield_javascript(data, topic)) == value
     assert json.loads(shield_csharp(data)) == value
 
 
 @given(st.text(), st.sampled_from(["camera", "日本", "robot_action", "aa"]))
-def test_no_text_names_the_topic_after_shielding_for_javascript(text, topic):
+def test_shielded_json_for_javascript_contains_no_topic_name(text, topic):
     data = json.dumps(
         {"message": f"{text}{topic}{text}{topic[0]}{topic}", topic: 1}, ensure_ascii=False
     ).encode()
     assert topic.encode() not in shield_javascript(data, topic)
 
 
-def test_no_space_is_left_after_shielding_for_csharp():
+def test_shielded_json_for_csharp_contains_no_space():
     assert b" " not in shield_csharp(b'{"a b": "c  d", "e": [1, 2]}')

@@ -51,7 +51,7 @@ def publishes(topic, codec="json", msg_type="json"):
     return TopicLink(topic, msg_type, codec, "publisher")
 
 
-def test_originals_are_nodes_with_their_language_and_wire(desk, listing):
+def test_originals_are_listed_as_nodes_with_language_and_wire(desk, listing):
     listing.show(
         (
             program("a", publishes("t")),
@@ -68,7 +68,7 @@ def test_originals_are_nodes_with_their_language_and_wire(desk, listing):
     assert topic.publishers[0].endpoints == ()
 
 
-def test_who_left_is_taken_out(desk, listing):
+def test_departed_programs_are_removed(desk, listing):
     listing.show((program("a", publishes("t")),))
     listing.show((program("a"),))
     assert not desk.view().topics
@@ -76,14 +76,14 @@ def test_who_left_is_taken_out(desk, listing):
     assert not desk.view().nodes
 
 
-def test_what_did_not_change_is_not_told_again(desk, listing):
+def test_unchanged_program_is_not_registered_again(desk, listing):
     listing.show((program("a", publishes("t")),))
     told = len(desk.replies)
     listing.show((program("a", publishes("t")),))
     assert len(desk.replies) == told
 
 
-def test_rates_are_those_of_the_topic_and_counted_once(desk, listing):
+def test_rate_is_counted_once_per_topic(desk, listing):
     listing.show((program("a", publishes("t")), program("b", publishes("t"), pid=2)))
     for _ in range(5):
         listing.renew()
@@ -97,7 +97,7 @@ def test_rates_are_those_of_the_topic_and_counted_once(desk, listing):
     assert not any(getattr(reply, "again", False) for reply in desk.replies)
 
 
-def test_the_system_tells_the_load_of_an_original(desk):
+def test_cpu_load_of_an_original_is_read_from_the_system(desk):
     used = {1: 0.0}
     now = iter([0.0, 1.0])
     loads = {1: CpuLoad(lambda: used[1], lambda: next(now))}
@@ -110,22 +110,22 @@ def test_the_system_tells_the_load_of_an_original(desk):
     assert {node.name: node.cpu_ratio for node in desk.view().nodes.values()} == {"a": 0.5, "b": None}
 
 
-def test_a_process_that_is_none_has_no_load():
+def test_missing_process_has_no_load():
     assert load_of(2**22 + 1).ratio() is None
     assert load_of(os.getpid()).ratio() is None  # one reading tells nothing
 
 
-def test_the_names_of_one_datum_are_no_conflict_of_types(desk, listing):
+def test_equivalent_type_names_are_not_a_conflict(desk, listing):
     listing.show((program("a", publishes("t")), program("b", publishes("t", msg_type="dictionary"), pid=2)))
     assert not desk.view().alerts
 
 
-def test_a_name_that_is_no_native_topic_is_left_out_of_the_graph(desk, listing):
+def test_invalid_native_topic_name_is_left_out_of_the_graph(desk, listing):
     listing.show((program("a", publishes("not a topic"), publishes("t")),))
     assert set(desk.view().topics) == {"t"}
 
 
-def test_services_of_originals_are_listed_with_the_port_of_the_server(desk, listing):
+def test_services_of_originals_are_listed_with_the_server_port(desk, listing):
     listing.show(
         (
             program("a", TopicLink("weather", "json", "service", "server", 9000)),

@@ -20,7 +20,7 @@ def message(data=b"1"):
     return Message("t", data, "json", "json")
 
 
-def test_what_is_posted_is_taken_in_order_and_wakes_the_reader(inbox):
+def test_posted_messages_are_taken_in_order_and_wake_the_reader(inbox):
     assert not select.select([inbox], [], [], 0)[0]
     first, second = message(), message()
     poster = threading.Thread(target=lambda: (inbox.post(first), inbox.post(second)))
@@ -32,7 +32,7 @@ def test_what_is_posted_is_taken_in_order_and_wakes_the_reader(inbox):
     assert inbox.pop_all() == []
 
 
-def test_it_is_bounded_in_messages_and_in_bytes_and_counts_what_it_refuses(inbox):
+def test_inbox_is_bounded_in_messages_and_bytes_and_counts_drops(inbox):
     for _ in range(5):
         inbox.post(message())
     assert (len(inbox.pop_all()), inbox.dropped) == (3, 2)
@@ -43,6 +43,6 @@ def test_it_is_bounded_in_messages_and_in_bytes_and_counts_what_it_refuses(inbox
     assert len(inbox.pop_all()) == 1
 
 
-def test_a_wake_after_the_end_harms_nobody(inbox):
+def test_wake_after_close_is_harmless(inbox):
     inbox.close()
     inbox.wake()

@@ -43,14 +43,14 @@ def scene(master):
     made.close()
 
 
-def test_no_node_is_made_before_something_is_carried(scene):
+def test_node_is_created_only_on_first_use(scene):
     assert scene.made == 0
     scene.native.subscribe("t", "json")
     scene.native.subscribe("u", "json")
     assert scene.made == 1
 
 
-def test_what_an_original_published_arrives_in_its_own_bytes(scene):
+def test_message_of_an_original_is_published_with_its_bytes_unchanged(scene):
     with nep.node("listener") as node, node.new_sub("t") as sub:
         scene.native.publish("t", "json", b'{"a": 1}')
         message = sub.receive(LONG_S)
@@ -60,7 +60,7 @@ def test_what_an_original_published_arrives_in_its_own_bytes(scene):
         assert sub.receive(LONG_S).payload == {"a": 2}
 
 
-def test_native_messages_come_in_and_own_ones_never_come_back(scene, master):
+def test_native_messages_are_received_and_own_ones_are_not_echoed(scene, master):
     assert scene.native.subscribe("t", "json")
     with nep.node("talker") as node:
         pub = node.new_pub("t")
@@ -83,7 +83,7 @@ def test_native_messages_come_in_and_own_ones_never_come_back(scene, master):
         assert not scene.native._subscribers
 
 
-def test_pictures_that_originals_cannot_read_become_jpeg(scene):
+def test_pictures_that_originals_cannot_decode_are_converted_to_jpeg(scene):
     np = pytest.importorskip("numpy")
     raw = nep.raw_image(np.zeros((4, 6, 3), np.uint8))
     message = Message("cam", raw.data, "image", "image", extension=raw.extension)
@@ -94,7 +94,7 @@ def test_pictures_that_originals_cannot_read_become_jpeg(scene):
 
 
 @pytest.mark.parametrize("told", [None, "jpeg", "png", "gif"])
-def test_a_bomb_is_not_handed_to_the_originals_whatever_it_calls_itself(scene, told):
+def test_decompression_bomb_is_not_forwarded_whatever_its_declared_encoding(scene, told):
     for name in ("gif", "png of many pixels"):
         bomb = Message(
             "cam", BOMBS[name], "image", "image", extension={} if told is None else {"encoding": told}
@@ -104,7 +104,7 @@ def test_a_bomb_is_not_handed_to_the_originals_whatever_it_calls_itself(scene, t
     assert "48000 × 48000 pixels are too many" in scene.alerts[0].sentence  # noqa: RUF001
 
 
-def test_numbers_that_the_originals_cannot_read_are_an_alert(scene):
+def test_pixel_types_that_originals_cannot_decode_raise_an_alert(scene):
     np = pytest.importorskip("numpy")
     depth = nep.raw_image(np.zeros((4, 6), np.uint16))
     sent = scene.native.data_of(Message("cam", depth.data, "image", "image", extension=depth.extension))
@@ -118,13 +118,13 @@ def test_numbers_that_the_originals_cannot_read_are_an_alert(scene):
 
 
 @pytest.mark.parametrize("encoding", ["bgr8", ["bgr8"], {"bgr8": 1}, 7, b"jpeg"])
-def test_a_picture_that_nobody_can_read_is_an_alert_and_no_end(scene, encoding):
+def test_undecodable_picture_raises_an_alert_and_is_dropped(scene, encoding):
     broken = Message("cam", b"123", "image", "image", extension={"encoding": encoding, "shape": [4, 6, 3]})
     assert scene.native.data_of(broken) is None
     assert [alert.id for alert in scene.alerts] == ["message:cam"]
 
 
-def test_a_name_that_is_no_native_topic_is_an_alert_and_is_not_tried_at_once_again(scene):
+def test_invalid_native_topic_name_raises_an_alert_and_is_not_retried_at_once(scene):
     assert not scene.native.subscribe("not a topic", "json")
     scene.native.publish("not a topic", "json", b"1")
     (alert,) = scene.alerts
@@ -132,7 +132,7 @@ def test_a_name_that_is_no_native_topic_is_an_alert_and_is_not_tried_at_once_aga
     assert alert.hint
 
 
-def test_an_alert_is_reported_once_and_taken_back_when_cured(scene):
+def test_alert_is_reported_once_and_removed_when_resolved(scene):
     scene.native.report("port:7000", "Port 7000 is taken")
     told = scene.alerts
     scene.native.report("port:7000", "Port 7000 is taken")
@@ -141,7 +141,7 @@ def test_an_alert_is_reported_once_and_taken_back_when_cured(scene):
     assert scene.alerts == ()
 
 
-def test_hostile_messages_pass_both_ways_and_the_next_one_arrives(scene):
+def test_hostile_messages_pass_in_both_directions_and_the_next_one_arrives(scene):
     payloads = tuple(hostile.payloads({"pose": {"x": 1.0}}))
     with nep.node("stranger") as node, node.new_sub("t") as sub:
         for payload in payloads:

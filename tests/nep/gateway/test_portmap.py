@@ -12,7 +12,7 @@ def registration(line=JSON_A, node="n", pid=7):
     return Registration(line, node, "publisher", "json", "A", None, pid, 12.5)
 
 
-def test_the_map_is_the_same_after_a_restart(tmp_path):
+def test_port_map_persists_after_a_restart(tmp_path):
     before = PortMap(tmp_path / "deep" / "map.json")
     before.assign(JSON_A, 9000)
     before.assign(JSON_B, 9002)
@@ -28,13 +28,13 @@ def test_the_map_is_the_same_after_a_restart(tmp_path):
     "text",
     ["", "{", "[]", '{"version":99}', '{"version":1,"lines":[{}],"programs":[]}', '{"version":1,"lines":7}'],
 )
-def test_a_damaged_file_is_an_empty_map(tmp_path, text):
+def test_damaged_file_gives_an_empty_map(tmp_path, text):
     file = tmp_path / "map.json"
     file.write_text(text)
     assert not PortMap(file).lines
 
 
-def test_asking_twice_is_one_registration_and_another_program_another():
+def test_repeated_registration_is_stored_once_and_other_programs_separately():
     known = PortMap(None)
     known.add(registration())
     known.add(registration())
@@ -44,7 +44,7 @@ def test_asking_twice_is_one_registration_and_another_program_another():
     assert known.registrations == (registration(),)
 
 
-def test_after_the_computer_was_started_again_no_program_is_remembered(tmp_path):
+def test_registrations_are_discarded_after_a_reboot(tmp_path):
     before = PortMap(tmp_path / "map.json", boot=1000.0)
     before.assign(JSON_A, 9000)
     before.add(registration())
@@ -54,14 +54,14 @@ def test_after_the_computer_was_started_again_no_program_is_remembered(tmp_path)
     assert not after.registrations
 
 
-def test_ports_are_given_from_9000_up_in_even_steps():
+def test_ports_are_assigned_from_9000_in_even_steps():
     known = PortMap(None)
     assert next(known.candidates(lambda line: True)) == FIRST_PORT == 9000
     known.assign(JSON_A, 9000)
     assert next(known.candidates(lambda line: True)) == 9002
 
 
-def test_a_line_that_nobody_uses_gives_its_port_away_only_when_all_are_given():
+def test_unused_line_gives_up_its_port_only_when_all_ports_are_assigned():
     known = PortMap(None)
     for number, port in enumerate(range(FIRST_PORT, LAST_PORT + 1, 2)):
         known.assign(TopicLine(f"t{number}", "bare", "json", "many2many"), port)
@@ -72,7 +72,7 @@ def test_a_line_that_nobody_uses_gives_its_port_away_only_when_all_are_given():
     assert not list(known.candidates(lambda line: True))
 
 
-def test_nodes_of_one_name_are_told_apart():
+def test_nodes_of_the_same_name_have_different_ids():
     assert registration(pid=1).node_id != registration(pid=2).node_id
     assert registration(pid=None).node_id == registration(pid=None).node_id
 

@@ -10,7 +10,7 @@ from nep.programs.gateway.processes import SystemProcesses
 PROCESSES = SystemProcesses()
 
 
-def test_a_process_has_a_beginning_and_an_end():
+def test_process_start_and_language_are_known_until_it_ends():
     child = subprocess.Popen([sys.executable, "-c", "input()"], stdin=subprocess.PIPE)
     try:
         assert PROCESSES.started(child.pid) is not None
@@ -22,7 +22,7 @@ def test_a_process_has_a_beginning_and_an_end():
     assert PROCESSES.is_joined(child.pid, 1, binds=False) is False
 
 
-def test_it_is_known_which_port_a_process_is_connected_to():
+def test_connection_of_a_process_to_a_port_is_detected():
     with socket.create_server(("127.0.0.1", 0)) as server:
         port = server.getsockname()[1]
         assert not PROCESSES.is_joined(os.getpid(), port, binds=False)

@@ -52,13 +52,13 @@ def roles(scene):
     return [link.role for program in scene.programs.programs() for link in program.links]
 
 
-def test_a_program_has_no_role_before_it_is_connected(scene):
+def test_program_has_no_role_before_it_connects(scene):
     register(scene)
     assert roles(scene) == []
     assert [program.name for program in scene.programs.programs()] == ["n"]
 
 
-def test_who_asked_as_publisher_and_connects_as_subscriber_is_a_subscriber(scene):
+def test_role_follows_the_connection_and_not_the_request(scene):
     register(scene, socket="publisher")
     scene.pair.connections["subscriber"] = 1
     scene.processes.joined = {(7, 9001)}
@@ -66,14 +66,14 @@ def test_who_asked_as_publisher_and_connects_as_subscriber_is_a_subscriber(scene
     assert scene.programs.programs()[0].links == (TopicLink("t", "json", "json", "subscriber"),)
 
 
-def test_where_the_system_does_not_tell_the_request_is_believed(scene):
+def test_role_follows_the_request_if_the_system_hides_connections(scene):
     register(scene, socket="publisher")
     scene.processes.is_secret = True
     scene.pair.connections.update(publisher=1, subscriber=1)
     assert roles(scene) == ["publisher"]
 
 
-def test_a_program_is_gone_with_its_process(scene):
+def test_program_is_removed_when_its_process_ends(scene):
     register(scene)
     assert not scene.programs.remove_ended()
     del scene.processes.running[7]
@@ -81,13 +81,13 @@ def test_a_program_is_gone_with_its_process(scene):
     assert not scene.programs.programs()
 
 
-def test_a_number_that_another_process_has_now_is_not_the_program(scene):
+def test_reused_process_id_is_not_mistaken_for_the_program(scene):
     register(scene)
     scene.processes.running[7] = 5000.0
     assert scene.programs.remove_ended()
 
 
-def test_a_program_is_gone_when_its_connections_are(scene):
+def test_program_is_removed_when_its_connections_close(scene):
     register(scene)
     scene.pair.connections["publisher"] = 1
     scene.processes.joined = {(7, 9000)}
@@ -98,7 +98,7 @@ def test_a_program_is_gone_when_its_connections_are(scene):
     assert scene.programs.remove_ended()
 
 
-def test_a_program_without_a_process_number_lives_as_long_as_its_connection(scene):
+def test_program_without_process_id_lives_as_long_as_its_connection(scene):
     register(scene, pid=None, started=None, socket="subscriber")
     assert not scene.programs.remove_ended()
     scene.pair.connections["subscriber"] = 1
@@ -108,7 +108,7 @@ def test_a_program_without_a_process_number_lives_as_long_as_its_connection(scen
     assert scene.programs.remove_ended()
 
 
-def test_a_program_that_left_before_anybody_looked_is_gone(scene):
+def test_program_that_left_between_polls_is_removed(scene):
     register(scene)
     scene.programs.update()
     scene.pair.openings = 1
@@ -117,7 +117,7 @@ def test_a_program_that_left_before_anybody_looked_is_gone(scene):
     assert scene.programs.remove_ended()
 
 
-def test_a_stranger_that_comes_and_goes_ends_no_program_that_is_about_to_come(scene):
+def test_short_foreign_connection_does_not_remove_a_connecting_program(scene):
     register(scene)
     scene.programs.update()
     scene.pair.openings = 1
@@ -131,7 +131,7 @@ def test_a_stranger_that_comes_and_goes_ends_no_program_that_is_about_to_come(sc
     assert not scene.programs.remove_ended()
 
 
-def test_one_program_that_publishes_and_subscribes_is_one_node_with_two_links(scene):
+def test_program_that_publishes_and_subscribes_is_one_node_with_two_links(scene):
     register(scene, socket="publisher")
     register(scene, socket="subscriber")
     scene.pair.connections.update(publisher=1, subscriber=1)
@@ -140,7 +140,7 @@ def test_one_program_that_publishes_and_subscribes_is_one_node_with_two_links(sc
     assert len(scene.programs.programs()) == 1
 
 
-def test_a_line_is_used_while_somebody_asked_for_it_or_is_connected(scene):
+def test_line_is_in_use_while_it_is_requested_or_connected(scene):
     assert not scene.programs.is_used(LINE)
     scene.pair.connections["publisher"] = 1
     assert scene.programs.is_used(LINE)
@@ -149,7 +149,7 @@ def test_a_line_is_used_while_somebody_asked_for_it_or_is_connected(scene):
     assert scene.programs.is_used(LINE)
 
 
-def test_the_broadcast_is_told_who_asked_for_what(scene):
+def test_broadcast_members_list_who_requested_what(scene):
     register(scene)
     (member,) = scene.programs.members()
     assert (member.topic, member.node, member.port, member.socket, member.pid) == (
@@ -162,7 +162,7 @@ def test_the_broadcast_is_told_who_asked_for_what(scene):
     assert scene.programs.languages() == {LINE: frozenset({"python"})}
 
 
-def test_a_version_that_cannot_be_served_is_shown_when_one_program_alone_can_be_meant(scene):
+def test_unsupported_version_is_shown_if_only_one_program_can_be_meant(scene):
     register(scene)
     scene.pair.connections["subscriber"] = 1
     scene.processes.joined = {(7, 9001)}

@@ -76,7 +76,7 @@ def rest(of: Socket) -> list[bytes]:
 
 
 @pytest.mark.parametrize("size", [200_000, 4_000_000, 60_000_000])
-def test_what_is_kept_for_who_does_not_read_is_bounded_in_bytes(pair, subscriber, size: int) -> None:
+def test_buffer_of_a_stalled_subscriber_is_bounded_in_bytes(pair, subscriber, size: int) -> None:
     stuck = subscriber(keep=1)
     for number in range(5 * MAX_BUFFERED_BYTES // size):
         pair.deliver(numbered(number, size))
@@ -85,7 +85,7 @@ def test_what_is_kept_for_who_does_not_read_is_bounded_in_bytes(pair, subscriber
     assert sum(map(len, kept)) < MAX_BUFFERED_BYTES + 3 * size + 20_000_000  # plus messages in flight
 
 
-def test_who_reads_gets_everything_beside_one_that_does_not(pair, subscriber) -> None:
+def test_active_reader_receives_everything_next_to_a_stalled_one(pair, subscriber) -> None:
     subscriber(keep=1)
     reader = subscriber(keep=1000, filter_=b"t {")
     for number in range(200):
@@ -94,7 +94,7 @@ def test_who_reads_gets_everything_beside_one_that_does_not(pair, subscriber) ->
         assert reader.recv().startswith(b't {"n":%d,' % number)
 
 
-def test_small_messages_are_kept_a_thousand_deep_after_large_ones(pair, subscriber) -> None:
+def test_thousand_small_messages_are_buffered_after_large_ones(pair, subscriber) -> None:
     slow = subscriber(keep=1)
     pair.deliver(numbered(0, 30_000_000))
     assert slow.recv().startswith(b't {"n":0,')

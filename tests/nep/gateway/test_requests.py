@@ -24,7 +24,7 @@ def ask(port=7000, **changes):
     return read_request(json.dumps(fields).encode(), port)
 
 
-def test_a_request_as_the_python_library_sends_it():
+def test_request_of_the_python_library_is_parsed():
     request = ask()
     assert (request.node, request.topic, request.socket, request.pid) == ("n1", "t1", "publisher", 3346)
     assert (request.generation, request.framing, request.codec) == ("A", "prefixed", "json")
@@ -34,22 +34,22 @@ def test_a_request_as_the_python_library_sends_it():
 @pytest.mark.parametrize(
     ("pid", "read"), [(7, 7), ("7", 7), ("none", None), (..., None), (True, None), (-1, None), (1e9, None)]
 )
-def test_the_process_id_is_a_number_a_text_or_not_there(pid, read):
+def test_process_id_may_be_a_number_a_string_or_missing(pid, read):
     assert ask(pid=pid).pid == read
 
 
-def test_only_csharp_sends_its_process_id_as_text():
+def test_process_id_as_string_identifies_csharp():
     assert ask(pid="77").language == "csharp"
     assert ask(pid=77).language is None
     assert ask(language="C++").language == "c++"
 
 
-def test_missing_type_and_mode_have_the_originals_defaults():
+def test_missing_type_and_mode_use_the_original_defaults():
     request = ask(msg_type=..., mode=...)
     assert (request.msg_type, request.mode) == ("json", "many2many")
 
 
-def test_the_answer_has_the_shape_and_order_that_the_originals_expect():
+def test_reply_has_the_shape_and_order_that_the_originals_expect():
     assert grant(ask(), 9000) == (
         b'{"topic":"t1","port":9000,"mode":"many2many","ip":"127.0.0.1","socket":"publisher","state":"success"}'
     )
@@ -73,7 +73,7 @@ def test_the_answer_has_the_shape_and_order_that_the_originals_expect():
         (b" " * 70000, "at most"),
     ],
 )
-def test_a_bad_request_is_answered_with_a_sentence(data, sentence):
+def test_invalid_request_is_answered_with_a_message(data, sentence):
     with pytest.raises(RequestError, match=sentence) as caught:
         read_request(data, 7000)
     answer = json.loads(refuse(caught.value))
@@ -81,20 +81,20 @@ def test_a_bad_request_is_answered_with_a_sentence(data, sentence):
     assert sentence in answer["error"]
 
 
-def test_a_refusal_names_the_topic_because_the_originals_compare_it():
+def test_rejection_names_the_topic_which_the_originals_compare():
     with pytest.raises(RequestError) as caught:
         ask(node=...)
     assert json.loads(refuse(caught.value))["topic"] == "t1"
 
 
 @given(st.binary(max_size=300))
-def test_random_bytes_are_refused_and_never_kill(data):
+def test_random_bytes_are_rejected_without_a_crash(data):
     with pytest.raises(RequestError) as caught:
         read_request(data, 50000)
     assert json.loads(refuse(caught.value))["state"] == "failure"
 
 
-def test_the_broadcast_has_the_prefix_and_the_shape_of_the_originals():
+def test_broadcast_has_the_prefix_and_shape_of_the_originals():
     frame = broadcast(
         [
             Member("t1", "n1", 9000, "publisher", "many2many", "json", 3346),
@@ -119,7 +119,7 @@ def test_the_broadcast_has_the_prefix_and_the_shape_of_the_originals():
     assert broadcast([]) == b"master {}"
 
 
-def test_hostile_requests_are_granted_or_refused_with_a_sentence():
+def test_hostile_requests_are_granted_or_rejected_with_a_message():
     told = {
         "node": "n",
         "topic": "t",

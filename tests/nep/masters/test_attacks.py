@@ -138,7 +138,7 @@ def publisher(**changes: object) -> PublisherRecord:
     return replace(PublisherRecord(77, "/arm/state", "json", "json", ("tcp://127.0.0.1:9",)), **changes)  # type: ignore[arg-type]
 
 
-def test_a_routing_id_that_belongs_to_a_node_throws_it_not_out(master: Master, victims: Victims) -> None:
+def test_connection_with_the_routing_id_of_a_node_cannot_remove_it(master: Master, victims: Victims) -> None:
     before = master.view().nodes
     for victim in (victims.arm, victims.eye):
         with attacker_at(master, victim.id.encode()) as attacker:
@@ -149,7 +149,7 @@ def test_a_routing_id_that_belongs_to_a_node_throws_it_not_out(master: Master, v
     eventually(lambda: any(each.id == "request:127.0.0.1" for each in master.view().alerts))
 
 
-def test_a_second_connection_with_a_used_routing_id_takes_nothing_over(master: Master) -> None:
+def test_second_connection_with_a_used_routing_id_takes_nothing_over(master: Master) -> None:
     mine = node()
     with attacker_at(master, b"first") as first:
         assert isinstance(first.ask(Join(mine)), Found)
@@ -179,7 +179,7 @@ def requests_for(victims: Victims) -> list[Request]:
 
 
 @pytest.mark.parametrize("number", range(9))
-def test_nobody_speaks_for_another_node(master: Master, victims: Victims, number: int) -> None:
+def test_requests_for_another_node_are_rejected(master: Master, victims: Victims, number: int) -> None:
     request = requests_for(victims)[number]
     with attacker_at(master) as attacker:
         assert isinstance(attacker.ask(request), Refused)
@@ -190,7 +190,7 @@ def test_nobody_speaks_for_another_node(master: Master, victims: Victims, number
     victims.go_on()
 
 
-def test_a_renewal_of_somebody_else_renews_and_counts_nothing(master: Master, victims: Victims) -> None:
+def test_forged_renewal_renews_and_counts_nothing(master: Master, victims: Victims) -> None:
     seen = master.view()
     lie = Renew(
         victims.arm.id,
@@ -209,7 +209,7 @@ def test_a_renewal_of_somebody_else_renews_and_counts_nothing(master: Master, vi
 
 
 @pytest.mark.parametrize("is_proven", [False, True])
-def test_nobody_takes_the_id_of_a_publisher_or_subscriber(
+def test_id_of_a_publisher_or_subscriber_cannot_be_taken_over(
     master: Master, victims: Victims, is_proven: bool
 ) -> None:
     number = 1 if is_proven else 0  # a number that does not prove it
@@ -225,7 +225,7 @@ def test_nobody_takes_the_id_of_a_publisher_or_subscriber(
     victims.go_on()
 
 
-def test_who_took_ids_first_loses_them_to_who_can_prove_them() -> None:
+def test_squatted_ids_are_evicted_by_the_owner_with_the_key() -> None:
     """A master was started again, and the attacker is quicker than those who come back."""
     with Master("127.0.0.1:0", learn_s=0.0) as master:
         address = master.address
@@ -244,7 +244,7 @@ def test_who_took_ids_first_loses_them_to_who_can_prove_them() -> None:
         victims.close()
 
 
-def test_one_connection_speaks_for_one_node(master: Master) -> None:
+def test_one_connection_can_speak_for_only_one_node(master: Master) -> None:
     with attacker_at(master) as attacker:
         assert isinstance(attacker.ask(Join(node())), Found)
         second = Join(NodeRecord(node_id_from("b"), "Second", "host", 1, key="b"))
@@ -257,7 +257,7 @@ def test_one_connection_speaks_for_one_node(master: Master) -> None:
         )
 
 
-def test_a_node_whose_old_connection_hangs_is_not_locked_out(master: Master) -> None:
+def test_node_with_a_hung_old_connection_can_rejoin(master: Master) -> None:
     """Its computer lost the network and has it again; for the master the old connection is still there."""
     with attacker_at(master) as old, attacker_at(master) as new:
         arm = PublisherRecord(id_from(OWN_KEY, 1), "/arm", "json", "json", ("tcp://127.0.0.1:9",), number=1)
@@ -272,7 +272,9 @@ def test_a_node_whose_old_connection_hangs_is_not_locked_out(master: Master) -> 
         assert [each.node_id for each in master.view().topics["/arm"].publishers] == [OWN_ID]
 
 
-def test_nobody_makes_others_wait_not_for_a_subscriber(master: Master, victims: Victims) -> None:
+def test_false_report_of_a_missing_subscriber_does_not_stop_others_from_waiting_for_it(
+    master: Master, victims: Victims
+) -> None:
     """An attacker reports that it does not answer. Who publishes next waits for it all the same."""
     with attacker_at(master) as attacker:
         for n in range(3):
@@ -297,7 +299,7 @@ BAD_ENDPOINTS = [
 
 
 @pytest.mark.parametrize("endpoint", BAD_ENDPOINTS, ids=ascii)
-def test_an_endpoint_is_a_host_and_a_port_and_nothing_else(endpoint: str) -> None:
+def test_invalid_endpoints_are_rejected(endpoint: str) -> None:
     assert not is_tcp_endpoint(endpoint)
 
 
@@ -311,12 +313,12 @@ def test_an_endpoint_is_a_host_and_a_port_and_nothing_else(endpoint: str) -> Non
         "tcp://[fe80::1%eth0]:5",
     ],
 )
-def test_all_forms_of_hosts_are_endpoints(endpoint: str) -> None:
+def test_all_host_forms_are_valid_endpoints(endpoint: str) -> None:
     assert is_tcp_endpoint(endpoint)
 
 
 @pytest.mark.parametrize("endpoint", ["ipc:///tmp/x", "inproc://x", "udp://127.0.0.1:9", "tcp://a b:9", "x"])
-def test_no_program_without_a_key_registers_such_an_endpoint_either(master: Master, endpoint: str) -> None:
+def test_invalid_endpoint_is_rejected_also_without_a_key(master: Master, endpoint: str) -> None:
     own = NodeRecord("5" * 16, "Mallory", "host", 1)
 
     def record(where: str) -> PublisherRecord:
@@ -332,14 +334,14 @@ def test_no_program_without_a_key_registers_such_an_endpoint_either(master: Mast
     ("word", "said"),
     [("x\u202ey", r"'\u202e' is not allowed"), ("j" * 1000, "use at most 200 characters")],
 )
-def test_why_a_type_is_refused_is_said(master: Master, word: str, said: str) -> None:
+def test_rejected_message_type_is_reported_with_the_reason(master: Master, word: str, said: str) -> None:
     with attacker_at(master) as attacker:
         refused = attacker.ask(AddPublisher(node(), publisher(msg_type=word)))
         assert isinstance(refused, Refused)
         assert said in refused.reason
 
 
-def test_what_no_program_may_register_is_refused_counted_and_named(master: Master, victims: Victims) -> None:
+def test_invalid_registrations_are_rejected_counted_and_named(master: Master, victims: Victims) -> None:
     with attacker_at(master) as attacker:
         nonsense: list[Request] = [
             *(
@@ -377,7 +379,7 @@ def test_what_no_program_may_register_is_refused_counted_and_named(master: Maste
     victims.go_on()
 
 
-def test_a_node_has_no_more_than_so_many_publishers(master: Master) -> None:
+def test_number_of_publishers_per_node_is_limited(master: Master) -> None:
     with attacker_at(master) as attacker:
         many = tuple(publisher(id=n, topic=f"/t{n}") for n in range(1, 5_001))
         assert isinstance(attacker.ask(Join(node(), 0, many)), Found)
@@ -388,7 +390,7 @@ def test_a_node_has_no_more_than_so_many_publishers(master: Master) -> None:
         assert isinstance(attacker.ask(AddPublisher(node(), publisher(id=20_000))), Added)
 
 
-def test_a_key_is_shown_to_nobody(master: Master, victims: Victims) -> None:
+def test_key_of_a_node_is_never_disclosed(master: Master, victims: Victims) -> None:
     with attacker_at(master) as attacker:
         answers = [
             attacker.ask(Look()),
@@ -400,7 +402,7 @@ def test_a_key_is_shown_to_nobody(master: Master, victims: Victims) -> None:
         assert not any(key in told for key in keys)
 
 
-def test_who_evicts_is_told_to_those_who_listen(master: Master) -> None:
+def test_eviction_of_a_squatter_is_announced_to_subscribers_before_the_owner(master: Master) -> None:
     """Subscribers hear that the unproven publisher is gone before they hear of the proven one."""
     real = PublisherRecord(id_from("k", 1), "/t", "json", "json", ("tcp://127.0.0.1:9",), number=1)
     with attacker_at(master) as ear, attacker_at(master) as squatter, attacker_at(master) as owner:
@@ -415,7 +417,7 @@ def test_who_evicts_is_told_to_those_who_listen(master: Master) -> None:
         assert [each.publisher.node_name for each in (came, again)] == ["Mallory", "Owner"]
 
 
-def test_counts_of_subscribers_are_no_way_out_either(master: Master) -> None:
+def test_invalid_subscriber_counts_are_handled_safely(master: Master) -> None:
     with attacker_at(master) as attacker, nep.node("honest", master=master.address) as honest:
         record = SubscriberRecord(5, "/t", "json")
         assert isinstance(attacker.ask(AddSubscriber(node(), record)), Found)

@@ -16,7 +16,7 @@ from nep.protocol.requests import Refused
 from tests.nep.programs import eventually
 
 
-def test_each_sender_is_counted_and_told_for_some_seconds() -> None:
+def test_each_sender_is_counted_and_reported_for_some_seconds() -> None:
     bad = BadRequests()
     assert bad.alerts(0.0) == ()
     for _ in range(3):
@@ -33,7 +33,7 @@ def test_each_sender_is_counted_and_told_for_some_seconds() -> None:
     assert bad.alerts(29.5) == ()
 
 
-def test_alerts_do_not_change_with_each_bad_request() -> None:
+def test_alert_text_is_not_updated_on_every_bad_request() -> None:
     bad = BadRequests()
     bad.add("a", "“A”", "reason", 10.0)
     before = bad.alerts(10.0)
@@ -42,7 +42,7 @@ def test_alerts_do_not_change_with_each_bad_request() -> None:
     assert " 2 requests " in bad.alerts(11.0)[0].sentence
 
 
-def test_strangers_without_end_take_no_memory_without_end() -> None:
+def test_memory_for_senders_of_bad_requests_is_bounded() -> None:
     bad = BadRequests()
     for n in range(10_000):
         bad.add(f"s{n}", f"S{n}", "reason " * 1000, 10.0)
@@ -53,19 +53,19 @@ def test_strangers_without_end_take_no_memory_without_end() -> None:
     assert max(len(each.sentence) for each in told) < 400
 
 
-def test_what_a_stranger_wrote_does_not_write_lines_of_its_own() -> None:
+def test_control_characters_in_bad_requests_are_escaped() -> None:
     bad = BadRequests()
     bad.add("a", "“A”", "unknown request 'x\nERROR all is lost\x1b[31m'", 10.0)
     assert bad.alerts(10.0)[0].sentence.isprintable()
 
 
-def test_strangers_count_by_computer_and_nodes_by_themselves() -> None:
+def test_unknown_senders_are_grouped_by_computer_and_nodes_counted_individually() -> None:
     assert describe_sender("00000000000000ff", "camera", "10.0.0.1") == ("00000000000000ff", "“camera”")
     assert describe_sender("", "", "10.0.0.1") == ("10.0.0.1", "A program on 10.0.0.1")
     assert describe_sender("", "", "") == ("", "A program on an unknown computer")
 
 
-def test_the_master_logs_the_first_then_rarely_and_shows_an_alert(
+def test_master_logs_the_first_bad_request_then_rarely_and_raises_an_alert(
     master: Master, caplog: pytest.LogCaptureFixture
 ) -> None:
     caplog.set_level(logging.WARNING, "nep.master")
@@ -90,7 +90,7 @@ def test_the_master_logs_the_first_then_rarely_and_shows_an_alert(
     assert " sent 10 requests " in logged[1]
 
 
-def test_what_only_begins_as_a_renewal_counts_too(master: Master) -> None:
+def test_malformed_renewal_counts_as_a_bad_request(master: Master) -> None:
     context = zmq.Context()
     with context.socket(zmq.DEALER) as socket:
         socket.setsockopt(zmq.LINGER, 0)

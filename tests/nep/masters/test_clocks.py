@@ -68,7 +68,7 @@ def renewed(graph: Graph, number: int, clock: tuple[int, ...] | None, now: float
     return answer.answer
 
 
-def test_a_node_is_told_the_sum_of_both_ways() -> None:
+def test_node_receives_the_summed_clock_offset_of_both_paths() -> None:
     graph = graph_of("c1", "c2")
     assert renewed(graph, 1, (3 * S, 400)).clocks == {}
     assert renewed(graph, 0, (S, 300)).clocks == {"n1": (2 * S, 700)}
@@ -76,7 +76,7 @@ def test_a_node_is_told_the_sum_of_both_ways() -> None:
     assert graph.view().nodes["n1"].clock_uncertainty_ns == 400
 
 
-def test_nodes_of_the_masters_computer_need_not_ask() -> None:
+def test_nodes_on_the_master_computer_need_no_clock_exchange() -> None:
     graph = graph_of(MASTERS, "c2")
     assert not graph.clocks.times(graph.members["n0"], 5)
     assert graph.clocks.times(graph.members["n1"], 5, lambda: 6) == (5, 6)
@@ -85,21 +85,21 @@ def test_nodes_of_the_masters_computer_need_not_ask() -> None:
     assert graph.view().nodes["n0"].clock_uncertainty_ns == 0
 
 
-def test_of_ones_own_computer_nothing_is_told() -> None:
+def test_no_clock_difference_is_sent_for_the_same_computer() -> None:
     graph = graph_of("c1", "c1", "")
     renewed(graph, 1, (S, 400))
     renewed(graph, 2, (2 * S, 400))
     assert set(renewed(graph, 0, (S, 400)).clocks) == {"n2"}, "who does not say may be anywhere"
 
 
-def test_what_was_told_gets_less_sure() -> None:
+def test_uncertainty_of_a_clock_difference_grows_with_age() -> None:
     graph = graph_of("c1", "c2")
     renewed(graph, 1, (0, 400), now=1.0)
     assert renewed(graph, 0, (0, 300), now=3.0).clocks == {"n1": (0, 700 + 100_000)}
 
 
 @pytest.mark.parametrize("clock", [None, ()])
-def test_a_node_that_does_not_know_is_not_told_and_others_are_not_told_of_it(
+def test_node_with_unknown_clock_gets_and_causes_no_clock_difference(
     clock: tuple[int, ...] | None,
 ) -> None:
     graph = graph_of("c1", "c2")
@@ -123,7 +123,7 @@ def test_a_node_that_does_not_know_is_not_told_and_others_are_not_told_of_it(
         (5, 5, 5),
     ],
 )
-def test_what_no_clock_can_be_is_not_known(clock: tuple[int, ...]) -> None:
+def test_implausible_clock_is_treated_as_unknown(clock: tuple[int, ...]) -> None:
     graph = graph_of("c1", "c2")
     renewed(graph, 0, (0, 0))
     assert not renewed(graph, 1, clock).again
@@ -134,7 +134,7 @@ def test_what_no_clock_can_be_is_not_known(clock: tuple[int, ...]) -> None:
 @pytest.mark.parametrize(
     "clock", ["x", 5, [1.5, 2], [float("nan"), 1], [True, 1], [None, 1], {"a": 1}, [[1]]]
 )
-def test_what_is_no_clock_at_all_is_refused_and_named(clock: object) -> None:
+def test_malformed_clock_is_rejected_and_named(clock: object) -> None:
     graph = graph_of("c1", "c2")
     what = encoding.write(renewal(graph, 0, None))
     assert isinstance(what, dict)
@@ -146,7 +146,7 @@ def test_what_is_no_clock_at_all_is_refused_and_named(clock: object) -> None:
 
 
 @pytest.mark.parametrize("clock", [None, (), (S, 300)])
-def test_the_quick_way_says_the_same(clock: tuple[int, ...] | None) -> None:
+def test_fast_path_gives_the_same_clock_reply(clock: tuple[int, ...] | None) -> None:
     quick, long = graph_of("c1", "c2"), graph_of("c1", "c2")
     for graph in (quick, long):
         renewed(graph, 1, (3 * S, 400))
@@ -164,7 +164,7 @@ def quick_answer(graph: Graph, said: RawRenewal, **more: Any) -> bytes:
     return encode_renewed(7, EPOCH, graph.revision, last_seqs, (), clocks=clocks, **more)
 
 
-def test_older_nodes_and_masters_see_what_they_always_saw() -> None:
+def test_messages_of_older_nodes_and_masters_are_unchanged() -> None:
     graph = graph_of("", "")
     said = read_renewal(encoding.encode_request(renewal(graph, 0, None), 7))
     assert said is not None
@@ -175,7 +175,7 @@ def test_older_nodes_and_masters_see_what_they_always_saw() -> None:
     assert b"clock" not in encoding.encode_request(renewal(graph, 0, None), 7)
 
 
-def test_a_subscriber_is_told_the_computer_of_a_publisher() -> None:
+def test_subscriber_receives_the_computer_id_of_a_publisher() -> None:
     graph = graph_of("c1", "c2")
     (answer,) = graph.apply(replace(joining(0, "c1", 2), epoch=EPOCH), 1, 0.0, "n0")
     assert isinstance(answer.answer, Found)
@@ -183,7 +183,7 @@ def test_a_subscriber_is_told_the_computer_of_a_publisher() -> None:
 
 
 @pytest.mark.parametrize("computer", ["x" * 65, "a\nb"])
-def test_a_computer_that_is_none_is_refused(computer: str) -> None:
+def test_invalid_computer_id_is_rejected(computer: str) -> None:
     graph = Graph(EPOCH, 0.0, 0.0)
     join = Join(NodeRecord("0123456789abcdef", "n", "h", 1, computer=computer))
     (answer,) = graph.apply(join, 1, 0.0, "0123456789abcdef", is_foreign=True)

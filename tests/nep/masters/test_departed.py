@@ -18,7 +18,7 @@ from nep.protocol.requests import (
 )
 
 
-def test_the_newest_are_kept_for_a_minute_and_bounded() -> None:
+def test_newest_departed_publishers_are_kept_for_a_minute_and_bounded() -> None:
     departed: Departed[str] = Departed()
     for number in range(100):
         departed.add(("t", "**"), number, f"{number}")
@@ -36,7 +36,7 @@ def test_the_newest_are_kept_for_a_minute_and_bounded() -> None:
     assert not departed.of("t")
 
 
-def test_all_of_them_are_bounded() -> None:
+def test_total_number_of_departed_publishers_is_bounded() -> None:
     departed: Departed[int] = Departed()
     for number in range(5000):
         departed.add((f"topic {number}",), number, number)
@@ -58,7 +58,7 @@ def renewed(graph: Graph, who: NodeRecord, now: float, *counts: PublisherCount) 
     return dict(answer.last_seqs)
 
 
-def test_a_renewal_tells_how_far_a_publisher_came_that_is_not_there_any_more() -> None:
+def test_renewal_reply_has_the_last_message_number_of_a_departed_publisher() -> None:
     graph = Graph(1, 0.0, learn_s=0.0)
     sends, hears = node("a"), node("b")
     record = PublisherRecord(1, "/robot/t", "json", "json", ("tcp://10.0.0.1:5000",))

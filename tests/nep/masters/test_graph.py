@@ -65,7 +65,7 @@ def ask(graph: Graph, request: Request, now: float = 0.0) -> tuple[Outgoing, ...
     return graph.apply(request, 1, now, "asker")
 
 
-def test_a_publisher_is_told_whom_to_expect_after_they_are_told(graph: Graph) -> None:
+def test_publisher_is_told_its_subscribers_after_they_are_notified(graph: Graph) -> None:
     ask(graph, AddSubscriber(node("s"), subscriber(1)))
     push, reply = ask(graph, AddPublisher(node("p"), publisher(2)))
     assert (push.to, push.call) == ("s", None)
@@ -76,7 +76,7 @@ def test_a_publisher_is_told_whom_to_expect_after_they_are_told(graph: Graph) ->
     assert (reply.answer.epoch, reply.answer.expected) == (7, (Expected(1, "s", "S"),))
 
 
-def test_only_the_first_notice_of_a_publisher_says_that_it_is_new(graph: Graph) -> None:
+def test_only_the_first_notice_of_a_publisher_marks_it_as_new(graph: Graph) -> None:
     ask(graph, AddSubscriber(node("s"), subscriber(1)))
     moved = publisher(2, at="tcp://127.0.0.1:6")
     rejoined = Join(node("p"), 3, (moved, publisher(3)), ())
@@ -85,7 +85,7 @@ def test_only_the_first_notice_of_a_publisher_says_that_it_is_new(graph: Graph) 
     assert [each.is_new for each in notices if isinstance(each, PublisherCame)] == [True, False, False]
 
 
-def test_an_unlisted_publisher_that_comes_back_with_another_endpoint_is_not_new(graph: Graph) -> None:
+def test_unlisted_publisher_that_returns_with_another_endpoint_is_not_new(graph: Graph) -> None:
     ask(graph, AddSubscriber(node("s"), subscriber(1)))
     ask(graph, AddPublisher(node("p"), publisher(2)))
     graph.drop(["p"])
@@ -94,14 +94,14 @@ def test_an_unlisted_publisher_that_comes_back_with_another_endpoint_is_not_new(
     assert not push.answer.is_new
 
 
-def test_a_node_with_two_subscribers_is_told_once(graph: Graph) -> None:
+def test_node_with_two_subscribers_is_notified_once(graph: Graph) -> None:
     for id in (1, 2):
         ask(graph, AddSubscriber(node("s"), subscriber(id)))
     outgoing = ask(graph, AddPublisher(node("p"), publisher(3)))
     assert [each.to for each in outgoing] == ["s", "asker"]
 
 
-def test_a_subscriber_is_told_who_publishes_and_these_are_probed(graph: Graph) -> None:
+def test_subscriber_receives_the_publishers_which_are_probed(graph: Graph) -> None:
     ask(graph, AddPublisher(node("p"), publisher(1)))
     ask(graph, AddPublisher(node("original", "A"), publisher(2, at="")))
     probe, reply = ask(graph, AddSubscriber(node("s"), subscriber(3)))
@@ -111,13 +111,13 @@ def test_a_subscriber_is_told_who_publishes_and_these_are_probed(graph: Graph) -
     assert without(reply.answer, frozenset({"p"})) == Found(7, graph.revision)
 
 
-def test_whoever_turns_out_dead_is_not_expected() -> None:
+def test_dead_subscribers_are_not_expected() -> None:
     answer = Added(1, 1, (Expected(1, "a", "A"), Expected(2, "b", "B")), (Expected(3, "a", "A"),))
     assert without(answer, frozenset({"a"})) == Added(1, 1, (Expected(2, "b", "B"),), ())
     assert without(answer, frozenset()) is answer
 
 
-def test_a_bad_topic_is_refused(graph: Graph) -> None:
+def test_invalid_topic_is_rejected(graph: Graph) -> None:
     (reply,) = ask(graph, AddPublisher(node("p"), publisher(1, "two words")))
     assert isinstance(reply.answer, Refused)
     assert reply.answer.code == "topic"
@@ -125,7 +125,7 @@ def test_a_bad_topic_is_refused(graph: Graph) -> None:
     assert graph.nodes == ()
 
 
-def test_orderly_goodbyes_carry_the_last_message(graph: Graph) -> None:
+def test_orderly_leave_carries_the_last_message_number(graph: Graph) -> None:
     ask(graph, AddSubscriber(node("s"), subscriber(1)))
     ask(graph, AddPublisher(node("p"), publisher(2)))
     push, reply = ask(graph, RemovePublisher("p", 2, last_seq=5))
@@ -140,7 +140,7 @@ def test_orderly_goodbyes_carry_the_last_message(graph: Graph) -> None:
     assert [each.id for each in graph.nodes] == ["s"]
 
 
-def test_a_lapsed_lease_unlists_and_does_not_close(graph: Graph) -> None:
+def test_expired_lease_unlists_a_publisher_without_closing_it(graph: Graph) -> None:
     ask(graph, AddSubscriber(node("s"), subscriber(1)), 0.0)
     ask(graph, AddPublisher(node("p"), publisher(2)), 0.0)
     ask(graph, Renew("s", 7, 0, (), (SubscriberCount(1, 0, 0),)), 2.0)
@@ -154,7 +154,7 @@ def test_a_lapsed_lease_unlists_and_does_not_close(graph: Graph) -> None:
     assert reply.answer.again
 
 
-def test_managed_nodes_have_no_lease_and_get_no_pushes(graph: Graph) -> None:
+def test_managed_nodes_have_no_lease_and_receive_no_pushes(graph: Graph) -> None:
     ask(graph, Join(node("o", "A"), 0, (publisher(1, at=""),), (subscriber(2),), managed=True))
     assert graph.silent(100.0) == ()
     assert graph.tick(100.0) == ()
@@ -165,7 +165,7 @@ def test_managed_nodes_have_no_lease_and_get_no_pushes(graph: Graph) -> None:
     assert graph.view().nodes["o"].generation == "A"
 
 
-def test_renewals_bring_statistics_and_what_changed(graph: Graph) -> None:
+def test_renewals_update_statistics_and_return_changes(graph: Graph) -> None:
     ask(graph, AddSubscriber(node("s"), subscriber(1)))
     before = graph.revision
     ask(graph, AddPublisher(node("p"), publisher(2)))
@@ -184,7 +184,7 @@ def test_renewals_bring_statistics_and_what_changed(graph: Graph) -> None:
     assert (topic.lost, topic.loss_ratio) == (10, 0.25)
 
 
-def test_a_node_shows_the_load_of_its_last_renewal(graph: Graph) -> None:
+def test_node_shows_the_cpu_load_of_its_last_renewal(graph: Graph) -> None:
     ask(graph, Join(node("p")))
     assert graph.view().nodes["p"].cpu_ratio is None
     ask(graph, Renew("p", 7, 0, cpu_ratio=0.25))
@@ -194,7 +194,7 @@ def test_a_node_shows_the_load_of_its_last_renewal(graph: Graph) -> None:
 
 
 @pytest.mark.parametrize("epoch", [6, 7])
-def test_a_renewal_that_does_not_match_asks_for_everything(graph: Graph, epoch: int) -> None:
+def test_mismatching_renewal_requests_a_full_join(graph: Graph, epoch: int) -> None:
     ask(graph, AddPublisher(node("p"), publisher(2)))
     counts = () if epoch == 7 else (PublisherCount(2, 0, 0, 0),)
     (reply,) = ask(graph, Renew("p", epoch, 0, counts))
@@ -202,7 +202,7 @@ def test_a_renewal_that_does_not_match_asks_for_everything(graph: Graph, epoch: 
     assert reply.answer.again
 
 
-def test_joining_replaces_what_was_known(graph: Graph) -> None:
+def test_join_replaces_the_previous_registration(graph: Graph) -> None:
     ask(graph, AddSubscriber(node("s"), subscriber(1)))
     ask(graph, AddPublisher(node("p"), publisher(2)))
     outgoing = ask(graph, Join(node("p"), 3, (publisher(4),), (subscriber(5),)))
@@ -212,7 +212,7 @@ def test_joining_replaces_what_was_known(graph: Graph) -> None:
     assert sorted(each.id for each in topic.subscribers) == [1, 5]
 
 
-def test_a_learning_master_lets_the_old_come_back_first() -> None:
+def test_restarted_master_accepts_known_nodes_before_new_ones() -> None:
     graph = Graph(epoch=7, now=0.0, learn_s=1.0)
     assert ask(graph, AddPublisher(node("new"), publisher(1)), 0.2) == ()
     assert graph.learning_end == 1.0
@@ -225,7 +225,7 @@ def test_a_learning_master_lets_the_old_come_back_first() -> None:
     assert graph.learning_end is None
 
 
-def test_who_does_not_answer_is_an_alert_until_it_renews(graph: Graph) -> None:
+def test_unresponsive_node_is_an_alert_until_it_renews(graph: Graph) -> None:
     ask(graph, AddSubscriber(node("s"), subscriber(1)))
     ask(graph, AddPublisher(node("p"), publisher(2)))
     ask(graph, ReportMissing("p", 2, (1, 99)))
@@ -238,7 +238,7 @@ def test_who_does_not_answer_is_an_alert_until_it_renews(graph: Graph) -> None:
     assert graph.view().alerts == ()
 
 
-def test_alerts_on_names_types_and_messages(graph: Graph) -> None:
+def test_name_type_and_message_conflicts_raise_alerts(graph: Graph) -> None:
     ask(graph, AddPublisher(node("a", name="N"), publisher(1, msg_type="json")))
     ask(graph, AddPublisher(node("b", name="N"), publisher(2, msg_type="string")))
     ask(graph, AddSubscriber(node("c"), subscriber(3)))
@@ -250,7 +250,7 @@ def test_alerts_on_names_types_and_messages(graph: Graph) -> None:
     assert {each.id for each in graph.view().alerts} == {"message:t"}
 
 
-def test_the_gateway_s_copies_do_not_count_twice(graph: Graph) -> None:
+def test_copies_of_the_gateway_are_not_counted_twice(graph: Graph) -> None:
     ask(graph, Join(node("o", "A"), 0, (publisher(1, at=""),), managed=True))
     ask(graph, AddPublisher(node("g", "gateway"), publisher(2)))
     for second in range(2):
@@ -275,11 +275,11 @@ REQUESTS: list[Request] = [
 
 
 @pytest.mark.parametrize("request_", REQUESTS, ids=lambda each: type(each).__name__)
-def test_requests_survive_the_wire(request_: Request) -> None:
+def test_requests_round_trip(request_: Request) -> None:
     assert encoding.decode_request(encoding.encode_request(request_, 42)) == (42, request_)
 
 
-def test_answers_survive_the_wire(graph: Graph) -> None:
+def test_answers_round_trip(graph: Graph) -> None:
     ask(graph, AddSubscriber(node("s"), subscriber(1)))
     ask(graph, AddPublisher(node("a", name="S"), publisher(2)))
     ask(graph, Renew("s", 7, 0, (), (SubscriberCount(1, 5, 5),)))
@@ -292,7 +292,7 @@ def test_answers_survive_the_wire(graph: Graph) -> None:
 
 
 @given(st.binary(max_size=50))
-def test_any_bytes_are_a_request_or_a_sentence(body: bytes) -> None:
+def test_any_bytes_decode_to_a_request_or_a_wire_error(body: bytes) -> None:
     assert isinstance(encoding.decode_request(body).request, WireError | Ping | Look)
     with pytest.raises(WireError):
         encoding.decode_answer(body)
@@ -310,14 +310,14 @@ def test_any_bytes_are_a_request_or_a_sentence(body: bytes) -> None:
         ),
     ),
 )
-def test_any_map_is_a_request_or_a_sentence(do: object, what: object) -> None:
+def test_any_map_decodes_to_a_request_or_a_wire_error(do: object, what: object) -> None:
     asked = encoding.decode_request(pack({"do": do, "call": 5, "what": what}))
     assert asked.call == 5
     if isinstance(asked.request, WireError):
         assert asked.request.reason
 
 
-def test_a_wrong_field_is_named() -> None:
+def test_invalid_field_is_named() -> None:
     body = pack({"do": "renew", "call": 1, "what": {"node_id": "a", "epoch": "x", "revision": 1}})
     refused = encoding.decode_request(body).request
     assert isinstance(refused, WireError)
@@ -328,7 +328,7 @@ def test_a_wrong_field_is_named() -> None:
     assert (missing.code, missing.reason) == ("field-missing", "'Leave.node_id' is missing")
 
 
-def test_subscribers_with_wildcards_are_no_topic_and_travel(graph: Graph) -> None:
+def test_wildcard_subscribers_are_listed_as_patterns_and_round_trip(graph: Graph) -> None:
     wide = SubscriberRecord(1, "/robot/*/camera", "image", pattern=True)
     ask(graph, AddSubscriber(node("s"), wide))
     ask(graph, AddPublisher(node("p"), publisher(2, "/robot/a/camera")))
@@ -347,12 +347,12 @@ def test_subscribers_with_wildcards_are_no_topic_and_travel(graph: Graph) -> Non
     assert (list(graph.view().topics), graph.view().patterns) == (["/robot/a/camera"], {})
 
 
-def test_newer_peers_may_send_more() -> None:
+def test_unknown_fields_of_newer_peers_are_ignored() -> None:
     body = pack({"do": "leave", "call": 1, "what": {"node_id": "a", "mood": "fine"}})
     assert encoding.decode_request(body).request == Leave("a")
 
 
-def test_a_meter_needs_two_readings_and_forgets() -> None:
+def test_meter_needs_two_readings_and_resets() -> None:
     meter = Meter()
     assert meter.rates() is None
     meter.add(0.0, 0, 0)

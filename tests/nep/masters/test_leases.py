@@ -56,7 +56,7 @@ def test_nodes_of_ordinary_graphs_renew_every_second(nodes: int, managed: int) -
 
 @pytest.mark.parametrize(("nodes", "renew_s"), [(250, 2.0), (500, 4.0), (2000, 5.0)])
 @pytest.mark.parametrize("within_s", [0.01, 1.0])
-def test_nodes_of_large_graphs_renew_less_often_together_and_spread(
+def test_nodes_of_large_graphs_renew_less_often_and_are_spread_evenly(
     nodes: int, renew_s: float, within_s: float
 ) -> None:
     times = told(nodes, rounds=8, within_s=within_s)
@@ -68,7 +68,7 @@ def test_nodes_of_large_graphs_renew_less_often_together_and_spread(
     assert max(together.values()) <= 2 + 1.2 * nodes / (renew_s * 10)
 
 
-def test_a_node_that_comes_a_little_late_stays_in_its_place() -> None:
+def test_slightly_late_renewal_keeps_its_slot() -> None:
     registry = census_of(500)
     found = Leases(registry, LEASE_S)
     found.set_renew_interval(0.0)
@@ -79,7 +79,7 @@ def test_a_node_that_comes_a_little_late_stays_in_its_place() -> None:
     assert at == pytest.approx(26.01)
 
 
-def test_whoever_was_told_to_wait_is_late_and_lapses_that_much_later() -> None:
+def test_longer_renewal_interval_extends_the_lease() -> None:
     registry = census_of(500)
     found = Leases(registry, LEASE_S)
     found.set_renew_interval(0.0)
@@ -91,7 +91,7 @@ def test_whoever_was_told_to_wait_is_late_and_lapses_that_much_later() -> None:
     assert "n1" in found.expired(3.0)  # it was told nothing yet
 
 
-def test_a_master_tells_how_long_to_wait() -> None:
+def test_master_sends_the_renewal_interval() -> None:
     graph = Graph(7, 0.0, learn_s=0.0)
     for n in range(500):
         graph.apply(Join(NodeRecord(f"n{n}", f"N{n}", "host", 1)), 1, 0.0, f"n{n}")
@@ -103,7 +103,7 @@ def test_a_master_tells_how_long_to_wait() -> None:
     assert reply.answer == Renewed(7, graph.revision, again=True)
 
 
-def test_a_node_obeys_and_goes_on_without_answers() -> None:
+def test_node_follows_the_renewal_interval_and_continues_without_replies() -> None:
     pace = RenewalTimer()
     pace.start(10.0)
     assert pace.due_at == 11.0
@@ -116,7 +116,7 @@ def test_a_node_obeys_and_goes_on_without_answers() -> None:
 
 
 @pytest.mark.parametrize(("told_s", "waits_s"), [(0.0, 1.0), (-5.0, 1.0), (1e9, 30.0), (float("nan"), 1.0)])
-def test_nothing_that_a_master_says_makes_a_node_race_or_sleep(told_s: float, waits_s: float) -> None:
+def test_renewal_interval_of_a_master_is_clamped(told_s: float, waits_s: float) -> None:
     pace = RenewalTimer()
     pace.set_interval(told_s, 10.0)
     assert pace.due_at == 10.0 + waits_s
@@ -134,7 +134,7 @@ for line in sys.stdin:
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="uses POSIX signals")
-def test_a_killed_program_is_gone_within_3_s_though_it_may_be_silent_for_longer(
+def test_killed_program_is_removed_within_3_s_despite_a_longer_renewal_interval(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     monkeypatch.setattr(leases, "_MAX_RENEWALS_PER_S", 0.01)
@@ -151,7 +151,9 @@ def test_a_killed_program_is_gone_within_3_s_though_it_may_be_silent_for_longer(
             assert node.graph().nodes == {}
 
 
-def test_a_node_that_waits_is_known_at_once_to_a_new_master(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_node_with_a_long_renewal_interval_registers_at_once_at_a_new_master(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
     monkeypatch.setattr(leases, "_MAX_RENEWALS_PER_S", 0.01)
     monkeypatch.setattr(leases, "_MAX_RENEW_S", 20.0)
     master = Master("127.0.0.1:0", learn_s=0.0).start()
@@ -173,7 +175,7 @@ def dealer(context: zmq.Context[zmq.Socket[bytes]], address: str, name: bytes) -
     return socket
 
 
-def test_the_port_tells_whose_connection_ended_each_once_a_moment_later() -> None:
+def test_router_reports_each_closed_connection_once_after_a_delay() -> None:
     port = MasterRouter("127.0.0.1:0")
     context: zmq.Context[zmq.Socket[bytes]] = zmq.Context()
     sockets = {name: dealer(context, port.address, name) for name in (b"a", b"b", b"c")}

@@ -81,7 +81,7 @@ def view(graph: Graph) -> GraphView:
     return GraphViewer(graph._registry).view(EPOCH)
 
 
-def test_a_quick_renewal_says_and_does_what_the_long_way_does() -> None:
+def test_fast_renewal_matches_the_normal_path() -> None:
     quick, long = graph_of(5), graph_of(5)
     for now in (1.0, 2.0, 3.0):
         for n in range(5):
@@ -96,7 +96,7 @@ def test_a_quick_renewal_says_and_does_what_the_long_way_does() -> None:
     assert view(quick).topics["t0"].rate_hz is not None
 
 
-def test_a_lease_begins_anew() -> None:
+def test_renewal_restarts_the_lease() -> None:
     graph = graph_of(2)
     assert renew(graph, renewal(0, graph), 2.9) is not None
     graph.tick(3.0)
@@ -125,7 +125,7 @@ def test_a_lease_begins_anew() -> None:
         {"cpu_ratio": "much"},
     ],
 )
-def test_an_unusual_renewal_goes_the_long_way(change: dict[str, object]) -> None:
+def test_unusual_renewal_falls_back_to_the_normal_path(change: dict[str, object]) -> None:
     graph = graph_of(2)
     what = write(renewal(0, graph))
     assert isinstance(what, dict)
@@ -135,7 +135,7 @@ def test_an_unusual_renewal_goes_the_long_way(change: dict[str, object]) -> None
 
 @settings(deadline=None, max_examples=60)
 @given(st.binary(max_size=60) | st.recursive(st.none() | st.integers() | st.text(), st.lists).map(write))
-def test_what_is_no_renewal_is_none(junk: object) -> None:
+def test_invalid_renewal_is_not_parsed_by_the_fast_path(junk: object) -> None:
     bodies_of_junk = [junk] if isinstance(junk, bytes) else []
     begins = encoding.encode_request(Renew("n0", 1, 1), 7)
     bodies_of_junk += [begins[:14] + (junk if isinstance(junk, bytes) else b""), begins[:-1], begins + b"x"]
@@ -151,7 +151,7 @@ CHANGES = st.lists(st.tuples(KINDS, st.integers(0, 4)))
 
 @settings(deadline=None, max_examples=60)
 @given(CHANGES)
-def test_a_view_of_what_changed_is_the_view_of_everything(changes: list[tuple[str, int]]) -> None:
+def test_incremental_view_matches_a_full_view(changes: list[tuple[str, int]]) -> None:
     graph, packer = graph_of(3), AnswerEncoder()
     for now, (what, n) in enumerate(changes):
         if what == "join":
@@ -172,7 +172,7 @@ def test_a_view_of_what_changed_is_the_view_of_everything(changes: list[tuple[st
         assert encoding.decode_answer(packer.encode(answer.answer, 3)) == (3, answer.answer)
 
 
-def test_what_has_not_changed_is_the_same_value() -> None:
+def test_unchanged_topics_are_the_same_object() -> None:
     graph = graph_of(3)
     before = graph.view()
     renew(graph, renewal(0, graph), 1.0)
@@ -181,7 +181,7 @@ def test_what_has_not_changed_is_the_same_value() -> None:
     assert after.topics["t0"] != before.topics["t0"]
 
 
-def test_listeners_hear_of_the_last_change_though_not_of_each() -> None:
+def test_slow_listeners_receive_the_last_change_but_not_every_one() -> None:
     class Slow:
         def __init__(self) -> None:
             self.views: list[GraphView] = []

@@ -54,7 +54,7 @@ class Attached:
         self.events.append("close")
 
 
-def test_malformed_requests_get_an_error_and_do_not_kill(master: Master) -> None:
+def test_malformed_requests_get_an_error_and_the_master_survives(master: Master) -> None:
     context = zmq.Context()
     socket = context.socket(zmq.DEALER)
     socket.setsockopt(zmq.LINGER, 0)
@@ -85,13 +85,13 @@ def test_malformed_requests_get_an_error_and_do_not_kill(master: Master) -> None
     assert ORIGINAL.id in master.view().nodes
 
 
-def test_nobody_takes_replies_that_are_for_the_masters_own_process(master: Master) -> None:
+def test_negative_call_number_cannot_intercept_internal_replies(master: Master) -> None:
     asked = encoding.decode_request(pack({"do": "ping", "call": -1}))
     assert asked == encoding.ReceivedRequest(0, Ping())
     assert encoding.decode_request(pack({"do": "ping", "call": True})).call == 0
 
 
-def test_a_socket_of_another_kind_does_not_kill(master: Master) -> None:
+def test_socket_of_another_type_does_not_crash_the_master(master: Master) -> None:
     context = zmq.Context()
     for kind in (zmq.REQ, zmq.PUB, zmq.REP):
         socket = context.socket(kind)
@@ -104,19 +104,19 @@ def test_a_socket_of_another_kind_does_not_kill(master: Master) -> None:
     assert is_running(master.address)
 
 
-def test_two_masters_do_not_share_an_address(master: Master) -> None:
+def test_second_master_on_an_address_raises_address_in_use_error(master: Master) -> None:
     with pytest.raises(nep.AddressInUseError, match="in use by another program"):
         Master(master.address).start()
 
 
-def test_nobody_answers_where_no_master_is() -> None:
+def test_is_running_is_false_without_a_master() -> None:
     with Master("127.0.0.1:0") as master:
         address = master.address
         assert is_running(address)
     assert not is_running(address, 0.1)
 
 
-def test_what_is_attached_starts_before_anybody_is_answered_and_hears_of_changes() -> None:
+def test_attachment_starts_before_the_first_reply_and_receives_changes() -> None:
     attached = Attached()
     with Master("127.0.0.1:0", attachments=[attached], learn_s=0.0) as master:
         with nep.node("n", master=master.address) as node:
@@ -126,7 +126,7 @@ def test_what_is_attached_starts_before_anybody_is_answered_and_hears_of_changes
     assert attached.events == ["start", "close"]
 
 
-def test_an_attachment_that_cannot_start_ends_the_start() -> None:
+def test_attachment_that_fails_to_start_aborts_the_start() -> None:
     fine, broken = Attached(), Attached(fails=True)
     master = Master("127.0.0.1:0", attachments=[fine, broken])
     with pytest.raises(nep.AddressInUseError):
@@ -135,7 +135,7 @@ def test_an_attachment_that_cannot_start_ends_the_start() -> None:
     assert not is_running(master.address, 0.1)
 
 
-def test_an_attachment_that_breaks_does_not_break_the_master(caplog: pytest.LogCaptureFixture) -> None:
+def test_attachment_that_raises_does_not_stop_the_master(caplog: pytest.LogCaptureFixture) -> None:
     attached = Attached()
     with Master("127.0.0.1:0", attachments=[attached], learn_s=0.0) as master:
         attached.fails = True
@@ -146,7 +146,7 @@ def test_an_attachment_that_breaks_does_not_break_the_master(caplog: pytest.LogC
     assert "an attachment of the master failed" in caplog.text
 
 
-def test_foreign_nodes_are_registered_from_inside(master: Master) -> None:
+def test_foreign_nodes_can_be_registered_in_process(master: Master) -> None:
     record = PublisherRecord(5, "old/topic", "json", "json")
     assert not isinstance(master.submit(Join(ORIGINAL, 0, (record,), managed=True)), Refused)
     renew = Renew(ORIGINAL.id, master.epoch, 0, (PublisherCount(5, 3, 30, 0),))
@@ -160,7 +160,7 @@ def test_foreign_nodes_are_registered_from_inside(master: Master) -> None:
     assert master.view().nodes == {}
 
 
-def test_a_closed_master_takes_nothing(master: Master) -> None:
+def test_closed_master_rejects_requests(master: Master) -> None:
     master.close()
     master.close()
     with pytest.raises(nep.ClosedError):
@@ -168,7 +168,7 @@ def test_a_closed_master_takes_nothing(master: Master) -> None:
     assert master.wait(0.0)
 
 
-def test_submitting_from_many_threads(master: Master) -> None:
+def test_concurrent_submits_from_many_threads_are_answered(master: Master) -> None:
     replies: list[object] = []
     threads = [
         threading.Thread(target=lambda: replies.extend(master.submit(Ping()) for _ in range(50)))
@@ -191,7 +191,7 @@ with nep.node("stranger") as node:
 """
 
 
-def test_a_master_ends_with_its_owner_when_nobody_else_needs_it(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_master_exits_with_its_owner_when_no_other_node_is_left(monkeypatch: pytest.MonkeyPatch) -> None:
     with running(SLEEPER) as owner:
         owner.line()
         with Master("127.0.0.1:0", owner_pid=owner.process.pid, learn_s=0.0) as master:
@@ -205,13 +205,13 @@ def test_a_master_ends_with_its_owner_when_nobody_else_needs_it(monkeypatch: pyt
                 assert master.wait(30.0)
 
 
-def test_a_master_of_this_process_outlives_nothing_it_should_not() -> None:
+def test_master_owned_by_its_own_process_does_not_exit_early() -> None:
     with Master("127.0.0.1:0", owner_pid=os.getpid()) as master:
         assert not master.wait(0.6)
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="needs the POSIX meaning of kill")
-def test_a_process_that_is_no_master_is_given_up(tmp_path: object) -> None:
+def test_failed_master_process_raises_master_unreachable(tmp_path: object) -> None:
     with Master("127.0.0.1:0") as probe:
         address = probe.address
     with pytest.raises(nep.MasterUnreachable):

@@ -58,7 +58,7 @@ def wait_for(node, wanted):
         ([], "127.0.0.1:7780", ""),
     ],
 )
-def test_everybody_connects_to_what_is_in_reach(endpoints, master, chosen):
+def test_nearest_reachable_endpoint_is_chosen(endpoints, master, chosen):
     assert nearest(endpoints, master) == chosen
 
 
@@ -72,13 +72,13 @@ def test_only_addresses_of_this_computer_can_be_served():
         check_hosts(["192.168.1.21"], ())
 
 
-def test_own_addresses_are_none_of_the_loopback():
+def test_own_addresses_exclude_loopback_and_link_local():
     assert not [own for own in own_addresses() if own.host.startswith(("127.", "169.254."))]
     assert has_address("127.0.0.1")
     assert not has_address("203.0.113.77")
 
 
-def test_a_master_serves_this_computer_only_until_it_is_told(master):
+def test_master_listens_on_loopback_only_until_another_address_is_configured(master):
     far = f"{OTHER}:{master.address.rpartition(':')[2]}"
     assert not nep.masters.master.is_running(far, 0.3)
     listen([OTHER], master.address)
@@ -89,7 +89,7 @@ def test_a_master_serves_this_computer_only_until_it_is_told(master):
     assert master.view().listens == ()
 
 
-def test_a_refusal_changes_nothing_and_says_why(master):
+def test_rejected_listen_address_leaves_served_addresses_unchanged(master):
     listen([OTHER], master.address)
     with pytest.raises(RequestRefusedError, match=r"'203\.0\.113\.77' is not an address"):
         listen(["203.0.113.77"], master.address)
@@ -98,7 +98,7 @@ def test_a_refusal_changes_nothing_and_says_why(master):
     assert master.view().listens == (OTHER,)
 
 
-def test_another_computer_cannot_decide_who_may_connect(far, master):
+def test_listen_request_from_another_computer_is_rejected(far, master):
     context = zmq.Context()
     try:
         with context.socket(zmq.DEALER) as asking:
@@ -113,7 +113,7 @@ def test_another_computer_cannot_decide_who_may_connect(far, master):
     assert master.view().listens == (OTHER,)
 
 
-def test_messages_go_both_ways_between_two_computers_from_the_first_on(far, master):
+def test_nodes_on_two_computers_exchange_all_messages_from_the_first(far, master):
     with nep.node("near") as near, nep.node("far", master=far) as away:
         heard_far, heard_near = away.new_sub("to_far"), near.new_sub("to_near")
         to_far, to_near = near.new_pub("to_far"), away.new_pub("to_near")
@@ -134,7 +134,7 @@ def test_messages_go_both_ways_between_two_computers_from_the_first_on(far, mast
         assert to_far.missing == to_near.missing == ()
 
 
-def test_publishers_that_were_there_before_are_reached_when_the_master_begins_to_serve(master):
+def test_existing_publishers_advertise_a_newly_served_address(master):
     with nep.node("near") as near:
         pub = near.new_pub("t", latched=True)
         pub.publish("before")
@@ -146,7 +146,7 @@ def test_publishers_that_were_there_before_are_reached_when_the_master_begins_to
         wait_for(near, lambda view: len(view.topics["t"].publishers[0].endpoints) == 1)
 
 
-def test_a_node_whose_computer_gets_another_address_is_reached_there(far, master, monkeypatch):
+def test_publisher_is_received_after_its_computer_changes_address(far, master, monkeypatch):
     address = ["127.0.0.3"]
     monkeypatch.setattr(master_session, "local_address_towards", lambda _master: address[0])
     with nep.node("near") as near, nep.node("far", master=far) as away:
@@ -168,7 +168,7 @@ def test_a_node_whose_computer_gets_another_address_is_reached_there(far, master
         assert sub.listen(True, timeout_s=WAIT_S) == (True, "still")
 
 
-def test_the_loss_of_a_served_address_is_an_alert_until_it_is_back():
+def test_lost_served_address_raises_an_alert_until_it_returns():
     here = [HERE]
     bound = []
 
@@ -198,7 +198,7 @@ def test_the_loss_of_a_served_address_is_an_alert_until_it_is_back():
     assert bound == ["tcp://192.168.1.20:7780"]
 
 
-def test_when_one_address_can_not_be_bound_none_is():
+def test_failed_bind_of_one_address_unbinds_all():
     bound = []
 
     class Router:
@@ -216,7 +216,7 @@ def test_when_one_address_can_not_be_bound_none_is():
     assert (bound, listening.hosts) == ([], ())
 
 
-def test_addresses_that_nobody_can_reach_are_not_offered(monkeypatch):
+def test_unreachable_addresses_are_not_offered(monkeypatch):
     def address(host):
         return types.SimpleNamespace(family=socket.AF_INET, address=host)
 
@@ -236,7 +236,7 @@ def test_addresses_that_nobody_can_reach_are_not_offered(monkeypatch):
     assert own_addresses() == (OwnAddress("192.168.1.20", "eth0"), OwnAddress("10.8.0.2", "tun0"))
 
 
-def test_a_taken_port_is_a_sentence(master):
+def test_port_in_use_is_rejected_with_its_address(master):
     port = master.address.rpartition(":")[2]
     with Master(f"{OTHER}:{port}", learn_s=0.0), pytest.raises(RequestRefusedError, match=OTHER):
         listen([OTHER], master.address)

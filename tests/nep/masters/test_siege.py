@@ -221,7 +221,7 @@ def looks_that_are_never_read(siege: Siege) -> None:
     ],
     ids=lambda attack: attack.__name__,
 )
-def test_honest_nodes_do_not_notice(siege: Siege, attack: Callable[[Siege], None]) -> None:
+def test_honest_nodes_are_unaffected_by_attacks(siege: Siege, attack: Callable[[Siege], None]) -> None:
     attack(siege)
     siege.go_on()
     eventually(lambda: set(NAMES) <= {each.name for each in siege.nodes[0].graph(5.0).nodes.values()})

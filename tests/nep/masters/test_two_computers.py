@@ -110,7 +110,7 @@ def advertised(computers: Computers) -> str:
 
 
 @pytest.mark.timeout(240)
-def test_two_computers_hear_each_other_also_after_a_new_address_and_a_pulled_plug(
+def test_two_computers_communicate_after_address_change_and_cable_unplug(
     computers: Computers,
 ) -> None:
     near = {"before": computers.inside("a"), "NEP_MASTER": "127.0.0.1:7780"}

@@ -48,7 +48,7 @@ def back(name: str, payload: object) -> object:
 
 
 @pytest.mark.parametrize("name", sorted(PAYLOADS))
-def test_round_trip(name: str) -> None:
+def test_payload_round_trip(name: str) -> None:
     @given(PAYLOADS[name])
     def check(payload: object) -> None:
         assert back(name, payload) == payload
@@ -58,12 +58,12 @@ def test_round_trip(name: str) -> None:
 
 @pytest.mark.parametrize("name", sorted(CODECS))
 @given(data=st.binary(max_size=200))
-def test_any_bytes_decode_or_raise_a_decode_error(name: str, data: bytes) -> None:
+def test_arbitrary_bytes_decode_or_raise_decode_error(name: str, data: bytes) -> None:
     with contextlib.suppress(DecodeError):
         codec(name).decode(memoryview(data), {})
 
 
-def test_names_and_numbers() -> None:
+def test_codecs_are_found_by_name_and_number() -> None:
     assert [codec_numbered(number) for number in range(1, 6)] == list(CODECS.values())
     assert codec_numbered(99) is None
     assert codec_for("robot/description").name == codec_for("dictionary").name == "json"
@@ -72,7 +72,7 @@ def test_names_and_numbers() -> None:
         codec("jason")
 
 
-def test_json_takes_numpy_number_keys_and_dataclasses() -> None:
+def test_json_encodes_numpy_number_keys_and_dataclasses() -> None:
     @dataclasses.dataclass
     class Pose:
         x: float
@@ -91,7 +91,7 @@ def test_json_takes_numpy_number_keys_and_dataclasses() -> None:
     assert back("json", np.zeros((2, 2))[:, ::2]) == [[0.0], [0.0]]
 
 
-def test_json_has_no_nan_but_reads_that_of_the_originals() -> None:
+def test_json_encodes_nan_as_null_and_decodes_nan_literals() -> None:
     assert back("json", [math.nan, math.inf]) == [None, None]
     value = codec("json").decode(memoryview(b'{"a": NaN}'), {})
     assert isinstance(value, dict)
@@ -108,7 +108,7 @@ class Place:
     when: datetime
 
 
-def test_msgpack_takes_what_json_takes_and_keeps_times() -> None:
+def test_msgpack_encodes_json_compatible_types_and_preserves_datetimes() -> None:
     moment = datetime(2026, 11, 22, 16, 30, 0, 123456, timezone.utc)
     payload = {
         "place": Place(math.inf, moment), "day": date(2026, 11, 22), "at": time(16, 30), "mood": Mood.HAPPY,
@@ -123,7 +123,7 @@ def test_msgpack_takes_what_json_takes_and_keeps_times() -> None:
     assert math.isnan(nan)
 
 
-def test_a_time_without_a_zone_is_that_of_this_computer() -> None:
+def test_naive_datetime_is_encoded_as_local_time() -> None:
     moment = datetime(2026, 11, 22, 16, 30, 0, 5)  # noqa: DTZ001 - that is what is tried
     assert back("msgpack", moment) == moment.astimezone(timezone.utc)
 
@@ -136,7 +136,7 @@ def test_a_time_without_a_zone_is_that_of_this_computer() -> None:
         ("c70cff00000000fffffffffffffff6", datetime(1969, 12, 31, 23, 59, 50, tzinfo=timezone.utc)),
     ],
 )
-def test_timestamps_of_other_languages(data: str, moment: datetime) -> None:
+def test_msgpack_timestamps_of_other_languages_are_decoded(data: str, moment: datetime) -> None:
     assert codec("msgpack").decode(memoryview(bytes.fromhex(data)), {}) == moment
     assert (
         codec("msgpack").encode(datetime(2018, 1, 2, 3, 4, 5, tzinfo=timezone.utc)).data.hex()
@@ -145,13 +145,13 @@ def test_timestamps_of_other_languages(data: str, moment: datetime) -> None:
 
 
 @pytest.mark.parametrize("seconds", [2**63 - 1, -(2**63), 2**40])
-def test_a_timestamp_that_is_no_date_is_kept_as_it_came(seconds: int) -> None:
+def test_timestamp_out_of_datetime_range_is_kept_as_msgpack_timestamp(seconds: int) -> None:
     stamp = msgpack.Timestamp(seconds, 7)
     assert back("msgpack", {"t": stamp, (1, (2,)): 3}) == {"t": stamp, (1, (2,)): 3}
 
 
 @given(st.binary(max_size=40))
-def test_any_bytes_behind_a_timestamp_or_a_map_decode_or_raise_a_decode_error(data: bytes) -> None:
+def test_arbitrary_bytes_after_timestamp_or_map_header_decode_or_raise_decode_error(data: bytes) -> None:
     for head in (b"\xd6\xff", b"\xd7\xff", b"\xc7\x0c\xff", b"\x81\x91", b"\x82\x81", b"\x91\xc7"):
         with contextlib.suppress(DecodeError):
             codec("msgpack").decode(memoryview(head + data), {})
@@ -176,12 +176,12 @@ def test_any_bytes_behind_a_timestamp_or_a_map_decode_or_raise_a_decode_error(da
         ("image", np.zeros((0, 5, 3), np.uint8), r"\(0, 5, 3\) is not the shape of an image"),
     ],
 )
-def test_what_does_not_fit(name: str, payload: object, sentence: str) -> None:
+def test_unsupported_payload_raises_encode_error(name: str, payload: object, sentence: str) -> None:
     with pytest.raises(EncodeError, match=sentence):
         codec(name).encode(payload)
 
 
-def test_json_that_nests_too_deeply_is_an_encode_error() -> None:
+def test_self_referencing_payload_raises_encode_error() -> None:
     payload: list[object] = []
     payload.append(payload)
     with pytest.raises(EncodeError):
@@ -196,7 +196,7 @@ def picture() -> np.ndarray:
     return np.dstack([rows * 4, columns * 3, np.full_like(rows, 128)]).astype(np.uint8)
 
 
-def test_a_picture_is_published_as_jpeg(picture: np.ndarray) -> None:
+def test_image_array_is_published_as_jpeg(picture: np.ndarray) -> None:
     data, extension = codec("image").encode(picture)
     assert extension == {"shape": [48, 64, 3], "encoding": "jpeg"}
     assert image_codec.picture_info(data) == extension
@@ -207,7 +207,7 @@ def test_a_picture_is_published_as_jpeg(picture: np.ndarray) -> None:
     assert np.array_equal(codec("image").decode(memoryview(data), {}), read)  # type: ignore[arg-type]
 
 
-def test_raw_pictures_are_exact(picture: np.ndarray) -> None:
+def test_raw_image_round_trip_is_lossless(picture: np.ndarray) -> None:
     def read(encoded: image_codec.Encoded) -> object:
         return codec("image").decode(memoryview(encoded.data), encoded.extension or {})
 
@@ -233,7 +233,7 @@ def numbers_of(kind: str, shape: tuple[int, ...]) -> np.ndarray:
 
 @pytest.mark.parametrize("shape", SHAPES)
 @pytest.mark.parametrize("kind", NUMBERS)
-def test_any_numbers_and_channels_are_kept_without_loss(kind: str, shape: tuple[int, ...]) -> None:
+def test_any_dtype_and_channel_count_round_trips_losslessly(kind: str, shape: tuple[int, ...]) -> None:
     made = numbers_of(kind, shape)
     wanted = made[:, :, 0] if shape[2:] == (1,) else made
     sent = [image_codec.raw_image(made), image_codec.raw_image(made.astype(made.dtype.newbyteorder(">")))]
@@ -262,12 +262,12 @@ def test_any_numbers_and_channels_are_kept_without_loss(kind: str, shape: tuple[
         (np.zeros((2, 3), np.int16), ("16SC1", "16SC1")),
     ],
 )
-def test_how_an_array_is_sent(made: np.ndarray, encodings: tuple[str, str]) -> None:
+def test_image_encoding_depends_on_dtype_and_channels(made: np.ndarray, encodings: tuple[str, str]) -> None:
     sent = codec("image").encode(made), image_codec.raw_image(made)
     assert tuple((extension or {})["encoding"] for _, extension in sent) == encodings
 
 
-def test_a_jpeg_of_one_channel_stays_one(picture: np.ndarray) -> None:
+def test_greyscale_jpeg_keeps_one_channel(picture: np.ndarray) -> None:
     for grey in (picture[:, :, 0], picture[:, :, :1]):
         read = back("image", grey)
         assert isinstance(read, np.ndarray)
@@ -276,7 +276,7 @@ def test_a_jpeg_of_one_channel_stays_one(picture: np.ndarray) -> None:
 
 
 @pytest.mark.parametrize(("encoding", "kind"), [("rgb8", "uint8"), ("rgba8", "uint8"), ("rgb16", "<u2")])
-def test_red_first_becomes_blue_first(encoding: str, kind: str) -> None:
+def test_rgb_images_are_decoded_as_bgr(encoding: str, kind: str) -> None:
     channels = 4 if "a" in encoding else 3
     made = np.arange(4 * 5 * channels, dtype=kind).reshape(4, 5, channels)
     data = memoryview(made[:, :, [2, 1, 0, 3][:channels]].tobytes())
@@ -285,7 +285,7 @@ def test_red_first_becomes_blue_first(encoding: str, kind: str) -> None:
 
 
 @pytest.mark.parametrize("ending", ["jpeg", "png"])
-def test_files_pass_unchanged(picture: np.ndarray, ending: str) -> None:
+def test_encoded_image_files_are_published_unchanged(picture: np.ndarray, ending: str) -> None:
     file = cv2.imencode(f".{ending}", picture)[1].tobytes()
     data, extension = codec("image").encode(file)
     assert data == file
@@ -306,7 +306,7 @@ def test_files_pass_unchanged(picture: np.ndarray, ending: str) -> None:
         (b"", {"shape": [0, 2**64], "encoding": "mono8"}),
     ],
 )
-def test_broken_pictures(data: bytes, extension: dict[str, object]) -> None:
+def test_corrupt_images_raise_decode_error(data: bytes, extension: dict[str, object]) -> None:
     with pytest.raises(DecodeError):
         codec("image").decode(memoryview(data), extension)
 

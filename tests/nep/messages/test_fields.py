@@ -43,22 +43,22 @@ def message(payload, stamp_ns=1_700_000_000_000_000_001, codec="json", **more):
         ("pose.x.deeper", MISSING),
     ],
 )
-def test_a_path_picks_a_value(text, value):
+def test_field_path_selects_a_value(text, value):
     assert pick(ODOM, parse_path(text)) == value
 
 
 @given(st.lists(st.integers(-(10**6), 10**6) | st.text(), max_size=5))
-def test_a_path_that_is_written_is_read_as_it_was(steps):
+def test_formatted_field_path_parses_back_to_the_same_path(steps):
     assert parse_path(path_text(tuple(steps))) == tuple(steps)
 
 
 @pytest.mark.parametrize("text", ["", "joints[x]", "joints[", "a..b", "a.", "]", 'a["b'])
-def test_what_is_no_path_is_a_sentence(text):
+def test_invalid_field_path_is_rejected(text):
     with pytest.raises(NepError, match="field"):
         parse_path(text)
 
 
-def test_every_leaf_of_a_message_has_a_path_that_finds_it():
+def test_leaves_yield_the_path_of_every_leaf_value():
     paths = list(leaves(ODOM))
     assert paths == ["pose.x", "pose.y", "joints[0]", "joints[1]", "joints[2].name", '["a key"]']
     assert list(leaves(7)) == ["."]
@@ -72,7 +72,7 @@ def test_every_leaf_of_a_message_has_a_path_that_finds_it():
         max_leaves=8,
     )
 )
-def test_paths_of_any_message_lead_back(payload):
+def test_leaf_paths_of_any_payload_resolve_to_a_value(payload):
     for path in leaves(payload):
         assert pick(payload, parse_path(path)) is not MISSING
 
@@ -81,7 +81,7 @@ def rows(out):
     return list(csv.reader(io.StringIO(out, newline="")))
 
 
-def test_the_table_has_a_header_the_time_and_quoted_cells():
+def test_csv_table_has_header_timestamps_and_quoted_cells():
     out = io.StringIO(newline="")
     table = Table(Fields(["pose.x", "joints[2].name", "a", "."]), out)
     table(message({"pose": {"x": 1.5}, "joints": [0, 0, {"name": 'say "hi",\nbye'}], "a": False}))
@@ -96,7 +96,7 @@ def test_the_table_has_a_header_the_time_and_quoted_cells():
     assert len(head) == 5
 
 
-def test_what_is_missing_or_cannot_be_read_is_counted(capsys):
+def test_missing_fields_and_undecodable_messages_are_counted(capsys):
     fields = Fields(["x", "y"])
     table = Table(fields, io.StringIO())
     for each in (message({"x": 1}), message({"x": 1, "y": 2}), message(b"{oops"), message({})):
@@ -108,7 +108,7 @@ def test_what_is_missing_or_cannot_be_read_is_counted(capsys):
     assert "skipped 1 undecodable message" in said
 
 
-def test_a_pictures_fields_are_its_shape():
+def test_shape_is_a_field_of_image_messages():
     fields = Fields(["shape[0]"])
     picture = message(b"\xff", codec="image", extension={"shape": [240, 320, 3]})
     assert fields.of(picture) == [240]
@@ -121,7 +121,7 @@ def odom(master):
         yield master.address
 
 
-def test_echo_writes_a_table(odom, capfd):
+def test_echo_writes_csv(odom, capfd):
     echo("/odom", ["pose.x", "pose.z"], 1, None, odom, as_json=False, as_csv=True)
     shown = capfd.readouterr()
     head, row = rows(shown.out)
@@ -131,7 +131,7 @@ def test_echo_writes_a_table(odom, capfd):
     assert "'pose.z' was missing in 1 of 1 messages" in shown.err
 
 
-def test_echo_shows_picked_fields_to_people_and_programs(odom, capfd):
+def test_echo_prints_selected_fields_as_text_and_json(odom, capfd):
     echo("/odom", ["pose.x"], 1, None, odom)
     assert '{"pose.x":1.5}' in capfd.readouterr().out
     echo("/odom", ["pose.x", "no"], 1, None, odom, as_json=True)
@@ -140,7 +140,7 @@ def test_echo_shows_picked_fields_to_people_and_programs(odom, capfd):
     assert "payload" not in record
 
 
-def test_wrong_wishes_are_sentences(odom):
+def test_conflicting_or_invalid_echo_options_are_rejected(odom):
     with pytest.raises(typer.BadParameter, match="name the fields"):
         echo("/odom", None, 1, None, odom, as_csv=True)
     with pytest.raises(typer.BadParameter, match="choose one"):
@@ -149,7 +149,7 @@ def test_wrong_wishes_are_sentences(odom):
         echo("/odom", ["x["], 1, None, odom, as_csv=True)
 
 
-def test_a_topic_that_is_not_there_is_waited_for_and_the_nearest_is_named(odom, capfd):
+def test_echo_waits_for_an_unknown_topic_and_suggests_a_similar_name(odom, capfd):
     with pytest.raises(nep.WaitTimeoutError):
         echo("/odm", None, 1, 0.1, odom)
     assert "did you mean '/odom'?" in capfd.readouterr().err

@@ -25,7 +25,7 @@ REPOSITORY = Path(__file__).resolve().parents[3]
 
 
 @pytest.mark.parametrize("name", sorted(bad.BOMBS))
-def test_a_bomb_never_reaches_the_decoder(name: str) -> None:
+def test_decompression_bomb_is_rejected_before_decoding(name: str) -> None:
     data = bad.BOMBS[name]
     with pytest.raises(DecodeError) as caught:
         examine(data)
@@ -62,7 +62,7 @@ print(json.dumps(said))
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="RLIMIT_AS is kept by Linux alone")
-def test_no_bomb_takes_memory_in_the_library_or_in_studio() -> None:
+def test_decompression_bombs_use_little_memory_in_library_and_studio() -> None:
     done = subprocess.run(
         [sys.executable, "-c", CHILD],
         capture_output=True,
@@ -90,13 +90,13 @@ def test_no_bomb_takes_memory_in_the_library_or_in_studio() -> None:
         ("a word", "it is neither a JPEG nor a PNG image"),
     ],
 )
-def test_the_sentence_says_what_was_refused_and_why(name: str, words: str) -> None:
+def test_rejected_image_error_states_the_reason(name: str, words: str) -> None:
     with pytest.raises(DecodeError) as caught:
         examine(bad.BOMBS[name])
     assert words in str(caught.value)
 
 
-def test_one_limit() -> None:
+def test_pixel_limit_applies_to_decoding_and_encoding() -> None:
     check_size(MOST_PIXELS // 1000, 1000, 3, 0)
     with pytest.raises(DecodeError):
         check_size(MOST_PIXELS // 1000 + 1, 1000, 3, 0)
@@ -111,7 +111,7 @@ def scene() -> np.ndarray:
     return frame
 
 
-def test_text_profiles_and_animations_of_a_png_are_left_out() -> None:
+def test_png_text_profile_and_animation_chunks_are_stripped() -> None:
     plain = cv2.imencode(".png", scene())[1].tobytes()
     bomb = zlib.compress(bytes(1_000_000))
     more = (
@@ -128,7 +128,7 @@ def test_text_profiles_and_animations_of_a_png_are_left_out() -> None:
 @pytest.mark.parametrize("order", [">", "<"])
 @pytest.mark.parametrize("kind", ["jpeg", "png"])
 @pytest.mark.parametrize("orientation", range(1, 9))
-def test_a_camera_that_was_turned(kind: str, orientation: int, order: str) -> None:
+def test_exif_orientation_is_applied_on_decode(kind: str, orientation: int, order: str) -> None:
     made = cv2.imencode(f".{kind}", scene())[1].tobytes()
     told = bad.exif(orientation, order)
     if kind == "jpeg":
@@ -141,7 +141,7 @@ def test_a_camera_that_was_turned(kind: str, orientation: int, order: str) -> No
     assert image_codec.picture_info(made) == {"shape": list(read.shape), "encoding": kind}
 
 
-def test_a_jpeg_in_refinements_and_one_with_restarts_are_read() -> None:
+def test_progressive_jpeg_and_jpeg_with_restart_markers_are_decoded() -> None:
     for option in ([cv2.IMWRITE_JPEG_PROGRESSIVE, 1], [cv2.IMWRITE_JPEG_RST_INTERVAL, 1]):
         data = cv2.imencode(".jpg", scene(), option)[1].tobytes()
         read = codec("image").decode(memoryview(data), {"encoding": "png", "shape": [999_999, 999_999, 3]})
@@ -158,7 +158,7 @@ FILE_PNG = cv2.imencode(".png", scene())[1].tobytes()
     st.integers(0, 2000),
 )
 @settings(max_examples=300, deadline=None)
-def test_what_is_let_through_is_as_large_as_was_said(
+def test_decoded_image_has_the_examined_size_for_any_corruption(
     data: bytes, changes: list[tuple[int, int]], end: int
 ) -> None:
     changed = bytearray(data[:2000])

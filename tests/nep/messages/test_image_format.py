@@ -44,7 +44,7 @@ def node() -> Iterator[nep.Node]:
         (ImageFormat(), DEPTH.astype(np.float32), "32FC1"),
     ],
 )
-def test_a_picture_is_sent_as_asked_for(image: ImageFormat, frame: Any, encoding: str) -> None:
+def test_image_is_encoded_in_the_requested_format(image: ImageFormat, frame: Any, encoding: str) -> None:
     made = image.encode(frame)
     assert made.extension is not None
     assert made.extension["encoding"] == encoding
@@ -52,28 +52,28 @@ def test_a_picture_is_sent_as_asked_for(image: ImageFormat, frame: Any, encoding
         np.testing.assert_array_equal(back(image, frame), frame)
 
 
-def test_less_quality_takes_fewer_bytes() -> None:
+def test_lower_jpeg_quality_uses_fewer_bytes() -> None:
     sizes = [len(ImageFormat("jpeg", quality=each).encode(COLOUR).data) for each in (1, 50, 90, 100)]
     assert sizes == sorted(set(sizes))
     assert ImageFormat("jpeg").encode(COLOUR).data == image_codec.encode(COLOUR).data
 
 
 @pytest.mark.parametrize("kind", ["auto", "jpeg", "png", "raw"])
-def test_a_wide_picture_is_made_narrower_and_keeps_its_form(kind: str) -> None:
+def test_wide_image_is_scaled_down_with_its_aspect_ratio(kind: str) -> None:
     assert back(ImageFormat(kind, width=40), COLOUR).shape == (30, 40, 3)
     assert back(ImageFormat(kind, width=80), COLOUR).shape == COLOUR.shape
     assert back(ImageFormat(kind, width=1000), COLOUR).shape == COLOUR.shape
     assert back(ImageFormat(kind, width=1), np.zeros((1, 500, 3), np.uint8)).shape == (1, 1, 3)
 
 
-def test_depth_is_thinned_and_never_mixed() -> None:
+def test_depth_image_is_downsampled_without_interpolation() -> None:
     frame = np.where(np.arange(80) % 2, 0, 5000).astype(np.uint16) * np.ones((60, 1), np.uint16)
     small = back(ImageFormat("png", width=30), frame)
     assert small.shape == (22, 30)
     assert set(np.unique(small).tolist()) <= {0, 5000}
 
 
-def test_colour_is_mixed() -> None:
+def test_colour_image_is_downsampled_by_averaging() -> None:
     frame = np.where(np.arange(80) % 2, 0, 200).astype(np.uint8)[None, :, None] * np.ones(
         (60, 1, 3), np.uint8
     )
@@ -84,14 +84,20 @@ def test_colour_is_mixed() -> None:
     ("image", "frame", "sentence"),
     [
         (ImageFormat("jpeg"), DEPTH, "a JPEG image needs 'uint8' and one or three channels"),
-        (ImageFormat("jpeg"), np.zeros((4, 4, 4), np.uint8), "a JPEG image needs 'uint8' and one or three channels"),
+        (
+            ImageFormat("jpeg"),
+            np.zeros((4, 4, 4), np.uint8),
+            "a JPEG image needs 'uint8' and one or three channels",
+        ),
         (ImageFormat("png"), DEPTH.astype(np.float32), "a PNG image needs 'uint8' or 'uint16'"),
         (ImageFormat("png"), np.zeros((4, 4, 2), np.uint8), "a PNG image needs 'uint8' or 'uint16'"),
         (ImageFormat("raw"), "picture", "publish a 'uint8' array"),
         (ImageFormat("raw"), b"no file", "neither a JPEG nor a PNG image"),
     ],
 )
-def test_what_has_no_such_form_is_refused(image: ImageFormat, frame: Any, sentence: str) -> None:
+def test_image_unsupported_by_the_format_raises_encode_error(
+    image: ImageFormat, frame: Any, sentence: str
+) -> None:
     with pytest.raises(EncodeError, match=sentence):
         image.encode(frame)
 
@@ -108,12 +114,12 @@ def test_what_has_no_such_form_is_refused(image: ImageFormat, frame: Any, senten
         ({"width": True}, "width is True; give a whole number"),
     ],
 )
-def test_a_format_that_is_none_is_refused(given: dict[str, Any], sentence: str) -> None:
+def test_invalid_image_format_is_rejected(given: dict[str, Any], sentence: str) -> None:
     with pytest.raises(ValueError, match=sentence):
         ImageFormat(**given)
 
 
-def test_a_publisher_has_its_own_format_and_files_pass_unchanged(node: nep.Node) -> None:
+def test_publisher_applies_its_image_format_but_not_to_encoded_files(node: nep.Node) -> None:
     sub = node.new_sub("camera", "image")
     with node.new_pub("camera", "image", image=nep.ImageFormat("png", width=40)) as pub:
         pub.publish(COLOUR)
@@ -127,7 +133,7 @@ def test_a_publisher_has_its_own_format_and_files_pass_unchanged(node: nep.Node)
         np.testing.assert_array_equal(sub.listen(timeout_s=30.0)[1], DEPTH)
 
 
-def test_what_cannot_be_sent_so_is_refused_and_named(
+def test_image_that_does_not_fit_the_format_is_rejected_and_logged(
     node: nep.Node, caplog: pytest.LogCaptureFixture
 ) -> None:
     node.new_sub("camera", "image")
@@ -144,7 +150,9 @@ def test_what_cannot_be_sent_so_is_refused_and_named(
         ("image", "jpeg", "image is a 'str'; give a 'nep.ImageFormat'"),
     ],
 )
-def test_only_pictures_have_a_format(node: nep.Node, msg_type: str, image: Any, sentence: str) -> None:
+def test_image_format_is_rejected_for_other_message_types(
+    node: nep.Node, msg_type: str, image: Any, sentence: str
+) -> None:
     with pytest.raises(ValueError, match=sentence):
         node.new_pub("camera", msg_type, image=image)
     assert not node.graph().topics

@@ -47,7 +47,7 @@ LINES = """{
         ("[" * 100_000, 1, 1, "levels"),
     ],
 )
-def test_a_fault_has_its_position_and_reason(text, line, column, word) -> None:
+def test_json_fault_has_position_and_reason(text, line, column, word) -> None:
     fault = find_json_fault(text)
     assert fault is not None
     assert (fault.line, fault.column) == (line, column)
@@ -55,7 +55,7 @@ def test_a_fault_has_its_position_and_reason(text, line, column, word) -> None:
     assert fault.is_nan == (word.partition(" ")[0] in {"NaN", "-Infinity"})
 
 
-def test_the_fix_repairs_the_text() -> None:
+def test_applying_json_fixes_repairs_the_text() -> None:
     text = '{"a": [1, {"b": "x'
     while (fault := find_json_fault(text)) is not None:
         assert fault.fix is not None
@@ -63,7 +63,7 @@ def test_the_fix_repairs_the_text() -> None:
     assert json.loads(text) == {"a": [1, {"b": "x"}]}
 
 
-def test_nan_is_a_value_where_it_is_allowed() -> None:
+def test_nan_is_accepted_if_allowed() -> None:
     assert find_json_fault('{"a": NaN}', allow_nan=True) is None
     fault = find_json_fault('{"a": NaN', allow_nan=True)
     assert fault is not None
@@ -71,10 +71,10 @@ def test_nan_is_a_value_where_it_is_allowed() -> None:
 
 
 @pytest.mark.parametrize("text", ['{"a', "[1", '"x', "-1.", "0x", "NaN", " true ", "-Infinity"])
-def test_a_beginning_of_json_is_recognized(text) -> None:
+def test_incomplete_json_is_recognized_as_json(text) -> None:
     assert looks_like_json(text)
 
 
 @pytest.mark.parametrize("text", ["hello", "", "truest", "- x", "'a'", "Nancy", ".5"])
-def test_other_texts_do_not_look_like_json(text) -> None:
+def test_other_text_is_not_recognized_as_json(text) -> None:
     assert not looks_like_json(text)

@@ -32,7 +32,9 @@ def nested(levels: int, kind: str) -> object:
 
 @pytest.mark.parametrize("kind", ["lists", "maps", "both"])
 @pytest.mark.parametrize("name", ["json", "msgpack"])
-def test_64_levels_are_carried_and_65_are_refused_in_the_same_words(name: str, kind: str) -> None:
+def test_payload_of_64_levels_is_encoded_and_65_levels_are_rejected_with_one_message(
+    name: str, kind: str
+) -> None:
     assert codec(name).decode(codec(name).encode(nested(64, kind)).data, {}) == nested(64, kind)
     for levels in (65, 300, 1_000, 2_000):
         value = nested(levels, kind)
@@ -62,12 +64,12 @@ def test_64_levels_are_carried_and_65_are_refused_in_the_same_words(name: str, k
         json.dumps({"a\\": '\\\\"[[[['} | {f"[{number}": "{" for number in range(200)}, indent=2),
     ],
 )
-def test_brackets_in_texts_are_no_levels(text: str) -> None:
+def test_brackets_inside_strings_do_not_count_as_levels(text: str) -> None:
     assert codec("json").decode(text.encode(), {}) == json.loads(text)
 
 
 @pytest.mark.parametrize(("before", "after"), [('["]",', '"["]'), ('["\\\\]",', ',"["]'), ('{"}":', "}")])
-def test_brackets_in_texts_hide_no_levels(before: str, after: str) -> None:
+def test_strings_with_brackets_do_not_hide_levels(before: str, after: str) -> None:
     text = before * 70 + "1" + after * 70
     with pytest.raises(DecodeError, match=SENTENCE):
         codec("json").decode(text.encode(), {})
@@ -90,7 +92,7 @@ def levels_of(value: object) -> int:
 
 @settings(max_examples=150)
 @given(JSON_VALUES, st.integers(0, 80))
-def test_check_of_the_bytes_agrees_with_the_value(value: object, around: int) -> None:
+def test_depth_check_of_json_bytes_matches_depth_of_the_value(value: object, around: int) -> None:
     for _level in range(around):
         value = [value, "]"]
     assert json_is_too_deep(orjson.dumps(value)) == (levels_of(value) > MAX_LEVELS)
@@ -115,7 +117,9 @@ PACKED_VALUES = st.recursive(
 
 @settings(max_examples=150)
 @given(PACKED_VALUES, st.integers(50, 70), st.sampled_from(["list", "tuple", "map"]))
-def test_check_of_the_decoded_value_agrees_with_its_levels(value: object, around: int, kind: str) -> None:
+def test_depth_check_of_decoded_msgpack_matches_depth_of_the_value(
+    value: object, around: int, kind: str
+) -> None:
     padding = [0.5] * 500  # too large for a count of the headers
     for _level in range(around):
         value = {"a": value} if kind == "map" else (value,) if kind == "tuple" else [value]
@@ -126,7 +130,7 @@ def test_check_of_the_decoded_value_agrees_with_its_levels(value: object, around
 
 @pytest.mark.parametrize("inner", [[], {}, [1], {"a": 1}, 1, "text"])
 @pytest.mark.parametrize("levels", [63, 64, 65])
-def test_empty_lists_and_maps_are_levels(levels: int, inner: object) -> None:
+def test_empty_lists_and_maps_count_as_levels(levels: int, inner: object) -> None:
     value = inner
     for _level in range(levels - levels_of(inner)):
         value = [value, *range(8)]
@@ -134,7 +138,7 @@ def test_empty_lists_and_maps_are_levels(levels: int, inner: object) -> None:
     assert packed_is_too_deep(pack(value) + bytes(4096), value) == (levels > MAX_LEVELS)
 
 
-def test_text_of_another_encoding_hides_no_levels() -> None:
+def test_utf16_json_does_not_bypass_the_depth_limit() -> None:
     text = '["\u5d5d\u2222",' * 100 + "1" + "]" * 100
     with pytest.raises(DecodeError):
         codec("json").decode(text.encode("utf-16"), {})
@@ -149,7 +153,7 @@ class Linked:
 
 
 @pytest.mark.parametrize("name", ["json", "msgpack"])
-def test_nested_dataclasses_are_levels(name: str) -> None:
+def test_nested_dataclasses_count_as_levels(name: str) -> None:
     value: object = "x" * 200
     for _level in range(64):
         before, value = value, Linked(value)
@@ -160,7 +164,7 @@ def test_nested_dataclasses_are_levels(name: str) -> None:
         codec(name).encode(Linked(value))
 
 
-def test_publisher_refuses_and_counts_what_is_too_deep(caplog: pytest.LogCaptureFixture) -> None:
+def test_publisher_rejects_and_counts_too_deep_payloads(caplog: pytest.LogCaptureFixture) -> None:
     with nep.node("deep", "memory") as node, caplog.at_level(logging.WARNING):
         publisher, subscriber = node.new_pub("/deep"), node.new_sub("/deep")
         publisher.publish(nested(65, "both"))
@@ -171,6 +175,6 @@ def test_publisher_refuses_and_counts_what_is_too_deep(caplog: pytest.LogCapture
         assert subscriber.listen(timeout_s=30.0) == (True, nested(64, "both"))
 
 
-def test_deep_msgpack_is_refused_however_it_is_deep() -> None:
+def test_deep_msgpack_in_a_large_payload_is_rejected() -> None:
     with pytest.raises(DecodeError, match=SENTENCE):
         codec("msgpack").decode(msgpack.packb([[1.5] * 1000, nested(70, "maps")]), {})

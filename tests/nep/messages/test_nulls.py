@@ -34,7 +34,7 @@ class Pose:
         ({7: (None, math.nan)}, "7[1]"),
     ],
 )
-def test_it_is_told_with_its_place(payload, where, caplog):
+def test_nan_is_logged_with_its_field_path(payload, where, caplog):
     teller = JsonEncoder("/odom")
     assert b"null" in teller.encode(payload).data
     assert teller.count == 1
@@ -49,13 +49,13 @@ def test_it_is_told_with_its_place(payload, where, caplog):
 @pytest.mark.parametrize(
     "payload", [{"a": None}, {"a": "null"}, {"a": [None, 1.5]}, Pose(1.0), [2**53 + 0.0, 1e308]]
 )
-def test_what_is_nothing_on_purpose_is_not(payload, caplog):
+def test_none_is_not_reported_as_nan(payload, caplog):
     teller = JsonEncoder("/odom")
     teller.encode(payload)
     assert (teller.count, caplog.records) == (0, [])
 
 
-def test_a_flood_is_counted_whole_and_told_seldom(caplog):
+def test_repeated_nan_is_counted_fully_and_logged_at_intervals(caplog):
     now = [0.0]
     teller = JsonEncoder("/odom", lambda: now[0])
     for _ in range(1000):
@@ -74,20 +74,20 @@ VALUES = st.recursive(
 
 
 @given(VALUES)
-def test_none_is_missed_and_none_is_made_up(payload):
+def test_nan_detection_has_no_false_positives_or_negatives(payload):
     teller = JsonEncoder("t")
     teller.encode(payload)
     assert (teller.count == 1) == (find_nan(payload) is not None)
 
 
-def test_who_publishes_nan_is_told_so(master, caplog):
+def test_publishing_nan_logs_a_warning(master, caplog):
     with nep.node("robot") as node, node.new_sub("/odom") as sub:
         node.new_pub("/odom").publish({"x": math.nan})
         assert sub.listen(timeout_s=5) == (True, {"x": None})
         assert "'/odom' sends NaN or infinity as null" in caplog.text
 
 
-def test_a_publisher_counts_them_and_its_readers_get_null(master, caplog):
+def test_publisher_counts_nan_and_subscriber_receives_null(master, caplog):
     with nep.node("robot") as node, node.new_sub("/odom") as sub:
         pub = node.new_pub("/odom")
         pub.publish({"x": math.nan, "y": None})

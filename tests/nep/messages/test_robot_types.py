@@ -38,7 +38,7 @@ _ROS = {
 
 
 @pytest.mark.parametrize("name", sorted(_ROS))
-def test_fields_are_those_of_ros(name: str) -> None:
+def test_robot_type_fields_match_ros_definitions(name: str) -> None:
     typesys = pytest.importorskip("rosbags.typesys")
     store = typesys.get_typestore(typesys.Stores.ROS2_HUMBLE)
     of_ros = store.types[name.replace("/", "/msg/")]
@@ -51,7 +51,7 @@ def test_fields_are_those_of_ros(name: str) -> None:
 
 
 @pytest.mark.parametrize("name", sorted(set(_ROS) - {"builtin_interfaces/Time"}))
-def test_they_travel_as_ros_2_s_own_types(name: str) -> None:
+def test_robot_types_round_trip_as_ros2_types(name: str) -> None:
     pytest.importorskip("rosbags")
     from nep.backends.ros2.type_mapping import mapping_for
 
@@ -65,7 +65,7 @@ def test_they_travel_as_ros_2_s_own_types(name: str) -> None:
 
 
 @pytest.mark.parametrize("name", sorted(set(_ROS) - {"builtin_interfaces/Time", "std_msgs/Header"}))
-def test_they_travel_as_ros_1_s_own_types(name: str) -> None:
+def test_robot_types_round_trip_as_ros1_types(name: str) -> None:
     typesys = pytest.importorskip("rosbags.typesys")
     from nep.backends.ros.carried import ros_codec
     from nep.backends.ros.definition import parse
@@ -94,13 +94,13 @@ def _filled(declared: type) -> Any:
 
 
 @pytest.mark.parametrize("name", sorted(_ROS))
-def test_the_defaults_are_sent_and_read(name: str) -> None:
+def test_robot_types_round_trip_with_defaults(name: str) -> None:
     assert through(_ROS[name]()) == _ROS[name]()
     assert through(_filled(_ROS[name])) == _filled(_ROS[name])
     assert read(_ROS[name], b"{}") == _ROS[name]()
 
 
-def test_there_are_all_of_them() -> None:
+def test_geometry_and_sensor_export_all_17_types() -> None:
     assert len(_ROS) == 17
     assert set(nep.geometry.__all__ + nep.sensor.__all__) == {each.__name__ for each in _ROS.values()}
 
@@ -110,7 +110,7 @@ _angles = st.floats(-math.pi, math.pi)
 
 @given(_angles, st.floats(-1.57, 1.57), _angles)
 @settings(max_examples=300, deadline=None)
-def test_angles_come_back(roll: float, pitch: float, yaw: float) -> None:
+def test_euler_angles_round_trip_through_quaternion(roll: float, pitch: float, yaw: float) -> None:
     turned = Quaternion.from_euler(roll, pitch, yaw)
     again = Quaternion.from_euler(*turned.to_euler())
     same = turned.x * again.x + turned.y * again.y + turned.z * again.z + turned.w * again.w
@@ -120,14 +120,14 @@ def test_angles_come_back(roll: float, pitch: float, yaw: float) -> None:
 
 @given(_angles, st.sampled_from([-math.pi / 2, math.pi / 2]), _angles)
 @settings(max_examples=200, deadline=None)
-def test_straight_up_and_down_the_rotation_is_the_same(roll: float, pitch: float, yaw: float) -> None:
+def test_euler_conversion_preserves_rotation_at_gimbal_lock(roll: float, pitch: float, yaw: float) -> None:
     turned = Quaternion.from_euler(roll, pitch, yaw)
     again = Quaternion.from_euler(*turned.to_euler())
     same = turned.x * again.x + turned.y * again.y + turned.z * again.z + turned.w * again.w
     assert abs(same) == pytest.approx(1.0, abs=1e-6)
 
 
-def test_known_rotations() -> None:
+def test_known_euler_rotations_and_invalid_quaternions() -> None:
     half = math.sqrt(0.5)
     assert Quaternion() == Quaternion.from_euler()
     turned = Quaternion.from_euler(yaw=math.pi / 2)
@@ -141,12 +141,12 @@ def test_known_rotations() -> None:
 
 
 @pytest.mark.parametrize("stamp_ns", [0, 1, -1, 1_700_000_000_123_456_789, (1 << 63) - 1])
-def test_times_keep_their_nanoseconds(stamp_ns: int) -> None:
+def test_time_conversion_preserves_nanoseconds(stamp_ns: int) -> None:
     moment = Time.from_ns(stamp_ns)
     assert moment.to_ns() == stamp_ns
     assert 0 <= moment.nanosec < 1_000_000_000
 
 
-def test_times_of_ros_1_are_read_by_their_names() -> None:
+def test_ros1_time_field_names_are_decoded() -> None:
     data = b'{"header":{"seq":1,"stamp":{"secs":5,"nsecs":6},"frame_id":"map"}}'
     assert read(PoseStamped, data).header == Header(Time(5, 6), "map")

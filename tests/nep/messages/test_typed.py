@@ -178,7 +178,7 @@ _everything = st.builds(
 
 @given(_everything)
 @settings(max_examples=150, deadline=None)
-def test_what_is_sent_is_what_is_read(payload: Everything) -> None:
+def test_typed_message_round_trip_preserves_values_and_types(payload: Everything) -> None:
     encoded = typed_codec(message_type(Everything), JSON).encode(payload)
     came = read_bytes(Everything, encoded.data)
     assert came == payload
@@ -195,7 +195,7 @@ def test_what_is_sent_is_what_is_read(payload: Everything) -> None:
     ),
 ))  # fmt: skip
 @settings(max_examples=300, deadline=None)
-def test_whatever_comes_is_an_instance_or_an_error(plain: object) -> None:
+def test_arbitrary_payload_becomes_an_instance_or_raises_decode_error(plain: object) -> None:
     for declared in (Everything, PoseStamped, Part, Tree):
         try:
             assert isinstance(read(declared, plain), declared)
@@ -204,26 +204,26 @@ def test_whatever_comes_is_an_instance_or_an_error(plain: object) -> None:
 
 
 @pytest.mark.parametrize("codec", ["json", "msgpack"])
-def test_what_other_programs_send_is_read(codec: str) -> None:
+def test_payload_of_another_program_is_converted_to_the_declared_type(codec: str) -> None:
     plain = {"position": {"x": 1, "y": 2.5}, "later": [1], "orientation": {"w": 0, "v": 1}}
     assert read(Pose, plain, codec) == Pose(Point(1.0, 2.5, 0.0), Quaternion(0.0, 0.0, 0.0, 0.0))
 
 
-def test_what_is_sent_has_the_names_of_its_fields() -> None:
+def test_typed_message_is_encoded_with_its_field_names() -> None:
     assert sent(Twist(Vector3(1), Vector3(z=2))) == {
         "linear": {"x": 1.0, "y": 0.0, "z": 0.0},
         "angular": {"x": 0.0, "y": 0.0, "z": 2.0},
     }
 
 
-def test_numbers_and_arrays_of_numpy_are_sent() -> None:
+def test_numpy_numbers_and_arrays_in_typed_messages_are_encoded() -> None:
     state = nep.sensor.JointState(position=np.arange(3), velocity=np.ones(2, "float32"), name=("a", "b"))
     assert (sent(state)["position"], sent(state)["velocity"]) == ([0.0, 1.0, 2.0], [1.0, 1.0])
     assert sent(Part(np.int64(3))) == {"number": 3, "word": "x"}
     assert sent(Vector3(np.float32(0.5), np.array(2.0), np.int8(1))) == {"x": 0.5, "y": 2.0, "z": 1.0}
 
 
-def test_a_list_that_is_read_is_nobody_else_s() -> None:
+def test_decoded_lists_are_not_shared_between_readers() -> None:
     message = Message("t", b'{"position":[1.0]}', "json", "json")
     reader = TypedReader(message_type(nep.sensor.JointState))
     first, second = reader.typed(message).payload, reader.typed(message).payload
@@ -232,18 +232,18 @@ def test_a_list_that_is_read_is_nobody_else_s() -> None:
     assert message.payload == {"position": [1.0]}
 
 
-def test_nan_comes_as_null_and_is_nan_again() -> None:
+def test_null_is_decoded_as_nan_in_float_fields() -> None:
     assert math.isnan(read(Vector3, {"x": None}).x)
     assert sent(Vector3(math.nan, math.inf)) == {"x": None, "y": None, "z": 0.0}
     assert read_bytes(Vector3, b'{"x": NaN, "y": -Infinity}').y == -math.inf
 
 
-def test_null_is_none_before_it_is_nan() -> None:
+def test_null_is_decoded_as_none_in_optional_float_fields() -> None:
     assert read(Reading, {"value": None}).value is None
     assert read(Reading, {}).value == 1.0
 
 
-def test_moments_as_other_languages_write_them() -> None:
+def test_datetime_formats_of_other_languages_are_decoded() -> None:
     @dataclass
     class Seen:
         at: datetime
@@ -254,7 +254,7 @@ def test_moments_as_other_languages_write_them() -> None:
     assert refused(Seen, {"at": "noon"}).startswith("at is 'noon'; give text such as '2026")
 
 
-def test_a_type_may_hold_itself() -> None:
+def test_recursive_type_round_trips_and_rejects_cycles() -> None:
     tree = Tree([Tree(), Tree([Tree()])])
     assert read(Tree, sent(tree)) == tree
     tree.parent = tree
@@ -264,7 +264,7 @@ def test_a_type_may_hold_itself() -> None:
         read_bytes(Tree, deep * 4)
 
 
-def test_what_is_private_is_not_sent_and_what_is_made_is_not_read() -> None:
+def test_private_fields_are_not_encoded_and_init_false_fields_are_not_decoded() -> None:
     @dataclass
     class Square:
         side: float
@@ -304,7 +304,7 @@ def test_what_is_private_is_not_sent_and_what_is_made_is_not_read() -> None:
         (Strict, {"b": "", "a": None}, "a is a 'NoneType'; give a 'int'"),
     ],
 )  # fmt: skip
-def test_what_does_not_fit_is_told_with_its_place(declared: type, plain: object, reason: str) -> None:
+def test_mismatched_payload_is_rejected_with_its_path(declared: type, plain: object, reason: str) -> None:
     assert refused(declared, plain) == reason
 
 
@@ -329,7 +329,7 @@ def test_what_does_not_fit_is_told_with_its_place(declared: type, plain: object,
         ("strict", {}, "strict.b is missing; give a 'str'"),
     ],
 )
-def test_what_is_wrong_in_one_field(name: str, value: object, reason: str) -> None:
+def test_mismatched_or_missing_field_is_rejected_by_name(name: str, value: object, reason: str) -> None:
     good = _good()
     assert isinstance(read(Everything, good), Everything)
     assert refused(Everything, {**good, name: value}) == reason
@@ -346,7 +346,7 @@ def _good() -> dict[str, Any]:
     }  # fmt: skip
 
 
-def test_what_a_class_refuses_does_not_fit() -> None:
+def test_error_in_post_init_is_reported_as_decode_error_with_its_path() -> None:
     assert refused(Shares, {"shares": [{"of_one": 0}, {"of_one": 2}]}) == (
         "shares[1] was rejected by 'Share': it is not from 0 to 1"
     )
@@ -371,11 +371,11 @@ def test_what_a_class_refuses_does_not_fit() -> None:
         (nep.sensor.JointState(position={1.0}), "position is a 'set'; give a 'list'", "position"),
     ],
 )  # fmt: skip
-def test_what_cannot_be_sent_is_told_with_its_place(payload: object, reason: str, place: str) -> None:
+def test_unencodable_typed_value_is_reported_with_its_path(payload: object, reason: str, place: str) -> None:
     assert unsent(payload) == (reason, place)
 
 
-def test_a_dict_is_checked_too() -> None:
+def test_dict_published_on_a_typed_topic_is_validated() -> None:
     encode = typed_codec(message_type(Strict), JSON).encode
     assert json.loads(bytes(encode({"b": "x", "a": 3}).data)) == {"b": "x", "a": 3}
     assert unsent({"b": "x", "aa": 1}, Strict) == ("aa is not a field of 'Strict'; did you mean 'a'?", "aa")
@@ -386,12 +386,12 @@ def test_a_dict_is_checked_too() -> None:
 
 
 @pytest.mark.parametrize("value", [1, 1.0, 1.5, "1", True, None, [1], [], Part(2)])
-def test_one_of_several_stays_what_it_was(value: object) -> None:
+def test_union_field_preserves_the_type_of_its_value(value: object) -> None:
     came = read(Number, sent(Number(value))).value
     assert (came, type(came)) == (value, type(value))
 
 
-def test_none_of_several_is_told_with_all_of_them() -> None:
+def test_mismatched_union_value_is_reported_with_all_alternatives() -> None:
     assert refused(Number, {"value": ["a"]}) == (
         "value is a 'list'; give a 'int', a 'str', a 'list', a 'Part', a 'bool', a 'float' or None"
     )
@@ -400,7 +400,7 @@ def test_none_of_several_is_told_with_all_of_them() -> None:
 # ---- what it costs, and odd classes
 
 
-def test_who_has_no_typed_messages_imports_nothing_of_them() -> None:
+def test_typed_message_modules_are_imported_on_first_use() -> None:
     program = (
         "import sys, nep\n"
         "with nep.node('n', 'memory', master='m') as node:\n"
@@ -444,7 +444,7 @@ class NothingAtAll(TypedDict):
     pass
 
 
-def test_odd_classes() -> None:
+def test_unusual_dataclasses_round_trip() -> None:
     assert read(Odd, sent(Odd(class_=3, _private=1))) == Odd(class_=3)
     assert message_type(Derived).name == "test/Base"
     assert json.loads(bytes(typed_codec(message_type(Base), JSON).encode(Derived(1)).data)) == {"a": 1}
@@ -454,7 +454,7 @@ def test_odd_classes() -> None:
     assert read(NothingAtAll, {"a": 1}) == {}
 
 
-def test_what_is_taken_away_from_an_instance_is_refused() -> None:
+def test_instance_with_a_deleted_attribute_is_rejected() -> None:
     @dataclass
     class Slot:
         a: int
@@ -470,7 +470,7 @@ def test_what_is_taken_away_from_an_instance_is_refused() -> None:
         assert sub.listen(timeout_s=30.0) == (True, {"a": 2, "b": 1})
 
 
-def test_two_threads_publish_and_read_different_types() -> None:
+def test_threads_publish_and_receive_different_types_concurrently() -> None:
     with nep.node("n", "memory", master="typed-threads") as node:
         faults: list[object] = []
 

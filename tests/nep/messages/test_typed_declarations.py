@@ -43,7 +43,7 @@ class Derived(Base):
     b: int = 2
 
 
-def test_names_in_the_graph() -> None:
+def test_message_type_names_in_the_graph() -> None:
     assert [message_type(each).name for each in (Part, Derived, Strict, Twist)] == [
         "Part", "test/Base", "Strict", "geometry_msgs/Twist",
     ]  # fmt: skip
@@ -153,10 +153,19 @@ class Plain:
         (Private, "Private._inner is not sent; give it a default"),
         (
             Image,
-            "the message type of 'Image' is 'image', a built-in type without fields; set MSG_TYPE to another name",
+            (
+                "the message type of 'Image' is 'image', a built-in type without fields; set MSG_TYPE to "
+                "another name"
+            ),
         ),
-        (Needs, "Needs.other is required" if sys.version_info >= (3, 11) else "the type hints of 'Needs' can't"),
-        (OwnConstructor, "OwnConstructor.another is required by the constructor but is not a field that is sent"),
+        (
+            Needs,
+            "Needs.other is required" if sys.version_info >= (3, 11) else "the type hints of 'Needs' can't",
+        ),
+        (
+            OwnConstructor,
+            "OwnConstructor.another is required by the constructor but is not a field that is sent",
+        ),
         (Empty, "MSG_TYPE is empty"),
         (Numbered, "MSG_TYPE is a 'int'; give a 'str'"),
         (Plain, "msg_type is the class 'Plain', which is neither a dataclass nor a TypedDict"),
@@ -165,7 +174,7 @@ class Plain:
         (Colour, "msg_type is the class 'Colour'"),
     ],
 )
-def test_a_type_that_cannot_be_is_refused_at_the_call(declared: type, sentence: str) -> None:
+def test_unsupported_type_is_rejected_by_new_pub_and_new_sub(declared: type, sentence: str) -> None:
     with nep.node("n", "memory", master="typed-refused") as node:
         for make in (node.new_pub, node.new_sub):
             with pytest.raises(ValueError, match=re.escape(sentence)) as caught:
@@ -174,7 +183,7 @@ def test_a_type_that_cannot_be_is_refused_at_the_call(declared: type, sentence: 
         assert not node.graph().topics
 
 
-def test_types_of_too_many_levels_are_refused() -> None:
+def test_too_deeply_nested_types_are_rejected() -> None:
     hint: Any = int
     for _level in range(2000):
         hint = list[hint]
@@ -188,7 +197,7 @@ def test_types_of_too_many_levels_are_refused() -> None:
 
 
 @pytest.mark.parametrize("given", [list[int], dict[str, int], Part(), Part | None, None, 3])
-def test_what_is_no_class_is_refused(given: Any) -> None:
+def test_message_type_that_is_not_a_class_is_rejected(given: Any) -> None:
     with nep.node("n", "memory", master="typed-no-class") as node:
         for make in (node.new_pub, node.new_sub):
             with pytest.raises(ValueError, match="msg_type is "):

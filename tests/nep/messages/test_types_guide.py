@@ -16,12 +16,12 @@ _PROGRAM = re.compile(
 
 
 @pytest.mark.parametrize("number", range(3))
-def test_the_program_prints_what_is_said(master: Master, number: int) -> None:
+def test_guide_program_prints_the_documented_output(master: Master, number: int) -> None:
     program, said, lines = _PROGRAM.findall(_GUIDE)[number]
     with running(program, NEP_MASTER=master.address) as example:
         printed, _errors = example.end()
     assert printed.splitlines() == [line.strip() for line in (said or lines).splitlines()]
 
 
-def test_each_program_says_what_it_prints() -> None:
+def test_every_guide_program_documents_its_output() -> None:
     assert len(_PROGRAM.findall(_GUIDE)) == _GUIDE.count("```python") == 3

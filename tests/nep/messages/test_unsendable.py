@@ -30,7 +30,7 @@ class Told:
         return RejectedPayloads("t", self.encode, self.problems.append, lambda: self.now)
 
 
-def test_unheard_payloads_are_looked_at_once_a_second() -> None:
+def test_unsubscribed_payloads_are_validated_once_per_second() -> None:
     told = Told()
     unsendable = told.new()
     for _ in range(1000):
@@ -39,7 +39,7 @@ def test_unheard_payloads_are_looked_at_once_a_second() -> None:
     assert told.encoded == 10
 
 
-def test_a_payload_that_takes_long_is_looked_at_less_often() -> None:
+def test_slow_payloads_are_validated_less_often() -> None:
     told = Told()
     told.takes_s = 0.5
     unsendable = told.new()
@@ -49,7 +49,7 @@ def test_a_payload_that_takes_long_is_looked_at_less_often() -> None:
     assert told.encoded * 0.5 / told.now < 0.025
 
 
-def test_an_unheard_payload_that_cannot_be_sent_is_told_until_one_can() -> None:
+def test_unencodable_unsubscribed_payload_is_reported_until_one_can_be_encoded() -> None:
     told = Told()
     unsendable = told.new()
     assert not unsendable.is_valid(object())
@@ -59,7 +59,9 @@ def test_an_unheard_payload_that_cannot_be_sent_is_told_until_one_can() -> None:
     assert told.problems == ["cannot encode a 'object' as 'json'; 'object' can't be encoded as JSON", ""]
 
 
-def test_good_and_bad_in_turn_are_logged_rarely(caplog: pytest.LogCaptureFixture) -> None:
+def test_alternating_valid_and_invalid_payloads_are_logged_at_growing_intervals(
+    caplog: pytest.LogCaptureFixture,
+) -> None:
     told = Told()
     unsendable = told.new()
     for _ in range(500):
@@ -70,7 +72,9 @@ def test_good_and_bad_in_turn_are_logged_rarely(caplog: pytest.LogCaptureFixture
     assert caplog.records[-1].getMessage().startswith("a message on 't' cannot be sent (100 so far): ")
 
 
-def test_good_and_bad_messages_in_turn_are_logged_rarely(caplog: pytest.LogCaptureFixture) -> None:
+def test_alternating_valid_and_invalid_messages_are_logged_at_growing_intervals(
+    caplog: pytest.LogCaptureFixture,
+) -> None:
     with nep.node("n", "memory", master="rarely") as node:
         sub, pub = node.new_sub("t"), node.new_pub("t")
         for _ in range(500):
@@ -94,15 +98,15 @@ def test_good_and_bad_messages_in_turn_are_logged_rarely(caplog: pytest.LogCaptu
         ({"a": (1, {2})}, "a[1]"),
     ],
 )
-def test_where_in_a_payload_it_is(payload: object, place: str) -> None:
+def test_path_of_the_unencodable_value_is_found(payload: object, place: str) -> None:
     assert path_of(payload, CODECS["json"].encode) == place
 
 
-def test_a_payload_that_holds_itself_has_an_end() -> None:
+def test_path_of_a_self_referencing_payload_is_bounded() -> None:
     endless: list[object] = []
     endless.append(endless)
     assert path_of(endless, CODECS["json"].encode).startswith("[0][0]")
 
 
-def test_the_rule_of_rare_logging() -> None:
+def test_only_powers_of_ten_are_logged() -> None:
     assert [count for count in range(1001) if is_logged(count)] == [1, 10, 100, 1000]

@@ -49,7 +49,7 @@ def node(request: pytest.FixtureRequest, master: Master) -> Iterator[nep.Node]:
         ),
     ],
 )
-def test_a_subscriber_of_wrong_arguments_is_not_made(
+def test_subscriber_with_invalid_arguments_is_rejected(
     node: nep.Node, given: dict[str, Any], sentence: str
 ) -> None:
     with pytest.raises(ValueError, match=sentence):
@@ -67,7 +67,7 @@ def test_a_subscriber_of_wrong_arguments_is_not_made(
         ({"qos": "sensor"}, r"the back end '(memory|zeromq)' .*\bqos"),
     ],
 )
-def test_a_publisher_of_wrong_arguments_is_not_made(
+def test_publisher_with_invalid_arguments_is_rejected(
     node: nep.Node, given: dict[str, Any], sentence: str
 ) -> None:
     with pytest.raises(ValueError, match=sentence):
@@ -75,12 +75,12 @@ def test_a_publisher_of_wrong_arguments_is_not_made(
     assert not node.graph().topics
 
 
-def test_strict_is_a_truth_value() -> None:
+def test_strict_must_be_a_bool() -> None:
     with pytest.raises(ValueError, match="strict"):
         nep.node("x", "memory", strict="yes")  # type: ignore[arg-type]
 
 
-def test_a_callback_is_a_function(node: nep.Node) -> None:
+def test_callback_must_be_callable(node: nep.Node) -> None:
     with pytest.raises(ValueError, match="callback is a 'str'; give a function"):
         node.new_callback("t", "json", "print")  # type: ignore[arg-type]
     assert not node.graph().topics
@@ -97,7 +97,7 @@ def test_a_callback_is_a_function(node: nep.Node) -> None:
         ({"qos": "sensor"}, r"the back end '(memory|zeromq)' .*\bqos"),
     ],
 )
-def test_a_callback_of_wrong_arguments_is_not_made(
+def test_callback_with_invalid_arguments_is_rejected(
     node: nep.Node, given: dict[str, Any], sentence: str
 ) -> None:
     with pytest.raises(ValueError, match=sentence):
@@ -106,7 +106,7 @@ def test_a_callback_of_wrong_arguments_is_not_made(
 
 
 @pytest.mark.parametrize("period_s", [0, 0.0, -1.0, math.nan, math.inf, None, "1", True])
-def test_a_period_is_more_than_nothing_and_ends(node: nep.Node, period_s: Any) -> None:
+def test_timer_with_invalid_period_or_callback_is_rejected(node: nep.Node, period_s: Any) -> None:
     with pytest.raises(ValueError, match=r"period_s is .*; give seconds, more than 0"):
         node.new_timer(period_s, print)
     with pytest.raises(ValueError, match="callback is a 'str'; give a function"):
@@ -114,7 +114,7 @@ def test_a_period_is_more_than_nothing_and_ends(node: nep.Node, period_s: Any) -
 
 
 @pytest.mark.parametrize("time_s", [-1.0, -0.001, math.nan, -math.inf])
-def test_a_time_is_no_less_than_nothing(node: nep.Node, time_s: float) -> None:
+def test_invalid_timeouts_are_rejected(node: nep.Node, time_s: float) -> None:
     sub, pub = node.new_sub("t"), node.new_pub("t")
     sentence = "_s is .*; give seconds, 0 or more, or None"
     for call in (sub.receive, node.spin, node.graph, pub.close, node.close):
@@ -157,13 +157,13 @@ def test_a_time_is_no_less_than_nothing(node: nep.Node, time_s: float) -> None:
         ({"generation": "C"}, "generation is 'C'; use 'A' or 'B'"),
     ],
 )
-def test_a_direct_connection_to_what_is_no_address(given: dict[str, Any], sentence: str) -> None:
+def test_direct_connection_with_invalid_address_is_rejected(given: dict[str, Any], sentence: str) -> None:
     with nep.node("direct") as node, pytest.raises((nep.NepError, ValueError), match=sentence):
         node.direct(**given)
 
 
 @pytest.mark.parametrize("wire", ["original", "native"])
-def test_a_direct_connection_that_cannot_be_leaves_no_socket_behind(wire: Any) -> None:
+def test_failed_direct_connection_leaves_no_open_socket(wire: Any) -> None:
     with nep.node("direct") as node:  # closing it would wait for a socket that is left
         anywhere = node.direct("*", 5003, "many2one", wire=wire)
         with pytest.raises(nep.NepError, match=r"'\*:5003'; .*a computer's address"):
@@ -176,7 +176,7 @@ def test_a_direct_connection_that_cannot_be_leaves_no_socket_behind(wire: Any) -
             node.new_sub("t", "json", last)
 
 
-def test_a_master_is_no_ipv6_address() -> None:
+def test_ipv6_and_malformed_master_addresses_are_rejected() -> None:
     for given in ("[::1]:7780", "::1", "[::1]"):
         with pytest.raises(nep.NepError, match=r"::1.*' is an IPv6 address, .*'127\.0\.0\.1'"):
             master_address(given)
@@ -212,7 +212,7 @@ BAD_ENDPOINTS = [
 
 
 @pytest.mark.parametrize("endpoint", BAD_ENDPOINTS)
-def test_one_bad_endpoint_keeps_nobody_from_hearing_the_others(
+def test_invalid_endpoint_does_not_block_other_publishers(
     master: Master, endpoint: str, caplog: pytest.LogCaptureFixture
 ) -> None:
     with nep.node("good", master=master.address) as good, nep.node("victim", master=master.address) as victim:
@@ -240,11 +240,11 @@ def test_one_bad_endpoint_keeps_nobody_from_hearing_the_others(
 
 
 @pytest.mark.parametrize("endpoint", ["tcp://127.0.0.1:1", "tcp://my-host.local:65535", "ipc://@nep-41234"])
-def test_endpoints_of_ours(endpoint: str) -> None:
+def test_own_endpoint_formats_are_valid(endpoint: str) -> None:
     assert is_endpoint(endpoint)
 
 
-def test_a_subscriber_whose_making_is_broken_off_is_not_registered(master: Master) -> None:
+def test_subscriber_whose_creation_is_interrupted_is_not_registered(master: Master) -> None:
     """So with Ctrl+C while it waits for an echo: nobody has it, so nobody could close it."""
 
     class BrokenOff(BaseException):

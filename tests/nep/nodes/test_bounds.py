@@ -50,7 +50,7 @@ def census_with_node() -> Registry:
     return registry
 
 
-def test_names_of_topics_that_nobody_uses_leave_nothing_behind() -> None:
+def test_removed_topics_leave_no_entries_in_master_tables() -> None:
     registry = census_with_node()
     member, viewer = registry.members["n"], GraphViewer(registry)
     for n in range(20_000):
@@ -67,7 +67,7 @@ def test_names_of_topics_that_nobody_uses_leave_nothing_behind() -> None:
     assert (viewer._topics, viewer._alerts) == ({}, {})
 
 
-def test_a_topic_that_comes_again_between_two_looks_is_looked_at_again() -> None:
+def test_topic_registered_again_between_two_graph_views_is_updated() -> None:
     registry = census_with_node()
     member, viewer = registry.members["n"], GraphViewer(registry)
     registry.add_publisher(member, PublisherRecord(1, "/t", "json", "json"))
@@ -77,7 +77,7 @@ def test_a_topic_that_comes_again_between_two_looks_is_looked_at_again() -> None
     assert viewer.view(7).topics["/t"].msg_type == "image"
 
 
-def test_who_renews_is_told_of_a_topic_whose_last_publisher_went() -> None:
+def test_renewal_reports_a_topic_whose_last_publisher_left() -> None:
     graph = Graph(epoch=7, now=0.0, learn_s=0.0)
     subscriber, publisher = SubscriberRecord(2, "/t", "json"), PublisherRecord(1, "/t", "json", "json")
     graph.apply(Join(NodeRecord("s", "S", "h", 1), 0, (), (subscriber,)), 1, 0.0, "s")
@@ -89,7 +89,7 @@ def test_who_renews_is_told_of_a_topic_whose_last_publisher_went() -> None:
     assert reply.answer.topics == (TopicPublishers("/t", ()),)
 
 
-def test_a_flood_of_new_senders_is_logged_rarely(caplog: pytest.LogCaptureFixture) -> None:
+def test_bad_requests_of_many_senders_are_logged_at_a_bounded_rate(caplog: pytest.LogCaptureFixture) -> None:
     caplog.set_level(logging.WARNING, "nep.master")
     bad = BadRequests()
     for n in range(10_000):
@@ -111,7 +111,7 @@ def pair() -> Iterator[SimpleNamespace]:
     context.term()
 
 
-def test_who_asks_for_a_graph_decodes_it_and_not_the_nodes_thread(pair: SimpleNamespace) -> None:
+def test_graph_is_decoded_in_the_calling_thread_and_not_the_node_thread(pair: SimpleNamespace) -> None:
     asked = pair.calls.begin(Look())
     eventually(lambda: pair.calls.read() == [] and bool(pair.router.poll(10)))
     sender, body = pair.router.recv_multipart()
@@ -123,7 +123,7 @@ def test_who_asks_for_a_graph_decodes_it_and_not_the_nodes_thread(pair: SimpleNa
     assert pair.calls.wait(asked, 1.0) == seen
 
 
-def test_a_graph_that_nobody_waits_for_any_more_is_not_decoded(pair: SimpleNamespace) -> None:
+def test_graph_reply_without_a_pending_call_is_not_decoded(pair: SimpleNamespace) -> None:
     pair.calls.begin(Ping())
     eventually(lambda: pair.calls.read() == [] and bool(pair.router.poll(10)))
     sender, _body = pair.router.recv_multipart()
@@ -151,7 +151,7 @@ def test_many_pushes_are_read_in_slices(pair: SimpleNamespace) -> None:
     assert max(sizes) <= 50
 
 
-def test_who_asks_for_graphs_and_reads_none_costs_the_master_no_memory_without_end() -> None:
+def test_unread_graph_replies_use_bounded_master_memory() -> None:
     port = MasterRouter("127.0.0.1:0")
     context: zmq.Context[zmq.Socket[bytes]] = zmq.Context()
     with context.socket(zmq.DEALER) as socket:
@@ -180,7 +180,7 @@ def test_who_asks_for_graphs_and_reads_none_costs_the_master_no_memory_without_e
 CONTROLS = "Arm\x1b[2J\u202e\n\u2028"
 
 
-def test_names_of_originals_are_cleaned_and_cut_for_they_cannot_be_told_to_change_them() -> None:
+def test_original_node_names_are_escaped_and_truncated() -> None:
     graph = Graph(epoch=7, now=0.0, learn_s=0.0)
     listing = GraphRegistrar(lambda request: graph.apply(request, -1, 0.0, "")[-1].answer, 7)  # type: ignore[arg-type, return-value]
     line = TopicLine("t", "bare", "json", "many2many")
@@ -194,7 +194,7 @@ def test_names_of_originals_are_cleaned_and_cut_for_they_cannot_be_told_to_chang
     assert all(0 < each.id < 2**63 for each in graph.view().topics["t"].publishers)
 
 
-def test_alerts_about_originals_are_cleaned_and_bounded() -> None:
+def test_alerts_about_original_nodes_are_escaped_and_bounded() -> None:
     told: list[int] = []
     shown: list[str] = []
 
@@ -214,7 +214,7 @@ def test_alerts_about_originals_are_cleaned_and_bounded() -> None:
     assert told[-1] == 0
 
 
-def test_who_asked_and_never_came_makes_room() -> None:
+def test_registration_without_connection_is_evicted_first() -> None:
     known = PortMap(None)
     line = TopicLine("t", "bare", "json", "many2many")
     processes = SimpleNamespace(started=lambda _pid: None, is_joined=lambda *_a, **_k: None)
@@ -229,13 +229,13 @@ def test_who_asked_and_never_came_makes_room() -> None:
     assert not registry.make_room()
 
 
-def test_an_original_with_endless_words_is_refused() -> None:
+def test_original_request_with_oversized_text_is_rejected() -> None:
     request = b'{"node":"n","topic":"t","socket":"publisher","msg_type":"%s"}' % (b"x" * 10_000)
     with pytest.raises(RequestError, match="has 10000 letters"):
         read_request(request, PORT_A)
 
 
-def test_a_thread_that_waits_for_a_graph_is_told_when_it_is_unreadable(pair: SimpleNamespace) -> None:
+def test_unreadable_graph_raises_in_the_waiting_thread(pair: SimpleNamespace) -> None:
     asked = pair.calls.begin(Look())
     eventually(lambda: pair.calls.read() == [] and bool(pair.router.poll(10)))
     sender, body = pair.router.recv_multipart()
@@ -281,7 +281,7 @@ class JustConnected:
         self.sent.append(body)
 
 
-def test_a_request_is_sent_at_once_when_the_connection_comes_while_it_is_made() -> None:
+def test_request_is_sent_immediately_when_the_socket_connects_during_the_call() -> None:
     """The look at the socket takes the only signal of it: without a second try it waits for half a second."""
     socket = JustConnected()
     calls = RpcClient(socket, "127.0.0.1:9", lambda: None)  # type: ignore[arg-type]

@@ -22,7 +22,7 @@ def node(request: pytest.FixtureRequest, master: Master) -> Iterator[nep.Node]:
         yield made
 
 
-def test_spin_rests_when_its_callbacks_are_closed(node: nep.Node) -> None:
+def test_spin_idles_after_its_callbacks_are_closed(node: nep.Node) -> None:
     node.new_callback("topic", "json", lambda _payload: None).close()
     with node.new_callback("topic", "json", lambda _payload: None):
         pass
@@ -32,7 +32,7 @@ def test_spin_rests_when_its_callbacks_are_closed(node: nep.Node) -> None:
     assert share < 0.2  # it was all of the time
 
 
-def test_a_callback_may_close_itself_and_others(node: nep.Node) -> None:
+def test_callback_can_close_itself_and_others(node: nep.Node) -> None:
     got: list[object] = []
 
     def callback(payload: object) -> None:
@@ -51,7 +51,7 @@ def test_a_callback_may_close_itself_and_others(node: nep.Node) -> None:
     assert got == [1]
 
 
-def test_what_is_closed_is_forgotten(node: nep.Node) -> None:
+def test_closed_publishers_and_subscribers_are_garbage_collected(node: nep.Node) -> None:
     kept = node.new_pub("topic", latched=True)
     kept.publish(1)
     gone = []
@@ -100,7 +100,7 @@ tell()
 
 
 @pytest.mark.parametrize("what", ["held", "all"])
-def test_opening_and_closing_again_and_again_leaves_nothing(master: Master, what: str) -> None:
+def test_repeated_open_and_close_leaks_nothing(master: Master, what: str) -> None:
     with running(CYCLES, what, "200") as program:
         before = [int(word) for word in program.line().split()]
         after = [int(word) for word in program.line().split()]
@@ -120,7 +120,9 @@ def until_closed(do: Callable[[], object], begun: threading.Barrier, errors: lis
         errors.append(error)
 
 
-def test_closing_while_others_publish_listen_and_spin(node: nep.Node) -> None:
+def test_close_during_concurrent_publish_listen_and_spin_raises_closed_error_without_hang(
+    node: nep.Node,
+) -> None:
     """Whoever is in the middle of it gets `ClosedError` or ends, and nobody hangs."""
     pub, sub = node.new_pub("topic"), node.new_sub("topic")
     node.new_callback("topic", "json", lambda _payload: None)
@@ -148,7 +150,7 @@ def test_closing_while_others_publish_listen_and_spin(node: nep.Node) -> None:
     assert errors == []
 
 
-def test_nodes_do_not_wait_for_each_other(master: Master) -> None:
+def test_blocked_sink_of_one_node_does_not_block_other_nodes(master: Master) -> None:
     """One has a sink that does not return, and one is being closed; a third comes, works and goes."""
     held, let_go = threading.Event(), threading.Event()
 
@@ -170,7 +172,7 @@ def test_nodes_do_not_wait_for_each_other(master: Master) -> None:
             let_go.set()
 
 
-def test_a_sink_may_make_publishers_and_subscribers_and_ask_for_the_graph(node: nep.Node) -> None:
+def test_sink_can_create_publishers_and_subscribers_and_query_the_graph(node: nep.Node) -> None:
     done = threading.Event()
     made: list[object] = []
 
@@ -189,7 +191,7 @@ def test_a_sink_may_make_publishers_and_subscribers_and_ask_for_the_graph(node: 
 
 
 @pytest.mark.skipif(not hasattr(signal, "SIGSTOP"), reason="there are no signals that stop")
-def test_at_the_end_of_the_interpreter_all_nodes_deliver_at_once(master: Master) -> None:
+def test_all_nodes_flush_concurrently_at_interpreter_exit(master: Master) -> None:
     """The first has a subscriber that hangs; what the second published arrives all the same."""
     hung = """
     import sys, nep
@@ -224,7 +226,7 @@ def test_at_the_end_of_the_interpreter_all_nodes_deliver_at_once(master: Master)
     assert "quiet" not in error, "nothing was sent there, so nothing is missing"
 
 
-def test_connections_to_masters_that_nobody_needs_are_closed(master: Master) -> None:
+def test_unused_master_connections_are_closed(master: Master) -> None:
     with nep.node("n") as node:
         pub = node.new_pub("topic")
         for port in range(1, 40):

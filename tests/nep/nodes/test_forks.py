@@ -42,7 +42,9 @@ def closed(do):
 
 
 @pytest.mark.parametrize("transport", ["zeromq", "memory"])
-def test_all_that_a_child_inherits_is_closed_and_a_new_node_works(master: Master, transport: str) -> None:
+def test_inherited_node_is_closed_in_a_forked_child_and_a_new_node_works(
+    master: Master, transport: str
+) -> None:
     code = (
         CHILD
         + """
@@ -97,7 +99,7 @@ print(len(node.graph().nodes))
         assert program.end()[1] == ""
 
 
-def test_a_child_may_end_in_every_way(master: Master) -> None:
+def test_forked_child_can_exit_in_every_way(master: Master) -> None:
     code = (
         CHILD
         + """
@@ -145,7 +147,7 @@ print(sub.listen(timeout_s=30.0)[1], sub.lost)
         assert program.end()[1] == ""
 
 
-def test_a_fork_in_the_middle_of_all_that_threads_do(master: Master) -> None:
+def test_fork_while_threads_use_the_node_does_not_deadlock(master: Master) -> None:
     """Thirty forks while threads publish, listen, spin, log and make nodes: whatever lock is held then."""
     code = (
         CHILD
@@ -198,7 +200,7 @@ print(len(node.graph().nodes))
         assert program.end(20.0)[1] == ""
 
 
-def test_callbacks_and_sinks_may_fork(master: Master) -> None:
+def test_callbacks_and_sinks_can_fork(master: Master) -> None:
     code = (
         CHILD
         + """
@@ -242,7 +244,7 @@ print(codes)
         assert program.end()[1] == ""
 
 
-def test_a_child_that_lives_on_holds_no_port_and_no_connection_of_its_parent(master: Master) -> None:
+def test_long_lived_child_holds_no_port_or_connection_of_its_parent(master: Master) -> None:
     with socket.create_server(("127.0.0.1", 0)) as probe:
         port = probe.getsockname()[1]
     code = (
@@ -294,7 +296,7 @@ print(os.waitpid(pid, 0)[1])
         assert program.end()[1] == ""
 
 
-def test_what_a_worker_of_multiprocessing_publishes_last_arrives(master: Master) -> None:
+def test_last_message_of_a_multiprocessing_worker_is_delivered(master: Master) -> None:
     code = """
 import multiprocessing, sys, nep
 
@@ -321,7 +323,7 @@ print("all", flush=True)
         assert program.end()[1] == ""
 
 
-def test_sockets_that_the_parent_waits_in_stay_as_they_are(master: Master) -> None:
+def test_fork_keeps_blocking_mode_of_parent_sockets(master: Master) -> None:
     """Also with a default time-out, as rospy sets one: blocking or not is shared with the child."""
     code = (
         CHILD

@@ -57,7 +57,7 @@ def handler(kept):
     made.close()
 
 
-def test_the_last_errors_are_kept_for_who_comes_later_and_no_more_of_them():
+def test_last_errors_are_kept_for_late_subscribers_up_to_a_limit():
     records, errors = Kept(), Kept([MasterUnreachable("127.0.0.1:1", 2.0)])
     handler = LogHandler("robot", records.open, open_errors=errors.open)
     handler.logger.info("fine")
@@ -74,7 +74,7 @@ def test_the_last_errors_are_kept_for_who_comes_later_and_no_more_of_them():
     assert all(len(record["text"]) < 1100 for record in errors.records[-1])
 
 
-def test_who_never_logs_an_error_has_no_publisher_for_them(kept):
+def test_error_publisher_is_not_opened_without_errors(kept):
     errors = Kept()
     handler = LogHandler("robot", kept.open, open_errors=errors.open)
     handler.logger.warning("nearly")
@@ -82,7 +82,7 @@ def test_who_never_logs_an_error_has_no_publisher_for_them(kept):
     assert errors.opened == 0
 
 
-def test_an_error_is_shown_once_whichever_way_it_comes():
+def test_error_received_on_both_topics_is_shown_once():
     shown = ShownErrors()
     one, two = ({"level": "error", "text": text, "node": "robot", "stamp_ns": 7} for text in ("one", "two"))
     assert shown.is_new(LogRecord.from_plain(one))
@@ -96,11 +96,11 @@ def test_an_error_is_shown_once_whichever_way_it_comes():
 @pytest.mark.parametrize(
     "payload", [None, 7, "text", {}, [None], [[]], [{}], [{"stamp_ns": 2**70, "level": "error"}]]
 )
-def test_what_is_no_list_of_errors_is_nothing(payload):
+def test_malformed_error_list_is_ignored(payload):
     assert ShownErrors().new_in(payload) == []
 
 
-def test_the_errors_that_were_shown_are_bounded():
+def test_memory_of_shown_errors_is_bounded():
     shown = ShownErrors()
     for number in range(5000):
         assert shown.is_new(LogRecord("error", "x", "n", "robot", number + 1))
@@ -111,7 +111,7 @@ def test_the_errors_that_were_shown_are_bounded():
     )
 
 
-def test_a_record_says_level_text_logger_node_time_place_and_process(handler, kept):
+def test_log_record_has_level_text_logger_node_time_location_and_process(handler, kept):
     handler.logger.warning("at %d %%", 9)
     handler.close()
     (record,) = kept.records
@@ -124,7 +124,7 @@ def test_a_record_says_level_text_logger_node_time_place_and_process(handler, ke
     assert given.to_plain() == record
 
 
-def test_who_never_logs_has_no_thread_and_no_publisher(handler, kept):
+def test_node_that_never_logs_has_no_log_thread_and_no_publisher(handler, kept):
     threads = set(threading.enumerate())
     handler.logger.debug("too quiet")
     handler.close()
@@ -132,7 +132,7 @@ def test_who_never_logs_has_no_thread_and_no_publisher(handler, kept):
     assert set(threading.enumerate()) == threads
 
 
-def test_a_record_that_reaches_the_node_and_the_root_is_published_once(handler, kept):
+def test_record_handled_by_node_and_root_logger_is_published_once(handler, kept):
     root = logging.getLogger()
     root.addHandler(handler)
     try:
@@ -144,7 +144,7 @@ def test_a_record_that_reaches_the_node_and_the_root_is_published_once(handler, 
     assert kept.texts == ["once", "also"]
 
 
-def test_an_error_brings_its_traceback(handler, kept):
+def test_logged_exception_includes_its_traceback(handler, kept):
     try:
         raise ValueError("no such luck")
     except ValueError:
@@ -154,7 +154,7 @@ def test_an_error_brings_its_traceback(handler, kept):
     assert kept.texts[0].endswith("ValueError: no such luck")
 
 
-def test_a_storm_is_cut_and_what_is_left_out_is_counted_exactly(kept):
+def test_log_burst_is_limited_and_dropped_records_are_counted_exactly(kept):
     now = [0.0]
     handler = LogHandler("robot", kept.open, clock=lambda: now[0])
     for number in range(10_000):
@@ -166,7 +166,7 @@ def test_a_storm_is_cut_and_what_is_left_out_is_counted_exactly(kept):
     assert told == 10_000 - BURST
 
 
-def test_after_a_pause_records_come_again(kept):
+def test_rate_limited_logging_resumes_after_a_pause(kept):
     now = [0.0]
     handler = LogHandler("robot", kept.open, rate_hz=10, burst=2, clock=lambda: now[0])
     for text in ("a", "b", "c"):
@@ -179,7 +179,7 @@ def test_after_a_pause_records_come_again(kept):
     assert dropped in kept.texts
 
 
-def test_records_wait_for_a_master_and_are_given_up_when_it_never_comes():
+def test_records_wait_for_a_master_and_are_dropped_when_the_node_closes():
     kept = Kept([MasterUnreachable("127.0.0.1:1", 0.1)])
     handler = LogHandler("robot", kept.open)
     handler.logger.info("early")
@@ -193,7 +193,7 @@ def test_records_wait_for_a_master_and_are_given_up_when_it_never_comes():
     assert not gone.records
 
 
-def test_what_cannot_be_written_does_not_end_the_program(handler, kept, capsys):
+def test_unformattable_record_does_not_raise_and_long_text_is_truncated(handler, kept, capsys):
     handler.logger.propagate = False  # pytest's own handler raises
     handler.logger.info("%d", "no number")
     handler.logger.info("x" * (TEXT_LIMIT + 5))
@@ -213,17 +213,17 @@ def test_what_cannot_be_written_does_not_end_the_program(handler, kept, capsys):
         (None, "info", ""),
     ],
 )
-def test_whatever_somebody_publishes_becomes_a_record(payload, level, text):
+def test_any_payload_is_converted_to_a_log_record(payload, level, text):
     record = LogRecord.from_plain(payload, 5)
     assert (record.level, record.text, record.stamp_ns, record.node) == (level, text, 5, "")
 
 
-def test_levels_have_names():
+def test_log_level_names_are_mapped():
     assert [level_of(name.upper()) for name in LEVELS] == list(LEVELS)
     assert level_of(None) == "info"
 
 
-def test_a_nodes_log_arrives_at_who_subscribes_and_closing_flushes_it(master):
+def test_subscriber_receives_log_records_that_closing_the_node_flushes(master):
     with nep.node("page") as page, page.new_sub(LOG_TOPIC, LOG_TYPE) as sub:
         with nep.node("robot") as robot:
             assert LOG_TOPIC not in robot.graph().topics or not robot.graph().topics[LOG_TOPIC].publishers
@@ -233,13 +233,13 @@ def test_a_nodes_log_arrives_at_who_subscribes_and_closing_flushes_it(master):
         assert sub.listen(timeout_s=0) == (False, {})
 
 
-def test_logging_needs_no_master_and_does_not_hold_up_the_end(monkeypatch):
+def test_logging_without_a_master_does_not_delay_close(monkeypatch):
     monkeypatch.setenv("NEP_MASTER", "127.0.0.1:1")
     with nep.node("alone", wait_s=0.05) as node:
         node.log.error("this has no subscribers")
 
 
-def test_a_long_silence_saves_up_no_more_than_one_burst(kept):
+def test_rate_limit_accumulates_at_most_one_burst(kept):
     now = [0.0]
     handler = LogHandler("robot", kept.open, rate_hz=10, burst=3, clock=lambda: now[0])
     now[0] = 3600.0
@@ -249,7 +249,7 @@ def test_a_long_silence_saves_up_no_more_than_one_burst(kept):
     assert [text for text in kept.texts if text.isdigit()] == ["0", "1", "2"]
 
 
-def test_what_publishing_itself_logs_is_not_published():
+def test_records_logged_while_publishing_are_not_published():
     kept = Kept()
 
     class Chatty:
@@ -268,7 +268,7 @@ def test_what_publishing_itself_logs_is_not_published():
     assert kept.texts == ["once"]
 
 
-def test_without_a_master_no_more_records_wait_than_fit():
+def test_queue_of_records_without_a_master_is_bounded():
     came, kept = threading.Event(), Kept()
 
     def open_late():
@@ -285,7 +285,7 @@ def test_without_a_master_no_more_records_wait_than_fit():
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="limits memory as Linux does")
-def test_a_record_that_gets_no_thread_any_more_ends_nothing():
+def test_record_is_dropped_if_the_log_thread_cannot_start():
     """As at the end of the interpreter from Python 3.12 on: the same error, here for want of memory."""
     code = """
     import resource, threading

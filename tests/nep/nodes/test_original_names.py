@@ -23,7 +23,7 @@ def port() -> int:
 
 
 @pytest.mark.parametrize("transport", ["ZMQ", "POSIX", "socket"])
-def test_a_client_and_a_server_meet_at_a_fixed_port(port: int, transport: str) -> None:
+def test_client_calls_a_server_at_a_fixed_port(port: int, transport: str) -> None:
     requests: list[object] = []
 
     def serve() -> None:
@@ -42,14 +42,14 @@ def test_a_client_and_a_server_meet_at_a_fixed_port(port: int, transport: str) -
     assert requests == [{"question": 1}, {"question": 2}]
 
 
-def test_a_server_that_is_not_there_is_an_error_with_its_address(port: int) -> None:
+def test_missing_server_raises_no_server_error_with_its_address(port: int) -> None:
     with nep.client("127.0.0.1", port, timeout_s=0.01) as client:
         client.send_info({})
         with pytest.raises(nep.NoServerError, match=f"check the address '127.0.0.1:{port}'"):
             client.listen_info()
 
 
-def test_a_node_over_plain_tcp_has_calls_and_says_what_it_lacks(port: int) -> None:
+def test_plain_tcp_node_supports_services_only(port: int) -> None:
     with nep.node("arm", "TCP") as node:
         address = node.direct("127.0.0.1", port)
         node.new_server("/move", lambda request: request, address, threads=1)
@@ -66,7 +66,7 @@ def test_a_node_over_plain_tcp_has_calls_and_says_what_it_lacks(port: int) -> No
 
 
 @pytest.mark.parametrize("names", [("send_json", "listen_json"), ("sendJson", "listenDictionary")])
-def test_messages_pass_under_the_original_names(names: tuple[str, str]) -> None:
+def test_messages_are_exchanged_with_original_method_names(names: tuple[str, str]) -> None:
     with nep.node("both", "memory", master=place_for("memory", "")) as node:
         words, poses = node.new_sub("/words", "string"), node.new_sub("/poses", "json")
         node.new_pub("/words", "string").send_string("hello")
@@ -85,7 +85,7 @@ def test_helpers_of_the_original_module(tmp_path) -> None:
 
 
 @pytest.mark.parametrize("name", ["publisher", "subscriber", "nepmaster", "masterRegister", "getFiles"])
-def test_a_name_that_is_missing_is_an_error_that_names_the_replacement(name: str) -> None:
+def test_removed_name_raises_attribute_error_that_links_the_migration_guide(name: str) -> None:
     with pytest.raises(AttributeError, match=r"docs/original-nep\.md") as raised:
         getattr(nep, name)
     shown = "".join(traceback.format_exception(raised.value))

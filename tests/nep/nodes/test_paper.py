@@ -42,7 +42,7 @@ node.spin()
 
 
 @pytest.mark.parametrize("receiver", [POLLING, "CALLBACK"])
-def test_the_listings(master: Master, receiver: str) -> None:
+def test_paper_listings_exchange_a_message(master: Master, receiver: str) -> None:
     with running(CALLBACK if receiver == "CALLBACK" else receiver) as program:
         while program.line() != "ready":
             pass

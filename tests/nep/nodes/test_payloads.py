@@ -47,7 +47,7 @@ def next_by(way: str, sub: nep.Subscriber) -> int:
 
 
 @pytest.mark.parametrize("seed", range(4))
-def test_all_ways_of_reading_mixed_give_all_in_order(nodes: tuple[nep.Node, nep.Node], seed: int) -> None:
+def test_mixed_read_methods_return_all_messages_in_order(nodes: tuple[nep.Node, nep.Node], seed: int) -> None:
     sender, reader = nodes
     sub, pub = reader.new_sub("t"), sender.new_pub("t")
     sending = threading.Thread(target=burst, args=(pub, *range(COUNT)))
@@ -65,7 +65,7 @@ def test_all_ways_of_reading_mixed_give_all_in_order(nodes: tuple[nep.Node, nep.
     assert (sub.received, sub.lost) == (COUNT, 0)
 
 
-def test_payloads_come_without_messages(nodes: tuple[nep.Node, nep.Node]) -> None:
+def test_payloads_are_delivered_without_message_objects(nodes: tuple[nep.Node, nep.Node]) -> None:
     """Else the other tests here show nothing."""
     sender, reader = nodes
     sub, pub = reader.new_sub("t"), sender.new_pub("t")
@@ -82,7 +82,7 @@ def test_payloads_come_without_messages(nodes: tuple[nep.Node, nep.Node]) -> Non
     assert quickly
 
 
-def test_callbacks_and_listening_take_turns(nodes: tuple[nep.Node, nep.Node]) -> None:
+def test_callbacks_and_listen_alternate_without_loss(nodes: tuple[nep.Node, nep.Node]) -> None:
     sender, reader = nodes
     heard: list[object] = []
 
@@ -104,7 +104,7 @@ def test_callbacks_and_listening_take_turns(nodes: tuple[nep.Node, nep.Node]) ->
     assert sub.lost == 0
 
 
-def test_what_cannot_be_decoded_is_told_in_its_turn(nodes: tuple[nep.Node, nep.Node]) -> None:
+def test_undecodable_message_is_skipped_and_keeps_order(nodes: tuple[nep.Node, nep.Node]) -> None:
     sender, reader = nodes
     sub, pub = reader.new_sub("t"), sender.new_pub("t")
     for number in range(FIRST):
@@ -116,7 +116,7 @@ def test_what_cannot_be_decoded_is_told_in_its_turn(nodes: tuple[nep.Node, nep.N
     eventually(lambda: sub.listen() == (True, 1))
 
 
-def test_two_threads_share_what_comes(nodes: tuple[nep.Node, nep.Node]) -> None:
+def test_two_threads_share_messages_of_one_subscriber(nodes: tuple[nep.Node, nep.Node]) -> None:
     sender, reader = nodes
     sub, pub = reader.new_sub("t"), sender.new_pub("t")
     heard: list[list[object]] = [[], []]
@@ -144,7 +144,7 @@ def test_two_threads_share_what_comes(nodes: tuple[nep.Node, nep.Node]) -> None:
     assert (sub.received, sub.lost) == (COUNT + 2, 0)
 
 
-def test_closing_forgets_them(nodes: tuple[nep.Node, nep.Node]) -> None:
+def test_close_discards_queued_payloads(nodes: tuple[nep.Node, nep.Node]) -> None:
     sender, reader = nodes
     sub, pub = reader.new_sub("t"), sender.new_pub("t")
     burst(pub, *range(FIRST))

@@ -54,7 +54,7 @@ def node(master: Master) -> Iterator[nep.Node]:
 
 
 @pytest.mark.usefixtures("patient")
-def test_the_first_message_reaches_every_process_40_of_40(node: nep.Node) -> None:
+def test_first_message_reaches_every_process(node: nep.Node) -> None:
     with ExitStack() as stack:
         programs = [stack.enter_context(running(COLLECT, "topic", str(n), "40")) for n in range(4)]
         assert [program.line() for program in programs] == ["ready"] * 4
@@ -69,7 +69,7 @@ def test_the_first_message_reaches_every_process_40_of_40(node: nep.Node) -> Non
             assert json.loads(program.line()) == list(range(40))
 
 
-def test_the_next_message_reaches_a_new_process(node: nep.Node) -> None:
+def test_new_process_receives_the_next_message(node: nep.Node) -> None:
     pub = node.new_pub("topic")
     for n in range(3):
         with running(COLLECT, "topic", str(n), "1") as program:
@@ -79,7 +79,7 @@ def test_the_next_message_reaches_a_new_process(node: nep.Node) -> None:
             program.end()
 
 
-def test_a_killed_publisher_is_soon_gone(node: nep.Node) -> None:
+def test_killed_publisher_is_removed_from_the_graph(node: nep.Node) -> None:
     sub = node.new_sub("topic")
     with running(PUBLISH, "topic") as program:
         program.line()
@@ -90,7 +90,7 @@ def test_a_killed_publisher_is_soon_gone(node: nep.Node) -> None:
         assert {each.name for each in node.graph().nodes.values()} == {"tester"}
 
 
-def test_a_publisher_that_is_started_again_is_heard(node: nep.Node) -> None:
+def test_restarted_publisher_is_received(node: nep.Node) -> None:
     sub = node.new_sub("topic")
     for _ in range(2):
         with running(PUBLISH, "topic") as program:
@@ -102,7 +102,7 @@ def test_a_publisher_that_is_started_again_is_heard(node: nep.Node) -> None:
 
 
 @pytest.mark.usefixtures("patient")
-def test_a_killed_subscriber_costs_nothing(node: nep.Node) -> None:
+def test_killed_subscriber_does_not_delay_a_new_publisher(node: nep.Node) -> None:
     with running(COLLECT, "topic", "0", "1") as program:
         program.line()
         program.signal(signal.SIGKILL)
@@ -114,7 +114,7 @@ def test_a_killed_subscriber_costs_nothing(node: nep.Node) -> None:
 
 
 @pytest.mark.usefixtures("patient")
-def test_a_killed_publisher_costs_a_new_subscriber_nothing(node: nep.Node) -> None:
+def test_killed_publisher_does_not_delay_a_new_subscriber(node: nep.Node) -> None:
     with running(PUBLISH, "topic") as program:
         program.line()
         program.signal(signal.SIGKILL)
@@ -124,7 +124,7 @@ def test_a_killed_publisher_costs_a_new_subscriber_nothing(node: nep.Node) -> No
         assert monotonic() - started < GREETINGS_S
 
 
-def test_a_hung_subscriber_costs_half_a_second_once_and_is_named(
+def test_hung_subscriber_delays_the_first_publisher_once_and_is_reported(
     node: nep.Node, request: pytest.FixtureRequest
 ) -> None:
     with running(COLLECT, "topic", "0", "2") as program:
@@ -149,7 +149,7 @@ def test_a_hung_subscriber_costs_half_a_second_once_and_is_named(
         eventually(lambda: not node.graph().alerts)
 
 
-def test_a_stopped_publisher_is_unlisted_but_not_cut_off(node: nep.Node) -> None:
+def test_stopped_publisher_is_unlisted_but_stays_connected(node: nep.Node) -> None:
     code = """
     import nep, sys
     pub = nep.node("p").new_pub("topic")
@@ -172,7 +172,7 @@ def test_a_stopped_publisher_is_unlisted_but_not_cut_off(node: nep.Node) -> None
 
 
 @pytest.mark.usefixtures("patient")
-def test_a_master_that_is_killed_under_traffic_loses_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_killed_master_under_traffic_loses_no_messages(monkeypatch: pytest.MonkeyPatch) -> None:
     with ExitStack() as stack:
         first = stack.enter_context(running(MASTER, "127.0.0.1:0"))
         address = first.line()
@@ -220,7 +220,7 @@ def test_a_master_that_is_killed_under_traffic_loses_nothing(monkeypatch: pytest
             assert sub.lost == 0
 
 
-def test_the_end_of_the_interpreter_delivers_20_pictures_of_4_mb(node: nep.Node) -> None:
+def test_interpreter_exit_delivers_queued_large_messages(node: nep.Node) -> None:
     code = """
     import nep
     pub = nep.node("p").new_pub("topic", "bytes")
@@ -238,7 +238,7 @@ def test_the_end_of_the_interpreter_delivers_20_pictures_of_4_mb(node: nep.Node)
     assert "p" not in {each.name for each in node.graph().nodes.values()}
 
 
-def test_with_nothing_queued_the_interpreter_ends_at_once(master: Master) -> None:
+def test_interpreter_exits_immediately_with_empty_queue(master: Master) -> None:
     code = """
     import nep, time
     from nep import nodes
@@ -255,7 +255,7 @@ def test_with_nothing_queued_the_interpreter_ends_at_once(master: Master) -> Non
         assert monotonic() - closing_at < 50.0
 
 
-def test_what_could_not_be_delivered_is_said(master: Master) -> None:
+def test_undelivered_messages_are_reported_at_exit(master: Master) -> None:
     code = """
     import nep, sys
     pub = nep.node("p").new_pub("topic", "bytes")
@@ -276,7 +276,7 @@ def test_what_could_not_be_delivered_is_said(master: Master) -> None:
     assert "closed before 1 subscriber(s) received everything: up to 20 messages not delivered" in error
 
 
-def test_ctrl_c_ends_a_blocking_listen(master: Master) -> None:
+def test_ctrl_c_interrupts_a_blocking_listen(master: Master) -> None:
     code = """
     import nep
     node = nep.node("p")
@@ -295,7 +295,9 @@ def test_ctrl_c_ends_a_blocking_listen(master: Master) -> None:
         assert program.process.returncode == 0
 
 
-def test_without_a_master_new_pub_says_how_to_start_one(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_new_pub_without_a_master_raises_an_error_that_explains_how_to_start_one(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
     monkeypatch.setenv("NEP_MASTER", "127.0.0.1:1")
     with nep.node("n", wait_s=0.2) as node:
         with pytest.raises(nep.MasterUnreachable) as caught:
@@ -319,7 +321,7 @@ def test_wait_none_waits_for_a_master() -> None:
             assert made
 
 
-def test_a_computer_that_slept_is_registered_again_and_heard(node: nep.Node) -> None:
+def test_suspended_process_registers_again_and_loses_no_messages(node: nep.Node) -> None:
     """Its lease lapsed meanwhile; what it said before it fell asleep and after is all there."""
     sub = node.new_sub("topic")
     with running(ECHO, "topic") as program:

@@ -51,7 +51,7 @@ def node(clock: Clock) -> Iterator[nep.Node]:
         yield made
 
 
-def test_a_late_timer_is_called_once_and_keeps_its_beat(clock: Clock) -> None:
+def test_late_timer_fires_once_and_keeps_its_schedule(clock: Clock) -> None:
     calls: list[float] = []
     timer = Timer(0.5, lambda: calls.append(clock.now), clock)
     assert not timer.run_if_due()
@@ -63,7 +63,7 @@ def test_a_late_timer_is_called_once_and_keeps_its_beat(clock: Clock) -> None:
     assert timer.due == 104.0
 
 
-def test_two_threads_that_spin_call_a_timer_once_each_time_it_is_due() -> None:
+def test_timer_fires_once_per_period_with_two_spinning_threads() -> None:
     both = threading.Barrier(2)
     calls: list[int] = []
     now = 0.0
@@ -86,13 +86,13 @@ def test_two_threads_that_spin_call_a_timer_once_each_time_it_is_due() -> None:
     assert len(calls) == 2
 
 
-def test_who_is_due_first() -> None:
+def test_next_due_is_the_earliest_timer() -> None:
     clock = Clock()
     assert next_due([Timer(2.0, print, clock), Timer(0.5, print, clock)]) == 100.5
     assert next_due([]) == float("inf")
 
 
-def test_spin_waits_no_longer_than_until_the_next_timer(node: nep.Node, clock: Clock) -> None:
+def test_spin_waits_until_the_next_timer(node: nep.Node, clock: Clock) -> None:
     calls: list[float] = []
     node.new_timer(0.03125, lambda: calls.append(clock.now))
     node.spin(0.125)
@@ -100,7 +100,7 @@ def test_spin_waits_no_longer_than_until_the_next_timer(node: nep.Node, clock: C
     assert node._work.transport.waits == [0.03125] * 4  # type: ignore[attr-defined]
 
 
-def test_a_slow_callback_makes_a_timer_late_and_not_many(node: nep.Node, clock: Clock) -> None:
+def test_slow_callback_delays_a_timer_without_extra_calls(node: nep.Node, clock: Clock) -> None:
     calls: list[str] = []
 
     def slow() -> None:
@@ -113,7 +113,7 @@ def test_a_slow_callback_makes_a_timer_late_and_not_many(node: nep.Node, clock: 
     assert calls == ["quick", "slow", "quick"]
 
 
-def test_what_a_timer_raises_comes_out_of_spin_and_it_goes_on(node: nep.Node, clock: Clock) -> None:
+def test_timer_exception_propagates_from_spin_and_timer_stays_scheduled(node: nep.Node, clock: Clock) -> None:
     def fail() -> None:
         raise ZeroDivisionError
 
@@ -124,7 +124,7 @@ def test_what_a_timer_raises_comes_out_of_spin_and_it_goes_on(node: nep.Node, cl
     assert (clock.now, timer.due) == (101.0, 101.5)
 
 
-def test_a_timer_that_another_one_cancels_is_not_called(node: nep.Node) -> None:
+def test_timer_cancelled_by_another_timer_does_not_fire(node: nep.Node) -> None:
     calls: list[str] = []
 
     def first() -> None:
@@ -138,7 +138,7 @@ def test_a_timer_that_another_one_cancels_is_not_called(node: nep.Node) -> None:
     assert calls == ["first"]
 
 
-def test_a_timer_that_stops_spin_is_the_last_thing_that_is_done(node: nep.Node) -> None:
+def test_no_callback_runs_after_a_timer_stops_spin(node: nep.Node) -> None:
     got: list[object] = []
     node.new_callback("t", "json", got.append)
     pub = node.new_pub("t")
@@ -152,7 +152,7 @@ def test_a_timer_that_stops_spin_is_the_last_thing_that_is_done(node: nep.Node) 
     assert got == []
 
 
-def test_a_timer_that_is_always_due_leaves_callbacks_their_turn(node: nep.Node) -> None:
+def test_timer_that_is_always_due_does_not_starve_callbacks(node: nep.Node) -> None:
     got: list[object] = []
 
     def callback(payload: object) -> None:

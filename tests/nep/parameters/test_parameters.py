@@ -22,7 +22,7 @@ def pair(master: Master) -> Iterator[tuple[nep.Node, nep.Node]]:
         yield node, other
 
 
-def test_they_are_declared_read_and_set(make: Make) -> None:
+def test_parameters_are_declared_read_and_set(make: Make) -> None:
     parameters = make("robot").parameters
     assert parameters.list() == ()
     assert parameters.declare("speed", 0.5, min=0, max=2, description="m/s") == 0.5
@@ -38,7 +38,7 @@ def test_they_are_declared_read_and_set(make: Make) -> None:
     assert (said.default, said.minimum, said.maximum, said.description) == (0.5, 0, 2, "m/s")
 
 
-def test_others_read_them_on_a_topic_that_is_latched(make: Make) -> None:
+def test_parameter_values_are_published_on_a_latched_topic(make: Make) -> None:
     """Also where a back end has no services."""
     node = make("robot")
     node.parameters.declare("speed", 0.5)
@@ -54,7 +54,7 @@ def test_others_read_them_on_a_topic_that_is_latched(make: Make) -> None:
     assert state["parameters"][0]["value"] == 1.5  # type: ignore[index]
 
 
-def test_others_set_them_and_are_told_why_not(make: Make) -> None:
+def test_other_node_sets_parameters_and_receives_rejection_reasons(make: Make) -> None:
     node, other = make("robot"), make("tool")
     node.parameters.declare("speed", 0.5, max=2)
     node.parameters.declare("serial", "X1", read_only=True)
@@ -85,7 +85,7 @@ def test_others_set_them_and_are_told_why_not(make: Make) -> None:
     node.parameters["serial"] = "X2"
 
 
-def test_a_callback_is_asked_before_and_may_refuse(pair: tuple[nep.Node, nep.Node]) -> None:
+def test_change_callback_can_reject_new_values(pair: tuple[nep.Node, nep.Node]) -> None:
     node, other = pair
     asked: list[tuple[dict[str, object], object, str]] = []
 
@@ -120,7 +120,7 @@ def test_a_callback_is_asked_before_and_may_refuse(pair: tuple[nep.Node, nep.Nod
     assert node.parameters["speed"] == 3
 
 
-def test_what_is_no_call_of_parameters_is_refused(pair: tuple[nep.Node, nep.Node]) -> None:
+def test_malformed_parameter_calls_are_rejected(pair: tuple[nep.Node, nep.Node]) -> None:
     node, other = pair
     node.parameters.declare("speed", 1)
     client = other.new_client(place_of(node.id), timeout_s=30.0)
@@ -156,7 +156,7 @@ def test_what_is_no_call_of_parameters_is_refused(pair: tuple[nep.Node, nep.Node
         ({}, {}, {1: 2}, "Dict key must be str"),
     ],
 )
-def test_values_that_it_cannot_have(
+def test_invalid_parameter_value_is_rejected(
     make: Make, default: object, limits: dict[str, object], wrong: object, sentence: str
 ) -> None:
     parameters = make("robot").parameters
@@ -166,7 +166,7 @@ def test_values_that_it_cannot_have(
     assert parameters["x"] == default
 
 
-def test_a_whole_float_is_an_int_and_an_int_a_float(make: Make) -> None:
+def test_whole_float_converts_to_int_and_int_to_float(make: Make) -> None:
     parameters = make("robot").parameters
     parameters.declare("i", 1)
     parameters.declare("f", 1, type=float)
@@ -174,7 +174,7 @@ def test_a_whole_float_is_an_int_and_an_int_a_float(make: Make) -> None:
     assert [(each.value, type(each.value)) for each in parameters.list()] == [(2, int), (3.0, float)]
 
 
-def test_a_value_is_a_copy(make: Make) -> None:
+def test_parameter_value_is_copied(make: Make) -> None:
     parameters = make("robot").parameters
     given = [1, {"a": [2]}]
     parameters.declare("x", given)
@@ -197,7 +197,7 @@ def test_a_value_is_a_copy(make: Make) -> None:
         ("", 1, {}, "'' .*1 to 200"),
     ],
 )
-def test_what_cannot_be_declared(
+def test_invalid_parameter_declaration_is_rejected(
     make: Make, name: str, default: object, more: dict[str, object], sentence: str
 ) -> None:
     parameters = make("robot").parameters
@@ -207,14 +207,14 @@ def test_what_cannot_be_declared(
     assert [each.name for each in parameters.list()] == ["x"]
 
 
-def test_there_is_a_most(make: Make) -> None:
+def test_number_of_parameters_is_limited(make: Make) -> None:
     parameters = make("robot").parameters
     parameters._known = {str(n): None for n in range(1000)}  # type: ignore[misc]
     with pytest.raises(nep.ParameterError, match="a node can have at most 1000 parameters"):
         parameters.declare("x", 1)
 
 
-def test_which_node_is_meant(master: Master) -> None:
+def test_parameters_of_a_node_are_found_by_name_or_id(master: Master) -> None:
     with nep.node("a") as one, nep.node("a") as two, nep.node("b"), nep.node("tool") as tool:
         with pytest.raises(nep.NepError, match="no node is named 'a'; no node has parameters"):
             tool.parameters_of("a")
@@ -231,14 +231,14 @@ def test_which_node_is_meant(master: Master) -> None:
             tool.parameters_of("aa")
 
 
-def test_without_a_master_nothing_is_declared() -> None:
+def test_declare_without_a_master_raises_and_declares_nothing() -> None:
     with nep.node("a", master="127.0.0.1:1", wait_s=0.1) as node:
         with pytest.raises(nep.MasterUnreachable):
             node.parameters.declare("x", 1)
         assert node.parameters.list() == ()
 
 
-def test_after_closing_they_are_the_node_s_own(master: Master) -> None:
+def test_parameters_stay_local_after_the_node_is_closed(master: Master) -> None:
     node = nep.node("a")
     node.parameters.declare("x", 1)
     node.close()
@@ -252,7 +252,7 @@ def test_after_closing_they_are_the_node_s_own(master: Master) -> None:
         closed.parameters.declare("x", 1)
 
 
-def test_many_threads_set_one(pair: tuple[nep.Node, nep.Node]) -> None:
+def test_concurrent_changes_of_several_parameters_are_atomic(pair: tuple[nep.Node, nep.Node]) -> None:
     node, other = pair
     node.parameters.declare("a", 0)
     node.parameters.declare("b", 0)
@@ -279,7 +279,7 @@ def test_many_threads_set_one(pair: tuple[nep.Node, nep.Node]) -> None:
     assert node.parameters["a"] == node.parameters["b"]
 
 
-def test_a_node_that_is_killed_is_an_error_in_words(master: Master) -> None:
+def test_reading_parameters_of_a_killed_node_raises(master: Master) -> None:
     code = """
     import nep
     node = nep.node("robot")
@@ -299,7 +299,7 @@ def test_a_node_that_is_killed_is_an_error_in_words(master: Master) -> None:
 
 
 @pytest.mark.skipif(not hasattr(os, "fork"), reason="Windows does not fork")
-def test_in_a_child_they_are_told_to_nobody(master: Master) -> None:
+def test_parameter_change_in_a_forked_child_stays_local(master: Master) -> None:
     code = """
     import os, nep
     node = nep.node("robot")

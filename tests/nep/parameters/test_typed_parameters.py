@@ -60,7 +60,9 @@ def nodes() -> Iterator[tuple[nep.Node, nep.Node]]:
         yield robot, tool
 
 
-def test_a_dataclass_is_an_instance_here_and_a_map_there(nodes: tuple[nep.Node, nep.Node]) -> None:
+def test_dataclass_parameter_is_an_instance_locally_and_a_map_remotely(
+    nodes: tuple[nep.Node, nep.Node],
+) -> None:
     robot, tool = nodes
     assert robot.parameters.declare("limits", Limits(0.0)) == Limits(0.0)
     asked: list[object] = []
@@ -87,7 +89,7 @@ def test_a_dataclass_is_an_instance_here_and_a_map_there(nodes: tuple[nep.Node, 
         (5, "Limits"),
     ],
 )
-def test_what_does_not_fit_is_refused_from_both_sides(
+def test_mismatched_typed_value_is_rejected_locally_and_remotely(
     nodes: tuple[nep.Node, nep.Node], value: object, said: str
 ) -> None:
     robot, tool = nodes
@@ -99,7 +101,7 @@ def test_what_does_not_fit_is_refused_from_both_sides(
     assert robot.parameters["limits"] == Limits(0.0)
 
 
-def test_an_instance_that_is_changed_in_place_changes_nothing(nodes: tuple[nep.Node, nep.Node]) -> None:
+def test_in_place_change_of_a_parameter_instance_has_no_effect(nodes: tuple[nep.Node, nep.Node]) -> None:
     robot, _tool = nodes
     given = Limits(0.0)
     robot.parameters.declare("limits", given)
@@ -112,7 +114,7 @@ def test_an_instance_that_is_changed_in_place_changes_nothing(nodes: tuple[nep.N
     assert robot.parameters["limits"] == Limits(0.0, 99.0)
 
 
-def test_an_enum_is_its_value_there(nodes: tuple[nep.Node, nep.Node]) -> None:
+def test_enum_parameter_is_its_value_remotely(nodes: tuple[nep.Node, nep.Node]) -> None:
     robot, tool = nodes
     assert robot.parameters.declare("gait", Gait.WALK) is Gait.WALK
     robot.parameters.declare("level", 2, type=Level)
@@ -131,14 +133,14 @@ def test_an_enum_is_its_value_there(nodes: tuple[nep.Node, nep.Node]) -> None:
     assert robot.parameters["gait"] is Gait.WALK
 
 
-def test_some_members_may_be_the_only_choices(nodes: tuple[nep.Node, nep.Node]) -> None:
+def test_enum_choices_can_be_restricted(nodes: tuple[nep.Node, nep.Node]) -> None:
     robot, _tool = nodes
     robot.parameters.declare("gait", Gait.WALK, choices=(Gait.WALK,))
     with pytest.raises(ParameterError, match="walk"):
         robot.parameters["gait"] = Gait.RUN
 
 
-def test_a_typed_map_is_a_map(nodes: tuple[nep.Node, nep.Node]) -> None:
+def test_typed_dict_parameter_is_validated(nodes: tuple[nep.Node, nep.Node]) -> None:
     robot, tool = nodes
     robot.parameters.declare("place", {"x": 1}, type=Place)
     assert robot.parameters["place"] == {"x": 1.0}
@@ -152,7 +154,7 @@ def test_a_typed_map_is_a_map(nodes: tuple[nep.Node, nep.Node]) -> None:
     ("default", "kind"),
     [(Mixed.A, None), (Held(1), None), (5, Held), (1 + 2j, None), (5, complex), (Limits(0.0), Gait)],
 )
-def test_what_has_no_form_cannot_be_declared(
+def test_unsupported_parameter_type_cannot_be_declared(
     nodes: tuple[nep.Node, nep.Node], default: object, kind: type | None
 ) -> None:
     robot, _tool = nodes
@@ -161,7 +163,7 @@ def test_what_has_no_form_cannot_be_declared(
     assert robot.parameters.list() == ()
 
 
-def test_a_number_that_is_none_does_not_fit(nodes: tuple[nep.Node, nep.Node]) -> None:
+def test_non_finite_number_in_a_typed_parameter_is_rejected(nodes: tuple[nep.Node, nep.Node]) -> None:
     robot, _tool = nodes
     robot.parameters.declare("limits", Limits(0.0))
     with pytest.raises(ParameterError, match=r"'limits' .*; least .*finite"):

@@ -79,7 +79,7 @@ def of(hint: Any, ints: st.SearchStrategy[int] = INTS) -> st.SearchStrategy[Any]
 
 
 @pytest.mark.parametrize("kind", ASKED, ids=lambda kind: kind.__name__)
-def test_every_request_can_be_sent_and_read(kind: type[Request]) -> None:
+def test_every_request_round_trips(kind: type[Request]) -> None:
     @MANY
     @given(of(kind))
     def check(request: Request) -> None:
@@ -91,7 +91,7 @@ def test_every_request_can_be_sent_and_read(kind: type[Request]) -> None:
 
 
 @pytest.mark.parametrize("kind", ANSWERS, ids=lambda kind: kind.__name__)
-def test_every_answer_can_be_sent_and_read(kind: type[Any]) -> None:
+def test_every_reply_round_trips(kind: type[Any]) -> None:
     @MANY
     @given(of(kind))
     def check(answer: Any) -> None:
@@ -105,7 +105,7 @@ def test_every_answer_can_be_sent_and_read(kind: type[Any]) -> None:
 
 @MANY
 @given(st.dictionaries(INTS, INTS, max_size=4), INTS, FLOATS)
-def test_every_quick_answer_to_a_renewal_can_be_read(
+def test_every_fast_renewal_reply_can_be_decoded(
     last_seqs: dict[int, int], epoch: int, next_s: float
 ) -> None:
     call, read = encoding.decode_answer(encode_renewed(7, epoch, epoch, last_seqs, ("h",), next_s))
@@ -114,7 +114,7 @@ def test_every_quick_answer_to_a_renewal_can_be_read(
 
 @MANY
 @given(st.sampled_from(sorted(encoding._REQUESTS)), PLAIN, PLAIN)
-def test_nothing_that_comes_in_raises_anything_unexpected(name: str, what: object, call: object) -> None:
+def test_arbitrary_requests_and_replies_raise_only_wire_errors(name: str, what: object, call: object) -> None:
     encoding.decode_request(pack_saturated({"do": name, "call": call, "what": what}))
     read_renewal(pack_saturated({"do": "renew", "call": call, "what": what}))
     for answer in encoding._ANSWERS:
@@ -124,7 +124,7 @@ def test_nothing_that_comes_in_raises_anything_unexpected(name: str, what: objec
 
 @settings(MANY, max_examples=150)
 @given(st.lists(st.one_of(*(of(kind, ON_THE_WIRE) for kind in ASKED)), max_size=12), st.booleans())
-def test_no_request_raises_in_the_graph_and_everybody_can_still_look(
+def test_arbitrary_requests_do_not_raise_in_the_graph_or_break_its_view(
     asked: list[Request], is_foreign: bool
 ) -> None:
     graph, packer = Graph(epoch=7, now=0.0, learn_s=0.0), AnswerEncoder()
@@ -150,7 +150,9 @@ def test_no_request_raises_in_the_graph_and_everybody_can_still_look(
 
 
 @pytest.mark.parametrize("seq", [2**64 - 1, 2**63, 2**40])
-def test_a_message_with_a_number_that_cannot_be_breaks_nobodys_graph(master: Master, seq: int) -> None:
+def test_message_with_impossible_sequence_number_raises_an_alert_and_counts_no_loss(
+    master: Master, seq: int
+) -> None:
     """It comes over the connection of a publisher: straight into the socket, as any program can send it."""
     with (
         nep.node("hearer", master=master.address) as hearer,
@@ -199,7 +201,7 @@ def eventually_alerts(node: nep.Node) -> list[str]:
     return found
 
 
-def test_what_cannot_be_encoded_is_one_answer_that_fails_and_no_other(
+def test_reply_that_cannot_be_encoded_fails_without_affecting_other_replies(
     master: Master, caplog: pytest.LogCaptureFixture
 ) -> None:
     """A mistake of ours: something attached to the master registers what has no form on the wire."""
@@ -223,7 +225,7 @@ def test_what_cannot_be_encoded_is_one_answer_that_fails_and_no_other(
 
 
 @pytest.mark.parametrize("value", [math.nan, math.inf, -1.0, 1e300])
-def test_a_share_of_a_processor_that_cannot_be_is_none(value: float) -> None:
+def test_invalid_cpu_share_is_ignored(value: float) -> None:
     graph = Graph(epoch=7, now=0.0, learn_s=0.0)
     graph.apply(Join(NodeRecord("n", "N", "h", 1)), 1, 0.0, "n")
     for request in (Renew("n", 7, 99, (), (), value),):
@@ -235,7 +237,7 @@ def test_a_share_of_a_processor_that_cannot_be_is_none(value: float) -> None:
         assert graph.view().nodes["n"].cpu_ratio is None
 
 
-def test_counts_saturate_where_they_are_added_up() -> None:
+def test_summed_counts_saturate() -> None:
     graph = Graph(epoch=7, now=0.0, learn_s=0.0)
     subscribers = tuple(SubscriberRecord(n, "/t", "json") for n in (1, 2, 3))
     graph.apply(

@@ -54,7 +54,9 @@ class Pair:
     st.integers(-(2**60), 2**60),
     st.lists(st.tuples(*[st.integers(0, 200 * MS)] * 4), min_size=1, max_size=12),
 )
-def test_the_truth_lies_within_the_uncertainty(apart_ns: int, ways: list[tuple[int, int, int, int]]) -> None:
+def test_clock_offset_error_is_within_the_uncertainty(
+    apart_ns: int, ways: list[tuple[int, int, int, int]]
+) -> None:
     pair = Pair(apart_ns)
     halves: list[int] = []
     for there_ns, worked_ns, back_ns, pause_ns in ways:
@@ -65,7 +67,7 @@ def test_the_truth_lies_within_the_uncertainty(apart_ns: int, ways: list[tuple[i
     assert pair.samples.steps == 0
 
 
-def test_the_answer_that_was_soonest_here_tells_most() -> None:
+def test_sample_with_the_shortest_round_trip_is_used() -> None:
     pair = Pair(3 * S)
     assert pair.renew(40 * MS, 2 * MS)
     assert pair.check() == pytest.approx(21 * MS, abs=1000)
@@ -75,7 +77,7 @@ def test_the_answer_that_was_soonest_here_tells_most() -> None:
     assert pair.check() == pytest.approx(1 * MS + drift_ns(95 * MS), abs=1000)
 
 
-def test_of_many_renewals_the_last_ones_count() -> None:
+def test_only_the_latest_renewals_are_used() -> None:
     pair = Pair(0)
     assert pair.renew(0, 0)
     for _ in range(8):
@@ -83,7 +85,7 @@ def test_of_many_renewals_the_last_ones_count() -> None:
     assert pair.check() >= 50 * MS
 
 
-def test_what_is_known_gets_less_sure() -> None:
+def test_clock_uncertainty_grows_over_time() -> None:
     pair = Pair(S)
     pair.renew(MS, MS)
     before = pair.check()
@@ -94,7 +96,7 @@ def test_what_is_known_gets_less_sure() -> None:
 
 
 @pytest.mark.parametrize("step_ns", [MS, -MS, 3600 * S, -3600 * S])
-def test_a_clock_that_is_set_is_compared_anew(step_ns: int) -> None:
+def test_step_of_the_own_clock_resets_the_samples(step_ns: int) -> None:
     pair = Pair(0)
     pair.renew(2 * MS, 0)
     pair.apart_ns += step_ns
@@ -105,7 +107,7 @@ def test_a_clock_that_is_set_is_compared_anew(step_ns: int) -> None:
 
 
 @pytest.mark.parametrize("step_ns", [60 * MS, -60 * MS, 3600 * S, -3600 * S])
-def test_a_masters_clock_that_is_set_is_compared_anew(step_ns: int) -> None:
+def test_step_of_the_master_clock_resets_the_samples(step_ns: int) -> None:
     pair = Pair(0)
     pair.renew(MS, MS)
     sent = pair.samples.now()
@@ -116,7 +118,7 @@ def test_a_masters_clock_that_is_set_is_compared_anew(step_ns: int) -> None:
     assert known[0] == pytest.approx(step_ns, abs=1000)
 
 
-def test_a_clock_that_is_set_while_an_answer_is_awaited_spoils_that_answer() -> None:
+def test_clock_step_during_a_request_discards_its_sample() -> None:
     pair = Pair(0)
     sent = pair.samples.now()
     pair.apart_ns += S
@@ -124,7 +126,7 @@ def test_a_clock_that_is_set_while_an_answer_is_awaited_spoils_that_answer() -> 
     assert pair.samples.offset() is None
 
 
-def test_a_clock_that_is_slewed_is_not_set() -> None:
+def test_slewed_clock_is_not_a_step() -> None:
     pair = Pair(0)
     pair.renew(MS, MS)
     for _ in range(100):
@@ -146,7 +148,7 @@ def test_a_clock_that_is_slewed_is_not_set() -> None:
         (BEGIN_NS, BEGIN_NS + 3600 * S),
     ],
 )
-def test_times_that_cannot_be_are_left_out(received_ns: int, answered_ns: int) -> None:
+def test_impossible_times_are_discarded(received_ns: int, answered_ns: int) -> None:
     pair = Pair(0)
     sent = pair.samples.now()
     pair.steady_ns += MS
@@ -154,12 +156,12 @@ def test_times_that_cannot_be_are_left_out(received_ns: int, answered_ns: int) -
     assert pair.samples.offset() is None
 
 
-def test_an_answer_after_a_minute_tells_nothing() -> None:
+def test_reply_after_a_minute_is_discarded() -> None:
     pair = Pair(0)
     assert not pair.renew(60 * S, 0)
 
 
-def test_a_coarse_clock_is_known_less_surely() -> None:
+def test_coarse_clock_resolution_increases_the_uncertainty() -> None:
     moment = Moment(BEGIN_NS, S, 1)
     samples = ClockSamples(lambda: BEGIN_NS, lambda: S, 0.0156)
     assert samples.add(moment, BEGIN_NS, BEGIN_NS)
@@ -168,7 +170,7 @@ def test_a_coarse_clock_is_known_less_surely() -> None:
     assert known[1] >= 15_600_000
 
 
-def test_another_master_is_compared_anew() -> None:
+def test_samples_are_cleared_for_another_master() -> None:
     pair = Pair(0)
     pair.renew(0, 0)
     pair.samples.forget()
@@ -176,7 +178,7 @@ def test_another_master_is_compared_anew() -> None:
     assert pair.samples.steps == 0
 
 
-def test_a_difference_gets_less_sure_and_one_clock_does_not() -> None:
+def test_uncertainty_grows_for_different_clocks_only() -> None:
     difference = ClockDifference(5, 1000, known_at_ns=0)
     assert difference.uncertainty_at(20_000) == 1001
     assert difference.uncertainty_at(-(10**12)) == 1000

@@ -72,7 +72,7 @@ def said(kind: type, value: object) -> str:
     st.dictionaries(st.sampled_from([*TOPIC, *PUBLISHER, "mood"]), ITEMS, max_size=3),
     st.sets(st.sampled_from([*TOPIC, *PUBLISHER]), max_size=1),
 )
-def test_the_quick_way_says_what_the_long_way_says(
+def test_fast_decoding_matches_slow_decoding(
     usual: tuple[type, dict[str, object]], changes: dict[str, object], left_out: set[str]
 ) -> None:
     kind, whole = usual
@@ -81,11 +81,11 @@ def test_the_quick_way_says_what_the_long_way_says(
 
 
 @given(st.sampled_from(KINDS), st.dictionaries(st.sampled_from([*TOPIC, *PUBLISHER]), ITEMS))
-def test_any_map_is_read_alike(kind: type, value: dict[str, object]) -> None:
+def test_fast_decoding_matches_slow_decoding_of_any_map(kind: type, value: dict[str, object]) -> None:
     assert said(kind, value) == read_slowly(kind, value)
 
 
-def test_what_was_read_does_not_change_with_its_map() -> None:
+def test_decoded_value_is_independent_of_its_source_map() -> None:
     value = dict(TOPIC)
     read = encoding.read(TopicInfo, value)
     value["name"] = "other"
@@ -94,7 +94,7 @@ def test_what_was_read_does_not_change_with_its_map() -> None:
 
 
 @pytest.mark.parametrize(("item", "kept"), [(2, 2.0), (2.5, 2.5), (None, None)])
-def test_a_whole_number_is_a_float_where_one_is_due(item: object, kept: object) -> None:
+def test_int_is_converted_in_float_fields(item: object, kept: object) -> None:
     encoding.read(TopicInfo, TOPIC)
     read = encoding.read(TopicInfo, TOPIC | {"rate_hz": item})
     assert read.rate_hz == kept

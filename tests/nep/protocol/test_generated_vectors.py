@@ -41,7 +41,7 @@ def test_generated_vectors_are_up_to_date() -> None:
         assert (DATA / name).read_text("utf-8") == text, f"{name}: run python tools/wire_vectors.py"
 
 
-def test_thousand_malformed_messages_are_refused_with_their_codes() -> None:
+def test_thousand_malformed_messages_are_rejected_with_their_codes() -> None:
     assert len({tuple(parts) for _code, *parts in MALFORMED}) == wire_vectors.MALFORMED_COUNT
     wrong = [
         (code, found, parts)
@@ -52,7 +52,7 @@ def test_thousand_malformed_messages_are_refused_with_their_codes() -> None:
 
 
 @pytest.mark.parametrize("vector", BATCHES, ids=name_of)
-def test_batch_is_read_or_refused_with_its_code(vector: dict[str, Any]) -> None:
+def test_batch_is_decoded_or_rejected_with_its_code(vector: dict[str, Any]) -> None:
     part = bytes.fromhex(vector["part"])
     if "error" in vector:
         assert code_of([part]) == vector["error"]
@@ -64,7 +64,7 @@ def test_batch_is_read_or_refused_with_its_code(vector: dict[str, Any]) -> None:
 
 
 @pytest.mark.parametrize("vector", FILTERS, ids=name_of)
-def test_filter_is_read_and_written(vector: dict[str, Any]) -> None:
+def test_filter_is_decoded_and_encoded(vector: dict[str, Any]) -> None:
     part = bytes.fromhex(vector["filter"])
     hello, read, shares = wire.parse_hello(part), wire.parse_read(part), wire.parse_shares(part)
     if "error" in vector:
@@ -95,7 +95,7 @@ def test_filter_is_read_and_written(vector: dict[str, Any]) -> None:
 
 
 @pytest.mark.parametrize("vector", [*MASTER["asked"], *MASTER["pushed"]], ids=name_of)
-def test_request_answer_and_push_are_decoded_and_encoded(vector: dict[str, Any]) -> None:
+def test_request_reply_and_push_are_decoded_and_encoded(vector: dict[str, Any]) -> None:
     request = bytes.fromhex(vector["request"])
     received = decode_request(request)
     assert not isinstance(received.request, WireError)

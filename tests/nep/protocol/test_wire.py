@@ -31,7 +31,7 @@ EXTENSIONS = st.dictionaries(
 
 
 @given(TOPICS, HEADERS, st.binary(max_size=100), EXTENSIONS)
-def test_what_is_joined_is_split_again(
+def test_joined_message_parts_split_back_into_the_message(
     topic: str, header: wire.Header, payload: bytes, extension: dict[str, object]
 ) -> None:
     parts = wire.join(topic, header, payload, extension)
@@ -43,7 +43,7 @@ def test_what_is_joined_is_split_again(
 
 
 @given(st.binary(max_size=60), st.integers(1, 2**32 - 1))
-def test_a_payload_of_another_size_than_told_is_refused(payload: bytes, told: int) -> None:
+def test_payload_of_another_size_than_declared_is_rejected(payload: bytes, told: int) -> None:
     parts = wire.join("t", wire.Header(3, 0, 1, 2, 3, told), payload)
     if told == len(payload):
         assert wire.split(parts).payload == payload
@@ -52,7 +52,7 @@ def test_a_payload_of_another_size_than_told_is_refused(payload: bytes, told: in
             wire.split(parts)
 
 
-def test_the_quick_ways_read_and_write_the_same_header() -> None:
+def test_fast_header_packing_matches_the_header_class() -> None:
     head = wire.pack_quickly(wire.form_of(3, wire.LATCHED), 17, 5, 6, 7)
     assert head == wire.Header(3, wire.LATCHED, 5, 6, 7, 17).pack()
     assert wire.read_header(head) == wire.Header(3, wire.LATCHED, 5, 6, 7, 17)
@@ -60,13 +60,13 @@ def test_the_quick_ways_read_and_write_the_same_header() -> None:
 
 
 @given(st.lists(st.binary(max_size=60), max_size=5))
-def test_anything_else_is_refused_with_a_sentence(parts: list[bytes]) -> None:
+def test_arbitrary_parts_raise_only_wire_errors(parts: list[bytes]) -> None:
     with contextlib.suppress(WireError):
         wire.split(parts)
 
 
 @pytest.mark.parametrize("vector", VECTORS, ids=lambda vector: vector["name"])
-def test_the_shared_vectors(vector: dict[str, object]) -> None:
+def test_wire_vectors_are_decoded_and_encoded(vector: dict[str, object]) -> None:
     parts = [bytes.fromhex(part) for part in vector["parts"]]  # type: ignore[attr-defined]
     if "error" in vector:
         with pytest.raises(WireError) as refused:
@@ -90,15 +90,15 @@ def test_the_shared_vectors(vector: dict[str, object]) -> None:
 
 
 @given(TOPICS, HEADERS, st.binary(max_size=100))
-def test_one_part_is_split_like_three(topic: str, header: wire.Header, payload: bytes) -> None:
+def test_single_part_message_is_split_like_three_parts(
+    topic: str, header: wire.Header, payload: bytes
+) -> None:
     parts = wire.join(topic, header, payload)
     assert wire.split([b"".join(parts)]) == wire.split(parts)
 
 
 @given(st.integers(0, 2**64 - 1), TOPICS, st.booleans(), st.booleans(), st.booleans())
-def test_a_hello_is_read_back(
-    subscriber: int, topic: str, one_part: bool, tells: bool, batches: bool
-) -> None:
+def test_hello_round_trip(subscriber: int, topic: str, one_part: bool, tells: bool, batches: bool) -> None:
     part = wire.hello_part(subscriber, topic, one_part=one_part, tells=tells, batches=batches)
     said = (one_part or tells or batches, tells or batches, batches)
     assert wire.parse_hello(part) == (subscriber, topic, *said)
@@ -116,25 +116,25 @@ def test_a_hello_is_read_back(
         b"\xffhello/" + b"0" * 16,
     ],
 )
-def test_what_is_no_hello(part: bytes) -> None:
+def test_invalid_hello_is_not_parsed(part: bytes) -> None:
     assert wire.parse_hello(part) is None
 
 
 @given(st.builds(wire.Read, *[st.integers(0, 2**64 - 1)] * 4))
-def test_what_was_read_is_read_back(read: wire.Read) -> None:
+def test_acknowledgement_round_trip(read: wire.Read) -> None:
     assert wire.parse_read(wire.read_part(read)) == read
     assert wire.parse_hello(wire.read_part(read)) is None
 
 
 @given(st.binary(max_size=80) | st.text("0123456789abcdef/-", max_size=70).map(str.encode))
-def test_what_is_no_such_answer(junk: bytes) -> None:
+def test_invalid_acknowledgement_is_not_parsed(junk: bytes) -> None:
     read = wire.parse_read(b"\xffread/" + junk)
     assert read is None or wire.read_part(read) == b"\xffread/" + junk.lower()
     assert wire.parse_read(junk) is None
 
 
 @pytest.mark.parametrize("topic", ["a", "/Pepper/camera", "ü/ä", "x" * 200, "a=b,c", "機器人"])
-def test_topics_that_are_allowed(topic: str) -> None:
+def test_valid_topics_are_accepted(topic: str) -> None:
     assert wire.check_topic(topic) == topic
 
 
@@ -154,24 +154,24 @@ def test_topics_that_are_allowed(topic: str) -> None:
         (7, "a topic name must be a 'str'"),
     ],
 )
-def test_topics_that_are_not(topic: str, reason: str) -> None:
+def test_invalid_topics_are_rejected(topic: str, reason: str) -> None:
     with pytest.raises(BadTopicError, match=reason):
         wire.check_topic(topic)
 
 
-def test_an_unknown_version_is_named() -> None:
+def test_unknown_wire_version_is_reported() -> None:
     header = bytearray(wire.Header(1, 0, 1, 2, 3).pack())
     header[0] = 9
     with pytest.raises(WireError, match="its version is 9, but this nep reads version 1; update nep"):
         wire.read_header(bytes(header))
 
 
-def test_an_extension_that_msgpack_cannot_hold() -> None:
+def test_extension_that_msgpack_cannot_encode_is_rejected() -> None:
     with pytest.raises(WireError, match="can't encode the extension"):
         wire.extension_part({"a": object()})
 
 
-def test_ids_come_from_the_key_as_the_vectors_say() -> None:
+def test_ids_derived_from_the_key_match_the_vectors() -> None:
     vectors = json.loads((Path(__file__).parents[2] / "data" / "wire" / "ids.json").read_text("utf-8"))
     assert len(vectors["nodes"]) == 3
     for each in vectors["nodes"]:

@@ -78,7 +78,7 @@ def node() -> Iterator[nep.Node]:
 
 
 @pytest.mark.parametrize("vector", GOOD, ids=name_of)
-def test_a_publisher_sends_what_the_vector_says(
+def test_publisher_sends_the_bytes_of_the_vector(
     vector: dict[str, Any],
     master: Master,
     node: nep.Node,
@@ -115,7 +115,7 @@ def test_a_publisher_sends_what_the_vector_says(
 
 
 @pytest.mark.parametrize("vector", GOOD, ids=name_of)
-def test_a_subscriber_reads_what_the_vector_means(
+def test_subscriber_decodes_the_vector(
     vector: dict[str, Any], node: nep.Node, their: Callable[[int], zmq.Socket[bytes]]
 ) -> None:
     said = meaning_of(vector["means"])
@@ -139,7 +139,7 @@ def test_a_subscriber_reads_what_the_vector_means(
 
 
 @pytest.mark.parametrize("vector", BATCHES, ids=name_of)
-def test_a_subscriber_reads_a_batch(
+def test_subscriber_decodes_a_batch(
     vector: dict[str, Any], node: nep.Node, their: Callable[[int], zmq.Socket[bytes]]
 ) -> None:
     theirs = their(zmq.XPUB)
@@ -174,7 +174,7 @@ def test_a_subscriber_reads_a_batch(
 
 
 @pytest.mark.parametrize("vector", BAD, ids=name_of)
-def test_a_subscriber_refuses_what_is_none_and_reads_on(
+def test_subscriber_rejects_an_invalid_message_and_receives_the_next(
     vector: dict[str, Any], node: nep.Node, their: Callable[[int], zmq.Socket[bytes]]
 ) -> None:
     theirs = their(zmq.XPUB)
@@ -245,7 +245,7 @@ def asks(
 
 
 @pytest.mark.parametrize("vector", MASTER["asked"], ids=name_of)
-def test_a_master_answers_what_the_vector_says(
+def test_master_reply_matches_the_vector(
     vector: dict[str, Any], asks: Callable[[str, str], tuple[bytes, zmq.Socket[bytes]]]
 ) -> None:
     for each in vector["before"]:
@@ -255,7 +255,7 @@ def test_a_master_answers_what_the_vector_says(
 
 
 @pytest.mark.parametrize("vector", MASTER["pushed"], ids=name_of)
-def test_a_master_pushes_what_the_vector_says(
+def test_master_push_matches_the_vector(
     vector: dict[str, Any], asks: Callable[[str, str], tuple[bytes, zmq.Socket[bytes]]]
 ) -> None:
     listening = [
@@ -270,7 +270,7 @@ def test_a_master_pushes_what_the_vector_says(
         pushes = [each for each in pushes if each != body]
 
 
-def test_whoever_asks_sends_what_the_vector_says(their: Callable[[int], zmq.Socket[bytes]]) -> None:
+def test_ping_request_matches_the_vector(their: Callable[[int], zmq.Socket[bytes]]) -> None:
     theirs = their(zmq.ROUTER)
     port = theirs.bind_to_random_port("tcp://127.0.0.1")
     found: list[bool] = []

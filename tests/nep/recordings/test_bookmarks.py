@@ -26,7 +26,7 @@ def path(tmp_path):
     return path
 
 
-def test_notes_of_the_recording_and_what_is_made_later_come_in_their_order(path):
+def test_bookmarks_and_notes_are_listed_in_time_order_and_saved_beside_the_recording(path):
     before = path.read_bytes()
     with Recording(path) as recording:
         marks = Bookmarks(recording)
@@ -62,7 +62,7 @@ def test_notes_of_the_recording_and_what_is_made_later_come_in_their_order(path)
 @pytest.mark.parametrize(
     "text", ["", "[]", "{", '{"bookmarks": 5}', '{"bookmarks": [{"at_ns": -1, "name": ""}]}', "\x00" * 100]
 )
-def test_a_damaged_file_is_none_and_is_kept_when_one_is_made(path, text):
+def test_damaged_bookmark_file_is_ignored_and_backed_up_on_the_next_change(path, text):
     beside = path.with_name(f"{path.name}.bookmarks.json")
     beside.write_text(text)
     with Recording(path) as recording:
@@ -74,7 +74,7 @@ def test_a_damaged_file_is_none_and_is_kept_when_one_is_made(path, text):
     assert beside.with_name(f"{beside.name}.damaged").read_text() == text
 
 
-def test_what_cannot_be_kept_is_a_sentence_and_changes_nothing(path, monkeypatch):
+def test_bookmark_that_cannot_be_saved_raises_and_changes_nothing(path, monkeypatch):
     with Recording(path) as recording:
         marks = Bookmarks(recording)
         with pytest.raises(RecordingError, match=r"name .*characters"):

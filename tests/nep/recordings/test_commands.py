@@ -44,7 +44,7 @@ def path(tmp_path_factory):
 
 @pytest.mark.skipif(os.name == "nt", reason="Ctrl+C of another program needs POSIX")
 @pytest.mark.parametrize("name", ["SIGINT", "SIGTERM", "SIGHUP"])
-def test_a_recording_ends_whole_and_private_when_it_is_asked_to_end(master, tmp_path, name):
+def test_record_command_writes_a_complete_private_file_when_interrupted(master, tmp_path, name):
     path = tmp_path / "a.mcap"
     command = [
         "-m",
@@ -78,7 +78,7 @@ def test_a_recording_ends_whole_and_private_when_it_is_asked_to_end(master, tmp_
         assert recording.words["note"] == "first"
 
 
-def test_a_recording_ends_after_its_time_and_tells_as_json(master, tmp_path, capfdbinary):
+def test_record_command_stops_after_its_duration_and_prints_json(master, tmp_path, capfdbinary):
     path = tmp_path / "a.mcap"
     run("record", "-o", path, "--duration", 0.2, "--not", "/log", "--json", "--master", master.address)
     told = json.loads(capfdbinary.readouterr().out)
@@ -91,7 +91,7 @@ def test_a_recording_ends_after_its_time_and_tells_as_json(master, tmp_path, cap
 
 
 @pytest.mark.skipif(os.name == "nt", reason="signals to another program need POSIX")
-def test_a_ring_keeps_the_last_seconds_by_a_command_and_by_a_signal(master, tmp_path, capfdbinary):
+def test_ring_command_saves_the_last_seconds_on_command_and_on_signal(master, tmp_path, capfdbinary):
     command = ["-m", "nep", "recording", "ring", "/arm/*", "--not", "/arm/raw", "-o", str(tmp_path)]
     child = subprocess.Popen(
         [sys.executable, *command, "--master", master.address],
@@ -141,7 +141,7 @@ def test_a_ring_keeps_the_last_seconds_by_a_command_and_by_a_signal(master, tmp_
             run("recording", "ring", "-o", tmp_path, "--master", master.address, *wrong)
 
 
-def test_info_tells_what_is_there_and_what_is_missing(path, tmp_path, capfd):
+def test_info_command_lists_topics_and_reports_an_incomplete_file(path, tmp_path, capfd):
     run("recording", "info", path)
     out = capfd.readouterr().out
     assert "24 messages in 0:00" in out
@@ -156,7 +156,7 @@ def test_info_tells_what_is_there_and_what_is_missing(path, tmp_path, capfd):
     assert "nep recording repair" in capfd.readouterr().err
 
 
-def test_repair_says_what_came_back(path, tmp_path, capfd):
+def test_repair_command_reports_recovered_messages(path, tmp_path, capfd):
     cut = tmp_path / "cut.mcap"
     cut.write_bytes(path.read_bytes()[:-200])
     run("recording", "repair", cut)
@@ -165,7 +165,7 @@ def test_repair_says_what_came_back(path, tmp_path, capfd):
     assert json.loads(capfd.readouterr().out)["recovered"] == 24
 
 
-def test_export_makes_files_beside(path, tmp_path, capfd):
+def test_export_command_writes_files_to_the_output_folder(path, tmp_path, capfd):
     run("recording", "export", path, "/arm/*", "-o", tmp_path / "out")
     assert "20 messages" in capfd.readouterr().err
     assert [each.name for each in (tmp_path / "out").iterdir()] == ["arm_joints.csv"]
@@ -176,7 +176,7 @@ def test_export_makes_files_beside(path, tmp_path, capfd):
             run("recording", "export", path, "-o", tmp_path / "out", *wrong)
 
 
-def test_play_publishes_what_is_named_and_nothing_else(path, master, capfd):
+def test_play_command_publishes_only_the_named_topics(path, master, capfd):
     with nep.node("hears", master=master.address) as node:
         heard: list[nep.Message] = []
         node.new_sub("**", sink=heard.extend)
@@ -234,7 +234,7 @@ def test_play_publishes_what_is_named_and_nothing_else(path, master, capfd):
         (("/arm/joints", "--remap", "/arm/joints=two words"), NepError, "two words"),
     ],
 )
-def test_play_asks_before_it_sends(path, words, error, said):
+def test_play_command_rejects_missing_or_unsafe_options(path, words, error, said):
     with pytest.raises(error, match=said):
         run("play", path, *words)
 
@@ -248,7 +248,7 @@ def describe(robot: nep.Node, name: str, command: str) -> list[nep.Message]:
     return told
 
 
-def test_play_moves_no_robot_that_is_there_under_whatever_topic_it_names(master, tmp_path, capfd):
+def test_play_command_does_not_move_a_connected_robot_without_permission(master, tmp_path, capfd):
     path = tmp_path / "Drive.mcap"
     record(path, [[json_message(1, topic="/Rover/drive"), json_message(2, topic="/weather")]])
     words = ("play", path, "--master", master.address, "--speed", 10)
@@ -268,7 +268,7 @@ def test_play_moves_no_robot_that_is_there_under_whatever_topic_it_names(master,
         eventually(lambda: len(told) == 2)
 
 
-def test_play_stops_sending_when_a_robot_comes_that_the_topic_moves(master, tmp_path, capfd):
+def test_play_command_stops_publishing_a_topic_when_a_robot_it_moves_connects(master, tmp_path, capfd):
     path = tmp_path / "Drive.mcap"
     record(path, [[json_message(seq, topic="/drive") for seq in range(1, 601)]])
     told = []
@@ -285,7 +285,7 @@ def test_play_stops_sending_when_a_robot_comes_that_the_topic_moves(master, tmp_
     assert len(told[0]) < 300
 
 
-def test_the_shell_is_offered_topics_of_the_file(path):
+def test_shell_completion_offers_topics_of_the_file(path):
     from nep.cli.recording_files import _complete_recorded
 
     def offered(file):
@@ -295,7 +295,7 @@ def test_the_shell_is_offered_topics_of_the_file(path):
     assert offered(path.parent / "none") == offered(None) == []
 
 
-def test_nothing_of_recordings_is_imported_before_it_is_asked_for_and_a_missing_package_is_a_sentence():
+def test_recording_modules_are_imported_lazily_and_a_missing_package_is_reported():
     code = (
         "import sys, nep.cli.app\n"
         "heavy = ('nep.recordings', 'mcap', 'zstandard', 'lz4', 'pyarrow', 'rich.progress')\n"
@@ -331,14 +331,14 @@ HOUR = 3600 * 10**9
         ("{utc}+00:00", 90.0),
     ],
 )
-def test_a_part_begins_by_seconds_or_by_the_clock(text, after_s):
+def test_start_time_is_parsed_from_seconds_or_clock_time(text, after_s):
     utc = datetime.fromtimestamp(START / 1e9 + 90, timezone.utc)
     at = utc.astimezone()
     given = text.format(clock=f"{at:%H:%M:%S}", day=f"{at:%Y-%m-%d}", utc=f"{utc:%H:%M:%S}")
     assert time_ns(given, START, START + HOUR) == START + round(after_s * 1e9)
 
 
-def test_a_time_of_day_after_midnight_is_the_next_days():
+def test_clock_time_after_midnight_is_on_the_next_day():
     at = datetime.fromtimestamp(START / 1e9, timezone.utc).astimezone()
     midnight = at.replace(hour=23, minute=59, second=50, microsecond=0)
     start = int(midnight.timestamp()) * 10**9
@@ -360,6 +360,6 @@ def test_a_time_of_day_after_midnight_is_the_next_days():
         "1" * 400,
     ],
 )
-def test_what_is_no_time_is_said(text):
+def test_invalid_time_is_rejected(text):
     with pytest.raises(typer.BadParameter, match="is not a valid"):
         time_ns(text, START, START + HOUR)

@@ -49,7 +49,7 @@ def recording(tmp_path):
         yield opened
 
 
-def test_csv_has_every_field_of_every_message_that_can_be_read(recording, tmp_path):
+def test_csv_export_has_every_field_of_every_decodable_message(recording, tmp_path):
     progress = []
     made = export(recording, "csv", tmp_path / "out", progress=lambda *told: progress.append(told))
     assert [(each.topic, each.path.name, each.count, each.unreadable) for each in made] == [
@@ -73,7 +73,7 @@ def test_csv_has_every_field_of_every_message_that_can_be_read(recording, tmp_pa
     assert not list((tmp_path / "out").glob("*.part"))
 
 
-def test_parquet_keeps_kinds_of_values(recording, tmp_path):
+def test_parquet_export_preserves_value_types(recording, tmp_path):
     pq = pytest.importorskip("pyarrow.parquet")
     made = export(recording, "parquet", tmp_path, Part(topics=("/arm/state",)))
     table = pq.read_table(made[0].path)
@@ -88,7 +88,7 @@ def test_parquet_keeps_kinds_of_values(recording, tmp_path):
 
 
 @pytest.mark.parametrize("kind", ["csv", "parquet"])
-def test_fields_that_are_called_as_ours_and_letters_that_are_none_have_their_place(tmp_path, kind):
+def test_export_renames_conflicting_fields_and_escapes_invalid_characters(tmp_path, kind):
     values = [{"seq": "seven", "time_s": 1, "publisher": None, "big": 2**70, "x": float("nan")}]
     values += [{"seq": 2**70, "text": "\ud800", "big": 0.5, "x": 2**2000, "deep": {"\ud800": [{}] * 200}}]
     record(tmp_path / "a.mcap", [[message(seq, value) for seq, value in enumerate(values, 1)]])
@@ -106,14 +106,14 @@ def test_fields_that_are_called_as_ours_and_letters_that_are_none_have_their_pla
     assert rows[1]["text"] == "\\ud800"
 
 
-def test_pictures_are_the_very_files(recording, tmp_path):
+def test_exported_images_are_the_original_files(recording, tmp_path):
     made = export(recording, "pictures", tmp_path / "out")
     files = sorted(made[0].path.iterdir())
     assert [each.name for each in files] == [f"{number:06d}.jpg" for number in range(1, 6)]
     assert [each.read_bytes() for each in files] == [bytes(picture(seq).data) for seq in range(1, 6)]
 
 
-def test_raw_pictures_become_png_without_loss(tmp_path):
+def test_raw_images_are_exported_as_lossless_png(tmp_path):
     frame = np.arange(60, dtype=np.uint16).reshape(6, 10) * 1000
     raw = image_codec.raw_image(frame)
     sent = Message("/depth", bytes(raw.data), "image", "image", seq=1, extension=dict(raw.extension))
@@ -123,7 +123,7 @@ def test_raw_pictures_become_png_without_loss(tmp_path):
     assert (cv2.imread(str(made[0].path / "000001.png"), cv2.IMREAD_UNCHANGED) == frame).all()
 
 
-def test_a_film_has_the_recordings_time(tmp_path):
+def test_exported_video_has_the_duration_of_the_recording(tmp_path):
     record(tmp_path / "a.mcap", [[picture(seq) for seq in range(1, 101)]])
     with Recording(tmp_path / "a.mcap") as recording:
         times = [each.log_ns for each in recording.read()]
@@ -140,7 +140,7 @@ def test_a_film_has_the_recordings_time(tmp_path):
     )
 
 
-def test_without_ffmpeg_a_film_is_an_avi(tmp_path):
+def test_video_is_exported_as_avi_without_ffmpeg(tmp_path):
     """As in a package, in a process of its own: OpenCV reads what it may use once."""
     record(tmp_path / "a.mcap", [[picture(seq) for seq in range(1, 31)]])
     program = f"""
@@ -163,7 +163,7 @@ def test_without_ffmpeg_a_film_is_an_avi(tmp_path):
     assert [each.name for each in (tmp_path / "out").iterdir()] == [made.name]
 
 
-def test_what_is_in_the_folder_already_stays_when_films_are_tried(tmp_path):
+def test_video_encoder_probe_keeps_existing_files(tmp_path):
     record(tmp_path / "a.mcap", [[picture(seq) for seq in range(1, 4)]])
     out = tmp_path / "out"
     out.mkdir()
@@ -175,7 +175,7 @@ def test_what_is_in_the_folder_already_stays_when_films_are_tried(tmp_path):
     assert {(out / name).read_bytes() for name in ("trial.mp4", "trial.avi")} == {b"mine"}
 
 
-def test_where_no_film_can_be_written_that_is_said(tmp_path, monkeypatch):
+def test_missing_video_encoder_is_reported(tmp_path, monkeypatch):
     record(tmp_path / "a.mcap", [[picture(1)]])
     monkeypatch.setattr("nep.recordings.film.CONTAINERS", ())
     with (
@@ -186,7 +186,7 @@ def test_where_no_film_can_be_written_that_is_said(tmp_path, monkeypatch):
     assert not list((tmp_path / "out").iterdir())
 
 
-def test_a_film_that_cannot_be_is_a_sentence_and_leaves_nothing(tmp_path, monkeypatch):
+def test_failed_video_export_raises_and_leaves_no_file(tmp_path, monkeypatch):
     record(tmp_path / "a.mcap", [[picture(seq) for seq in range(1, 4)]])
     with Recording(tmp_path / "a.mcap") as recording:
         with monkeypatch.context() as patched:
@@ -206,13 +206,13 @@ def truncate(film):
         os.truncate(film._written, 100)
 
 
-def test_a_part_of_it(recording, tmp_path):
+def test_export_of_a_time_range(recording, tmp_path):
     start = recording.start_ns
     made = export(recording, "csv", tmp_path, Part(start + STEP_NS, start + 2 * STEP_NS, ("/arm/state",)))
     assert made[0].count == 1
 
 
-def test_nothing_is_written_over_and_nothing_half_is_left(recording, tmp_path, monkeypatch):
+def test_export_overwrites_nothing_and_leaves_no_partial_file(recording, tmp_path, monkeypatch):
     export(recording, "csv", tmp_path / "out")
     before = (tmp_path / "out" / "t.csv").read_bytes()
     with pytest.raises(RecordingError, match=r"\.csv'; .*already exists"):
@@ -224,7 +224,7 @@ def test_nothing_is_written_over_and_nothing_half_is_left(recording, tmp_path, m
     assert not list((tmp_path / "more").iterdir())
 
 
-def test_names_of_files_are_different_ones_on_every_system(tmp_path):
+def test_export_file_names_are_unique_and_valid_on_every_system(tmp_path):
     topics = ["/a/b", "/a_b", "/A/B", "a:b", "/日本", "/..", "/" + "x" * 190]
     record(tmp_path / "a.mcap", [[json_message(1, topic=each) for each in topics]])
     with Recording(tmp_path / "a.mcap") as recording:
@@ -233,7 +233,7 @@ def test_names_of_files_are_different_ones_on_every_system(tmp_path):
     assert all(len(each) < 120 and not set('/\\:*?"<>|') & set(each) for each in names)
 
 
-def test_sentences(recording, tmp_path, monkeypatch):
+def test_invalid_export_requests_raise_errors(recording, tmp_path, monkeypatch):
     record(tmp_path / "b.mcap", [[json_message(1)]])
     with (
         Recording(tmp_path / "b.mcap") as plain,
@@ -249,13 +249,13 @@ def test_sentences(recording, tmp_path, monkeypatch):
         export(recording, "parquet", tmp_path / "out")
 
 
-def test_values_alone_and_empty_things_have_a_column():
+def test_scalars_and_empty_collections_are_flattened_to_a_column():
     assert flattened(5) == {"value": 5}
     assert flattened({}) == {"value": "{}"}
     assert flattened({"a": {}, "b": [], "c": b"\0"}) == {"a": "{}", "b": "[]", "c": "\"b'\\\\x00'\""}
 
 
-def test_a_part_as_a_recording_has_the_same_bytes_and_times_and_what_was_said(tmp_path):
+def test_mcap_export_of_a_range_preserves_bytes_times_notes_and_run(tmp_path):
     path = tmp_path / "a.mcap"
     run = {"id": "1", "name": "Greeting", "until_ns": None}
     with RecordingWriter(path, note="first", clock=TestClock(), limits=limits(figures_s=1e6)) as writer:

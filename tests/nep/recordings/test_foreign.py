@@ -67,7 +67,7 @@ KINDS: dict[str, dict[str, object]] = {
 
 
 @pytest.mark.parametrize("kind", KINDS)
-def test_every_kind_of_file_is_read_directly(tmp_path: Path, kind: str) -> None:
+def test_every_mcap_variant_of_other_programs_is_read(tmp_path: Path, kind: str) -> None:
     path = written(tmp_path / "theirs.mcap", **KINDS[kind])
     with Recording(path) as recording:
         assert recording.is_complete
@@ -86,7 +86,7 @@ def test_every_kind_of_file_is_read_directly(tmp_path: Path, kind: str) -> None:
     assert [each.name for each in tmp_path.iterdir()] == ["theirs.mcap"]
 
 
-def test_a_file_without_chunks_that_was_cut_is_told_as_cut(tmp_path: Path) -> None:
+def test_truncated_file_without_chunks_is_incomplete_and_can_be_repaired(tmp_path: Path) -> None:
     path = written(tmp_path / "theirs.mcap", use_chunking=False)
     data = path.read_bytes()
     path.write_bytes(data[: data.index(b'{"rpm": 30}') + 3])
@@ -97,7 +97,7 @@ def test_a_file_without_chunks_that_was_cut_is_told_as_cut(tmp_path: Path) -> No
     assert report.recovered == 30
 
 
-def test_messages_outside_of_chunks_beside_chunks_are_found(tmp_path: Path) -> None:
+def test_messages_outside_chunks_are_found(tmp_path: Path) -> None:
     path = tmp_path / "both.mcap"
     written(path)
     data = path.read_bytes()
@@ -111,7 +111,7 @@ def test_messages_outside_of_chunks_beside_chunks_are_found(tmp_path: Path) -> N
         assert recording.topics["/wheel"].message_count == COUNT + 1
 
 
-def test_info_tells_encodings_schemas_compression_attachments_and_metadata(
+def test_info_command_lists_encodings_schemas_compression_attachments_and_metadata(
     tmp_path: Path, capfd: pytest.CaptureFixture[str]
 ) -> None:
     path = written(tmp_path / "theirs.mcap")
@@ -144,7 +144,7 @@ def test_info_tells_encodings_schemas_compression_attachments_and_metadata(
     assert told["attachments"] == [{"name": "map.png", "media_type": "image/png", "size_bytes": 1000}]
 
 
-def test_a_part_keeps_encodings_schemas_and_topics_and_invents_no_counts(tmp_path: Path) -> None:
+def test_exported_range_keeps_encodings_schemas_and_metadata_without_loss_counts(tmp_path: Path) -> None:
     path = written(tmp_path / "theirs.mcap", chunk_size=200)
     with Recording(path) as recording:
         part = Part(SECOND, SECOND + 200_000_000)
@@ -174,7 +174,7 @@ def damaged(path: Path) -> Path:
     return path
 
 
-def test_every_command_says_what_of_a_damaged_file_is_missing_and_leaves_with_1(
+def test_commands_report_missing_messages_of_a_damaged_file_and_exit_with_1(
     tmp_path: Path, master: object, capfd: pytest.CaptureFixture[str]
 ) -> None:
     path = damaged(tmp_path / "damaged.mcap")
@@ -190,21 +190,21 @@ def test_every_command_says_what_of_a_damaged_file_is_missing_and_leaves_with_1(
     assert sorted(each.name for each in tmp_path.iterdir()) == ["damaged.mcap", "out"]
 
 
-def test_playing_ends_with_a_sentence_where_nothing_can_be_played(tmp_path: Path) -> None:
+def test_playing_an_empty_recording_raises(tmp_path: Path) -> None:
     empty = tmp_path / "empty.mcap"
     record(empty, [])
     with pytest.raises(NepError, match="nothing to play"):
         run("play", empty, "--all")
 
 
-def test_playing_all_of_too_many_topics_is_refused_with_a_sentence(tmp_path: Path) -> None:
+def test_playing_all_of_too_many_topics_is_rejected(tmp_path: Path) -> None:
     path = tmp_path / "many.mcap"
     path.write_bytes(hostile.many_channels(1_001))
     with pytest.raises(NepError, match="1001 matching topics"):
         run("play", path, "--all")
 
 
-def test_a_recording_of_one_message_is_played_to_its_end(
+def test_recording_of_one_message_is_played_to_its_end(
     tmp_path: Path, master: object, capfd: pytest.CaptureFixture[str]
 ) -> None:
     record(tmp_path / "one.mcap", [[json_message(1)]])
@@ -212,7 +212,7 @@ def test_a_recording_of_one_message_is_played_to_its_end(
     assert "published 1 message" in capfd.readouterr().err
 
 
-def test_names_of_a_file_are_escaped_in_mistakes(tmp_path: Path) -> None:
+def test_topic_names_of_a_file_are_escaped_in_error_messages(tmp_path: Path) -> None:
     name = "/a\x1b]0;owned\x07"
     path = tmp_path / "names.mcap"
     with path.open("wb") as file:
@@ -227,7 +227,7 @@ def test_names_of_a_file_are_escaped_in_mistakes(tmp_path: Path) -> None:
         assert "owned" in str(raised.value)
 
 
-def test_what_is_no_recording_stays_a_sentence(tmp_path: Path) -> None:
+def test_file_with_only_magic_bytes_is_incomplete_and_cannot_be_repaired(tmp_path: Path) -> None:
     (tmp_path / "a.mcap").write_bytes(b"\x89MCAP0\r\n")
     with Recording(tmp_path / "a.mcap") as recording:
         assert not recording.is_complete
@@ -235,7 +235,7 @@ def test_what_is_no_recording_stays_a_sentence(tmp_path: Path) -> None:
         repair(tmp_path / "a.mcap", tmp_path / "b.mcap")
 
 
-def test_own_parts_still_count_what_was_lost_in_them(tmp_path: Path) -> None:
+def test_exported_range_of_own_recording_counts_its_losses(tmp_path: Path) -> None:
     messages = [json_message(seq) for seq in (1, 2, 3, 5, 6, 9)]
     record(tmp_path / "a.mcap", [messages])
     with Recording(tmp_path / "a.mcap") as recording:

@@ -53,7 +53,7 @@ def there_and_back(message: Message, *, is_self_contained: bool = False) -> Mess
     extension=st.dictionaries(st.text(max_size=10), VALUES, max_size=3),
     is_self_contained=st.booleans(),
 )
-def test_every_message_comes_back_whole(codec, data, seq, stamp_ns, publisher, extension, is_self_contained):
+def test_recorded_message_round_trip(codec, data, seq, stamp_ns, publisher, extension, is_self_contained):
     message = Message(
         "/a/b", data, codec, "some/Type", seq=seq, stamp_ns=stamp_ns, publisher=publisher, extension=extension
     )
@@ -61,33 +61,33 @@ def test_every_message_comes_back_whole(codec, data, seq, stamp_ns, publisher, e
 
 
 @pytest.mark.parametrize("message", odd_messages(), ids=lambda each: each.topic)
-def test_odd_messages_come_back_whole(message):
+def test_unusual_message_round_trip(message):
     assert kept(there_and_back(message)) == kept(message)
     assert kept(there_and_back(message, is_self_contained=True)) == kept(message)
 
 
 @given(st.binary(max_size=60))
-def test_any_bytes_in_the_place_of_a_wrapped_message_give_a_message(data):
+def test_arbitrary_bytes_in_a_wrapped_message_decode_without_error(data):
     for message in (picture(1), picture(1, "raw"), Message("/t", b"x", "string", "string")):
         decoder = ChannelDecoder(definition_of(message, encoding_of(message, 0)))
         assert decoder.message(RawMessage(0, 1, 1, 1, 1, memoryview(data))).topic == message.topic
 
 
-def test_a_recording_gives_back_what_was_posted_in_its_order(tmp_path):
+def test_recording_returns_posted_messages_in_order(tmp_path):
     messages = odd_messages()
     record(tmp_path / "a.mcap", [messages])
     with Recording(tmp_path / "a.mcap") as recording:
         assert [kept(each.message) for each in recording.read()] == [kept(each) for each in messages]
 
 
-def test_the_rules_of_the_doctor_hold(tmp_path):
+def test_recordings_pass_the_mcap_doctor(tmp_path):
     path = tmp_path / "a.mcap"
     messages = odd_messages()
     record(path, [messages, [json_message(seq) for seq in range(2, 200)], messages])
     assert McapDoctor(path).problems == []
 
 
-def test_the_doctor_of_these_tests_finds_what_is_wrong(tmp_path):
+def test_mcap_doctor_detects_a_flipped_bit(tmp_path):
     path = tmp_path / "a.mcap"
     record(path, [[json_message(seq) for seq in range(1, 20)]])
     data = bytearray(path.read_bytes())
@@ -96,7 +96,7 @@ def test_the_doctor_of_these_tests_finds_what_is_wrong(tmp_path):
     assert McapDoctor(path).problems
 
 
-def test_mcaps_own_reader_reads_it_and_its_crcs_are_right(tmp_path):
+def test_mcap_library_reads_recordings_with_valid_crcs(tmp_path):
     path = tmp_path / "a.mcap"
     messages = odd_messages()
     record(path, [messages, messages])
@@ -120,7 +120,7 @@ def test_mcaps_own_reader_reads_it_and_its_crcs_are_right(tmp_path):
         assert set(plain) <= sent
 
 
-def test_json_channels_have_only_json_that_every_reader_takes_and_schemas_that_they_fulfil(tmp_path):
+def test_json_channels_hold_valid_json_that_matches_their_schemas(tmp_path):
     path = tmp_path / "a.mcap"
     record(path, [odd_messages()])
     with path.open("rb") as file:
@@ -137,7 +137,7 @@ def test_json_channels_have_only_json_that_every_reader_takes_and_schemas_that_t
     assert {("/odom", "json"), ("/typed", "geometry_msgs/Point")} <= seen
 
 
-def test_pictures_are_messages_of_foxgloves_with_the_very_bytes():
+def test_images_are_foxglove_messages_with_the_original_bytes():
     for message, name, data_field in (
         (picture(1), "foxglove.CompressedImage", 2),
         (picture(3, "raw"), "foxglove.RawImage", 6),
@@ -153,13 +153,13 @@ def test_pictures_are_messages_of_foxgloves_with_the_very_bytes():
             assert (found[2], found[3], bytes(found[4]), found[5]) == (16, 12, b"bgr8", 48)
 
 
-def test_descriptions_of_wrapped_messages_are_those_that_googles_parser_read():
+def test_protobuf_descriptors_match_the_verified_checksums():
     # Parsed and compared with foxglove's definitions by protobuf 7.36; the sums hold them to that.
     sums = {name: hashlib.sha256(descriptor_set(name)).hexdigest()[:16] for name in SCHEMAS}
     assert sums == GOLDEN
 
 
-def test_googles_own_parser_reads_a_picture():
+def test_google_protobuf_parses_a_recorded_image():
     descriptor_pb2 = pytest.importorskip("google.protobuf.descriptor_pb2")
     from google.protobuf import descriptor_pool, message_factory
 
@@ -184,7 +184,7 @@ class Wheel:
     _hidden: int = 0
 
 
-def test_schemas_tell_the_fields_of_types_and_nothing_of_others():
+def test_json_schemas_list_fields_of_known_types_only():
     assert schema_of("anything/Else") == ANY_OBJECT
     made = json.loads(schema_of("geometry_msgs/PoseStamped"))
     assert made["properties"]["pose"]["properties"]["position"]["properties"]["x"] == {"type": "number"}
@@ -198,7 +198,7 @@ def test_schemas_tell_the_fields_of_types_and_nothing_of_others():
     }  # lists of lists are none of what viewers read
 
 
-def test_recordings_of_other_programs_are_read_as_far_as_they_go(tmp_path: Path):
+def test_recordings_of_other_programs_are_read_with_every_compression(tmp_path: Path):
     from mcap.writer import CompressionType, Writer
 
     path = tmp_path / "theirs.mcap"

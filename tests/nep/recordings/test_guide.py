@@ -11,7 +11,7 @@ from tests.nep.programs import ROOT, running
 _GUIDE = (ROOT / "docs" / "recordings.md").read_text(encoding="utf-8")
 
 
-def test_the_program_prints_what_is_said(master: Master) -> None:
+def test_guide_program_prints_the_documented_output(master: Master) -> None:
     program, _fence, text = _GUIDE.partition("```python\n")[2].partition("\n```\n\n")
     with running(program, NEP_MASTER=master.address) as example:
         printed, errors = example.end()
@@ -19,7 +19,7 @@ def test_the_program_prints_what_is_said(master: Master) -> None:
     assert printed.splitlines() == [line.strip() for line in text.split("\n\n")[1].splitlines()]
 
 
-def test_the_modules_and_names_of_the_table_are_there() -> None:
+def test_modules_and_names_in_the_guide_table_exist() -> None:
     rows = re.findall(r"^\| `(nep\.recordings\.\w+)` \| (.*) \|$", _GUIDE, re.MULTILINE)
     assert len(rows) == 11
     for module, said in rows:

@@ -57,7 +57,7 @@ def paths(tmp_path_factory: pytest.TempPathFactory) -> list[Path]:
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="/proc tells the most memory of a process")
-def test_commands_need_little_memory_and_work_for_any_file(paths: list[Path], tmp_path: Path) -> None:
+def test_commands_use_bounded_memory_and_time_for_any_file(paths: list[Path], tmp_path: Path) -> None:
     done = subprocess.run(
         [sys.executable, "-c", _ALL_COMMANDS, str(tmp_path), *map(str, paths)],
         capture_output=True,
@@ -86,7 +86,7 @@ def test_commands_need_little_memory_and_work_for_any_file(paths: list[Path], tm
         "lz4 chunk of 300 MB",
     ],
 )
-def test_a_chunk_that_expands_too_far_is_damage(paths: list[Path], name: str) -> None:
+def test_decompression_bomb_in_a_chunk_is_reported_as_damage(paths: list[Path], name: str) -> None:
     (path,) = (each for each in paths if each.stem == name)
     with Recording(path) as recording:
         assert list(recording.read()) == []
@@ -94,13 +94,13 @@ def test_a_chunk_that_expands_too_far_is_damage(paths: list[Path], name: str) ->
         assert (damage.start_ns, damage.end_ns) == hostile.TIMES
 
 
-def test_one_chunk_is_listed_once_however_often_the_summary_names_it(paths: list[Path]) -> None:
+def test_chunk_is_indexed_once_despite_repeated_summary_entries(paths: list[Path]) -> None:
     (path,) = (each for each in paths if each.stem.startswith("3 000 entries"))
     with FileReader(path) as reader:
         assert len(reader.chunks()) + len(reader.damage) <= 1
 
 
-def test_work_of_opening_grows_with_the_file_and_not_with_what_it_states(paths: list[Path]) -> None:
+def test_open_cost_is_bounded_by_the_file_size(paths: list[Path]) -> None:
     for path in paths:
         with path.open("rb") as file:
             budget = open_budget(path, path.stat().st_size)
@@ -112,7 +112,7 @@ def test_work_of_opening_grows_with_the_file_and_not_with_what_it_states(paths: 
                 assert len(index.chunks) <= 1000
 
 
-def test_a_budget_bounds_bytes_and_seconds_of_all_that_is_read(tmp_path: Path) -> None:
+def test_read_budget_limits_bytes_and_seconds(tmp_path: Path) -> None:
     path = tmp_path / "a.mcap"
     path.write_bytes(hostile.closed(hostile.channel() + hostile.chunk_of(hostile.message()) * 10))
     size = path.stat().st_size
@@ -125,14 +125,14 @@ def test_a_budget_bounds_bytes_and_seconds_of_all_that_is_read(tmp_path: Path) -
         FileReader(path, budget=ReadBudget(path, 100_000, 1.0, lambda: next(clock)))
 
 
-def test_messages_of_chunks_that_overlap_without_end_are_not_held(paths: list[Path]) -> None:
+def test_overlapping_chunks_are_read_without_holding_all_messages(paths: list[Path]) -> None:
     (path,) = (each for each in paths if each.stem == "all chunks at all times")
     with FileReader(path) as reader:
         assert sum(1 for _each in reader.raw(None, None, {1})) == 20_000
 
 
 @pytest.mark.parametrize("kind", ["chunks", "no chunks", "no summary", "no message index"])
-def test_any_damaged_byte_is_survived(tmp_path: Path, kind: str) -> None:
+def test_damaged_bytes_raise_only_recording_errors(tmp_path: Path, kind: str) -> None:
     """Opening, reading, seeking and counting raise nothing but `RecordingError`."""
     whole = written(tmp_path / "whole.mcap", **KINDS[kind]).read_bytes()
     rnd, path = random.Random(kind), tmp_path / "damaged.mcap"
@@ -154,7 +154,7 @@ def test_any_damaged_byte_is_survived(tmp_path: Path, kind: str) -> None:
             assert error.reason  # noqa: PT017 - either is right
 
 
-def test_a_writer_records_on_after_any_value(tmp_path: Path) -> None:
+def test_writer_continues_after_any_value(tmp_path: Path) -> None:
     deep = (b"[" * 1000 + b"]" * 1000, b'{"a":' * 1000 + b"1" + b"}" * 1000, b"\x91" * 1000 + b"\x01")
     odd = [
         Message("/odd", data, codec, kind, stamp_ns=stamp, seq=stamp, publisher=stamp, extension=extension)

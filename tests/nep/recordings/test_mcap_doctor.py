@@ -221,7 +221,7 @@ BYTES_AT = {"no magic": 0, "no magic at the end": -1, "a record is cut": len(MAG
 @pytest.mark.parametrize(
     ("problem", "damage"), DAMAGES, ids=[f"{each[0]} {n}" for n, each in enumerate(DAMAGES)]
 )
-def test_a_record_that_breaks_a_rule_is_found(
+def test_mcap_doctor_detects_an_invalid_record(
     whole: bytes, tmp_path: Path, problem: str, damage: Damage
 ) -> None:
     records = taken_apart(whole)
@@ -232,14 +232,14 @@ def test_a_record_that_breaks_a_rule_is_found(
 
 
 @pytest.mark.parametrize("problem", BYTES_AT)
-def test_a_byte_that_breaks_a_rule_is_found(whole: bytes, tmp_path: Path, problem: str) -> None:
+def test_mcap_doctor_detects_an_invalid_byte(whole: bytes, tmp_path: Path, problem: str) -> None:
     data = bytearray(whole)
     data[BYTES_AT[problem]] ^= 0x7F
     (tmp_path / "a.mcap").write_bytes(data)
     assert problem in McapDoctor(tmp_path / "a.mcap").problems
 
 
-def test_every_rule_of_the_doctor_has_a_file_that_breaks_it() -> None:
+def test_every_mcap_doctor_rule_has_a_failing_file() -> None:
     said = {
         call.args[1].value
         for call in ast.walk(ast.parse(inspect.getsource(mcap_doctor)))

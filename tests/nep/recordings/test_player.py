@@ -63,7 +63,7 @@ def jumped(playback: Playback) -> dict[str, int]:
 
 
 @pytest.mark.parametrize("speed", [0.1, 0.5, 1.0, 3.0, 10.0])
-def test_each_message_comes_when_it_came_at_any_speed(recording, times, speed):
+def test_playback_delivers_each_message_at_its_time_for_any_speed(recording, times, speed):
     clock = Clock()
     playback = Playback(recording, clock=clock)
     playback.speed = speed
@@ -78,7 +78,7 @@ def test_each_message_comes_when_it_came_at_any_speed(recording, times, speed):
     assert playback.advance().wait_s is None
 
 
-def test_what_is_waited_for_is_the_next_message_and_never_long(recording):
+def test_playback_waits_until_the_next_message_and_at_most_50_ms(recording):
     clock = Clock()
     playback = Playback(recording, clock=clock)
     playback.play()
@@ -93,7 +93,7 @@ def test_what_is_waited_for_is_the_next_message_and_never_long(recording):
     assert count == COUNT
 
 
-def test_seek_shows_the_newest_of_each_topic_and_goes_on_behind(recording, times):
+def test_seek_returns_the_newest_message_of_each_topic_and_continues_after_them(recording, times):
     clock = Clock()
     playback = Playback(recording, clock=clock)
     playback.seek(times[50])
@@ -109,7 +109,7 @@ def test_seek_shows_the_newest_of_each_topic_and_goes_on_behind(recording, times
         assert recording.start_ns <= playback.status().position_ns <= recording.end_ns
 
 
-def test_steps_go_from_message_to_message_of_a_topic(recording, times):
+def test_step_moves_between_messages_of_a_topic(recording, times):
     playback = Playback(recording, clock=Clock())
     playback.seek(times[50])
     jumped(playback)
@@ -124,7 +124,7 @@ def test_steps_go_from_message_to_message_of_a_topic(recording, times):
     assert not playback.step("/a")
 
 
-def test_a_part_is_played_again_and_again_until_that_ends(recording, times):
+def test_loop_repeats_a_range_until_it_is_ended(recording, times):
     clock = Clock()
     playback = Playback(recording, clock=clock)
     playback.loop(times[20], times[24])
@@ -144,7 +144,7 @@ def test_a_part_is_played_again_and_again_until_that_ends(recording, times):
             playback.loop(*part)
 
 
-def test_at_its_end_it_begins_again(recording):
+def test_play_at_the_end_restarts_from_the_beginning(recording):
     clock = Clock()
     playback = Playback(recording, clock=clock)
     for _each in range(2):
@@ -152,7 +152,7 @@ def test_at_its_end_it_begins_again(recording):
         assert [seq for _at, seq in run(playback, clock, 1.5)] == list(range(COUNT))
 
 
-def test_who_is_slow_loses_nothing_and_is_told_the_true_speed(recording):
+def test_slow_consumer_receives_all_messages_and_the_true_speed_is_reported(recording):
     clock = Clock()
     playback = Playback(recording, clock=clock)
     playback.speed = 10.0
@@ -176,7 +176,7 @@ def test_who_is_slow_loses_nothing_and_is_told_the_true_speed(recording):
     assert playback.status().true_speed == pytest.approx(0.2, rel=0.3)  # 0.25 s of every half
 
 
-def test_pause_keeps_the_place_and_wrong_speeds_are_refused(recording):
+def test_pause_keeps_the_position_and_invalid_speeds_are_rejected(recording):
     clock = Clock()
     playback = Playback(recording, clock=clock)
     playback.play()
@@ -193,7 +193,7 @@ def test_pause_keeps_the_place_and_wrong_speeds_are_refused(recording):
             playback.speed = wrong
 
 
-def test_topics_are_chosen_and_get_other_names(recording):
+def test_played_topics_are_filtered_and_remapped(recording):
     clock = Clock()
     playback = Playback(recording, clock=clock, topics=("/a",), remap={"/a": "/test/a"})
     playback.play()
@@ -207,7 +207,7 @@ def test_topics_are_chosen_and_get_other_names(recording):
     ]
 
 
-def test_an_empty_recording_is_at_its_end(tmp_path):
+def test_playback_of_an_empty_recording_does_nothing(tmp_path):
     record(tmp_path / "a.mcap", [])
     with Recording(tmp_path / "a.mcap") as recording:
         playback = Playback(recording, clock=Clock())
@@ -220,7 +220,7 @@ def test_an_empty_recording_is_at_its_end(tmp_path):
         playback.advance()
 
 
-def test_the_players_thread_gives_all_in_order_and_jumps_apart(recording, times):
+def test_player_thread_delivers_messages_in_order_and_seeks_separately(recording, times):
     came, jumps, ended = [], [], threading.Event()
     playback = Playback(recording)
     with Player(playback, came.extend, on_jump=jumps.append, on_end=ended.set) as player:
@@ -238,7 +238,7 @@ def test_the_players_thread_gives_all_in_order_and_jumps_apart(recording, times)
     player.close()
 
 
-def test_what_the_sink_raises_ends_it_and_is_told(recording):
+def test_exception_of_the_sink_ends_playback_and_is_reported(recording):
     ended = threading.Event()
 
     def refuse(_messages):

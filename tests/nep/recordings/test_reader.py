@@ -42,7 +42,7 @@ def everything(path):
     return found
 
 
-def test_what_it_tells_of_itself(recording, everything):
+def test_recording_reports_start_count_and_topics(recording, everything):
     assert recording.is_complete
     assert (recording.start_ns, recording.message_count) == (everything[0].log_ns, len(ALL))
     assert [(each.name, each.message_count) for each in recording.topics.values()] == [
@@ -55,7 +55,7 @@ def test_what_it_tells_of_itself(recording, everything):
 
 @settings(max_examples=60)
 @given(st.data())
-def test_reading_a_part_gives_what_a_look_at_each_message_gives(path, everything, data):
+def test_range_read_matches_filtering_of_all_messages(path, everything, data):
     times = st.integers(everything[0].log_ns - 10, everything[-1].log_ns + 10)
     start, end = data.draw(st.one_of(st.none(), times)), data.draw(st.one_of(st.none(), times))
     topics = data.draw(st.one_of(st.none(), st.sets(st.sampled_from(["/a", "/b", "/rare", "/none"]))))
@@ -73,7 +73,7 @@ def test_reading_a_part_gives_what_a_look_at_each_message_gives(path, everything
 
 @settings(max_examples=60)
 @given(st.data())
-def test_the_newest_of_each_topic_and_a_step(path, everything, data):
+def test_newest_before_and_after_match_a_linear_search(path, everything, data):
     at = data.draw(st.sampled_from([-1, 0, 2**64 - 1, 2**70, *(each.log_ns for each in everything)]))
     at += data.draw(st.integers(-1, 1))
     wanted = {}
@@ -89,7 +89,7 @@ def test_the_newest_of_each_topic_and_a_step(path, everything, data):
         assert (after and after.log_ns) == min((each for each in times if each > at), default=None)
 
 
-def test_densities_are_counts_without_a_look_at_payloads(recording, everything, monkeypatch):
+def test_densities_are_counted_without_reading_payloads(recording, everything, monkeypatch):
     monkeypatch.setattr(recording.file, "_chunk", pytest.fail)
     start, end = recording.start_ns, recording.end_ns + 1
     for buckets in (1, 7, 100):
@@ -108,7 +108,7 @@ def test_densities_are_counts_without_a_look_at_payloads(recording, everything, 
     assert recording.densities(start, end, 0) == recording.densities(end, start, 5) == {}
 
 
-def test_memory_is_bounded_by_the_cache(path, everything):
+def test_reader_memory_is_bounded_by_the_cache(path, everything):
     with Recording(path, cache_bytes=1) as opened:
         assert len(list(opened.read())) == len(ALL)
         assert len(opened.file._cache) == 1
@@ -119,7 +119,7 @@ def test_memory_is_bounded_by_the_cache(path, everything):
             assert len(opened.file._cache) == 1
 
 
-def test_a_file_that_was_not_ended_tells_the_same(path, everything, tmp_path):
+def test_unfinished_file_gives_the_same_messages_and_counts(path, everything, tmp_path):
     cut = tmp_path / "cut.mcap"
     with Recording(path) as opened:
         chunks = opened.file.chunks()
@@ -148,7 +148,7 @@ def test_a_file_that_was_not_ended_tells_the_same(path, everything, tmp_path):
         assert sum(opened.densities(opened.start_ns, opened.end_ns + 1, 9)["/a"]) == 120
 
 
-def test_a_damaged_piece_is_passed_over_and_counted(path, everything, tmp_path):
+def test_damaged_chunk_is_skipped_and_counted(path, everything, tmp_path):
     damaged = tmp_path / "damaged.mcap"
     data = bytearray(path.read_bytes())
     with Recording(path) as opened:
@@ -166,7 +166,7 @@ def test_a_damaged_piece_is_passed_over_and_counted(path, everything, tmp_path):
 
 
 @pytest.mark.parametrize("size", [0, 1, 7, 8, 9, 30, 1000])
-def test_what_is_no_recording_is_a_sentence(tmp_path, size):
+def test_file_that_is_not_a_recording_raises_recording_error(tmp_path, size):
     path = tmp_path / "a.mcap"
     path.write_bytes(random.Random(size).randbytes(size))
     with pytest.raises(RecordingError, match=r"a\.mcap'; .*MCAP file"):
@@ -177,7 +177,7 @@ def test_what_is_no_recording_is_a_sentence(tmp_path, size):
         Recording(tmp_path / "nothing.mcap")
 
 
-def test_any_damage_to_the_end_is_survived(path, tmp_path):
+def test_reader_recovers_from_random_damage_near_the_end(path, tmp_path):
     data, damaged = path.read_bytes(), tmp_path / "a.mcap"
     rnd = random.Random(4)
     for _each in range(60):
@@ -208,7 +208,7 @@ def resummed(data: bytes, changed: dict[str, int]) -> bytes:
 
 @pytest.mark.parametrize("name", ["offset", "length"])
 @pytest.mark.parametrize("value", [0, 1, 2**31 + 1, 2**63 - 1, 2**64 - 1])
-def test_a_summary_that_lies_about_places_is_not_believed(path, everything, tmp_path, name, value):
+def test_summary_with_wrong_offsets_is_not_trusted(path, everything, tmp_path, name, value):
     (tmp_path / "a.mcap").write_bytes(resummed(path.read_bytes(), {name: value}))
     with Recording(tmp_path / "a.mcap") as opened:
         found = [each.log_ns for each in opened.read()]
@@ -217,7 +217,7 @@ def test_a_summary_that_lies_about_places_is_not_believed(path, everything, tmp_
         opened.densities(0, 2**64 - 1, 10)
 
 
-def test_a_summary_that_lies_about_times_costs_no_time(path, everything, tmp_path):
+def test_summary_with_wrong_times_does_not_slow_down_reading(path, everything, tmp_path):
     (tmp_path / "a.mcap").write_bytes(resummed(path.read_bytes(), {"start": 0, "end": 2**64 - 1}))
     with Recording(tmp_path / "a.mcap") as opened:
         assert [each.log_ns for each in opened.read()] == [each.log_ns for each in everything]
@@ -231,7 +231,7 @@ def test_a_summary_that_lies_about_times_costs_no_time(path, everything, tmp_pat
         assert sum(counts) <= 12 * 120
 
 
-def test_messages_that_overlap_between_chunks_come_in_order(tmp_path, everything):
+def test_messages_of_overlapping_chunks_are_read_in_order(tmp_path, everything):
     path = tmp_path / "a.mcap"
     record(path, [ALL[:1]])
     with Recording(path) as opened:
@@ -254,7 +254,7 @@ def test_messages_that_overlap_between_chunks_come_in_order(tmp_path, everything
             assert (found and found.log_ns) == wanted
 
 
-def test_an_empty_recording(tmp_path):
+def test_empty_recording_has_no_messages(tmp_path):
     record(tmp_path / "a.mcap", [])
     with Recording(tmp_path / "a.mcap") as opened:
         assert (opened.start_ns, opened.duration_s, opened.message_count) == (0, 0.0, 0)
@@ -262,7 +262,7 @@ def test_an_empty_recording(tmp_path):
         assert opened.newest(5) == opened.densities(0, 10, 5) == {}
 
 
-def test_pictures_are_slices_of_the_file_that_decode(tmp_path):
+def test_recorded_images_are_decoded(tmp_path):
     messages = [picture(seq, kind) for seq, kind in enumerate(("jpeg", "png", "raw"), 1)]
     record(tmp_path / "a.mcap", [messages])
     with Recording(tmp_path / "a.mcap") as opened:
@@ -270,7 +270,7 @@ def test_pictures_are_slices_of_the_file_that_decode(tmp_path):
             assert (found.message.payload == sent.payload).all()
 
 
-def test_who_reads_a_closed_recording_is_told(path):
+def test_reading_a_closed_recording_raises_closed_error(path):
     opened = Recording(path)
     opened.close()
     opened.close()
@@ -278,6 +278,6 @@ def test_who_reads_a_closed_recording_is_told(path):
         list(opened.read())
 
 
-def test_the_clock_of_tests_is_what_these_tests_think(everything):
+def test_test_clock_times_match_the_test_constants(everything):
     assert START_NS < everything[0].log_ns < START_NS + 100 * STEP_NS
     assert limits().least_free_bytes == 0

@@ -57,7 +57,7 @@ class Heard:
         ((), ("**/camera",), ("**",), ["/x"], ["/x/camera", "camera"]),
     ],
 )
-def test_what_is_chosen(topics, left_out, subscriptions, chosen, others):
+def test_topic_selection_matches_chosen_topics_only(topics, left_out, subscriptions, chosen, others):
     selection = TopicSelection(topics, left_out)
     assert selection.subscriptions == subscriptions
     for topic in (*chosen, *others):
@@ -69,14 +69,14 @@ def test_what_is_chosen(topics, left_out, subscriptions, chosen, others):
 
 
 @pytest.mark.parametrize("pattern", ["/a*/b", "?", "*", "*/*", "/x/*y*/**", "**/cam?", "/plain"])
-def test_a_wider_pattern_hears_no_less(pattern):
+def test_widened_pattern_matches_every_topic_of_the_original_pattern(pattern):
     topics = ["/a/b", "/ab/b", "q", "/x/y", "/x/ayb/c/d", "/cam1", "cams", "/r/cam2", "/plain", "/a/b/c"]
     for topic in topics:
         if glob_matches(pattern, topic):
             assert matches(widened(pattern), topic)
 
 
-def test_each_message_once_from_the_first_one_of_topics_that_come_later(make):
+def test_each_message_is_recorded_once_including_the_first_of_later_topics(make):
     node, heard = make("recorder"), Heard()
     before = make("before").new_pub("/arm/joints")
     selection = TopicSelection(("/arm/*", "/arm/joints", "/cam*"), ("/arm/secret",))
@@ -100,7 +100,7 @@ def test_each_message_once_from_the_first_one_of_topics_that_come_later(make):
     assert 99 not in heard.of("/arm/joints")
 
 
-def test_descriptions_of_robots_and_alerts_are_recorded_whatever_is_chosen(master):
+def test_robot_descriptions_and_alerts_are_recorded_for_any_selection(master):
     heard = Heard()
     with (
         nep.node("recorder", master=master.address) as node,
@@ -117,7 +117,7 @@ def test_descriptions_of_robots_and_alerts_are_recorded_whatever_is_chosen(maste
         assert {each.topic for each in heard.messages} == {"/pepper/description"}
 
 
-def test_what_is_recorded_is_what_a_subscriber_gets_byte_for_byte(master, tmp_path):
+def test_recorded_messages_equal_received_messages_byte_for_byte(master, tmp_path):
     path = tmp_path / "a.mcap"
     with (
         nep.node("recorder", master=master.address) as node,
@@ -153,7 +153,7 @@ def test_what_is_recorded_is_what_a_subscriber_gets_byte_for_byte(master, tmp_pa
     assert {(each.received, each.lost, each.late) for each in figures.values()} == {(10, 0, 0)}
 
 
-def test_orders_of_the_service(master, tmp_path):
+def test_recorder_service_executes_commands(master, tmp_path):
     events: list[dict[str, object]] = []
 
     def seen(kind: str) -> list[dict[str, object]]:
@@ -214,7 +214,7 @@ def test_orders_of_the_service(master, tmp_path):
 
 
 @pytest.mark.parametrize(("limit", "ends"), [("time", {"seconds": 5}), ("size", {"size_bytes": 1000})])
-def test_a_recording_ends_by_itself_after_so_long_or_with_so_many_bytes(master, tmp_path, limit, ends):
+def test_recording_stops_at_its_duration_or_size_limit(master, tmp_path, limit, ends):
     events: list[dict[str, object]] = []
     now = [100.0]
     with (
@@ -254,7 +254,7 @@ def test_a_recording_ends_by_itself_after_so_long_or_with_so_many_bytes(master, 
 
 
 @pytest.mark.skipif(os.name == "nt", reason="Windows removes no file that is open")
-def test_what_ends_by_itself_is_told_and_something_new_may_begin(master, tmp_path, monkeypatch):
+def test_recording_that_stops_on_its_own_is_reported_and_another_can_start(master, tmp_path, monkeypatch):
     events: list[dict[str, object]] = []
 
     def seen(kind: str) -> list[dict[str, object]]:
@@ -285,7 +285,7 @@ def test_what_ends_by_itself_is_told_and_something_new_may_begin(master, tmp_pat
     assert [(each["op"], each["path"]) for each in seen("problem")] == [("keep", str(tmp_path / "b.mcap"))]
 
 
-def test_a_line_that_is_too_long_is_no_order(monkeypatch):
+def test_command_line_that_is_too_long_is_discarded(monkeypatch):
     monkeypatch.setattr(child, "_MAX_LINE_BYTES", 10)
     lines = child._lines(io.BytesIO(b'{"a":1}\n' + b"x" * 25 + b'{"op":1}\n\n{"b":2}'))
     assert list(lines) == [b'{"a":1}\n', b"", b"\n", b'{"b":2}']
@@ -294,7 +294,7 @@ def test_a_line_that_is_too_long_is_no_order(monkeypatch):
 @pytest.mark.parametrize(
     "is_told", [False, pytest.param(True, marks=pytest.mark.skipif(os.name == "nt", reason="needs POSIX"))]
 )
-def test_a_process_of_its_own_finishes_when_its_input_ends_or_it_is_told_to(master, tmp_path, is_told):
+def test_recorder_process_finishes_on_end_of_input_or_stop_command(master, tmp_path, is_told):
     path = tmp_path / "a.mcap"
     child = subprocess.Popen(
         [sys.executable, "-m", "nep.recordings.child", "--master", master.address],

@@ -37,7 +37,7 @@ def reader(path: Path) -> Iterator[ReaderProcess]:
         yield reader
 
 
-def test_what_is_read_there_is_what_is_read_here(path: Path, reader: ReaderProcess) -> None:
+def test_remote_reader_returns_the_same_as_a_local_reader(path: Path, reader: ReaderProcess) -> None:
     with Recording(path) as here, reader.open(path) as there:
         assert there.facts == here.facts
         assert there.topics == here.topics
@@ -58,14 +58,14 @@ def test_what_is_read_there_is_what_is_read_here(path: Path, reader: ReaderProce
         next(there.read())
 
 
-def test_several_readers_of_one_file_do_not_disturb_one_another(path: Path, reader: ReaderProcess) -> None:
+def test_several_remote_readers_of_one_file_are_independent(path: Path, reader: ReaderProcess) -> None:
     with reader.open(path) as one, reader.open(path) as two:
         pairs = list(zip(one.read(), two.read(), strict=True))
     assert pairs
     assert all(kept(a.message) == kept(b.message) for a, b in pairs)
 
 
-def test_what_can_not_be_read_is_said_and_others_are_read_on(
+def test_unreadable_file_raises_and_other_files_stay_readable(
     tmp_path: Path, path: Path, reader: ReaderProcess
 ) -> None:
     (tmp_path / "none.mcap").write_bytes(b"none")
@@ -83,7 +83,7 @@ def test_what_can_not_be_read_is_said_and_others_are_read_on(
         assert next(whole.read())
 
 
-def test_a_process_that_dies_is_a_sentence_and_the_next_file_has_a_new_one(path: Path) -> None:
+def test_crashed_reader_process_raises_and_the_next_open_starts_another(path: Path) -> None:
     with ReaderProcess(DIES) as reader:
         for _again in range(2):
             with pytest.raises(RecordingError, match=r"a\.mcap'; .*process"):
@@ -92,13 +92,13 @@ def test_a_process_that_dies_is_a_sentence_and_the_next_file_has_a_new_one(path:
         reader.open(path)
 
 
-def test_a_process_that_does_not_answer_is_ended(path: Path) -> None:
+def test_unresponsive_reader_process_is_terminated(path: Path) -> None:
     reader = ReaderProcess(NEVER_ANSWERS, timeout_s=0.05)
     with reader, pytest.raises(RecordingTooLargeError, match="too long"):
         reader.open(path)
 
 
-def test_closing_ends_who_waits(path: Path) -> None:
+def test_closing_the_reader_process_ends_pending_calls(path: Path) -> None:
     reader = ReaderProcess(NEVER_ANSWERS)
     raised: list[BaseException] = []
 
@@ -123,7 +123,7 @@ def test_closing_ends_who_waits(path: Path) -> None:
 NepErrors = (ClosedError, RecordingError)
 
 
-def test_requests_that_make_no_sense_are_answered() -> None:
+def test_invalid_requests_receive_an_error_reply() -> None:
     service = RecordingService(lambda _content: None)
     for request in (
         {},
@@ -135,7 +135,7 @@ def test_requests_that_make_no_sense_are_answered() -> None:
         assert "error" in service.answer(request)
 
 
-def test_frames_end_where_the_stream_does() -> None:
+def test_truncated_or_invalid_frame_is_read_as_end_of_stream() -> None:
     stream = io.BytesIO()
     write_frame(stream, {"a": b"\0" * 10})
     whole = stream.getvalue()

@@ -32,7 +32,7 @@ def read(path):
         return [kept(each.message) for each in recording.read()]
 
 
-def test_a_recording_that_is_cut_anywhere_gives_all_that_was_whole(path, tmp_path):
+def test_repair_of_a_truncated_recording_recovers_all_complete_messages(path, tmp_path):
     data, whole = path.read_bytes(), [kept(each) for each in ALL]
     with Recording(path) as recording:
         chunks = recording.file.chunks()
@@ -56,7 +56,7 @@ def test_a_recording_that_is_cut_anywhere_gives_all_that_was_whole(path, tmp_pat
         assert damaged.stat().st_size == cut  # as it was
 
 
-def test_what_was_repaired_is_a_whole_file_with_its_figures(path, tmp_path):
+def test_repaired_file_is_complete_and_keeps_its_figures(path, tmp_path):
     damaged = tmp_path / "a.mcap"
     damaged.write_bytes(path.read_bytes()[:-300])
     progress = []
@@ -71,14 +71,14 @@ def test_what_was_repaired_is_a_whole_file_with_its_figures(path, tmp_path):
         assert recording.figures() == before.figures()
 
 
-def test_a_whole_recording_loses_nothing(path, tmp_path):
+def test_repair_of_an_undamaged_recording_loses_nothing(path, tmp_path):
     report = repair(path, tmp_path / "copy.mcap")
     assert report.is_whole
     assert read(report.path) == [kept(each) for each in ALL]
 
 
 @pytest.mark.parametrize("has_end", [True, False])
-def test_damage_in_the_middle_costs_the_damaged_chunk_alone_and_is_counted(path, tmp_path, has_end):
+def test_repair_drops_only_the_damaged_chunk_and_counts_its_messages(path, tmp_path, has_end):
     with Recording(path) as recording:
         chunks = recording.file.chunks()
     data = bytearray(path.read_bytes())
@@ -93,7 +93,7 @@ def test_damage_in_the_middle_costs_the_damaged_chunk_alone_and_is_counted(path,
     assert report.discarded_bytes >= chunks[4].length
 
 
-def test_what_a_damaged_length_hides_is_found_again(path, tmp_path):
+def test_repair_finds_chunks_after_a_damaged_length(path, tmp_path):
     with Recording(path) as recording:
         chunks = recording.file.chunks()
     data = bytearray(path.read_bytes())
@@ -108,7 +108,7 @@ def test_what_a_damaged_length_hides_is_found_again(path, tmp_path):
     assert McapDoctor(report.path).problems == []
 
 
-def test_random_damage_never_ends_in_a_traceback_or_a_false_message(path, tmp_path):
+def test_repair_of_random_damage_raises_only_recording_errors_and_invents_no_message(path, tmp_path):
     data, sent = path.read_bytes(), {kept(each) for each in ALL}
     rnd = random.Random(5)
     for at in range(60):
@@ -126,7 +126,7 @@ def test_random_damage_never_ends_in_a_traceback_or_a_false_message(path, tmp_pa
             assert payload in {each[1] for each in sent}
 
 
-def test_names_beside_are_new_and_nothing_is_written_over(path, tmp_path):
+def test_repaired_file_gets_an_unused_name(path, tmp_path):
     damaged = tmp_path / "a.mcap"
     damaged.write_bytes(path.read_bytes()[:-300])
     assert [repair(damaged).path.name for _each in range(3)] == [
@@ -142,14 +142,14 @@ def test_names_beside_are_new_and_nothing_is_written_over(path, tmp_path):
 
 
 @pytest.mark.parametrize("data", [b"", b"\x89MCAP0\r\n", b"nothing of the kind" * 100, bytes(100_000)])
-def test_a_file_without_a_message_is_a_sentence_and_leaves_nothing(tmp_path, data):
+def test_repair_of_a_file_without_messages_raises_and_leaves_no_file(tmp_path, data):
     (tmp_path / "a.mcap").write_bytes(data)
     with pytest.raises(RecordingError):
         repair(tmp_path / "a.mcap")
     assert [each.name for each in tmp_path.iterdir()] == ["a.mcap"]
 
 
-def test_a_result_that_cannot_be_read_back_is_no_success(path, tmp_path, monkeypatch):
+def test_repair_result_that_cannot_be_read_back_is_an_error(path, tmp_path, monkeypatch):
     damaged = tmp_path / "a.mcap"
     damaged.write_bytes(path.read_bytes()[:-300])
     finish = repair_module.FileWriter.finish
@@ -166,7 +166,7 @@ def test_a_result_that_cannot_be_read_back_is_no_success(path, tmp_path, monkeyp
     assert [each.name for each in tmp_path.iterdir()] == ["a.mcap"]
 
 
-def test_recordings_of_other_programs_are_repaired_too(tmp_path):
+def test_recordings_of_other_programs_are_repaired(tmp_path):
     from mcap.writer import Writer
 
     damaged = tmp_path / "theirs.mcap"
@@ -189,7 +189,7 @@ def test_recordings_of_other_programs_are_repaired_too(tmp_path):
         assert not [each for each in McapDoctor(report.path).problems if "earlier" not in each]
 
 
-def test_odd_messages_survive_a_repair(tmp_path):
+def test_unusual_messages_survive_a_repair(tmp_path):
     record(tmp_path / "a.mcap", [odd_messages(), odd_messages()])
     (tmp_path / "b.mcap").write_bytes((tmp_path / "a.mcap").read_bytes()[:-100])
     assert read(repair(tmp_path / "b.mcap").path) == read(tmp_path / "a.mcap")

@@ -26,7 +26,7 @@ def fill(ring: FlightRecorder, first: int, last: int, every: int = 10) -> None:
             assert ring._writer.flush()
 
 
-def test_it_keeps_the_last_seconds_and_no_more_than_a_segment_beyond(tmp_path):
+def test_flight_recorder_keeps_the_last_seconds_plus_at_most_one_segment(tmp_path):
     with FlightRecorder(tmp_path / "ring", seconds=2.0, clock=TestClock(), limits=limits()) as ring:
         fill(ring, 1, 1001)
         status = ring.status
@@ -52,7 +52,7 @@ def test_it_keeps_the_last_seconds_and_no_more_than_a_segment_beyond(tmp_path):
     assert not list((tmp_path / "ring").iterdir())
 
 
-def test_bytes_end_it_before_seconds(tmp_path):
+def test_flight_recorder_is_limited_by_bytes_before_seconds(tmp_path):
     size = 60_000
     with FlightRecorder(tmp_path, seconds=1e6, size_bytes=size, clock=TestClock(), limits=limits()) as ring:
         for part in range(40):
@@ -64,7 +64,7 @@ def test_bytes_end_it_before_seconds(tmp_path):
         (tmp_path / "kept").unlink()
 
 
-def test_a_segment_that_is_copied_is_removed_only_afterwards(tmp_path, monkeypatch):
+def test_segment_being_copied_is_removed_after_the_copy(tmp_path, monkeypatch):
     copying, go_on, made = threading.Event(), threading.Event(), []
 
     class SlowWriter(ring_module.FileWriter):
@@ -91,7 +91,7 @@ def test_a_segment_that_is_copied_is_removed_only_afterwards(tmp_path, monkeypat
     assert not list((tmp_path / "ring").iterdir())
 
 
-def test_losses_are_those_of_the_kept_seconds(tmp_path):
+def test_saved_flight_recording_counts_only_losses_of_its_seconds(tmp_path):
     clock = TestClock()
     with FlightRecorder(tmp_path / "ring", clock=clock, limits=limits(figures_s=1e-9)) as ring:
         ring.post([json_message(1), json_message(5)])  # three are missing, long ago
@@ -112,7 +112,7 @@ def test_losses_are_those_of_the_kept_seconds(tmp_path):
         assert recording.figures()["/odom"].lost in {0, 1}  # of this second, never the three
 
 
-def test_what_a_process_left_behind_is_removed_and_what_another_one_has_is_not(tmp_path):
+def test_segments_of_dead_processes_are_removed_and_others_kept(tmp_path):
     gone = tmp_path / f"ring-{NO_PROCESS}-a-1.mcap"
     others = [tmp_path / f"ring-{os.getppid()}-a-1.mcap", tmp_path / "mine.mcap", tmp_path / "ring-x-1.mcap"]
     for each in (gone, *others):
@@ -122,7 +122,7 @@ def test_what_a_process_left_behind_is_removed_and_what_another_one_has_is_not(t
     assert all(each.exists() for each in others)
 
 
-def test_sentences(tmp_path):
+def test_invalid_flight_recorder_requests_raise_errors(tmp_path):
     with pytest.raises(ValueError, match="above 0"):
         FlightRecorder(tmp_path, seconds=0.0)
     with pytest.raises(ValueError, match="above 0"):
@@ -150,7 +150,7 @@ def test_sentences(tmp_path):
         assert recording.words["damaged"] == "1"
 
 
-def test_nothing_is_kept_of_nothing_and_of_a_ring_that_has_ended(tmp_path):
+def test_saving_an_empty_or_closed_flight_recorder_raises(tmp_path):
     ring = FlightRecorder(tmp_path / "ring", clock=TestClock(), limits=limits())
     with pytest.raises(RecordingError, match="no messages received yet"):
         ring.keep(tmp_path / "a.mcap", 1.0)
@@ -167,7 +167,7 @@ def test_nothing_is_kept_of_nothing_and_of_a_ring_that_has_ended(tmp_path):
     assert [each.name for each in tmp_path.iterdir()] == ["ring"]
 
 
-def test_a_full_disk_makes_it_shorter_before_it_ends(tmp_path):
+def test_full_disk_is_reported_and_leaves_no_flight_recorder_files(tmp_path):
     told = []
     ring = FlightRecorder(
         tmp_path / "ring",
@@ -184,6 +184,6 @@ def test_a_full_disk_makes_it_shorter_before_it_ends(tmp_path):
     assert not list((tmp_path / "ring").iterdir())
 
 
-def test_time_of_the_tests_clock(tmp_path):
+def test_test_clock_advances_one_step_per_call(tmp_path):
     clock = TestClock()
     assert clock() + STEP_NS == clock()

@@ -37,7 +37,7 @@ def split(path: Path, sequences: range) -> SplitFiles:
     return files
 
 
-def test_each_file_is_complete_and_together_they_have_every_message_once(tmp_path: Path) -> None:
+def test_split_files_are_complete_and_together_hold_every_message_once(tmp_path: Path) -> None:
     files = split(tmp_path / "tour.mcap", range(1, 401))
     assert len(files.paths) > 3
     numbers = range(1, len(files.paths) + 1)
@@ -57,14 +57,14 @@ def test_each_file_is_complete_and_together_they_have_every_message_once(tmp_pat
     assert sequences == list(range(1, 401))
 
 
-def test_what_fits_into_one_file_is_one(tmp_path: Path) -> None:
+def test_recording_below_the_split_size_is_one_file(tmp_path: Path) -> None:
     files = split(tmp_path / "tour.mcap", range(1, 5))
     assert [each.name for each in tmp_path.iterdir()] == ["tour-001.mcap"]
     with Recording(files.paths[0]) as recording:
         assert "part" not in recording.words
 
 
-def test_a_file_that_is_there_is_not_written_over_and_the_one_before_stays_whole(tmp_path: Path) -> None:
+def test_split_does_not_overwrite_a_file_and_keeps_the_previous_part_complete(tmp_path: Path) -> None:
     (tmp_path / "tour-002.mcap").write_bytes(b"mine")
     writer = RecordingWriter(
         SplitFiles(tmp_path / "tour.mcap", PART, limits()), clock=TestClock(), limits=limits()
@@ -83,7 +83,7 @@ def test_a_file_that_is_there_is_not_written_over_and_the_one_before_stays_whole
         SplitFiles(tmp_path / "tour.mcap", PART)
 
 
-def test_nep_record_splits_and_ends_by_size(
+def test_record_command_splits_and_stops_by_size(
     master: nep.Master, tmp_path: Path, capfdbinary: pytest.CaptureFixture[bytes]
 ) -> None:
     words = ("--max-size", "100kB", "--master", master.address, "--json")

@@ -171,7 +171,7 @@ def kept_by_a_ring(folder: Path) -> Path:
 
 
 @pytest.mark.parametrize("made", [fresh, cut, exported, kept_by_a_ring])
-def test_a_viewer_reads_all_that_it_has_an_encoding_for(made: Made, tmp_path: Path) -> None:
+def test_viewer_reads_all_supported_encodings(made: Made, tmp_path: Path) -> None:
     shown = [(topic, each) for topic, each in look(made(tmp_path)) if not topic.startswith("/nep/")]
     assert {topic for topic, each in shown if each is UnreadableError} <= {"/packed", "/camera"}
     assert ("/typed", {"x": 1.0}) in shown
@@ -184,7 +184,7 @@ def test_a_viewer_reads_all_that_it_has_an_encoding_for(made: Made, tmp_path: Pa
 
 
 @pytest.mark.parametrize("order", [1, -1])
-def test_json_of_a_topic_is_shown_when_some_of_its_messages_are_none(order: int, tmp_path: Path) -> None:
+def test_viewer_shows_json_topic_with_some_invalid_messages(order: int, tmp_path: Path) -> None:
     whole = json_message(1)
     broken = Message("/odom", b"{", "json", "json", stamp_ns=START_NS, seq=2, publisher=7)
     record(tmp_path / "a.mcap", [[whole, broken][::order]])
@@ -227,7 +227,7 @@ def types_of_nep() -> list[type]:
 
 
 @pytest.mark.parametrize("kind", [*types_of_nep(), Odd], ids=lambda kind: kind.__name__)
-def test_every_schema_has_only_what_viewers_read(kind: type) -> None:
+def test_every_schema_is_supported_by_viewers(kind: type) -> None:
     made = json.loads(json_schema(kind))
     look_at_schema(made, kind.__name__)
     assert made["properties"].keys() <= {each.name for each in dataclasses.fields(kind)}
@@ -251,6 +251,6 @@ def test_every_schema_has_only_what_viewers_read(kind: type) -> None:
         {"type": "object", "properties": {"a": {"type": "object", "properties": {"b": {}}}}},
     ],
 )
-def test_a_schema_that_viewers_give_up_is_found(schema: Any) -> None:
+def test_schema_unsupported_by_viewers_is_detected(schema: Any) -> None:
     with pytest.raises(UnreadableError):
         look_at_schema(schema)

@@ -74,7 +74,7 @@ def read(path: Path) -> list[Message]:
         return [each.message for each in recording.read()]
 
 
-def test_what_does_not_fit_into_the_queue_is_counted_shown_and_told_in_the_recording(tmp_path):
+def test_messages_beyond_the_queue_limit_are_counted_in_status_and_recording(tmp_path):
     path = tmp_path / "a.mcap"
     with RecordingWriter(path, clock=TestClock(), limits=limits(queue_messages=10)) as writer:
         writer.post([json_message(seq) for seq in range(1, 26)])
@@ -86,7 +86,7 @@ def test_what_does_not_fit_into_the_queue_is_counted_shown_and_told_in_the_recor
     assert [each.seq for each in read(path)] == list(range(1, 11))
 
 
-def test_a_slow_disk_never_keeps_who_posts_waiting(tmp_path):
+def test_slow_disk_does_not_block_post(tmp_path):
     destination = HeldDestination(tmp_path / "a.mcap")
     writer = RecordingWriter(destination, clock=TestClock(), limits=limits(queue_bytes=1000, flush_s=0.001))
     writer.post([json_message(1)])
@@ -104,7 +104,7 @@ def test_a_slow_disk_never_keeps_who_posts_waiting(tmp_path):
         assert recording.figures()["/odom"].lost == 0
 
 
-def test_gaps_late_and_unreadable_messages_are_counted_per_topic(tmp_path):
+def test_lost_late_and_undecodable_messages_are_counted_per_topic(tmp_path):
     path = tmp_path / "a.mcap"
     seqs = [3, 4, 7, 6, 9]  # 5 and 8 are missing, 6 is late
     messages = [json_message(seq) for seq in seqs] + [
@@ -122,7 +122,7 @@ def test_gaps_late_and_unreadable_messages_are_counted_per_topic(tmp_path):
     assert figures == writer.status.topics
 
 
-def test_figures_say_when_something_was_lost(tmp_path):
+def test_figures_record_the_time_of_a_loss(tmp_path):
     path = tmp_path / "a.mcap"
     with RecordingWriter(path, clock=TestClock(), limits=limits(figures_s=0.001)) as writer:
         for seqs in ((1, 2), (5,), (6,)):
@@ -140,7 +140,7 @@ def last_seen(writer: RecordingWriter, seq: int) -> bool:
     return received == {2: 2, 5: 3, 6: 4}[seq]
 
 
-def test_times_of_arrival_are_those_of_the_stamps_where_clocks_are_known_and_never_go_back(tmp_path):
+def test_receive_times_follow_stamps_of_known_clocks_and_never_decrease(tmp_path):
     path, now = tmp_path / "a.mcap", [START_NS]
     kinds = {
         "own": kind_of("/own", "json", "json", clock=OWN_CLOCK),
@@ -164,7 +164,7 @@ def test_times_of_arrival_are_those_of_the_stamps_where_clocks_are_known_and_nev
 
 
 @pytest.mark.parametrize("budget", [0, 1, 40, 500, 1000, 2100, 3003, 5000, 8191])
-def test_a_full_disk_leaves_whole_records_and_counts_the_rest(tmp_path, budget):
+def test_full_disk_leaves_complete_records_and_counts_the_remaining_messages(tmp_path, budget):
     path = tmp_path / "a.mcap"
     messages = [json_message(seq) for seq in range(1, 101)]
     told = []
@@ -185,7 +185,7 @@ def test_a_full_disk_leaves_whole_records_and_counts_the_rest(tmp_path, budget):
     assert [kept(each) for each in found] == [kept(each) for each in messages[: status.message_count]]
 
 
-def test_a_disk_that_is_really_full(tmp_path):
+def test_writer_reports_a_really_full_disk_and_counts_unwritten_messages(tmp_path):
     disk = SmallDisk(tmp_path)
     found = disk.run(
         "import json, sys\n"
@@ -214,7 +214,7 @@ def test_a_disk_that_is_really_full(tmp_path):
     assert is_in_order
 
 
-def test_it_ends_by_itself_and_whole_before_the_disk_is_full(tmp_path, monkeypatch):
+def test_writer_stops_with_a_complete_file_before_the_disk_is_full(tmp_path, monkeypatch):
     path, free = tmp_path / "a.mcap", [1000]
     monkeypatch.setattr(
         "nep.recordings.formats.destination.shutil.disk_usage", lambda _folder: SimpleNamespace(free=free[0])
@@ -232,7 +232,7 @@ def test_it_ends_by_itself_and_whole_before_the_disk_is_full(tmp_path, monkeypat
 
 
 @pytest.mark.skipif(os.name == "nt", reason="Windows removes no file that is open")
-def test_a_file_that_is_gone_is_told(tmp_path):
+def test_deleted_recording_file_is_reported(tmp_path):
     path = tmp_path / "a.mcap"
     writer = RecordingWriter(path, clock=TestClock(), limits=limits(figures_s=0.001))
     writer.post([json_message(1)])
@@ -244,7 +244,7 @@ def test_a_file_that_is_gone_is_told(tmp_path):
     assert writer.status.unkept == 1
 
 
-def test_an_error_of_our_own_ends_it_with_a_sentence_and_what_came_before_is_kept(tmp_path, monkeypatch):
+def test_internal_error_stops_the_writer_and_keeps_earlier_messages(tmp_path, monkeypatch):
     path, told = tmp_path / "a.mcap", []
     writer = RecordingWriter(path, clock=TestClock(), limits=limits(), on_problem=told.append)
     writer.post([json_message(1), json_message(2)])
@@ -260,7 +260,7 @@ def test_an_error_of_our_own_ends_it_with_a_sentence_and_what_came_before_is_kep
     assert [each.seq for each in read(path)] == [1, 2]
 
 
-def test_numbers_at_random_end_no_recording(tmp_path):
+def test_extreme_sequence_numbers_do_not_stop_the_recording(tmp_path):
     path = tmp_path / "a.mcap"
     messages = [json_message(seq, publisher=who) for who in range(3) for seq in (0, 2**64 - 1)]
     with RecordingWriter(path, clock=TestClock(), limits=limits()) as writer:
@@ -270,7 +270,7 @@ def test_numbers_at_random_end_no_recording(tmp_path):
         assert recording.figures()["/odom"].lost == MAX_LOST
 
 
-def test_a_disk_that_is_full_from_the_beginning_has_no_empty_file(tmp_path, monkeypatch):
+def test_no_file_is_left_if_the_disk_is_full_from_the_start(tmp_path, monkeypatch):
     monkeypatch.setattr("nep.recordings.formats.mcap_file.MAGIC", FailingBytes())
     with pytest.raises(RecordingError, match="disk is full"):
         RecordingWriter(tmp_path / "a.mcap")
@@ -284,7 +284,7 @@ class FailingBytes:
         raise OSError(errno.ENOSPC, "No space left on device")
 
 
-def test_no_file_is_written_over_and_no_folder_is_no_reason_for_a_traceback(tmp_path):
+def test_existing_file_or_missing_folder_raises_recording_error(tmp_path):
     path = tmp_path / "a.mcap"
     path.write_bytes(b"mine")
     with pytest.raises(RecordingError, match=r"a\.mcap'; .*already exists"):
@@ -294,7 +294,7 @@ def test_no_file_is_written_over_and_no_folder_is_no_reason_for_a_traceback(tmp_
         RecordingWriter(tmp_path / "nowhere" / "a.mcap")
 
 
-def test_with_too_many_publishers_they_share_a_channel_and_nothing_is_lost(tmp_path, monkeypatch):
+def test_publishers_beyond_the_limit_share_a_channel_without_loss(tmp_path, monkeypatch):
     monkeypatch.setattr("nep.recordings.writer.MAX_PUBLISHER_CHANNELS", 3)
     path = tmp_path / "a.mcap"
     messages = [json_message(seq, publisher=seq) for seq in range(1, 50)] + odd_messages()
@@ -304,7 +304,7 @@ def test_with_too_many_publishers_they_share_a_channel_and_nothing_is_lost(tmp_p
     assert McapDoctor(path).problems == []
 
 
-def test_with_too_many_channels_what_is_left_out_is_counted(tmp_path, monkeypatch):
+def test_messages_of_channels_beyond_the_limit_are_counted(tmp_path, monkeypatch):
     monkeypatch.setattr("nep.recordings.formats.mcap_file.MAX_CHANNELS", 5)
     monkeypatch.setattr("nep.recordings.writer.MAX_PUBLISHER_CHANNELS", 2)
     path = tmp_path / "a.mcap"
@@ -330,7 +330,7 @@ for line in sys.stdin:
 """
 
 
-def test_a_process_that_is_killed_leaves_all_but_the_last_moment(tmp_path):
+def test_killed_process_loses_only_the_last_moment(tmp_path):
     path = tmp_path / "a.mcap"
     child = subprocess.Popen(
         [sys.executable, "-c", _CHILD, str(path)], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True

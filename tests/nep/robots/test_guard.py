@@ -30,7 +30,7 @@ def describe(robot: nep.Node, name: str, command: str) -> None:
     publisher.publish({"title": name, "rb:robot": {"virtual": True}, "rb:topics": {"command": command}})
 
 
-def test_robot_that_appears_later_is_protected_under_whatever_topic_it_names(
+def test_robot_that_connects_later_is_protected_on_any_topic_it_describes(
     network: str, node: nep.Node
 ) -> None:
     guard = MotionGuard(node)
@@ -51,7 +51,7 @@ def test_robot_that_appears_later_is_protected_under_whatever_topic_it_names(
     guard.close()
 
 
-def test_allowed_robots_and_topics_are_not_refused(network: str, node: nep.Node) -> None:
+def test_allowed_robots_and_topics_are_not_rejected(network: str, node: nep.Node) -> None:
     with nep.node("robot", "memory", master=network) as robot:
         describe(robot, "Rover", "/orders")
         describe(robot, "Fido", "/orders")
@@ -63,7 +63,7 @@ def test_allowed_robots_and_topics_are_not_refused(network: str, node: nep.Node)
         guard.close()
 
 
-def test_description_that_cannot_be_read_protects_what_its_program_hears(
+def test_unreadable_description_protects_all_topics_its_program_subscribes_to(
     network: str, node: nep.Node
 ) -> None:
     with nep.node("robot", "memory", master=network) as robot:
@@ -85,7 +85,9 @@ HOSTILE = [
 ]  # fmt: skip
 
 
-def test_hostile_descriptions_end_nothing_and_protect_no_less(network: str, node: nep.Node) -> None:
+def test_hostile_descriptions_do_not_stop_the_guard_or_reduce_protection(
+    network: str, node: nep.Node
+) -> None:
     with nep.node("robot", "memory", master=network) as robot, nep.node("x", "memory", master=network) as x:
         describe(robot, "Rover", "/orders")
         guard = MotionGuard(node)

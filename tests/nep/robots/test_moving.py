@@ -38,7 +38,7 @@ def test_robot_is_moved_by_the_topics_of_its_description() -> None:
     assert moving.moved_by("/elsewhere", "robot/command") == ("/elsewhere",)
 
 
-def test_topic_of_all_rize_robots_moves_each_robot() -> None:
+def test_rize_command_topic_moves_each_robot() -> None:
     fido = RobotControls("Fido", frozenset({"/Fido/command"}))
     assert MovingTopics([ROVER, fido]).moved_by("robot_action") == ("Rover", "Fido")
     assert MovingTopics().moved_by("robot_action") == ("robot_action",)
@@ -58,7 +58,7 @@ def test_wildcards_in_a_description_protect_every_topic_that_matches() -> None:
         ({"title": 7, "rb:topics": {"command": "/c", "world": 7}, "actions": [1]}, {"/c"}),
     ],
 )
-def test_description_is_read_as_far_as_it_can_be(description: object, topics: set[str]) -> None:
+def test_partly_invalid_description_yields_its_valid_topics(description: object, topics: set[str]) -> None:
     found = controls_in(description, "R")
     assert found == RobotControls("R", frozenset(topics))
 
@@ -68,7 +68,7 @@ def test_description_without_a_topic_describes_no_robot(description: object) -> 
     assert controls_in(description, "R") is None
 
 
-def test_program_whose_description_is_unread_is_protected_on_all_that_it_hears() -> None:
+def test_program_with_unread_description_is_protected_on_all_its_subscriptions() -> None:
     view = graph(
         topic("/Rover/description", "robot/description", publisher="n"), topic("/go", subscriber="n"),
         topic("/other", subscriber="m"),
@@ -80,7 +80,7 @@ def test_program_whose_description_is_unread_is_protected_on_all_that_it_hears()
     assert moving.moved_by("/other") == ()
 
 
-def test_driver_that_is_about_to_announce_itself_is_protected() -> None:
+def test_driver_without_a_published_description_yet_is_protected() -> None:
     answers = topic("/Rover/answer", "robot/answer", publisher="n")
     view = graph(answers, topic("/go", subscriber="n"))
     assert moving_topics(view, ()).moved_by("/go") == ("Rover",)
@@ -103,7 +103,7 @@ def test_topic_of_the_command_type_moves_a_robot_of_unknown_name() -> None:
     assert moving_topics(view, [], own_nodes=["n"]).moved_by("/x/y") == ()
 
 
-def test_robots_of_the_original_nep_have_the_names_of_their_nodes() -> None:
+def test_robots_of_original_nep_are_named_after_their_nodes() -> None:
     nodes = (
         NodeInfo("n", "pepper_driver", "", None, "python", "B", 0),
         NodeInfo("m", "me", "", None, "", "native", 0),

@@ -40,7 +40,7 @@ def client(master: Master):
         yield node.new_client("/x", timeout_s=LONG_S)
 
 
-def test_a_server_that_dies_while_it_is_called_is_reported_at_once(client) -> None:
+def test_server_death_during_a_call_is_reported_immediately(client) -> None:
     with running(SERVER) as program:
         assert program.line() == "ready"
         future = client.call_async("hang", timeout_s=None)
@@ -53,7 +53,7 @@ def test_a_server_that_dies_while_it_is_called_is_reported_at_once(client) -> No
         assert client.call({}) == {"pid": program.process.pid}
 
 
-def test_a_call_made_after_the_death_waits_for_the_next_server(client) -> None:
+def test_call_made_after_server_death_waits_for_the_next_server(client) -> None:
     with running(SERVER) as program:
         assert program.line() == "ready"
         client.call({})
@@ -65,7 +65,7 @@ def test_a_call_made_after_the_death_waits_for_the_next_server(client) -> None:
 
 
 @pytest.mark.skipif(not hasattr(signal, "SIGSTOP"), reason="there are no signals that stop")
-def test_a_server_that_is_stopped_keeps_its_calls(client) -> None:
+def test_suspended_server_answers_pending_calls_after_resuming(client) -> None:
     with running(SERVER) as program:
         assert program.line() == "ready"
         client.call({})
@@ -79,9 +79,7 @@ def test_a_server_that_is_stopped_keeps_its_calls(client) -> None:
 
 @pytest.mark.parametrize("is_late", [False, True], ids=["before it is unlisted", "after that"])
 @pytest.mark.skipif(not hasattr(signal, "SIGSTOP"), reason="there are no signals that stop")
-def test_a_server_that_is_stopped_while_it_is_called_is_replaced_by_another(
-    master: Master, client, is_late: bool
-) -> None:
+def test_server_suspended_during_a_call_is_replaced_by_another(master: Master, client, is_late: bool) -> None:
     with running(SERVER) as program, nep.node("other") as other:
         assert program.line() == "ready"
         waiting = client.call_async("hang", timeout_s=None)
@@ -100,7 +98,7 @@ def test_a_server_that_is_stopped_while_it_is_called_is_replaced_by_another(
         assert client.call(2) == ["other", 2]
 
 
-def test_calls_go_on_while_the_master_is_away() -> None:
+def test_calls_continue_while_the_master_is_away() -> None:
     master = Master("127.0.0.1:0", learn_s=0.0).start()
     address = master.address
     with nep.node("server", master=address) as a, nep.node("client", master=address) as b:
@@ -128,7 +126,7 @@ def test_calls_go_on_while_the_master_is_away() -> None:
             eventually(is_new)
 
 
-def test_a_server_that_cannot_be_reached_does_not_hide_one_that_can(master: Master, client) -> None:
+def test_unreachable_server_does_not_hide_a_reachable_one(master: Master, client) -> None:
     """Something is listed first whose port is closed."""
     key = "k" * 20
     node = NodeRecord(node_id_from(key), "ghost", "", None, key=key)
@@ -143,7 +141,7 @@ def test_a_server_that_cannot_be_reached_does_not_hide_one_that_can(master: Mast
         assert client.call({}) == "real"
 
 
-def test_no_master_is_said_as_everywhere() -> None:
+def test_server_and_client_without_a_master_raise_master_unreachable() -> None:
     with nep.node("alone", master="127.0.0.1:1", wait_s=0.1) as node:
         with pytest.raises(nep.MasterUnreachable):
             node.new_server("/x", lambda request: request)
@@ -165,7 +163,7 @@ def test_no_master_is_said_as_everywhere() -> None:
         [b"\1\1\1\0" + b"\xff" * 12, b"[" * 100_000],
     ],
 )
-def test_strangers_do_not_end_a_server(master: Master, client, parts) -> None:
+def test_malformed_messages_do_not_stop_a_server(master: Master, client, parts) -> None:
     with nep.node("server") as node:
         server = node.new_server("/x", lambda request: request, threads=1)
         with zmq.Context() as context, context.socket(zmq.DEALER) as stranger:
@@ -176,7 +174,7 @@ def test_strangers_do_not_end_a_server(master: Master, client, parts) -> None:
         assert client.call({"n": 2}) == {"n": 2}
 
 
-def test_many_that_are_no_calls_do_not_hold_up_the_one_behind_them(master: Master) -> None:
+def test_many_malformed_calls_do_not_block_the_next_valid_call(master: Master) -> None:
     with nep.node("server") as node:
         server = node.new_server("/x", lambda request: request, threads=1)
         with zmq.Context() as context, context.socket(zmq.DEALER) as stranger:
@@ -199,7 +197,7 @@ def test_many_that_are_no_calls_do_not_hold_up_the_one_behind_them(master: Maste
         [b"\2\2\1\0\0\0\0\0" + (1).to_bytes(8, "little"), b"{}"],  # of a later version
     ],
 )
-def test_a_server_that_talks_nonsense_is_a_time_out(master: Master, client, answer) -> None:
+def test_malformed_reply_raises_service_timeout(master: Master, client, answer) -> None:
     with _fake_server(master, lambda parts: [answer]), pytest.raises(nep.ServiceTimeoutError):
         client.call({}, timeout_s=1.0)
 
@@ -215,9 +213,7 @@ def test_a_server_that_talks_nonsense_is_a_time_out(master: Master, client, answ
         (4, 1, b"", nep.RequestRefusedError),
     ],
 )
-def test_answers_that_make_no_sense_are_errors_of_nep(
-    master: Master, client, kind, codec, data, error
-) -> None:
+def test_invalid_reply_raises_a_nep_error(master: Master, client, kind, codec, data, error) -> None:
     def answer(parts):
         return [[bytes([1, kind, codec, 0, 0, 0, 0, 0]) + parts[0][8:], data]]
 
@@ -225,7 +221,7 @@ def test_answers_that_make_no_sense_are_errors_of_nep(
         client.call({})
 
 
-def test_an_answer_that_comes_twice_is_counted_as_late(master: Master, client) -> None:
+def test_duplicate_reply_is_counted_as_late(master: Master, client) -> None:
     def answer(parts):
         return [[bytes([1, 2, 1, 0, 0, 0, 0, 0]) + parts[0][8:], b"1"]] * 2
 
@@ -267,7 +263,7 @@ class _fake_server:  # noqa: N801 - it reads as a function
         self._context.term()
 
 
-def test_more_calls_than_a_server_has_room_for_are_refused(master: Master) -> None:
+def test_calls_beyond_the_server_queue_are_rejected(master: Master) -> None:
     with nep.node("server") as a, nep.node("one") as one, nep.node("two") as two:
         server = a.new_server("/full", lambda request: request)  # nobody spins
         calls = [
@@ -289,7 +285,7 @@ def test_more_calls_than_a_server_has_room_for_are_refused(master: Master) -> No
         assert server.calls == 1000
 
 
-def test_too_large_a_call_or_answer_is_an_error(master: Master) -> None:
+def test_oversized_request_or_reply_raises(master: Master) -> None:
     with nep.node("server") as a, nep.node("client") as b:
         a.new_server("/big", lambda n: b"x" * n, threads=1)
         client = b.new_client("/big", msg_type="msgpack", timeout_s=LONG_S)
@@ -301,7 +297,7 @@ def test_too_large_a_call_or_answer_is_an_error(master: Master) -> None:
         assert client.call(2) == b"xx"
 
 
-def test_ctrl_c_in_a_callback_ends_the_spin_and_tells_the_client(master: Master) -> None:
+def test_ctrl_c_in_a_callback_ends_spin_and_fails_the_call(master: Master) -> None:
     def answer(_request):
         raise KeyboardInterrupt
 
@@ -314,7 +310,7 @@ def test_ctrl_c_in_a_callback_ends_the_spin_and_tells_the_client(master: Master)
             future.result(LONG_S)
 
 
-def test_timers_and_messages_go_on_beside_calls(master: Master) -> None:
+def test_timers_and_messages_are_handled_between_calls(master: Master) -> None:
     with nep.node("server") as a, nep.node("client") as b:
         ticks, heard = [], []
         a.new_timer(0.01, lambda: ticks.append(1))
@@ -331,7 +327,7 @@ def test_timers_and_messages_go_on_beside_calls(master: Master) -> None:
         spinner.join(LONG_S)
 
 
-def test_who_spins_already_is_woken_by_a_new_server_and_by_each_call(
+def test_spin_wakes_for_a_new_server_and_for_each_call(
     master: Master, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """A wait without a wake takes an hour: one that is lost would be a call without an answer."""
@@ -350,7 +346,7 @@ def test_who_spins_already_is_woken_by_a_new_server_and_by_each_call(
 
 @pytest.mark.skipif(not hasattr(os, "fork"), reason="there is no fork")
 @pytest.mark.filterwarnings("ignore:.*fork.*:DeprecationWarning")
-def test_a_fork_leaves_the_child_with_closed_ones_and_the_parent_as_it_was(master: Master) -> None:
+def test_fork_closes_services_in_the_child_and_keeps_them_in_the_parent(master: Master) -> None:
     with nep.node("server") as a, nep.node("client") as b:
         server = a.new_server("/x", lambda request: request, threads=1)
         client = b.new_client("/x", timeout_s=LONG_S)
@@ -370,7 +366,7 @@ def test_a_fork_leaves_the_child_with_closed_ones_and_the_parent_as_it_was(maste
         assert client.call(3) == 3
 
 
-def test_a_program_that_closes_nothing_ends(master: Master) -> None:
+def test_program_exits_without_closing_services(master: Master) -> None:
     program = """
         import nep
         node = nep.node("forgetful")
@@ -387,7 +383,7 @@ def test_a_program_that_closes_nothing_ends(master: Master) -> None:
     eventually(lambda: not master.view().services)
 
 
-def test_the_configuration_may_be_another_master(master: Master) -> None:
+def test_server_and_client_use_the_master_of_their_configuration(master: Master) -> None:
     with Master("127.0.0.1:0", learn_s=0.0) as other, nep.node("a") as a, nep.node("b") as b:
         there = Hybrid(other.address)
         a.new_server("/x", lambda request: "there", there, threads=1)

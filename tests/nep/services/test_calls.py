@@ -90,7 +90,7 @@ def doubled(request):
     return {"n": 2 * request["n"]}
 
 
-def test_a_call_is_answered_in_the_thread_that_spins(make: Make, spin) -> None:
+def test_call_is_handled_in_the_spinning_thread(make: Make, spin) -> None:
     seen = []
 
     def answer(request):
@@ -105,7 +105,7 @@ def test_a_call_is_answered_in_the_thread_that_spins(make: Make, spin) -> None:
     assert seen == ["spin-server"]
 
 
-def test_nobody_has_to_spin_for_threads_of_the_server_s_own(make: Make) -> None:
+def test_server_threads_handle_calls_without_spin(make: Make) -> None:
     together = threading.Barrier(3)
 
     def answer(request):
@@ -119,18 +119,18 @@ def test_nobody_has_to_spin_for_threads_of_the_server_s_own(make: Make) -> None:
     assert (server.calls, server.errors) == (3, 0)
 
 
-def test_a_callback_without_an_answer_gives_an_empty_map(make: Make) -> None:
+def test_callback_that_returns_none_replies_with_an_empty_map(make: Make) -> None:
     make("server").new_server("/quiet", lambda request: None, threads=1)
     assert make("client").new_client("/quiet").call({}, timeout_s=LONG_S) == {}
 
 
-def test_a_call_that_comes_before_its_server_waits_for_it(make: Make) -> None:
+def test_call_waits_for_its_server_to_start(make: Make) -> None:
     future = make("client").new_client("/later", timeout_s=LONG_S).call_async({"n": 1})
     make("server").new_server("/later", doubled, threads=1)
     assert future.result(LONG_S) == {"n": 2}
 
 
-def test_several_clients_at_once(make: Make) -> None:
+def test_concurrent_calls_of_several_clients(make: Make) -> None:
     server = make("server").new_server("/double", doubled, threads=2)
     clients = [make(f"client{n}").new_client("/double", timeout_s=LONG_S) for n in range(4)]
     futures = {each.call_async({"n": n}): n for n in range(50) for each in clients}
@@ -158,7 +158,7 @@ class UntellableError(Exception):
         (UntellableError(), "UntellableError", ""),
     ],
 )
-def test_what_the_callback_raises_is_raised_at_the_client(make: Make, error, kind, reason) -> None:
+def test_callback_exception_raises_service_error_in_the_client(make: Make, error, kind, reason) -> None:
     def answer(request):
         if request == "again":
             return "alive"
@@ -176,14 +176,14 @@ def test_what_the_callback_raises_is_raised_at_the_client(make: Make, error, kin
     assert client.call("again", timeout_s=LONG_S) == "alive"
 
 
-def test_an_answer_that_cannot_be_sent_is_an_error_of_the_server(make: Make) -> None:
+def test_unencodable_reply_is_a_service_error(make: Make) -> None:
     make("server").new_server("/odd", lambda request: {"set": {1, 2}}, threads=1)
     with pytest.raises(nep.ServiceError) as raised:
         make("client").new_client("/odd").call({}, timeout_s=LONG_S)
     assert raised.value.kind == "EncodeError"
 
 
-def test_a_request_that_cannot_be_sent_is_refused_at_the_call(make: Make) -> None:
+def test_unencodable_request_raises_in_the_call(make: Make) -> None:
     client = make("client").new_client("/odd")
     with pytest.raises(nep.EncodeError):
         client.call({"set": {1, 2}})
@@ -192,12 +192,12 @@ def test_a_request_that_cannot_be_sent_is_refused_at_the_call(make: Make) -> Non
 
 
 @pytest.mark.parametrize("value", [{}, {"n": 0}, [1, None], "grüß", -1, 2**64 - 1, {"x": "y" * 8_000_000}])
-def test_every_value_comes_back_as_it_was(make: Make, value: object) -> None:
+def test_request_value_round_trip(make: Make, value: object) -> None:
     make("server").new_server("/echo", lambda request: request, threads=1)
     assert make("client").new_client("/echo").call(value, timeout_s=LONG_S) == value
 
 
-def test_msgpack_carries_bytes_and_nan(make: Make) -> None:
+def test_msgpack_calls_carry_bytes_and_nan(make: Make) -> None:
     make("server").new_server("/echo", lambda request: request, threads=1)
     client = make("client").new_client("/echo", msg_type="msgpack")
     answer = client.call({"data": b"\0\xff", "nan": math.nan}, timeout_s=LONG_S)
@@ -205,7 +205,7 @@ def test_msgpack_carries_bytes_and_nan(make: Make) -> None:
     assert math.isnan(answer["nan"])
 
 
-def test_a_call_is_awaited_while_the_loop_goes_on(make: Make) -> None:
+def test_awaited_call_does_not_block_the_event_loop(make: Make) -> None:
     go_on = threading.Event()
 
     def answer(request):
@@ -225,7 +225,7 @@ def test_a_call_is_awaited_while_the_loop_goes_on(make: Make) -> None:
     assert asyncio.run(program()) == {"n": 6}
 
 
-def test_an_awaited_call_that_is_cancelled_is_forgotten(make: Make) -> None:
+def test_cancelled_awaited_call_discards_its_reply(make: Make) -> None:
     came, go_on = threading.Event(), threading.Event()
 
     def answer(_request: object) -> dict[str, object]:
@@ -248,14 +248,14 @@ def test_an_awaited_call_that_is_cancelled_is_forgotten(make: Make) -> None:
     eventually(lambda: server.calls == 1 and client.late == 1)
 
 
-def test_a_future_can_be_cancelled(make: Make) -> None:
+def test_future_of_a_call_can_be_cancelled(make: Make) -> None:
     client = make("client").new_client("/nobody", timeout_s=None)
     future = client.call_async({})
     assert future.cancel()
     assert future.cancelled()
 
 
-def test_what_is_attached_to_a_future_holds_up_no_other_call(make: Make) -> None:
+def test_blocking_done_callback_of_a_future_does_not_block_other_calls(make: Make) -> None:
     make("server").new_server("/echo", lambda request: request, threads=1)
     client, other = (make(name).new_client("/echo", timeout_s=LONG_S) for name in ("a", "b"))
     go_on = threading.Event()
@@ -267,7 +267,7 @@ def test_what_is_attached_to_a_future_holds_up_no_other_call(make: Make) -> None
     assert future.result(LONG_S) == 1
 
 
-def test_nobody_serves_it_says_so_and_names_what_is_near(registered: Make) -> None:
+def test_call_without_a_server_raises_no_server_error_with_a_suggestion(registered: Make) -> None:
     registered("server").new_server("/arm/move", doubled, threads=1)
     client = registered("client").new_client("/arm/mov")
     with pytest.raises(
@@ -280,7 +280,7 @@ def test_nobody_serves_it_says_so_and_names_what_is_near(registered: Make) -> No
         client.call_async({}, timeout_s=0).result(LONG_S)
 
 
-def test_a_server_that_takes_too_long_is_another_error_and_its_answer_is_dropped(make: Make) -> None:
+def test_slow_server_raises_service_timeout_and_its_late_reply_is_dropped(make: Make) -> None:
     go_on = threading.Event()
     server = make("server").new_server("/slow", lambda request: go_on.wait(LONG_S) and {}, threads=1)
     client = make("client").new_client("/slow")
@@ -293,7 +293,7 @@ def test_a_server_that_takes_too_long_is_another_error_and_its_answer_is_dropped
     assert server.calls == 2
 
 
-def test_calls_that_nobody_waits_for_any_more_are_not_carried_out(make: Make, spin) -> None:
+def test_timed_out_calls_are_not_executed(make: Make, spin) -> None:
     seen = []
     node = make("server")
     server = node.new_server("/tired", seen.append)
@@ -309,7 +309,7 @@ def test_calls_that_nobody_waits_for_any_more_are_not_carried_out(make: Make, sp
     assert (server.calls, server.refused) == (1, 1)
 
 
-def test_a_server_that_closes_refuses_what_waits(make: Make) -> None:
+def test_closing_server_rejects_a_queued_call_and_fails_a_running_one(make: Make) -> None:
     node = make("server")
     server = node.new_server("/closes", doubled)  # nobody spins
     client = make("client").new_client("/closes", timeout_s=LONG_S)
@@ -325,7 +325,7 @@ def test_a_server_that_closes_refuses_what_waits(make: Make) -> None:
         future.result(LONG_S)
 
 
-def test_a_server_that_closes_refuses_each_call_that_waits(make: Make) -> None:
+def test_closing_server_rejects_every_queued_call(make: Make) -> None:
     """None of them was carried out, and their clients are told so: not that nobody knows."""
     node = make("server")
     server = node.new_server("/closes", doubled)  # nobody spins
@@ -339,7 +339,7 @@ def test_a_server_that_closes_refuses_each_call_that_waits(make: Make) -> None:
             future.result(LONG_S)
 
 
-def test_a_server_that_closes_answers_what_it_carries_out(registered: Make) -> None:
+def test_closing_server_finishes_its_running_call(registered: Make) -> None:
     has_waiting_calls, go_on = threading.Event(), threading.Event()
 
     def answer(request):
@@ -363,7 +363,7 @@ def test_a_server_that_closes_answers_what_it_carries_out(registered: Make) -> N
     assert (first.calls, first.errors, first.refused) == (1, 0, 0)
 
 
-def test_a_node_that_closes_answers_what_its_servers_carry_out(make: Make) -> None:
+def test_closing_node_finishes_running_calls_of_its_servers(make: Make) -> None:
     has_waiting_calls = threading.Event()
     node = make("server")
 
@@ -379,7 +379,7 @@ def test_a_node_that_closes_answers_what_its_servers_carry_out(make: Make) -> No
     assert future.result(LONG_S) == "answered"
 
 
-def test_a_client_that_closes_ends_its_calls(make: Make) -> None:
+def test_closing_client_ends_its_calls(make: Make) -> None:
     client = make("client").new_client("/nobody", timeout_s=None)
     errors: list[BaseException] = []
 
@@ -403,7 +403,7 @@ def test_a_client_that_closes_ends_its_calls(make: Make) -> None:
         client.call({})
 
 
-def test_a_node_that_closes_ends_its_servers_and_clients(make: Make) -> None:
+def test_closing_node_closes_its_servers_and_clients(make: Make) -> None:
     a, b = make("a"), make("b")
     server = a.new_server("/x", doubled, threads=2)
     client = b.new_client("/x", timeout_s=None)
@@ -421,7 +421,7 @@ def test_a_node_that_closes_ends_its_servers_and_clients(make: Make) -> None:
         a.new_server("/x")
 
 
-def test_a_callback_may_close_its_server_and_call_others(make: Make) -> None:
+def test_callback_can_close_its_server_and_call_other_services(make: Make) -> None:
     node = make("server")
     inner = make("inner").new_client("/double", timeout_s=LONG_S)
     make("other").new_server("/double", doubled, threads=1)
@@ -437,7 +437,7 @@ def test_a_callback_may_close_its_server_and_call_others(make: Make) -> None:
     eventually(lambda: box[0].is_closed)
 
 
-def test_a_callback_that_waits_for_its_own_thread_is_told_so_in_time(make: Make) -> None:
+def test_callback_that_calls_its_own_single_threaded_server_times_out(make: Make) -> None:
     """A service that calls itself has one thread too few: a time-out, and everything goes on."""
     node = make("server")
     inner = make("inner").new_client("/self", timeout_s=0.3)
@@ -452,7 +452,7 @@ def test_a_callback_that_waits_for_its_own_thread_is_told_so_in_time(make: Make)
     assert two.call(1) == "done"
 
 
-def test_fifty_clients_at_once(make: Make) -> None:
+def test_fifty_concurrent_clients(make: Make) -> None:
     server = make("server").new_server("/echo", lambda request: request, threads=4)
     node = make("callers")
     clients = [node.new_client("/echo", timeout_s=LONG_S) for _ in range(50)]
@@ -461,7 +461,7 @@ def test_fifty_clients_at_once(make: Make) -> None:
     assert (server.calls, server.errors, server.refused) == (1000, 0, 0)
 
 
-def test_listen_and_send_as_the_original_has_it(make: Make) -> None:
+def test_listen_info_and_send_info_work_as_in_the_original_nep(make: Make) -> None:
     server = make("server").new_server("/x")
     client = make("client").new_client("/x", timeout_s=LONG_S)
     assert server.listen_info(timeout_s=0) is None
@@ -481,7 +481,7 @@ def test_listen_and_send_as_the_original_has_it(make: Make) -> None:
     assert client.listen_info() == {"b": 2}
 
 
-def test_a_second_server_is_an_alert_and_takes_over(registered: Make) -> None:
+def test_second_server_raises_an_alert_and_takes_over(registered: Make) -> None:
     first = registered("first").new_server("/x", lambda request: "first", threads=1)
     client = registered("client").new_client("/x", timeout_s=LONG_S)
     assert client.call({}) == "first"
@@ -503,7 +503,7 @@ def test_a_second_server_is_an_alert_and_takes_over(registered: Make) -> None:
     assert second.calls >= 1
 
 
-def test_the_graph_tells_of_services_and_not_of_topics(registered: Make) -> None:
+def test_services_are_listed_in_the_graph_apart_from_topics(registered: Make) -> None:
     a, b = registered("a"), registered("b")
     server = a.new_server("/x", lambda request: 1 / 0 if request == "bad" else request, threads=1)
     client = b.new_client("/x", timeout_s=LONG_S)
@@ -528,7 +528,7 @@ def test_the_graph_tells_of_services_and_not_of_topics(registered: Make) -> None
 
 
 @pytest.mark.parametrize("name", ["", "a b", "x{", "\x07", "x" * 189, "nep.service:/x", 7, None])
-def test_a_name_that_cannot_be_one_is_refused(make: Make, name) -> None:
+def test_invalid_service_name_is_rejected(make: Make, name) -> None:
     node = make("node")
     with pytest.raises(nep.BadTopicError):
         node.new_server(name, doubled)
@@ -536,7 +536,7 @@ def test_a_name_that_cannot_be_one_is_refused(make: Make, name) -> None:
         node.new_client(name)
 
 
-def test_callback_that_returns_futures_answers_in_any_order(make: Make) -> None:
+def test_callback_that_returns_futures_replies_in_any_order(make: Make) -> None:
     promised: list[Future[object]] = [Future(), Future(), Future()]
     make("server").new_server("/later", lambda request: promised[request["n"]], threads=1)
     client = make("client").new_client("/later", timeout_s=LONG_S)
@@ -551,13 +551,13 @@ def test_callback_that_returns_futures_answers_in_any_order(make: Make) -> None:
             call.result(LONG_S)
 
 
-def test_the_longest_name_is_served(make: Make) -> None:
+def test_service_name_of_maximum_length_works(make: Make) -> None:
     name = "x" * 188
     make("server").new_server(name, doubled, threads=1)
     assert make("client").new_client(name).call({"n": 1}, timeout_s=LONG_S) == {"n": 2}
 
 
-def test_nobody_publishes_where_services_are_listed(make: Make) -> None:
+def test_topics_in_the_service_namespace_are_rejected(make: Make) -> None:
     with pytest.raises(nep.BadTopicError, match=r"'nep\.service:/x'.*'nep\.service:'"):
         make("node").new_pub("nep.service:/x")
     with pytest.raises(nep.BadTopicError, match=r"'nep\.service:/x'.*'nep\.service:'"):
@@ -575,12 +575,12 @@ def test_nobody_publishes_where_services_are_listed(make: Make) -> None:
         {"configuration": "here"},
     ],
 )
-def test_what_no_client_can_have_is_refused(make: Make, wrong) -> None:
+def test_invalid_client_arguments_are_rejected(make: Make, wrong) -> None:
     with pytest.raises((ValueError, nep.NepError)):
         make("node").new_client("/x", **wrong)
 
 
-def test_what_no_server_can_have_is_refused(make: Make) -> None:
+def test_invalid_server_arguments_are_rejected(make: Make) -> None:
     node = make("node")
     for wrong in ({"threads": -1}, {"threads": 1.5}, {"threads": True}):
         with pytest.raises(ValueError, match="threads"):
@@ -593,7 +593,7 @@ def test_what_no_server_can_have_is_refused(make: Make) -> None:
         node.new_client("/x").call({}, timeout_s=-0.1)
 
 
-def test_calls_beyond_the_bound_are_refused_at_the_call(make: Make) -> None:
+def test_calls_beyond_the_client_limit_are_rejected(make: Make) -> None:
     client = make("client").new_client("/nobody", timeout_s=None)
     for _ in range(1000):
         client.call_async({})
@@ -601,7 +601,7 @@ def test_calls_beyond_the_bound_are_refused_at_the_call(make: Make) -> None:
         client.call_async({})
 
 
-def test_a_coroutine_function_is_refused_where_nobody_awaits_it(master: Master) -> None:
+def test_coroutine_callback_is_rejected_by_server_and_respondent(master: Master) -> None:
     async def answer(request: object) -> object:
         return request
 

@@ -11,7 +11,7 @@ from tests.nep.programs import ROOT, running
 _PROGRAM = re.compile(r"^```python\n(.*?)^```", re.MULTILINE | re.DOTALL)
 
 
-def test_the_example_prints_what_is_said(master: Master) -> None:
+def test_guide_example_prints_the_documented_output(master: Master) -> None:
     guide = (ROOT / "docs" / "services.md").read_text(encoding="utf-8")
     program, _typed, _of_surveys = _PROGRAM.findall(guide)
     with running(program, NEP_MASTER=master.address) as example:
@@ -20,7 +20,7 @@ def test_the_example_prints_what_is_said(master: Master) -> None:
     assert said.strip() == "{'sum': 5}"
 
 
-def test_the_typed_example_prints_what_is_said(master: Master) -> None:
+def test_typed_guide_example_prints_the_documented_output(master: Master) -> None:
     guide = (ROOT / "docs" / "services.md").read_text(encoding="utf-8")
     _first, program, _of_surveys = _PROGRAM.findall(guide)
     with running(program, NEP_MASTER=master.address) as example:
@@ -29,7 +29,7 @@ def test_the_typed_example_prints_what_is_said(master: Master) -> None:
     assert indent(said, "    ") in guide
 
 
-def test_the_example_of_surveys_runs(master: Master) -> None:
+def test_survey_guide_example_runs(master: Master) -> None:
     guide = (ROOT / "docs" / "services.md").read_text(encoding="utf-8")
     _first, _typed, program = _PROGRAM.findall(guide)
     around = f"import nep\nwith nep.node('me') as node:\n{indent(program, '    ')}    print(answers)\n"

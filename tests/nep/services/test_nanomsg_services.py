@@ -55,7 +55,7 @@ def node() -> Iterator[nep.Node]:
 
 
 @needs_nanocat
-def test_nanocat_asks(node: nep.Node, port: int) -> None:
+def test_nanocat_calls_a_nep_server(node: nep.Node, port: int) -> None:
     seen = []
     server = node.new_server(
         "/x", lambda request: seen.append(request) or {"n": 2}, node.direct("127.0.0.1", port), threads=1
@@ -71,7 +71,7 @@ def test_nanocat_asks(node: nep.Node, port: int) -> None:
 
 
 @needs_nanocat
-def test_nanocat_answers(node: nep.Node, port: int) -> None:
+def test_nep_client_calls_a_nanocat_server(node: nep.Node, port: int) -> None:
     client = node.new_client("/x", node.direct("127.0.0.1", port), timeout_s=LONG_S)
     told = ["nanocat", "--rep", "--bind-local", str(port), "--data", '{"cat":1}', "--raw"]
     with subprocess.Popen(told, stdout=subprocess.PIPE) as cat:
@@ -82,7 +82,7 @@ def test_nanocat_answers(node: nep.Node, port: int) -> None:
         cat.terminate()
 
 
-def test_pynng_asks_and_answers_with_the_header(node: nep.Node, port: int) -> None:
+def test_pynng_calls_and_serves_with_the_nep_header(node: nep.Node, port: int) -> None:
     at = node.direct("127.0.0.1", port, wire="native")
     with (
         node.new_server("/half", lambda n: n / 2, at, threads=1) as server,
@@ -113,7 +113,7 @@ def test_pynng_asks_and_answers_with_the_header(node: nep.Node, port: int) -> No
 @pytest.mark.parametrize(
     "said", [b"", b"x", bytes(15), bytes(16), HEADER.pack(1, 2, 1, 0, 1), bytes(8_000_000)]
 )
-def test_what_is_no_call_is_counted(node: nep.Node, port: int, said: bytes) -> None:
+def test_malformed_call_is_counted(node: nep.Node, port: int, said: bytes) -> None:
     at = node.direct("127.0.0.1", port, wire="native")
     server = node.new_server("/x", lambda request: request, at, threads=1)
     with pynng.Req0(dial=f"tcp://127.0.0.1:{port}") as theirs:
@@ -127,9 +127,7 @@ def test_what_is_no_call_is_counted(node: nep.Node, port: int, said: bytes) -> N
 
 
 @pytest.mark.parametrize("wire", [pytest.param("original", marks=pytest.mark.long), "native"])
-def test_a_server_that_dies_while_it_is_called_is_reported_at_once(
-    node: nep.Node, port: int, wire: str
-) -> None:
+def test_server_death_during_a_call_is_reported_immediately(node: nep.Node, port: int, wire: str) -> None:
     client = node.new_client("/x", node.direct("127.0.0.1", port, wire=wire), timeout_s=LONG_S)
     with running(SERVER, str(port), wire) as program:
         program.line()
@@ -144,7 +142,7 @@ def test_a_server_that_dies_while_it_is_called_is_reported_at_once(
         assert client.call({}) == {"pid": program.process.pid}
 
 
-def test_the_original_s_errors_travel_as_answers(node: nep.Node, port: int) -> None:
+def test_original_wire_errors_are_sent_as_replies(node: nep.Node, port: int) -> None:
     def answer(request):
         raise LookupError("no map")
 
@@ -157,7 +155,7 @@ def test_the_original_s_errors_travel_as_answers(node: nep.Node, port: int) -> N
         node.new_client("/y", node.direct("127.0.0.1", 1)).call({}, timeout_s=0.1)
 
 
-def test_a_client_that_does_not_read_holds_up_no_other(
+def test_client_that_does_not_read_does_not_block_others(
     node: nep.Node, port: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """It asks for large answers and reads none: the others have theirs."""
@@ -172,7 +170,7 @@ def test_a_client_that_does_not_read_holds_up_no_other(
         assert client.call(3) == "xxx"
 
 
-def test_many_calls_for_which_nobody_waits_are_forgotten(node: nep.Node, port: int) -> None:
+def test_threads_of_timed_out_calls_are_bounded(node: nep.Node, port: int) -> None:
     go_on = threading.Event()
     at = node.direct("127.0.0.1", port, wire="native")
     node.new_server("/x", lambda _request: go_on.wait(LONG_S), at, threads=1)
@@ -188,7 +186,7 @@ def test_many_calls_for_which_nobody_waits_are_forgotten(node: nep.Node, port: i
     eventually(lambda: not client._transport._threads)
 
 
-def test_what_cannot_be_is_refused(node: nep.Node, port: int) -> None:
+def test_invalid_nanomsg_service_requests_are_rejected(node: nep.Node, port: int) -> None:
     at = node.direct("127.0.0.1", port)
     with node.new_server("/x", lambda request: request, at), pytest.raises(nep.AddressInUseError):
         node.new_server("/x", lambda request: request, at)
@@ -200,7 +198,7 @@ def test_what_cannot_be_is_refused(node: nep.Node, port: int) -> None:
             make("/x", configuration=at)
 
 
-def test_through_the_master_it_meets_nodes_of_zeromq(master: Master) -> None:
+def test_nanomsg_and_zeromq_nodes_call_each_other_through_the_master(master: Master) -> None:
     with (
         nep.node("a", "nanomsg", master=master.address) as a,
         nep.node("b", "zeromq", master=master.address) as b,
@@ -212,14 +210,14 @@ def test_through_the_master_it_meets_nodes_of_zeromq(master: Master) -> None:
 
 
 @pytest.mark.skipif(not hasattr(os, "fork"), reason="there are no forks here")
-def test_a_forked_child_is_told_and_ends(port: int) -> None:
+def test_node_is_closed_in_a_forked_child(port: int) -> None:
     check_fork(
         "nep.node('parent', 'nanomsg', master='127.0.0.1:1')",
         f"node.direct('127.0.0.1', {port}, wire='native')",
     )
 
 
-def test_a_program_that_closes_nothing_ends(port: int) -> None:
+def test_program_exits_without_closing_services(port: int) -> None:
     code = f"""
     import threading, nep
     node = nep.node("forgetful", "nanomsg", master="127.0.0.1:1")

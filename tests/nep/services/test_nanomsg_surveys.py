@@ -34,7 +34,7 @@ def node() -> Iterator[nep.Node]:
         yield made
 
 
-def test_all_that_are_connected_answer(node: nep.Node, port: int) -> None:
+def test_all_connected_respondents_reply(node: nep.Node, port: int) -> None:
     at = node.direct("127.0.0.1", port)
     respondents = [
         node.new_respondent("/who", lambda question, n=n: {"n": n, "asked": question}, at, threads=1)
@@ -52,7 +52,7 @@ def test_all_that_are_connected_answer(node: nep.Node, port: int) -> None:
     assert sorted(each["n"] for each in surveyor.ask({})) == [1, 2]
 
 
-def test_a_question_ends_with_its_time(node: nep.Node, port: int) -> None:
+def test_survey_ends_at_its_timeout(node: nep.Node, port: int) -> None:
     go_on = threading.Event()
     at = node.direct("127.0.0.1", port)
     node.new_respondent("/who", lambda _question: go_on.wait(LONG_S) and "late", at, threads=1)
@@ -65,7 +65,7 @@ def test_a_question_ends_with_its_time(node: nep.Node, port: int) -> None:
     assert surveyor.failures == 0
 
 
-def test_questions_of_several_threads_have_their_own_answers(node: nep.Node, port: int) -> None:
+def test_concurrent_surveys_receive_their_own_replies(node: nep.Node, port: int) -> None:
     at = node.direct("127.0.0.1", port)
     for _ in range(2):
         node.new_respondent("/who", lambda question: question, at, threads=2)
@@ -84,7 +84,7 @@ def test_questions_of_several_threads_have_their_own_answers(node: nep.Node, por
     assert wrong == []
 
 
-def test_a_respondent_that_fails_is_counted(node: nep.Node, port: int) -> None:
+def test_failing_respondent_is_counted(node: nep.Node, port: int) -> None:
     def answer(_question):
         raise LookupError("no eyes")
 
@@ -96,7 +96,7 @@ def test_a_respondent_that_fails_is_counted(node: nep.Node, port: int) -> None:
     assert (surveyor.failures, respondent.errors) == (1, 1)
 
 
-def test_other_programs_ask_and_answer_in_bare_json(node: nep.Node, port: int) -> None:
+def test_surveys_with_other_programs_use_plain_json(node: nep.Node, port: int) -> None:
     at = node.direct("127.0.0.1", port)
     with pynng.Surveyor0(listen=f"tcp://127.0.0.1:{port}", survey_time=30_000) as theirs:
         respondent = node.new_respondent("/who", lambda question: {"heard": question}, at, threads=1)
@@ -122,7 +122,7 @@ def test_other_programs_ask_and_answer_in_bare_json(node: nep.Node, port: int) -
 
 
 @pytest.mark.skipif(shutil.which("nanocat") is None, reason="nanocat is missing (Debian: nanomsg-utils)")
-def test_nanocat_is_asked_and_answers(node: nep.Node, port: int) -> None:
+def test_nanocat_respondent_replies_to_a_nep_surveyor(node: nep.Node, port: int) -> None:
     surveyor = node.new_surveyor("/who", LONG_MS, node.direct("127.0.0.1", port))
     told = ["nanocat", "--respondent", "--connect-local", str(port), "--data", '{"cat":1}', "--raw"]
     with subprocess.Popen(told, stdout=subprocess.PIPE) as cat:
@@ -133,7 +133,7 @@ def test_nanocat_is_asked_and_answers(node: nep.Node, port: int) -> None:
         cat.terminate()
 
 
-def test_closing_ends_a_question(node: nep.Node, port: int) -> None:
+def test_closing_the_surveyor_ends_its_survey(node: nep.Node, port: int) -> None:
     has_waiting_calls, go_on = threading.Event(), threading.Event()
 
     def answer(_question):
@@ -164,7 +164,7 @@ def test_closing_ends_a_question(node: nep.Node, port: int) -> None:
     go_on.set()
 
 
-def test_a_respondent_answers_in_the_thread_that_spins(node: nep.Node, port: int) -> None:
+def test_respondent_replies_in_the_spinning_thread(node: nep.Node, port: int) -> None:
     at = node.direct("127.0.0.1", port)
     respondent = node.new_respondent("/who", lambda _question: threading.current_thread().name, at)
     spinner = threading.Thread(target=node.spin, name="spinner")
@@ -178,7 +178,7 @@ def test_a_respondent_answers_in_the_thread_that_spins(node: nep.Node, port: int
     assert respondent.is_closed
 
 
-def test_what_cannot_be_is_refused(node: nep.Node, port: int) -> None:
+def test_invalid_survey_requests_are_rejected(node: nep.Node, port: int) -> None:
     at = node.direct("127.0.0.1", port)
     with node.new_surveyor("/who", 1000, at) as surveyor:
         assert surveyor.ask({}) == []
@@ -194,7 +194,7 @@ def test_what_cannot_be_is_refused(node: nep.Node, port: int) -> None:
             make("/who", configuration=at)
 
 
-def test_a_program_that_closes_nothing_ends(port: int) -> None:
+def test_program_exits_without_closing_surveys(port: int) -> None:
     program = """
         import sys, threading, nep
         node = nep.node("forgetful", "nanomsg", master="127.0.0.1:1")
@@ -212,7 +212,7 @@ def test_a_program_that_closes_nothing_ends(port: int) -> None:
 
 @pytest.mark.skipif(not hasattr(os, "fork"), reason="there is no fork")
 @pytest.mark.filterwarnings("ignore:.*fork.*:DeprecationWarning")
-def test_a_fork_leaves_the_child_with_closed_ones(port: int) -> None:
+def test_fork_closes_surveys_in_the_child(port: int) -> None:
     program = """
         import os, sys, threading, nep
         node = nep.node("here", "nanomsg", master="127.0.0.1:1")
@@ -238,7 +238,7 @@ def test_a_fork_leaves_the_child_with_closed_ones(port: int) -> None:
         assert forking.process.returncode == 0
 
 
-def test_servers_clients_and_surveys_meet_at_the_master_as_those_of_zeromq(master: Master) -> None:
+def test_nanomsg_and_zeromq_services_and_surveys_interoperate_through_the_master(master: Master) -> None:
     with nep.node("a", "nanomsg") as a, nep.node("b", "zeromq") as b:
         a.new_server("/x", lambda request: [request], threads=1)
         assert b.new_client("/x", timeout_s=LONG_S).call(1) == [1]

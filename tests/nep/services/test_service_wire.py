@@ -40,7 +40,7 @@ def stream() -> Iterator[tuple[TcpStream, socket.socket]]:
 
 
 @pytest.mark.parametrize("vector", GOOD, ids=name_of)
-def test_parts_are_as_they_are_told(vector: dict[str, Any]) -> None:
+def test_calls_and_replies_match_the_vectors(vector: dict[str, Any]) -> None:
     means, parts = vector["means"], parts_of(vector)
     number, payload = int(means["number"]), bytes.fromhex(means["payload"])
     if means["kind"] == CallKind.CALL:
@@ -58,7 +58,7 @@ def test_parts_are_as_they_are_told(vector: dict[str, Any]) -> None:
 
 
 @pytest.mark.parametrize("vector", [each for each in VECTORS if "error" in each], ids=name_of)
-def test_what_is_none_is_refused_with_its_reason(
+def test_malformed_parts_are_rejected_with_their_error_code(
     vector: dict[str, Any], stream: tuple[TcpStream, socket.socket]
 ) -> None:
     if "parts" in vector:
@@ -81,7 +81,7 @@ def test_what_is_none_is_refused_with_its_reason(
 
 
 @pytest.mark.parametrize("vector", GOOD, ids=name_of)
-def test_plain_tcp_is_the_same_behind_its_size(
+def test_plain_tcp_frame_is_the_size_followed_by_the_native_parts(
     vector: dict[str, Any], stream: tuple[TcpStream, socket.socket]
 ) -> None:
     ours, theirs = stream

@@ -24,7 +24,7 @@ LONG_S = 30.0
         ("zenoh", "zenoh"),
     ],
 )
-def test_servers_of_several_nodes_answer_in_one_spin(master: Master, backends: tuple[str, str]) -> None:
+def test_servers_of_several_nodes_reply_in_one_spin(master: Master, backends: tuple[str, str]) -> None:
     own = {each: place_for(each, master.address) for each in backends}
     wheres = [own[each] for each in backends]
     with (
@@ -53,7 +53,7 @@ def test_servers_of_several_nodes_answer_in_one_spin(master: Master, backends: t
 
 
 @pytest.mark.parametrize("backend", ["zeromq", "memory", "zenoh"])
-def test_a_server_answers_in_a_loop_of_asyncio(master: Master, backend: str) -> None:
+def test_server_replies_in_an_asyncio_event_loop(master: Master, backend: str) -> None:
     where = place_for(backend, master.address)
 
     async def serve(node: nep.Node, client: nep.Client) -> list[object]:

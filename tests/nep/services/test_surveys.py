@@ -51,7 +51,7 @@ def respond(make: Make, *answers: object) -> list[nep.Respondent]:
     ]
 
 
-def test_all_that_were_there_before_are_asked_and_answer(make: Make) -> None:
+def test_all_existing_respondents_reply(make: Make) -> None:
     respondents = respond(make, 1, 2, 3)
     surveyor = make("surveyor").new_surveyor("/who", LONG_MS)
     answers = surveyor.ask({"n": 0})
@@ -63,7 +63,7 @@ def test_all_that_were_there_before_are_asked_and_answer(make: Make) -> None:
     assert respondents[0].survey == surveyor.survey == "/who"
 
 
-def test_later_ones_are_asked_from_then_on_and_who_has_left_is_not(make: Make) -> None:
+def test_survey_includes_later_respondents_and_excludes_closed_ones(make: Make) -> None:
     surveyor = make("surveyor").new_surveyor("/who", LONG_MS)
     assert surveyor.ask({}) == []
     first, _second = respond(make, 1, 2)
@@ -74,7 +74,7 @@ def test_later_ones_are_asked_from_then_on_and_who_has_left_is_not(make: Make) -
     assert [each["says"] for each in surveyor.ask({})] == [2]
 
 
-def test_at_the_end_of_its_time_there_is_what_has_come(make: Make) -> None:
+def test_survey_returns_replies_received_before_its_timeout(make: Make) -> None:
     go_on = threading.Event()
     slow = make("slow").new_respondent("/who", lambda _question: go_on.wait(LONG_S) and "late", threads=1)
     respond(make, 1)
@@ -87,7 +87,7 @@ def test_at_the_end_of_its_time_there_is_what_has_come(make: Make) -> None:
     assert len(surveyor.ask({}, LONG_S)) == 2
 
 
-def test_enough_answers_end_it_before_its_time(make: Make) -> None:
+def test_survey_ends_early_with_the_expected_number_of_replies(make: Make) -> None:
     go_on = threading.Event()
     make("slow").new_respondent("/who", lambda _question: go_on.wait(LONG_S) and "late", threads=1)
     respond(make, 1, 2)
@@ -96,7 +96,7 @@ def test_enough_answers_end_it_before_its_time(make: Make) -> None:
     go_on.set()
 
 
-def test_answers_are_given_as_they_come(make: Make) -> None:
+def test_replies_are_yielded_as_they_are_received(make: Make) -> None:
     go_on = threading.Event()
     make("slow").new_respondent("/who", lambda _question: go_on.wait(LONG_S) and "late", threads=1)
     respond(make, "quick")
@@ -107,7 +107,9 @@ def test_answers_are_given_as_they_come(make: Make) -> None:
     assert list(answers) == ["late"]
 
 
-def test_who_fails_has_no_answer_and_is_counted(make: Make, caplog: pytest.LogCaptureFixture) -> None:
+def test_failing_respondent_is_counted_and_gives_no_reply(
+    make: Make, caplog: pytest.LogCaptureFixture
+) -> None:
     respond(make, 1, LookupError("no eyes"))
     surveyor = make("surveyor").new_surveyor("/who", LONG_MS)
     assert [each["says"] for each in surveyor.ask({})] == [1]
@@ -115,7 +117,7 @@ def test_who_fails_has_no_answer_and_is_counted(make: Make, caplog: pytest.LogCa
     assert "a respondent of '/who' failed (1 so far): LookupError: no eyes" in caplog.text
 
 
-def test_several_surveyors_and_threads_at_once(make: Make) -> None:
+def test_concurrent_surveys_of_several_surveyors_and_threads(make: Make) -> None:
     respond(make, *range(5))
     surveyors = [make(f"surveyor {n}").new_surveyor("/who", LONG_MS) for n in range(3)]
     counts: list[int] = []
@@ -134,7 +136,7 @@ def test_several_surveyors_and_threads_at_once(make: Make) -> None:
     assert counts == [5] * 30
 
 
-def test_a_respondent_answers_in_the_thread_that_spins(make: Make) -> None:
+def test_respondent_replies_in_the_spinning_thread(make: Make) -> None:
     node = make("respondent")
     node.new_respondent("/who", lambda _question: threading.current_thread().name)
     spinner = threading.Thread(target=node.spin, name="spinner")
@@ -144,7 +146,7 @@ def test_a_respondent_answers_in_the_thread_that_spins(make: Make) -> None:
     spinner.join(LONG_S)
 
 
-def test_sending_and_listening_as_the_original_has_it(make: Make) -> None:
+def test_send_json_and_listen_json_work_as_in_the_original_nep(make: Make) -> None:
     respondent = make("respondent").new_respondent("/who")
     surveyor = make("surveyor").new_surveyor("/who", LONG_MS)
     assert respondent.listen_json() == (False, {})
@@ -159,7 +161,7 @@ def test_sending_and_listening_as_the_original_has_it(make: Make) -> None:
     assert respondent.listen_json(block_mode=True) == (True, None)
 
 
-def test_a_surveyor_that_closes_ends_its_question(make: Make) -> None:
+def test_closing_the_surveyor_ends_its_survey(make: Make) -> None:
     has_waiting_calls, go_on = threading.Event(), threading.Event()
 
     def answer(_question):
@@ -188,7 +190,7 @@ def test_a_surveyor_that_closes_ends_its_question(make: Make) -> None:
     go_on.set()
 
 
-def test_a_node_that_closes_ends_its_surveys(make: Make) -> None:
+def test_closing_node_closes_its_surveys(make: Make) -> None:
     a, b = make("a"), make("b")
     respondent = a.new_respondent("/who", lambda _question: 1, threads=1)
     surveyor = b.new_surveyor("/who", LONG_MS)
@@ -203,7 +205,7 @@ def test_a_node_that_closes_ends_its_surveys(make: Make) -> None:
         a.new_respondent("/who")
 
 
-def test_the_graph_tells_of_them_without_an_alert(make: Make) -> None:
+def test_surveys_are_listed_in_the_graph_without_an_alert(make: Make) -> None:
     respond(make, 1, 2)
     node = make("surveyor")
     surveyor = node.new_surveyor("/who", LONG_MS)
@@ -218,7 +220,7 @@ def test_the_graph_tells_of_them_without_an_alert(make: Make) -> None:
     eventually(lambda: not node.graph().services["survey:/who"].clients)
 
 
-def test_a_survey_and_a_service_of_one_name_are_two_things(make: Make) -> None:
+def test_survey_and_service_of_the_same_name_are_independent(make: Make) -> None:
     respond(make, 1)
     make("server").new_server("/who", lambda _request: "the server", threads=1)
     node = make("caller")
@@ -229,13 +231,13 @@ def test_a_survey_and_a_service_of_one_name_are_two_things(make: Make) -> None:
             make_one("survey:/who")
 
 
-def test_large_answers_and_bytes(make: Make) -> None:
+def test_survey_with_large_reply_and_bytes(make: Make) -> None:
     make("large").new_respondent("/who", lambda _question: b"\0" * 8_000_000, threads=1)
     surveyor = make("surveyor").new_surveyor("/who", LONG_MS, msg_type="msgpack")
     assert surveyor.ask(b"\xff") == [b"\0" * 8_000_000]
 
 
-def test_what_cannot_be_is_refused(make: Make) -> None:
+def test_invalid_survey_arguments_are_rejected(make: Make) -> None:
     node = make("node")
     for name in ("", "a b", "x" * 190, 7):
         with pytest.raises(nep.BadTopicError):
@@ -256,7 +258,7 @@ def test_what_cannot_be_is_refused(make: Make) -> None:
         node.new_surveyor("/who", 1000, node.direct("127.0.0.1", 9000))
 
 
-def test_a_back_end_without_them_says_so(master: Master, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_back_end_without_surveys_or_services_raises(master: Master, monkeypatch: pytest.MonkeyPatch) -> None:
     with nep.node("here") as node:
         monkeypatch.delattr(ZeromqTransport, "survey")
         for make_one in (node.new_surveyor, node.new_respondent):
@@ -282,7 +284,7 @@ RESPONDENT = """
 """
 
 
-def test_a_respondent_that_is_killed_does_not_hold_up_the_others(master: Master) -> None:
+def test_killed_respondent_does_not_delay_the_survey(master: Master) -> None:
     with nep.node("here") as node, running(RESPONDENT) as program:
         assert program.line() == "ready"
         node.new_respondent("/who", lambda _question: "here", threads=1)
@@ -295,7 +297,7 @@ def test_a_respondent_that_is_killed_does_not_hold_up_the_others(master: Master)
         assert surveyor.failures == 1
 
 
-def test_a_survey_goes_on_while_the_master_is_away() -> None:
+def test_surveys_continue_while_the_master_is_away() -> None:
     master = Master("127.0.0.1:0", learn_s=0.0).start()
     address = master.address
     with nep.node("a", master=address) as a, nep.node("b", master=address) as b:
@@ -316,7 +318,7 @@ def test_a_survey_goes_on_while_the_master_is_away() -> None:
 
 @pytest.mark.skipif(not hasattr(os, "fork"), reason="there is no fork")
 @pytest.mark.filterwarnings("ignore:.*fork.*:DeprecationWarning")
-def test_a_fork_leaves_the_child_with_closed_ones(master: Master) -> None:
+def test_fork_closes_surveys_in_the_child(master: Master) -> None:
     with nep.node("a") as a, nep.node("b") as b:
         respondent = a.new_respondent("/who", lambda question: question, threads=1)
         surveyor = b.new_surveyor("/who", LONG_MS)

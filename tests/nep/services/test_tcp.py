@@ -81,7 +81,7 @@ def serve(node: nep.Node, port: int, threads: int = 1):
     return node.new_server("/x", answer, node.direct("127.0.0.1", port, wire="tcp"), threads=threads)
 
 
-def test_a_program_with_nothing_but_a_socket_is_answered(node: nep.Node, port: int) -> None:
+def test_program_with_a_plain_socket_receives_replies(node: nep.Node, port: int) -> None:
     server = serve(node, port)
     with Program(port) as program, Program(port) as other:
         program.send(7, {"n": 1})
@@ -97,7 +97,7 @@ def test_a_program_with_nothing_but_a_socket_is_answered(node: nep.Node, port: i
     assert server.endpoints == (f"tcp://127.0.0.1:{port}",)
 
 
-def test_who_ends_its_side_after_the_call_gets_the_answer(node: nep.Node, port: int) -> None:
+def test_client_that_shuts_down_its_sending_side_receives_its_replies(node: nep.Node, port: int) -> None:
     go_on = threading.Event()
     node.new_server(
         "/x",
@@ -124,7 +124,7 @@ def test_who_ends_its_side_after_the_call_gets_the_answer(node: nep.Node, port: 
         (b"\xff" * 1000, "4294967295 bytes"),
     ],
 )
-def test_what_has_no_beginning_ends_the_connection_and_is_counted(
+def test_malformed_frame_closes_the_connection_and_is_counted(
     node: nep.Node, port: int, caplog: pytest.LogCaptureFixture, said: bytes, reason: str
 ) -> None:
     server = serve(node, port)
@@ -139,7 +139,7 @@ def test_what_has_no_beginning_ends_the_connection_and_is_counted(
     assert reason in caplog.text
 
 
-def test_half_a_call_at_the_end_is_counted(node: nep.Node, port: int) -> None:
+def test_incomplete_call_at_end_of_connection_is_counted(node: nep.Node, port: int) -> None:
     server = serve(node, port)
     with Program(port) as stranger:
         stranger.send(1, {}, size=100)
@@ -147,7 +147,7 @@ def test_half_a_call_at_the_end_is_counted(node: nep.Node, port: int) -> None:
     assert server.calls == 0
 
 
-def test_what_is_no_call_is_counted_and_the_next_one_answered(node: nep.Node, port: int) -> None:
+def test_malformed_calls_are_counted_and_the_next_call_is_answered(node: nep.Node, port: int) -> None:
     server = serve(node, port)
     with Program(port) as program:
         for _ in range(250):
@@ -158,7 +158,7 @@ def test_what_is_no_call_is_counted_and_the_next_one_answered(node: nep.Node, po
     assert (server.unreadable, server.calls) == (500, 1)
 
 
-def test_a_request_that_cannot_be_read_is_refused(node: nep.Node, port: int) -> None:
+def test_undecodable_request_is_rejected(node: nep.Node, port: int) -> None:
     serve(node, port)
     with Program(port) as program:
         program.socket.sendall(struct.pack("<IBBHIQ", 21, 1, 1, 1, 0, 3) + b"{oops")
@@ -167,7 +167,7 @@ def test_a_request_that_cannot_be_read_is_refused(node: nep.Node, port: int) -> 
         assert "cannot decode" in told["reason"]
 
 
-def test_a_server_that_is_killed_is_reported_at_once(node: nep.Node, port: int) -> None:
+def test_killed_server_is_reported_immediately(node: nep.Node, port: int) -> None:
     client = node.new_client("/x", node.direct("127.0.0.1", port, wire="tcp"), timeout_s=None)
     with running(SERVER, str(port)) as program:
         assert program.line() == "ready"
@@ -191,7 +191,7 @@ def test_a_server_that_is_killed_is_reported_at_once(node: nep.Node, port: int) 
         (struct.pack("<IBBHIQ", 16, 1, 2, 1, 0, 1), nep.DecodeError),
     ],
 )
-def test_a_server_that_talks_nonsense_is_an_error_of_nep(node: nep.Node, port: int, said, error) -> None:
+def test_malformed_reply_raises_a_nep_error(node: nep.Node, port: int, said, error) -> None:
     with socket.create_server(("127.0.0.1", port)) as listener:
         client = node.new_client("/x", node.direct("127.0.0.1", port, wire="tcp"))
         future = client.call_async({}, timeout_s=1.0 if error is nep.ServiceTimeoutError else LONG_S)
@@ -205,7 +205,7 @@ def test_a_server_that_talks_nonsense_is_an_error_of_nep(node: nep.Node, port: i
                 future.result(LONG_S)
 
 
-def test_an_answer_that_comes_with_the_end_is_an_answer(node: nep.Node, port: int) -> None:
+def test_reply_sent_just_before_connection_close_is_received(node: nep.Node, port: int) -> None:
     with socket.create_server(("127.0.0.1", port)) as listener:
         listener.settimeout(LONG_S)
         at = node.direct("127.0.0.1", port, wire="tcp")
@@ -221,7 +221,7 @@ def test_an_answer_that_comes_with_the_end_is_an_answer(node: nep.Node, port: in
             client.close()
 
 
-def test_more_connections_than_there_is_room_for_are_turned_away(
+def test_connections_beyond_the_limit_are_closed(
     node: nep.Node, port: int, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
 ) -> None:
     monkeypatch.setattr("nep.backends.zeromq.services.tcp_server._PEERS_MAX", 2)
@@ -248,7 +248,7 @@ def _is_answered(port: int) -> bool:
             return False
 
 
-def test_answers_that_nobody_reads_are_bounded(
+def test_unread_replies_are_bounded(
     node: nep.Node, port: int, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
 ) -> None:
     monkeypatch.setattr("nep.backends.zeromq.services.tcp_server._UNREAD_MAX_BYTES", 10_000_000)
@@ -267,7 +267,7 @@ def test_answers_that_nobody_reads_are_bounded(
     assert "the client doesn't read its replies" in caplog.text
 
 
-def test_a_client_without_a_server_does_not_call_itself(
+def test_client_without_a_server_does_not_connect_to_itself(
     node: nep.Node, port: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """The system may give a socket the very port that it asks for, if nobody listens there."""
@@ -284,7 +284,7 @@ def test_a_client_without_a_server_does_not_call_itself(
     assert not client.is_connected
 
 
-def test_a_port_that_is_held_and_an_address_that_is_none(node: nep.Node, port: int) -> None:
+def test_port_in_use_and_invalid_addresses_are_rejected(node: nep.Node, port: int) -> None:
     server = serve(node, port)
     with pytest.raises(nep.AddressInUseError, match="in use by another program"):
         serve(node, port)
@@ -297,7 +297,7 @@ def test_a_port_that_is_held_and_an_address_that_is_none(node: nep.Node, port: i
         node.new_client("/y", node.direct("*", port, wire="tcp"))
 
 
-def test_topics_have_no_plain_tcp(node: nep.Node, port: int) -> None:
+def test_plain_tcp_is_rejected_for_topics(node: nep.Node, port: int) -> None:
     at = node.direct("127.0.0.1", port, wire="tcp")
     for make in (
         lambda: node.new_pub("t", "json", at),
@@ -310,7 +310,7 @@ def test_topics_have_no_plain_tcp(node: nep.Node, port: int) -> None:
 
 @pytest.mark.skipif(not hasattr(os, "fork"), reason="there is no fork")
 @pytest.mark.filterwarnings("ignore:.*fork.*:DeprecationWarning")
-def test_a_fork_leaves_the_child_with_closed_ones_and_the_parent_as_it_was(node: nep.Node, port: int) -> None:
+def test_fork_closes_services_in_the_child_and_keeps_them_in_the_parent(node: nep.Node, port: int) -> None:
     server = serve(node, port)
     client = node.new_client("/x", node.direct("127.0.0.1", port, wire="tcp"), timeout_s=LONG_S)
     assert client.call(1) == {"heard": 1}

@@ -77,7 +77,7 @@ def memory() -> Iterator[nep.Node]:
         yield node
 
 
-def test_instances_are_asked_and_answered(make: Make) -> None:
+def test_typed_call_sends_and_returns_instances(make: Make) -> None:
     make("server").new_server("/length", length_of, threads=1, request=Way, answer=Length)
     client = make("client").new_client("/length", request=Way, answer=Length, timeout_s=30.0)
     way = Way([Point(0, 0), Point(3, 4)], "home")
@@ -86,13 +86,13 @@ def test_instances_are_asked_and_answered(make: Make) -> None:
     assert asyncio.run(client.acall(way)) == Length(5.0, ["home"])
 
 
-def test_by_msgpack_as_well(make: Make) -> None:
+def test_typed_call_over_msgpack(make: Make) -> None:
     make("server").new_server("/length", length_of, threads=1, request=Way, answer=Length)
     client = make("client").new_client("/length", msg_type="msgpack", request=Way, answer=Length)
     assert client.call(Way([Point(1), Point(2)])) == Length(1.0, [""])
 
 
-def test_programs_that_know_no_type_see_maps(memory: nep.Node) -> None:
+def test_untyped_programs_exchange_maps_with_typed_ones(memory: nep.Node) -> None:
     memory.new_server("/typed", length_of, threads=1, request=Way, answer=Length)
     memory.new_server("/plain", lambda request: request, threads=1)
     plain = memory.new_client("/typed")
@@ -113,7 +113,7 @@ def test_programs_that_know_no_type_see_maps(memory: nep.Node) -> None:
         ({"points": 5}, "points"),
     ],
 )
-def test_a_request_that_does_not_fit_is_refused_before_the_callback(
+def test_mismatched_request_is_rejected_before_the_callback(
     memory: nep.Node, asked: object, said: str
 ) -> None:
     called: list[object] = []
@@ -126,7 +126,7 @@ def test_a_request_that_does_not_fit_is_refused_before_the_callback(
 
 
 @pytest.mark.parametrize("given", [{"points": []}, None, 5, Length(1.0), Way([Point("left")])])  # type: ignore[arg-type]
-def test_what_is_no_instance_is_not_sent(memory: nep.Node, given: object) -> None:
+def test_request_of_another_type_is_not_sent(memory: nep.Node, given: object) -> None:
     server = memory.new_server("/a", lambda request: request, threads=1)
     client = memory.new_client("/a", request=Way)
     with pytest.raises(EncodeError):
@@ -135,7 +135,7 @@ def test_what_is_no_instance_is_not_sent(memory: nep.Node, given: object) -> Non
 
 
 @pytest.mark.parametrize("answer", [None, {"metres": 1.0}, 5, Length("far")])  # type: ignore[arg-type]
-def test_an_answer_of_another_type_is_the_servers_error(memory: nep.Node, answer: object) -> None:
+def test_reply_of_another_type_is_a_service_error(memory: nep.Node, answer: object) -> None:
     server = memory.new_server("/a", lambda _request: answer, threads=1, answer=Length)
     with pytest.raises(ServiceError) as caught:
         memory.new_client("/a").call({})
@@ -143,7 +143,7 @@ def test_an_answer_of_another_type_is_the_servers_error(memory: nep.Node, answer
     assert server.errors == 1
 
 
-def test_an_answer_that_does_not_fit_cannot_be_read(memory: nep.Node) -> None:
+def test_mismatched_reply_raises_decode_error(memory: nep.Node) -> None:
     memory.new_server("/a", lambda _request: {"metres": "far"}, threads=1)
     client = memory.new_client("/a", answer=Length)
     with pytest.raises(DecodeError, match="metres"):
@@ -152,12 +152,12 @@ def test_an_answer_that_does_not_fit_cannot_be_read(memory: nep.Node) -> None:
         client.call_async({}).result(30.0)
 
 
-def test_without_an_answers_type_nothing_is_an_empty_map(memory: nep.Node) -> None:
+def test_none_without_a_reply_type_is_an_empty_map(memory: nep.Node) -> None:
     memory.new_server("/a", lambda _request: None, threads=1, request=Way)
     assert memory.new_client("/a").call({"points": []}) == {}
 
 
-def test_typed_maps_are_maps(memory: nep.Node) -> None:
+def test_typed_dict_requests_and_replies_are_maps(memory: nep.Node) -> None:
     def answer(asked: Any) -> Told:
         return {"name": asked["name"], "age": 7}
 
@@ -168,7 +168,7 @@ def test_typed_maps_are_maps(memory: nep.Node) -> None:
         client.call({"nam": "Pepper"})
 
 
-def test_the_originals_form_has_types_as_well(memory: nep.Node) -> None:
+def test_original_style_calls_support_types(memory: nep.Node) -> None:
     server = memory.new_server("/a", request=Way, answer=Length)
     client = memory.new_client("/a", request=Way, answer=Length)
     client.send_info(Way([]))
@@ -179,7 +179,7 @@ def test_the_originals_form_has_types_as_well(memory: nep.Node) -> None:
     assert client.listen_info() == Length(1.0)
 
 
-def test_a_form_that_does_not_fit_is_refused_and_the_next_one_read(memory: nep.Node) -> None:
+def test_mismatched_original_style_request_is_rejected_and_the_next_one_read(memory: nep.Node) -> None:
     server = memory.new_server("/a", request=Way)
     plain = memory.new_client("/a")
     bad, good = plain.call_async({"points": 5}), plain.call_async({"points": []})
@@ -190,7 +190,7 @@ def test_a_form_that_does_not_fit_is_refused_and_the_next_one_read(memory: nep.N
         bad.result(30.0)
 
 
-def test_surveys_have_types_as_well(memory: nep.Node) -> None:
+def test_surveys_support_types(memory: nep.Node) -> None:
     memory.new_respondent("/who", lambda asked: {"name": "a", "age": len(asked)}, threads=1, question=Asked)
     memory.new_respondent("/who", lambda _asked: {"name": "b", "age": "old"}, threads=1)
     surveyor = memory.new_surveyor("/who", 30_000, question=Asked, answer=Told)
@@ -201,7 +201,7 @@ def test_surveys_have_types_as_well(memory: nep.Node) -> None:
 
 
 @pytest.mark.parametrize("kind", [int, dict, list[int], "Way", 5, Way([])])
-def test_what_is_no_type_for_calls_is_refused(memory: nep.Node, kind: Any) -> None:
+def test_unsupported_types_of_calls_are_rejected(memory: nep.Node, kind: Any) -> None:
     with pytest.raises(ValueError, match=r"dataclass|neither"):
         memory.new_server("/a", length_of, request=kind)
     with pytest.raises(ValueError, match=r"dataclass|neither"):

@@ -95,7 +95,7 @@ def stranger(routed: str) -> Iterator[Any]:
 # ---- servers that die
 
 
-def test_a_server_that_dies_while_it_is_called_is_reported_at_once(make: Make, place: str) -> None:
+def test_server_death_during_a_call_is_reported_immediately(make: Make, place: str) -> None:
     client = make("client").new_client("/x", timeout_s=LONG_S)
     with running(SERVER, place) as program:
         program.line()
@@ -112,7 +112,7 @@ def test_a_server_that_dies_while_it_is_called_is_reported_at_once(make: Make, p
         assert waiting.result(LONG_S) == {"pid": program.process.pid}
 
 
-def test_behind_a_router_it_is_the_same(make: Make, routed: str) -> None:
+def test_calls_and_server_death_through_a_router(make: Make, routed: str) -> None:
     client = make("client", routed).new_client("/x", timeout_s=LONG_S)
     with running(SERVER, routed) as program:
         program.line()
@@ -127,7 +127,7 @@ def test_behind_a_router_it_is_the_same(make: Make, routed: str) -> None:
 
 
 @pytest.mark.skipif(not hasattr(signal, "SIGSTOP"), reason="there are no signals that stop")
-def test_a_server_that_is_stopped_keeps_its_calls(make: Make, place: str) -> None:
+def test_suspended_server_answers_pending_calls_after_resuming(make: Make, place: str) -> None:
     client = make("client").new_client("/x", timeout_s=LONG_S)
     with running(SERVER, place) as program:
         program.line()
@@ -150,7 +150,7 @@ def asked(session: Any, key: str, header: bytes | None, data: bytes | None) -> l
     return [(reply.ok.attachment.to_bytes(), reply.ok.payload.to_bytes()) for reply in replies]
 
 
-def test_a_program_of_zenoh_calls_a_server_of_nep(make: Make, routed: str, stranger: Any) -> None:
+def test_zenoh_program_calls_a_nep_server(make: Make, routed: str, stranger: Any) -> None:
     def answer(request):
         return 1 / request["n"]
 
@@ -170,7 +170,7 @@ def test_a_program_of_zenoh_calls_a_server_of_nep(make: Make, routed: str, stran
     "header",
     [None, b"", bytes(15), bytes(17), bytes(16), HEADER.pack(1, 2, 1, 0, 7), HEADER.pack(2, 1, 1, 0, 7)],
 )
-def test_what_is_no_call_is_counted_and_ended(make: Make, place: str, header: bytes | None) -> None:
+def test_malformed_call_is_counted_without_reply(make: Make, place: str, header: bytes | None) -> None:
     node = make("server")
     server = node.new_server("/x", lambda request: request, threads=1)
     (session,) = node._transport._sessions.values()
@@ -179,7 +179,7 @@ def test_what_is_no_call_is_counted_and_ended(make: Make, place: str, header: by
     assert make("client").new_client("/x").call({"n": 2}, timeout_s=LONG_S) == {"n": 2}
 
 
-def test_a_client_of_nep_calls_a_program_of_zenoh(
+def test_nep_client_calls_a_zenoh_program(
     make: Make, routed: str, stranger: Any, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr("nep.backends.zenoh.services._TOKEN_DELAY_S", 0.05)
@@ -217,14 +217,14 @@ def test_a_client_of_nep_calls_a_program_of_zenoh(
     queryable.undeclare()
 
 
-def test_the_server_that_was_there_first_is_called_by_all(make: Make) -> None:
+def test_first_server_is_called_by_all_clients(make: Make) -> None:
     for number in range(3):
         make(f"server {number}").new_server("/x", lambda _request, said=number: said, threads=1)
     clients = [make(f"client {number}").new_client("/x", timeout_s=LONG_S) for number in range(2)]
     assert [client.call({}) for client in clients for _ in range(3)] == [0] * 6
 
 
-def test_all_respondents_are_asked_at_once(make: Make) -> None:
+def test_all_respondents_are_asked_in_one_survey(make: Make) -> None:
     for number in range(3):
         make(f"respondent {number}").new_respondent(
             "/who", lambda question, said=number: [said, 1 / question], threads=1
@@ -236,13 +236,13 @@ def test_all_respondents_are_asked_at_once(make: Make) -> None:
     assert surveyor.failures == 3
 
 
-def test_a_node_calls_its_own_server(make: Make) -> None:
+def test_node_calls_its_own_server(make: Make) -> None:
     node = make("both")
     node.new_server("/x", lambda request: request, threads=1)
     assert node.new_client("/x", timeout_s=LONG_S).call([1]) == [1]
 
 
-def test_wildcards_hear_no_services(make: Make) -> None:
+def test_wildcard_subscription_receives_no_service_calls(make: Make) -> None:
     node = make("node")
     sub = node.new_sub("**")
     node.new_server("/x", lambda request: request, threads=1)
@@ -253,7 +253,7 @@ def test_wildcards_hear_no_services(make: Make) -> None:
     assert set(node.graph().topics) == {"/x"}
 
 
-def test_direct_servers_are_refused(make: Make) -> None:
+def test_direct_servers_are_rejected(make: Make) -> None:
     node = make("node")
     for made in (node.new_server, node.new_client):
         with pytest.raises(nep.NepError, match=r"'zenoh' .*direct connections"):
@@ -264,7 +264,7 @@ def test_direct_servers_are_refused(make: Make) -> None:
 
 
 @pytest.mark.parametrize("word", ["/x", "%", "a/b", "*", "é 漢", "x" * 180])
-def test_tokens_of_services_say_what_was_written(word: str) -> None:
+def test_service_token_round_trip(word: str) -> None:
     endpoint = keys.serve_key(word, 2**63, 2**64 - 1)
     server = PublisherRecord(2**64 - 1, f"nep.service:{word}", "service", "service", (endpoint,))
     client = SubscriberRecord(1, f"nep.service:{word}", "service")
@@ -292,12 +292,12 @@ def test_tokens_of_services_say_what_was_written(word: str) -> None:
         "sub/1/nep.service%3Ax/service",
     ],
 )
-def test_what_is_no_token_of_a_service_is_none(words: str) -> None:
+def test_invalid_service_token_is_not_parsed(words: str) -> None:
     assert keys.parse_live(f"nep/v1/live/n/{words}") is None
 
 
 @pytest.mark.skipif(not hasattr(os, "fork"), reason="there are no forks here")
-def test_a_forked_child_is_told_and_ends(place: str) -> None:
+def test_services_are_closed_in_a_forked_child(place: str) -> None:
     code = f"""
     import os, sys, nep
     def say(it):
@@ -329,7 +329,7 @@ def test_a_forked_child_is_told_and_ends(place: str) -> None:
         assert [program.line() for _ in range(3)] == ["7", "fine", "2"]
 
 
-def test_closing_a_client_or_its_node_while_threads_call(make: Make) -> None:
+def test_closing_a_node_during_concurrent_calls_raises_closed_error(make: Make) -> None:
     make("server").new_server("/x", lambda request: request, threads=2)
     node = make("caller")
     client = node.new_client("/x", timeout_s=LONG_S)

@@ -20,7 +20,7 @@ class Hand:
         return CpuLoad(lambda: self.used, lambda: self.now)
 
 
-def test_the_first_reading_tells_nothing_the_next_ones_the_share_since() -> None:
+def test_cpu_share_is_unknown_at_the_first_reading_and_measured_since_the_last() -> None:
     hand = Hand()
     load = hand.load()
     assert load.ratio() is None
@@ -30,7 +30,7 @@ def test_the_first_reading_tells_nothing_the_next_ones_the_share_since() -> None
     assert load.ratio() == pytest.approx(1.5)
 
 
-def test_readings_close_together_repeat_the_last_share() -> None:
+def test_frequent_readings_repeat_the_last_cpu_share() -> None:
     hand = Hand()
     load = hand.load()
     load.ratio()
@@ -42,7 +42,7 @@ def test_readings_close_together_repeat_the_last_share() -> None:
     assert load.ratio() == pytest.approx(0.3)
 
 
-def test_a_program_that_cannot_be_asked_has_no_share_until_two_new_readings() -> None:
+def test_failed_reading_makes_the_cpu_share_unknown_until_two_new_readings() -> None:
     hand = Hand()
     load = hand.load()
     load.ratio()
@@ -54,7 +54,7 @@ def test_a_program_that_cannot_be_asked_has_no_share_until_two_new_readings() ->
     assert load.ratio() == pytest.approx(0.5)
 
 
-def test_a_counter_that_fell_is_no_negative_share() -> None:
+def test_decreased_cpu_counter_gives_a_share_of_zero() -> None:
     hand = Hand()
     load = hand.load()
     load.ratio()
@@ -62,7 +62,7 @@ def test_a_counter_that_fell_is_no_negative_share() -> None:
     assert load.ratio() == 0.0
 
 
-def test_this_process_has_a_share() -> None:
+def test_cpu_share_of_this_process_is_measured() -> None:
     ticks = iter([0.0, 1.0])
     load = CpuLoad(clock=lambda: next(ticks))
     load.ratio()

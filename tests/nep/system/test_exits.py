@@ -5,7 +5,7 @@ from __future__ import annotations
 from tests.nep.programs import running
 
 
-def test_what_nodes_use_ends_after_them_and_once() -> None:
+def test_after_nodes_handlers_run_once_after_all_nodes_are_closed() -> None:
     program = """
         import atexit, nep
         from nep.system.exits import after_nodes, not_after_nodes

@@ -50,7 +50,7 @@ only_linux = pytest.mark.skipif(not sys.platform.startswith("linux"), reason="Li
 
 
 @only_linux
-def test_an_update_leaves_the_modules_of_the_program_that_runs(held, tmp_path: Path) -> None:
+def test_update_keeps_modules_of_the_running_program(held, tmp_path: Path) -> None:
     names = (*(f"only_in_the_new_{number}" for number in range(50)), "late")
     frozen(tmp_path / "next", *names).replace(held.file)
     assert made_by(held.archive, "late") == "old late"
@@ -58,30 +58,30 @@ def test_an_update_leaves_the_modules_of_the_program_that_runs(held, tmp_path: P
 
 
 @only_linux
-def test_a_program_that_was_removed_still_has_its_modules(held) -> None:
+def test_removed_program_keeps_its_modules(held) -> None:
     held.file.unlink()
     assert made_by(held.archive, "late") == "old late"
 
 
-def test_without_it_a_click_would_have_ended_the_program(program) -> None:
+def test_import_from_a_removed_program_exits_without_hold_code(program) -> None:
     program.file.unlink()
     with pytest.raises(SystemExit):
         program.archive.extract("late")
 
 
-def test_a_program_that_is_gone_already_is_left_as_it_is(program) -> None:
+def test_hold_code_ignores_a_program_already_removed(program) -> None:
     program.file.unlink()
     assert not hold_code()
     assert program.archive._filename == str(program.file)
 
 
-def test_from_source_there_is_nothing_to_hold(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_hold_code_does_nothing_when_running_from_source(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.delitem(sys.modules, LOADER, raising=False)
     assert not hold_code()
 
 
 @only_linux
-def test_both_programs_of_a_package_hold_their_code() -> None:
+def test_packaged_entry_programs_call_hold_code_before_importing_main() -> None:
     entries = Path(__file__).resolve().parents[3] / "installers" / "entries"
     for entry in sorted(entries.glob("*_program.py")):
         lines = entry.read_text("utf-8").splitlines()

@@ -46,7 +46,7 @@ class Book:
         ("127.0.0.1:5", "127.0.0.1:5"),
     ],
 )
-def test_numbers_are_never_asked_for(address: str, known: str) -> None:
+def test_numeric_addresses_are_not_resolved(address: str, known: str) -> None:
     book = Book()
     name = MasterName(address, lambda _known: None, book.look_up)
     name.resolve(1.0)
@@ -55,7 +55,7 @@ def test_numbers_are_never_asked_for(address: str, known: str) -> None:
     assert book.asked == []
 
 
-def test_a_name_is_asked_for_again_only_after_a_while(caplog: pytest.LogCaptureFixture) -> None:
+def test_host_name_is_resolved_again_only_after_an_interval(caplog: pytest.LogCaptureFixture) -> None:
     book, told = Book("", "", "10.0.0.5", "10.0.0.5", "10.0.0.6"), []
     book.may_answer.set()
     name = MasterName("robot:7780", told.append, book.look_up)
@@ -86,7 +86,7 @@ def shared() -> Iterator[SharedContext]:
     made.leave()
 
 
-def test_a_name_that_nobody_answers_holds_up_nobody(shared: SharedContext, master: Master) -> None:
+def test_unanswered_name_lookup_does_not_block_other_nodes(shared: SharedContext, master: Master) -> None:
     book = Book("127.0.0.1")
     port = master.address.rpartition(":")[2]
     with nep.node("other") as other:
@@ -112,7 +112,7 @@ def test_a_name_that_nobody_answers_holds_up_nobody(shared: SharedContext, maste
             link.close()
 
 
-def test_an_unknown_name_of_a_direct_connection_is_an_error_at_once() -> None:
+def test_unknown_host_of_a_direct_connection_raises_immediately() -> None:
     with nep.node("n", master="127.0.0.1:1") as node:
         wrong = node.direct("no..computer", 9123, "many2one")
         with pytest.raises(nep.NepError, match=r"computer 'no\.\.computer'; .*IP address"):

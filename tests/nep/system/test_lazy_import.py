@@ -18,7 +18,7 @@ def in_a_new_process(program: str) -> str:
     return done.stdout.strip()
 
 
-def test_it_is_imported_when_something_of_it_is_used() -> None:
+def test_lazy_module_is_imported_on_first_attribute_access() -> None:
     program = (
         "import sys\n"
         "from nep.system.lazy_import import lazy_module\n"
@@ -28,11 +28,11 @@ def test_it_is_imported_when_something_of_it_is_used() -> None:
     assert in_a_new_process(program) == "False (0.0, 0.0, 0) True"
 
 
-def test_what_it_gives_is_that_of_the_module() -> None:
+def test_lazy_module_returns_attributes_of_the_module() -> None:
     assert lazy_module("colorsys").__getattr__("rgb_to_hls") is sys.modules["colorsys"].rgb_to_hls
 
 
-def test_what_is_not_there_is_said_at_its_first_use() -> None:
+def test_missing_lazy_module_or_attribute_raises_on_first_use() -> None:
     absent = lazy_module("nep.no_such_module")
     with pytest.raises(ModuleNotFoundError, match="no_such_module"):
         absent.__getattr__("something")
@@ -40,6 +40,6 @@ def test_what_is_not_there_is_said_at_its_first_use() -> None:
         lazy_module("colorsys").__getattr__("nothing_of_this_name")
 
 
-def test_nep_loads_without_what_it_seldom_needs() -> None:
+def test_nep_import_does_not_load_rarely_used_modules() -> None:
     program = "import sys, nep\nprint([n for n in ('psutil', 'importlib.metadata') if n in sys.modules])"
     assert in_a_new_process(program) == "[]"

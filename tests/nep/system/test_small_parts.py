@@ -37,7 +37,9 @@ def message(n: int, size: int = 1) -> Message:
 
 
 @given(st.lists(st.integers(0, 50), max_size=40), st.integers(1, 10), st.integers(1, 100))
-def test_an_inbox_keeps_the_newest_within_both_bounds(sizes: list[int], most: int, max_bytes: int) -> None:
+def test_inbox_keeps_the_newest_messages_within_both_limits(
+    sizes: list[int], most: int, max_bytes: int
+) -> None:
     inbox = Inbox("all", most, max_bytes)
     dropped = sum(inbox.put(message(n, size)) for n, size in enumerate(sizes))
     kept = inbox.take_all()
@@ -48,7 +50,7 @@ def test_an_inbox_keeps_the_newest_within_both_bounds(sizes: list[int], most: in
     assert inbox.pop() is None
 
 
-def test_an_inbox_of_the_latest_drops_nothing() -> None:
+def test_inbox_of_the_latest_message_counts_no_drops() -> None:
     inbox = Inbox("latest")
     assert [inbox.put(message(n)) for n in range(3)] == [0, 0, 0]
     assert [each.seq for each in inbox.take_all()] == [2]
@@ -58,7 +60,7 @@ def remote(id: int, node: str = "n", name: str = "N") -> RemotePublisher:
     return RemotePublisher(PublisherRecord(id, "t", "json", "json", ("tcp://x",)), node, name)
 
 
-def test_gaps_are_losses_counted_from_the_echo() -> None:
+def test_sequence_gaps_since_the_echo_are_counted_as_lost() -> None:
     sources = PublisherTracker()
     sources.advance_to(1, 10)
     for seq in (11, 12, 15):
@@ -68,21 +70,21 @@ def test_gaps_are_losses_counted_from_the_echo() -> None:
     assert sources.lost == 4
 
 
-def test_counting_starts_at_the_first_message_when_there_is_no_echo_yet() -> None:
+def test_loss_counting_starts_at_the_first_message_without_an_echo() -> None:
     sources = PublisherTracker()
     assert sources.count_message(1, 100, is_alone=False)
     sources.advance_to(1, 100)
     assert (sources.received, sources.lost) == (1, 0)
 
 
-def test_a_latched_message_that_is_sent_again_is_dropped() -> None:
+def test_repeated_latched_message_is_dropped() -> None:
     sources = PublisherTracker()
     assert sources.count_message(1, 5, is_alone=True)
     assert not sources.count_message(1, 5, is_alone=True)
     assert (sources.received, sources.lost) == (1, 0)
 
 
-def test_losses_at_the_tail_are_found_one_renewal_later_and_taken_back_if_late() -> None:
+def test_tail_loss_is_counted_one_renewal_later_and_reverted_if_late() -> None:
     sources = PublisherTracker()
     sources.advance_to(1, 0)
     sources.get(1).has_echoed = True
@@ -96,7 +98,7 @@ def test_losses_at_the_tail_are_found_one_renewal_later_and_taken_back_if_late()
     sources.expect_up_to(99, 5)  # nobody we know
 
 
-def test_a_publisher_that_starts_again_replaces_the_silent_one() -> None:
+def test_restarted_publisher_replaces_the_silent_one() -> None:
     sources = PublisherTracker()
     sources.get(1).remote = remote(1)
     assert sources.replaced_by(remote(2)) == []
@@ -107,7 +109,7 @@ def test_a_publisher_that_starts_again_replaces_the_silent_one() -> None:
     assert (sources.expired(12.9), sources.expired(13.0)) == ([], [1])
 
 
-def test_back_ends_are_found() -> None:
+def test_back_ends_are_discovered_and_a_similar_name_is_suggested() -> None:
     assert set(discover("nep.backends", "BACKEND", Backend)) >= {"memory", "zeromq"}
     with pytest.raises(nep.UnknownBackendError, match="unknown back end 'zeromk'; did you mean 'zeromq'"):
         nep.node("n", "zeromk")
@@ -126,13 +128,13 @@ def package(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
         del sys.modules[name]
 
 
-def test_an_empty_package_is_an_error(package: Path) -> None:
+def test_package_without_plug_ins_raises(package: Path) -> None:
     (package / "base.py").write_text("x = 1\n")
     with pytest.raises(PluginsMissingError, match=r"'plugs_for_test' .*'BACKEND'"):
         discover("plugs_for_test", "BACKEND", Backend)
 
 
-def test_one_file_is_a_plug_in(package: Path) -> None:
+def test_single_file_is_discovered_as_a_plug_in(package: Path) -> None:
     (package / "mine.py").write_text(
         "from nep.backends.base import Backend\nBACKEND = Backend('mine', lambda node: None)\n"
     )
@@ -142,7 +144,7 @@ def test_one_file_is_a_plug_in(package: Path) -> None:
         discover("plugs_for_test", "BACKEND", Backend)
 
 
-def test_a_waker_wakes_and_is_cleared() -> None:
+def test_waker_wakes_and_is_cleared() -> None:
     waker = Waker()
     assert select.select([waker.fd], [], [], 0)[0] == []
     for _ in range(100_000):
@@ -175,7 +177,7 @@ class Bell:
         return PollState(rest.pause_reading, None if rest.due is None else now + rest.due)
 
 
-def test_the_io_thread_serves_on_descriptors_orders_and_times() -> None:
+def test_io_thread_serves_on_wake_requests_and_deadlines() -> None:
     io = IoThread("nep-io-test")
     io.start()
     bell = Bell([PollState(), PollState(pause_reading=True, due=0.05), PollState(), PollState()])
@@ -195,7 +197,7 @@ def test_the_io_thread_serves_on_descriptors_orders_and_times() -> None:
     bell.waker.close()
 
 
-def test_the_io_thread_serves_who_sends_as_soon_as_it_can_be_written() -> None:
+def test_io_thread_serves_a_sender_as_soon_as_its_socket_is_writable() -> None:
     io = IoThread("nep-io-test")
     io.start()
     ours, theirs = socket.socketpair()
@@ -228,7 +230,7 @@ def test_the_io_thread_serves_who_sends_as_soon_as_it_can_be_written() -> None:
         io.close()
 
 
-def test_one_broken_socket_does_not_silence_the_others(caplog: pytest.LogCaptureFixture) -> None:
+def test_failing_socket_does_not_block_the_others(caplog: pytest.LogCaptureFixture) -> None:
     io = IoThread("nep-io-test")
     io.start()
     broken, fine = Bell([PollState(due=-1.0)]), Bell([])
@@ -248,7 +250,9 @@ def test_one_broken_socket_does_not_silence_the_others(caplog: pytest.LogCapture
     ("given_", "address"),
     [(None, "127.0.0.1:7780"), ("10.0.0.5", "10.0.0.5:7780"), ("tcp://h:1", "h:1"), ("", "127.0.0.1:7780")],
 )
-def test_addresses(monkeypatch: pytest.MonkeyPatch, given_: str | None, address: str) -> None:
+def test_master_address_is_normalized_and_read_from_the_environment(
+    monkeypatch: pytest.MonkeyPatch, given_: str | None, address: str
+) -> None:
     monkeypatch.delenv("NEP_MASTER", raising=False)
     assert addresses.master_address(given_) == address
     monkeypatch.setenv("NEP_MASTER", "127.0.0.1:5")
@@ -270,29 +274,29 @@ def test_addresses(monkeypatch: pytest.MonkeyPatch, given_: str | None, address:
         "http://[x]:1",
     ],
 )
-def test_what_is_no_address(address: str) -> None:
+def test_invalid_master_address_is_rejected(address: str) -> None:
     with pytest.raises(nep.NepError, match=rf"'{re.escape(address)}.*'127\.0\.0\.1:7780'"):
         addresses.master_address(address)
 
 
-def test_did_you_mean() -> None:
+def test_did_you_mean_suggests_a_similar_name() -> None:
     assert did_you_mean("jsn", ["json", "string"]) == "did you mean 'json'?"
     assert did_you_mean("xyz", ["json", "string"]) == "known names: 'json', 'string'"
 
 
-def test_names_of_nodes() -> None:
+def test_invalid_node_names_are_rejected() -> None:
     for name in ("", "x" * 201):
         with pytest.raises(nep.BadNameError, match=f"it has {len(name)} bytes; 1 to 200"):
             nep.node(name)
 
 
-def test_the_public_names_are_there() -> None:
+def test_public_names_exist() -> None:
     assert isinstance(nep, ModuleType)
     for name in nep.__all__:
         assert getattr(nep, name) is not None
 
 
-def test_a_leap_that_cannot_be_is_refused_and_counts_no_losses() -> None:
+def test_impossible_sequence_jump_is_rejected_and_counts_no_loss() -> None:
     sources = PublisherTracker()
     sources.advance_to(1, 0)
     assert sources.count_message(1, 1, is_alone=False)
@@ -306,7 +310,7 @@ def test_a_leap_that_cannot_be_is_refused_and_counts_no_losses() -> None:
     assert (sources.received, sources.lost, sources.get(1).last) == (2, 1, 3)
 
 
-def test_a_publisher_that_goes_on_behind_a_leap_is_heard_again() -> None:
+def test_publisher_is_received_again_after_an_impossible_sequence_jump() -> None:
     sources = PublisherTracker()
     assert sources.count_message(1, 1, is_alone=False)
     far = 1 + 2**32 + 1
@@ -317,7 +321,7 @@ def test_a_publisher_that_goes_on_behind_a_leap_is_heard_again() -> None:
     assert (sources.received, sources.lost) == (3, 1)
 
 
-def test_the_largest_gap_that_can_be_is_counted() -> None:
+def test_largest_possible_gap_is_counted() -> None:
     sources = PublisherTracker()
     assert sources.count_message(1, 1, is_alone=False)
     assert sources.count_message(1, 1 + 2**32, is_alone=False)
@@ -337,7 +341,7 @@ class Trap(selectors.DefaultSelector):
         return super().select(timeout)
 
 
-def test_the_io_thread_outlives_errors_of_its_poll(caplog: pytest.LogCaptureFixture) -> None:
+def test_io_thread_survives_poll_errors(caplog: pytest.LogCaptureFixture) -> None:
     made: list[Trap] = []
 
     def new_selector() -> Trap:
@@ -368,7 +372,7 @@ def test_the_io_thread_outlives_errors_of_its_poll(caplog: pytest.LogCaptureFixt
 
 # The second is what Windows has.
 @pytest.mark.parametrize("poller", [selectors.DefaultSelector, selectors.SelectSelector])
-def test_what_cannot_be_polled_is_served_each_second_and_the_others_at_once(
+def test_socket_that_cannot_be_polled_is_served_each_second(
     caplog: pytest.LogCaptureFixture, poller: type[selectors.BaseSelector]
 ) -> None:
     io = IoThread("nep-io-test", poller)
@@ -388,7 +392,7 @@ def test_what_cannot_be_polled_is_served_each_second_and_the_others_at_once(
         each.waker.close()
 
 
-def test_an_io_thread_that_is_held_up_is_waited_for_once() -> None:
+def test_removal_from_a_blocked_io_thread_waits_only_once() -> None:
     io = IoThread("nep-io-test")
     held, let_go = threading.Event(), threading.Event()
 
@@ -412,7 +416,7 @@ def test_an_io_thread_that_is_held_up_is_waited_for_once() -> None:
         each.waker.close()
 
 
-def test_publishers_that_nobody_lists_are_remembered_up_to_a_bound() -> None:
+def test_number_of_unlisted_publishers_is_bounded() -> None:
     sources = PublisherTracker()
     for number in range(1, 11):
         sources.add_listed(remote(number))
@@ -428,7 +432,7 @@ def test_publishers_that_nobody_lists_are_remembered_up_to_a_bound() -> None:
     assert len(sources.by_id) == UNLISTED_MAX + 11
 
 
-def test_a_flood_of_hellos_is_greeted_up_to_a_bound() -> None:
+def test_number_of_greeted_subscribers_is_bounded() -> None:
     subscriptions = Subscriptions("t", 7)
     for number in range(MAX_SUBSCRIBERS + 1000):
         greeted = subscriptions.note(b"\1" + hello_part(number, "t", tells=True), 0)
@@ -447,7 +451,7 @@ def test_a_flood_of_hellos_is_greeted_up_to_a_bound() -> None:
     assert len(subscriptions.legacy_filters) == 1
 
 
-def test_a_batch_of_a_sink_has_a_bound() -> None:
+def test_sink_batch_size_is_bounded() -> None:
     inbox = Inbox("all", max_bytes=1000)
     for number in range(10):
         inbox.put(message(number, 100))
@@ -457,14 +461,14 @@ def test_a_batch_of_a_sink_has_a_bound() -> None:
     assert inbox.put(message(11, 1000)) == 0
 
 
-def test_publishers_that_died_and_do_not_come_back_are_left_beyond_a_bound() -> None:
+def test_silent_publishers_beyond_a_limit_expire() -> None:
     sources = PublisherTracker()
     for number in range(1, UNLISTED_MAX + 11):
         sources.add_listed(remote(number, name=f"N{number}")).is_silent = number != 5
     assert sources.expired(0.0) == [1, 2, 3, 4, 6, 7, 8, 9, 10]
 
 
-def test_what_was_written_off_is_found_again_only_if_it_was_really_missing() -> None:
+def test_lost_message_that_is_received_later_is_counted_once() -> None:
     sources = PublisherTracker()
     for seq in (1, 2, 3):
         assert sources.count_message(1, seq, is_alone=False)
@@ -478,7 +482,7 @@ def test_what_was_written_off_is_found_again_only_if_it_was_really_missing() -> 
     assert (sources.received, sources.lost) == (5, 0)
 
 
-def test_what_comes_behind_what_was_written_off_settles_it() -> None:
+def test_newer_message_confirms_the_loss_of_earlier_ones() -> None:
     sources = PublisherTracker()
     sources.count_message(1, 1, is_alone=False)
     for _ in range(2):
@@ -491,7 +495,7 @@ def test_what_comes_behind_what_was_written_off_settles_it() -> None:
     assert sources.received + sources.lost == 6
 
 
-def test_a_publisher_that_is_left_settles_what_was_promised() -> None:
+def test_removed_publisher_counts_its_announced_messages_as_lost() -> None:
     sources = PublisherTracker()
     sources.count_message(1, 1, is_alone=False)
     sources.mark_silent(1, 3)

@@ -31,7 +31,7 @@ def parse_often(_worker: int) -> None:
         assert parse_expression("1 + 2").body.lineno == 1
 
 
-def test_threads_parse_at_the_same_time() -> None:
+def test_source_is_parsed_in_several_threads_concurrently() -> None:
     switch_s, threshold = sys.getswitchinterval(), gc.get_threshold()
     sys.setswitchinterval(1e-6)
     gc.set_threshold(10)

@@ -24,7 +24,7 @@ CONTROLS += [*"\u2066\u2067\u2068\u2069\u200e\u200f\u061c\u200b\ufeff", "\ud800"
 
 
 @pytest.mark.parametrize("control", CONTROLS, ids=ascii)
-def test_a_name_with_a_letter_that_controls_is_refused_and_the_sentence_can_be_shown(control: str) -> None:
+def test_name_with_control_character_is_rejected_with_an_escaped_message(control: str) -> None:
     name = f"arm{control}2"
     assert control_in(name) == ascii(control)[1:-1]
     with pytest.raises(nep.BadNameError, match=re.escape(ascii(name)[1:-1])) as bad_name:
@@ -36,7 +36,7 @@ def test_a_name_with_a_letter_that_controls_is_refused_and_the_sentence_can_be_s
         str(raised.value).encode("utf-8")
 
 
-def test_a_name_has_one_to_two_hundred_bytes() -> None:
+def test_node_name_length_is_1_to_200_bytes() -> None:
     for good in (
         "a",
         "Pepper 2",
@@ -58,13 +58,13 @@ def test_a_name_has_one_to_two_hundred_bytes() -> None:
 
 
 @pytest.mark.parametrize("name", ["a\x1b[2J", "a\nb", "a\u202eb", "\x9b2J", "x" * 201], ids=repr)
-def test_no_node_is_made_with_such_a_name(name: str) -> None:
+def test_node_with_an_invalid_name_is_not_created(name: str) -> None:
     with pytest.raises(ValueError, match="node"):
         nep.node(name, "memory")
 
 
 @given(st.text(st.characters(categories=["L", "N", "P", "S", "Zs", "Cc", "Cf", "Cs", "Zl", "Zp"])))
-def test_what_is_escaped_moves_no_cursor_and_has_one_line(text: str) -> None:
+def test_escaped_text_is_one_line_without_control_characters(text: str) -> None:
     shown = escaped(text)
     assert not control_in(shown)
     assert not any(unicodedata.category(letter) in {"Cc", "Cs", "Zl", "Zp"} for letter in shown)
@@ -74,12 +74,12 @@ def test_what_is_escaped_moves_no_cursor_and_has_one_line(text: str) -> None:
         assert shown == text
 
 
-def test_lines_stay_lines_where_they_may() -> None:
+def test_escaped_text_keeps_line_breaks_if_allowed() -> None:
     assert escaped("a\n\tb\x1b[2J\r\x85c", lines=True) == "a\n\tb\\x1b[2J\\r\\x85c"
     assert escaped("a\nb") == "a\\nb"
 
 
-def test_what_a_stranger_wrote_is_cleaned_and_cut_in_errors() -> None:
+def test_remote_text_in_errors_is_escaped_and_truncated() -> None:
     for error in (
         DecodeError("json", 3, "no \x1b]0;title\x07" + "x" * 9999),
         RequestRefusedError("\x9b2J" * 999),
@@ -88,12 +88,12 @@ def test_what_a_stranger_wrote_is_cleaned_and_cut_in_errors() -> None:
         assert len(str(error)) < 6 * 500 + 100
 
 
-def test_a_long_text_is_cut_and_says_so() -> None:
+def test_long_text_is_truncated_with_its_length() -> None:
     assert shortened("abc", 3) == "abc"
     assert shortened("abcd", 3) == "abc… (4 characters)"
 
 
-def test_a_sentence_of_somebody_else_does_nothing_between_our_own() -> None:
+def test_control_characters_are_removed_from_remote_text() -> None:
     assert harmless("a\u202eb\x1b[2J\nc\td") == "ab[2J c d"
     assert harmless("a\u202eb\nc\td", lines=True) == "ab\nc\td"
     assert harmless("".join(CONTROLS)).strip(" ") == ""

@@ -91,7 +91,7 @@ def test_server_for_other_computers_needs_a_token() -> None:
         WebServer(WebSettings(port=0, listen=("192.0.2.1",))).start()
 
 
-def test_node_has_the_pages_origin_or_the_programs_address() -> None:
+def test_node_name_has_the_origin_of_the_page_or_the_address_of_the_program() -> None:
     assert node_name("http://localhost:8000", "127.0.0.1:5001") == "web_localhost:8000_5001"
     assert node_name(None, "127.0.0.1:5001") == "web_127.0.0.1:5001"
     assert len(node_name("http://" + "x" * 500, "127.0.0.1:5001")) <= 150

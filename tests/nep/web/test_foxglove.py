@@ -69,7 +69,7 @@ def message_of(connection: ClientConnection) -> tuple[int, bytes]:
             return id_, data[13:]
 
 
-def test_json_topic_reaches_its_subscribers_and_goes_with_its_publisher(
+def test_json_topic_is_sent_to_subscribers_and_removed_with_its_publisher(
     foxglove: WebServer, node: nep.Node
 ) -> None:
     publisher = node.new_pub("/pose", "json", latched=True)
@@ -118,7 +118,7 @@ def publish(connection: ClientConnection, id_: int, message: object) -> None:
     connection.send(struct.pack("<BI", 1, id_) + json.dumps(message).encode())
 
 
-def test_client_publishes_in_the_shapes_that_it_knows(foxglove: WebServer, node: nep.Node) -> None:
+def test_client_publishes_in_supported_encodings(foxglove: WebServer, node: nep.Node) -> None:
     text, binary, twist = node.new_sub("/text", "string"), node.new_sub("/any"), node.new_sub("/cmd", Twist)
     node.new_pub("/text", "string")
     node.new_pub("/packed", "msgpack")
@@ -145,7 +145,7 @@ def test_client_publishes_in_the_shapes_that_it_knows(foxglove: WebServer, node:
         eventually(lambda: not node.graph().topics["/any"].publishers)
 
 
-def test_client_moves_a_robot_only_while_that_is_allowed(foxglove: WebServer, node: nep.Node) -> None:
+def test_client_moves_a_robot_only_while_allowed(foxglove: WebServer, node: nep.Node) -> None:
     description = {"title": "Rover", "rb:topics": {"command": "/orders"}}
     orders = node.new_sub("/orders")
     node.new_pub("/Rover/description", "robot/description", latched=True).publish(description)
@@ -189,7 +189,7 @@ def test_client_calls_services(foxglove: WebServer, node: nep.Node) -> None:
         assert received(client, "unadvertiseServices")["serviceIds"] == [service["id"]]
 
 
-def test_connection_graph_is_sent_as_changes(foxglove: WebServer, node: nep.Node) -> None:
+def test_connection_graph_is_sent_as_incremental_updates(foxglove: WebServer, node: nep.Node) -> None:
     node.new_sub("/odom")
     publisher = node.new_pub("/odom")
     node.new_server("/add", lambda given: given, threads=1)
@@ -214,7 +214,7 @@ def test_msgpack_is_sent_as_json(foxglove: WebServer, node: nep.Node) -> None:
         assert json.loads(message_of(client)[1]) == {"data": "YWJj", "n": 2**60}
 
 
-def test_wrong_messages_are_answered_and_the_client_stays_connected(foxglove: WebServer) -> None:
+def test_invalid_messages_are_answered_and_the_client_stays_connected(foxglove: WebServer) -> None:
     channel = {"id": 1, "topic": "/a", "encoding": "json", "schemaName": "x/Y"}
     wrong = [
         b"", b"[1]", b"\x01", b"\x01\xff\xff\xff\xff[", b"\x02\x00\x00", b"\x07", b"\xff\xfe", b"[" * 9_000,
@@ -237,7 +237,7 @@ def test_wrong_messages_are_answered_and_the_client_stays_connected(foxglove: We
         assert foxglove.counts.rejected == len(wrong)
 
 
-def test_client_that_stops_reading_loses_images_and_affects_nobody(
+def test_client_that_stops_reading_loses_images_without_affecting_others(
     foxglove: WebServer, node: nep.Node
 ) -> None:
     camera = node.new_pub("/camera", "image")
@@ -269,7 +269,7 @@ def test_client_that_stops_reading_loses_images_and_affects_nobody(
         slow.socket.shutdown(socket.SHUT_RDWR)
 
 
-def test_page_of_another_origin_is_refused(foxglove: WebServer) -> None:
+def test_page_of_another_origin_is_rejected(foxglove: WebServer) -> None:
     options = {"origin": "https://evil.example", "subprotocols": ["foxglove.sdk.v1"]}
     with pytest.raises(InvalidStatus) as refused, connect(foxglove.url, **options):
         pass

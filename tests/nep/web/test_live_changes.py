@@ -39,7 +39,9 @@ def refused_to_connect(server: WebServer, path: str = "", **options: object) -> 
     return False
 
 
-def test_removed_origin_is_disconnected_and_the_others_stay(server: WebServer, open_page: Open) -> None:
+def test_removed_origin_is_disconnected_and_other_pages_stay_connected(
+    server: WebServer, open_page: Open
+) -> None:
     assert server.set_access(Access({LAPTOP, TABLET})) == 0
     laptop, tablet = open_page(origin=LAPTOP), open_page(origin=TABLET)
     program, own = open_page(), open_page(origin=f"http://127.0.0.1:{server.port}")
@@ -51,7 +53,7 @@ def test_removed_origin_is_disconnected_and_the_others_stay(server: WebServer, o
     assert refused_to_connect(server, origin=TABLET)
 
 
-def test_new_token_disconnects_everybody_who_used_the_old_one(server: WebServer, open_page: Open) -> None:
+def test_new_token_disconnects_all_users_of_the_old_token(server: WebServer, open_page: Open) -> None:
     before = open_page()
     eventually(lambda: len(server.pages) == 1)
     assert server.set_access(Access(token="first-token-of-all")) == 1
@@ -77,7 +79,7 @@ def test_server_for_other_computers_keeps_its_token(master: Master) -> None:
     assert server.settings.access.token
 
 
-def test_robots_are_allowed_and_refused_while_a_page_is_connected(
+def test_robots_are_allowed_and_denied_while_a_page_is_connected(
     server: WebServer, node: nep.Node, page: Peer
 ) -> None:
     description = {"title": "Rover", "rb:topics": {"command": "/orders"}}
@@ -95,7 +97,7 @@ def test_robots_are_allowed_and_refused_while_a_page_is_connected(
     assert orders.received == 1
 
 
-def test_foxglove_is_served_and_switched_off_without_a_restart(server: WebServer, page: Peer) -> None:
+def test_foxglove_is_enabled_and_disabled_without_a_restart(server: WebServer, page: Peer) -> None:
     subprotocols = ["foxglove.sdk.v1"]
     server.set_foxglove(LiveChannels())
     with connect(server.url, subprotocols=subprotocols) as client:
@@ -152,15 +154,13 @@ def test_topics_of_a_page_have_limits_rates_and_counts(server: WebServer, node: 
     assert server.pages[0].published == ("/buttons",)
 
 
-def test_page_is_recognizable_as_a_web_page_in_the_graph(
-    server: WebServer, node: nep.Node, page: Peer
-) -> None:
+def test_page_is_identified_as_a_web_page_in_the_graph(server: WebServer, node: nep.Node, page: Peer) -> None:
     eventually(lambda: "web" in {each.language for each in node.graph().nodes.values()})
     names = {each.name for each in node.graph().nodes.values() if each.language == "web"}
     assert names == {each.name for each in server.pages}
 
 
-def test_page_that_is_kept_out_is_refused_until_it_is_let_in(server: WebServer, open_page: Open) -> None:
+def test_blocked_page_is_rejected_until_it_is_unblocked(server: WebServer, open_page: Open) -> None:
     own = f"http://127.0.0.1:{server.port}"
     first, twin, other = open_page(origin=own), open_page(origin=own), open_page()
     eventually(lambda: len(server.pages) == 3)
@@ -175,7 +175,7 @@ def test_page_that_is_kept_out_is_refused_until_it_is_let_in(server: WebServer, 
     assert is_open(open_page(origin=own).connection)
 
 
-def test_rosbridge_can_be_switched_off_while_foxglove_is_served(server: WebServer, open_page: Open) -> None:
+def test_rosbridge_can_be_disabled_while_foxglove_is_served(server: WebServer, open_page: Open) -> None:
     page = open_page()
     server.set_foxglove(LiveChannels())
     eventually(lambda: len(server.pages) == 1)

@@ -47,7 +47,7 @@ def sent(made: Message, *form: object) -> object:
     return whole["msg"]
 
 
-def test_string_is_data_both_ways() -> None:
+def test_string_is_converted_to_and_from_a_data_field() -> None:
     assert sent(message("string", "hé")) == {"data": "hé"}
     assert sent(message("string", "hé"), "cbor") == {"data": "hé"}
     assert from_ros({"data": "hé"}, "std_msgs/String", "string") == "hé"
@@ -80,7 +80,7 @@ def test_bytes_are_base64_in_json_and_bytes_in_cbor() -> None:
             from_ros({"data": given}, "std_msgs/UInt8MultiArray", "bytes")
 
 
-def test_picture_is_a_compressed_image_or_pixels_if_asked() -> None:
+def test_image_is_sent_as_compressed_image_or_raw_pixels_on_request() -> None:
     made = message("image", PICTURE)
     file = to_ros(made)
     assert (file["format"], file["data"][:2]) == ("jpeg", b"\xff\xd8")
@@ -119,7 +119,7 @@ def test_cbor_raw_is_the_ros_message() -> None:
     assert sent(message("string", "hi"), "cbor-raw")["bytes"] == b"\x02\0\0\0hi"
 
 
-def test_png_holds_the_text_and_large_ones_are_refused() -> None:
+def test_png_holds_the_text_and_large_texts_are_rejected() -> None:
     for text in (b"{}", json.dumps({"x": "é" * 999}).encode()):
         assert text_in_png(text_as_png(text)) == text
     packed = json.loads(publish_frames("/t", message("json", {"a": 1}), EncodingOptions("png"))[0].data)
@@ -138,7 +138,7 @@ def test_large_message_is_split_into_fragments() -> None:
 
 
 @pytest.mark.parametrize("compression", ["none", "cbor", "cbor-raw"])
-def test_hostile_message_is_sent_or_refused(compression: str) -> None:
+def test_hostile_message_is_sent_or_rejected(compression: str) -> None:
     for data in hostile.WHOLES:
         for msg_type in ("json", "string", "bytes", "image", "msgpack", "geometry_msgs/Twist"):
             made = message(msg_type, None, Encoded(data))
@@ -148,12 +148,12 @@ def test_hostile_message_is_sent_or_refused(compression: str) -> None:
                 continue
 
 
-def test_answer_that_is_not_json_is_refused() -> None:
+def test_reply_that_is_not_json_is_rejected() -> None:
     with pytest.raises(NepError):
         operation_frames({"op": "service_response", "values": {"x": object()}}, EncodingOptions())
 
 
-def test_definitions_have_the_fields_of_neps_types() -> None:
+def test_definitions_have_the_fields_of_nep_types() -> None:
     for module in (geometry, sensor):
         for name in module.__all__:
             kind = getattr(module, name)

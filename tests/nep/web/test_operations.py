@@ -55,13 +55,13 @@ def test_operations_are_parsed_to_typed_values() -> None:
 
 
 @pytest.mark.parametrize("fields", EXAMPLES, ids=lambda each: each["op"])
-def test_hostile_operation_is_parsed_or_refused_with_a_message(fields: dict[str, object]) -> None:
+def test_hostile_operation_is_parsed_or_rejected_with_a_message(fields: dict[str, object]) -> None:
     for payload in hostile.payloads(fields):
         said = refusal(payload)
         assert said is None or (said and said.isprintable() and len(said) < 1_000)
 
 
-def test_mutated_operations_raise_nothing_else() -> None:
+def test_mutated_operations_raise_only_operation_errors() -> None:
     chance = random.Random(27)
     texts = [json.dumps(each).encode() for each in EXAMPLES]
     for _number in range(4_000):
@@ -74,7 +74,7 @@ def test_mutated_operations_raise_nothing_else() -> None:
         refusal(bytes(text))
 
 
-def test_operation_beyond_a_limit_is_refused_before_it_is_parsed() -> None:
+def test_operation_beyond_a_limit_is_rejected_before_parsing() -> None:
     for data in (
         b'"' + b"x" * MAX_MESSAGE_BYTES + b'"',
         b"[" * 1_000 + b"]" * 1_000,

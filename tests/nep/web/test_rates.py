@@ -63,5 +63,5 @@ def test_client_is_named_after_its_user_agent(user_agent: str, name: str) -> Non
         ("", ""),
     ],
 )
-def test_user_agent_tells_the_kind_of_device(user_agent: str, device: str) -> None:
+def test_device_kind_is_detected_from_the_user_agent(user_agent: str, device: str) -> None:
     assert device_kind(user_agent) == device

@@ -100,7 +100,7 @@ def test_topics_are_sent_round_robin_after_other_operations() -> None:
     assert asyncio.run(drain()) == [b"status", 0, 9, 1, 2]
 
 
-def test_page_that_reads_no_answers_is_closed_once() -> None:
+def test_page_that_does_not_read_replies_is_closed_once() -> None:
     async def fill() -> int:
         ended: list[bool] = []
         waiting = SendQueue(lambda: 0.0, lambda: ended.append(True))

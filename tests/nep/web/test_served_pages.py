@@ -47,13 +47,13 @@ def asked(
         (("localhost", "evil.example"), False),
     ],
 )
-def test_page_is_served_for_a_host_from_which_it_can_connect(hosts: tuple[str, ...], is_served: bool) -> None:
+def test_page_is_served_only_for_hosts_it_can_connect_from(hosts: tuple[str, ...], is_served: bool) -> None:
     status, body = asked(hosts=hosts)
     assert status == (HTTPStatus.OK if is_served else HTTPStatus.FORBIDDEN)
     assert is_served or OWN in body
 
 
-def test_unknown_paths_and_methods_are_refused() -> None:
+def test_unknown_paths_and_methods_are_rejected() -> None:
     for path in (
         "/x",
         "//",
@@ -73,7 +73,7 @@ def test_unknown_paths_and_methods_are_refused() -> None:
 
 
 @pytest.mark.parametrize("path", ["/", "/starter.html"])
-def test_token_is_required_for_pages_and_never_in_a_refusal(path: str) -> None:
+def test_token_is_required_for_pages_and_absent_from_rejections(path: str) -> None:
     for query in ("", "?token=", "?token=wrong", "?token=wrong&token=x", "?x=" + TOKEN):
         status, body = asked(path + query, token=TOKEN)
         assert (status, TOKEN in body) == (HTTPStatus.UNAUTHORIZED, False)
@@ -81,7 +81,7 @@ def test_token_is_required_for_pages_and_never_in_a_refusal(path: str) -> None:
     assert (status, TOKEN in body) == (HTTPStatus.OK, path == "/starter.html")
 
 
-def test_pages_run_only_their_own_scripts_and_load_nothing() -> None:
+def test_pages_run_only_their_own_scripts_and_load_no_external_resources() -> None:
     found = answer(PageRequest("GET", "/", ("localhost:9090",), OWN), Access())
     policy = found.headers["Content-Security-Policy"]
     assert "default-src 'none'" in policy
@@ -94,7 +94,7 @@ def test_pages_run_only_their_own_scripts_and_load_nothing() -> None:
         assert "{{" not in page
 
 
-def test_address_of_a_starter_page_cannot_end_its_script() -> None:
+def test_address_of_a_starter_page_cannot_break_out_of_its_script() -> None:
     page = starter_page("ws://h/?token=</script>\"'")
     assert page.count("</script>") == 1
     for topic in re.findall(r'topic: "(.*?)"', page):
@@ -110,7 +110,7 @@ def response(server: WebServer, path: str, **headers: str) -> tuple[int, str]:
     return found.status, body
 
 
-def test_server_answers_browsers_and_websockets_at_one_port(server: WebServer, page: Peer) -> None:
+def test_server_serves_http_and_websockets_at_one_port(server: WebServer, page: Peer) -> None:
     status, body = response(server, "/")
     assert (status, "<!doctype html>" in body) == (HTTPStatus.OK, True)
     assert f"ws://127.0.0.1:{server.port}/" in response(server, "/starter.html")[1]
@@ -120,7 +120,7 @@ def test_server_answers_browsers_and_websockets_at_one_port(server: WebServer, p
     assert page.refusal("nothing")
 
 
-def test_page_opened_without_the_token_is_a_listed_refusal(master: Master) -> None:
+def test_page_opened_without_the_token_is_listed_as_rejected(master: Master) -> None:
     settings = WebSettings(port=0, master=master.address, access=Access(token=TOKEN))
     with WebServer(settings) as server:
         assert response(server, "/")[0] == HTTPStatus.UNAUTHORIZED

@@ -157,7 +157,7 @@ def test_page_cannot_move_a_robot_without_permission(server: WebServer, node: ne
     assert server.counts.motions_refused == 2
 
 
-def test_allowed_robot_is_moved(master: Master, node: nep.Node) -> None:
+def test_page_moves_an_allowed_robot(master: Master, node: nep.Node) -> None:
     description = {"title": "Rover", "rb:topics": {"command": "/orders"}}
     orders = node.new_sub("/orders")
     node.new_pub("/Rover/description", "robot/description", latched=True).publish(description)
@@ -229,7 +229,7 @@ def test_message_beyond_the_limit_closes_only_its_page(server: WebServer, open_p
     assert other.refusal("nothing")
 
 
-def test_page_that_reads_nothing_does_not_affect_others(
+def test_page_that_does_not_read_does_not_affect_others(
     node: nep.Node, server: WebServer, open_page: Open
 ) -> None:
     slow, quick = open_page(max_queue=1), open_page()
@@ -247,7 +247,7 @@ def test_page_that_reads_nothing_does_not_affect_others(
     assert server.counts.dropped + len(got) == 60
 
 
-def test_other_origins_are_refused_before_they_are_pages(server: WebServer) -> None:
+def test_other_origins_are_rejected_before_they_become_pages(server: WebServer) -> None:
     for origin in ("http://evil.example", "null"):
         with pytest.raises(InvalidStatus) as refused, connect(server.url, origin=origin):
             pass
@@ -312,9 +312,7 @@ def test_connected_pages_are_listed_with_their_topics_and_can_be_disconnected(
     eventually(lambda: server.pages == ())
 
 
-def test_refused_connection_is_listed_with_the_origin_that_would_let_it_in(
-    server: WebServer, open_page: Open
-) -> None:
+def test_rejected_connection_is_listed_with_the_origin_to_allow(server: WebServer, open_page: Open) -> None:
     for _attempt in range(3):  # listed once
         with pytest.raises(InvalidStatus):
             open_page(origin="http://192.168.1.77:5173")

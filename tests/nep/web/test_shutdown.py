@@ -45,7 +45,7 @@ def close_code(connection: ClientConnection) -> int | None:
         return None if closed.rcvd is None else closed.rcvd.code
 
 
-def test_connections_that_do_not_react_do_not_hold_up_the_end(server: WebServer, node: nep.Node) -> None:
+def test_unresponsive_connections_do_not_delay_shutdown(server: WebServer, node: nep.Node) -> None:
     with (
         page_that_never_reads(server.url, node),
         socket.create_connection(("127.0.0.1", server.port)),  # no handshake

@@ -105,7 +105,7 @@ def drone(node, clock):
     assert [t.name for t in threading.enumerate() if t.name.startswith("Drone")] == []
 
 
-def test_it_runs_to_its_end_and_tells_what_it_returns(drone):
+def test_async_action_runs_to_completion_and_returns_its_output(drone):
     body, ears, _ = drone
     ears.invoke("1", "fly", times=2)
     answer = ears.final("1")
@@ -116,7 +116,7 @@ def test_it_runs_to_its_end_and_tells_what_it_returns(drone):
     assert ears.final("2")["output"] == {"value": "as ever"}
 
 
-def test_all_of_it_lives_in_one_loop(drone):
+def test_all_coroutines_run_in_one_event_loop(drone):
     body, ears, _ = drone
     assert body.connected == "connected"
     for wanted in ("1", "2"):
@@ -125,7 +125,7 @@ def test_all_of_it_lives_in_one_loop(drone):
     assert len(body.loops) == 1
 
 
-def test_a_cancel_a_time_limit_and_a_stop_end_it(drone):
+def test_cancel_timeout_and_stop_end_an_async_action(drone):
     body, ears, clock = drone
     ears.invoke("1", "fly")
     eventually(lambda: body.events == ["flies"])
@@ -159,7 +159,7 @@ def test_a_cancel_a_time_limit_and_a_stop_end_it(drone):
     ],
     ids=repr,
 )
-def test_whatever_it_raises_is_answered_and_the_next_one_runs(drone, raised, state, error):
+def test_exception_in_a_coroutine_is_reported_and_the_next_action_runs(drone, raised, state, error):
     body, ears, _ = drone
     body.raises = raised
     ears.invoke("1", "crash")
@@ -171,13 +171,13 @@ def test_whatever_it_raises_is_answered_and_the_next_one_runs(drone, raised, sta
     assert ears.final("s", "stop")["state"] == "succeeded"
 
 
-def test_a_wait_that_would_hold_all_others_up_says_what_to_use(drone):
+def test_blocking_wait_in_a_coroutine_fails_with_a_hint(drone):
     _, ears, _ = drone
     ears.invoke("1", "wait_wrongly")
     assert "use `await asyncio.sleep` there" in str(ears.final("1")["error"])
 
 
-def test_one_that_does_not_listen_is_named_until_it_ends(drone):
+def test_coroutine_that_ignores_cancellation_is_reported_until_it_ends(drone):
     body, ears, clock = drone
     ears.invoke("1", "stubborn")
     eventually(lambda: "begun" in body.events)  # "running" is told before; who has not begun need not listen
@@ -189,7 +189,7 @@ def test_one_that_does_not_listen_is_named_until_it_ends(drone):
     eventually(lambda: [a["not_ended"] for a in ears.heard["answer"] if a["op"] == "alive"][-1] == [])
 
 
-def test_a_function_that_returns_an_awaitable_is_run_as_well(node):
+def test_function_that_returns_an_awaitable_is_awaited(node):
     class Wrapped:
         ran: list[str] = []  # noqa: RUF012 - read after the robot has ended
 
@@ -215,7 +215,7 @@ def test_a_function_that_returns_an_awaitable_is_run_as_well(node):
     assert Wrapped.ran == ["ran"]
 
 
-def test_a_loop_that_has_ended_runs_nothing_and_leaves_no_warning():
+def test_closed_event_loop_rejects_coroutines_without_warning():
     async def never() -> None:
         raise AssertionError
 
@@ -225,7 +225,7 @@ def test_a_loop_that_has_ended_runs_nothing_and_leaves_no_warning():
         loop.run(never())
 
 
-def test_a_coroutine_that_takes_too_long_is_canceled():
+def test_coroutine_that_exceeds_its_timeout_is_canceled():
     ended = threading.Event()
 
     async def long() -> None:
@@ -241,7 +241,7 @@ def test_a_coroutine_that_takes_too_long_is_canceled():
     loop.close()
 
 
-def test_the_loop_itself_is_not_waited_for_in_itself():
+def test_blocking_run_inside_the_event_loop_raises():
     loop = EventLoop("test")
 
     async def inner() -> None:

@@ -10,7 +10,7 @@ def first_answer(ears: Ears, wanted: str) -> dict[str, object]:
     return ears.answers(wanted)[0]
 
 
-def test_queue_waits_for_what_runs_and_for_what_waits_already(turtle) -> None:
+def test_queue_waits_for_running_and_queued_actions(turtle) -> None:
     body, ears, _ = turtle
     ears.invoke("1", "say", text="one")
     ears.invoke("2", "say", text="two")
@@ -24,7 +24,7 @@ def test_queue_waits_for_what_runs_and_for_what_waits_already(turtle) -> None:
     assert ears.states("2") == ["accepted", "running", "succeeded"]
 
 
-def test_replace_ends_the_other_and_both_say_so(turtle) -> None:
+def test_replace_cancels_the_running_action_and_both_answers_report_it(turtle) -> None:
     body, ears, _ = turtle
     ears.invoke("1", "move", distance=1)
     eventually(lambda: body.moving)
@@ -37,7 +37,7 @@ def test_replace_ends_the_other_and_both_say_so(turtle) -> None:
     assert body.done == [("move", 0.5)]
 
 
-def test_replace_also_clears_what_waits(turtle) -> None:
+def test_replace_also_cancels_queued_actions(turtle) -> None:
     body, ears, _ = turtle
     ears.invoke("1", "ignore")  # does not end when it is told to: what comes waits for it
     eventually(lambda: ears.states("1") == ["accepted", "running"])
@@ -50,7 +50,7 @@ def test_replace_also_clears_what_waits(turtle) -> None:
     assert ears.final("3")["state"] == "succeeded"
 
 
-def test_reject_refuses_and_says_with_what_the_robot_is_busy(turtle) -> None:
+def test_reject_reports_the_action_that_keeps_the_robot_busy(turtle) -> None:
     body, ears, _ = turtle
     ears.invoke("1", "move", distance=1)
     eventually(lambda: body.moving)
@@ -64,7 +64,7 @@ def test_reject_refuses_and_says_with_what_the_robot_is_busy(turtle) -> None:
     assert ears.final("3")["state"] == "succeeded"
 
 
-def test_a_queued_one_is_canceled_without_ever_running(turtle) -> None:
+def test_queued_action_is_canceled_without_running(turtle) -> None:
     body, ears, _ = turtle
     ears.invoke("1", "say", text="one")
     ears.invoke("2", "say", text="two")
@@ -77,7 +77,7 @@ def test_a_queued_one_is_canceled_without_ever_running(turtle) -> None:
     assert [text for _, text in body.done] == ["one", "three"]
 
 
-def test_a_stop_clears_the_queue(turtle) -> None:
+def test_stop_clears_the_queue(turtle) -> None:
     body, ears, _ = turtle
     for wanted in ("1", "2", "3"):
         ears.invoke(wanted, "say", text=wanted)
@@ -91,7 +91,7 @@ def test_a_stop_clears_the_queue(turtle) -> None:
     assert body.done == [("say", "4")]
 
 
-def test_a_time_limit_begins_when_it_runs_not_while_it_waits(turtle) -> None:
+def test_timeout_starts_when_the_action_runs_and_not_while_queued(turtle) -> None:
     body, ears, clock = turtle
     ears.invoke("1", "ignore")
     ears.invoke("2", "ignore")
@@ -108,7 +108,7 @@ def test_a_time_limit_begins_when_it_runs_not_while_it_waits(turtle) -> None:
     assert ears.final("2")["state"] == "succeeded"
 
 
-def test_the_robot_says_that_it_lives_while_something_runs_or_waits(turtle) -> None:
+def test_heartbeat_is_sent_while_an_action_runs_or_waits(turtle) -> None:
     body, ears, clock = turtle
 
     def beats() -> int:
@@ -130,7 +130,7 @@ def test_the_robot_says_that_it_lives_while_something_runs_or_waits(turtle) -> N
 # ---- who must stay alive ---------------------------------------------------------------------------
 
 
-def test_a_program_for_which_nothing_is_done_any_more_may_fall_silent(turtle) -> None:
+def test_silent_program_without_running_actions_does_not_stop_the_robot(turtle) -> None:
     body, ears, clock = turtle
     ears.invoke("1", "light", program="tried")
     ears.final("1")
@@ -146,7 +146,7 @@ def test_a_program_for_which_nothing_is_done_any_more_may_fall_silent(turtle) ->
     assert ears.final("2")["state"] == "succeeded"
 
 
-def test_a_program_whose_action_runs_must_not(turtle) -> None:
+def test_silent_program_with_a_running_action_stops_the_robot(turtle) -> None:
     body, ears, clock = turtle
     ears.invoke("1", "move", program="running", distance=1)
     eventually(lambda: body.moving)

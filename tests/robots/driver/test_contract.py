@@ -225,7 +225,7 @@ def bench(shared: Bench) -> Iterator[Bench]:
 # ---- what it says about itself ---------------------------------------------------------------------
 
 
-def test_its_description_is_valid_and_every_action_is_there(bench, request) -> None:
+def test_description_is_valid_and_declares_every_action(bench, request) -> None:
     option = request.config.getoption
     ours = not option("--driver") and not option(
         "--driver-command"
@@ -247,12 +247,12 @@ def test_its_description_is_valid_and_every_action_is_there(bench, request) -> N
 # ---- stop ------------------------------------------------------------------------------------------
 
 
-def test_a_stop_at_rest_is_answered(bench) -> None:
+def test_stop_while_idle_is_answered(bench) -> None:
     assert bench.stop()["state"] == "succeeded"
     assert bench.stop()["state"] == "succeeded"
 
 
-def test_a_stop_ends_whatever_runs_and_whatever_waits(bench) -> None:
+def test_stop_ends_running_and_queued_actions(bench) -> None:
     ended = []
     for action in bench.long():
         first = bench.invoke(action)
@@ -267,7 +267,7 @@ def test_a_stop_ends_whatever_runs_and_whatever_waits(bench) -> None:
     assert set(ended) <= FINAL
 
 
-def test_many_stops_at_once_are_all_answered(bench) -> None:
+def test_concurrent_stops_are_all_answered(bench) -> None:
     bench.begun()
     ids = [bench.new_id() for _ in range(5)]
     for wanted in ids:
@@ -275,7 +275,7 @@ def test_many_stops_at_once_are_all_answered(bench) -> None:
     assert {bench.ears.final(wanted, "stop")["state"] for wanted in ids} == {"succeeded"}
 
 
-def test_the_stop_action_is_a_stop_too(bench) -> None:
+def test_stop_action_stops_the_robot(bench) -> None:
     started = bench.begun()
     wanted = bench.new_id()
     bench.ears.invoke(wanted, bench.robot.safe_stop.action)
@@ -283,14 +283,14 @@ def test_the_stop_action_is_a_stop_too(bench) -> None:
     assert bench.ears.final(started)["state"] == "canceled"
 
 
-def test_a_stop_that_ends_a_program_refuses_what_it_sent_before(bench) -> None:
+def test_stop_that_ends_a_program_rejects_its_later_commands(bench) -> None:
     bench.ears.command(id=bench.new_id(), op="stop", ends="the key of a program")
     late = bench.invoke(bench.any_action(), program_of("the key of a program"))
     assert bench.ears.final(late)["state"] == "canceled"
     assert "running" not in bench.ears.states(late)
 
 
-def test_nobody_else_ends_a_program(bench) -> None:
+def test_stop_with_only_the_name_of_a_program_does_not_end_it(bench) -> None:
     """Its name can be read by everybody: a stop that only names it stops the robot, and no more."""
     assert bench.stop(ends="studio")["state"] == "succeeded"
     asked = bench.invoke(bench.any_action(), "studio")
@@ -322,14 +322,14 @@ def test_each_action_is_answered_exactly_once_and_can_be_canceled(shared) -> Non
     assert canceled or not any(takes_time(shared, action) for action in shared.long())
 
 
-def test_a_cancel_that_finds_nothing_says_so(bench) -> None:
+def test_cancel_of_an_unknown_task_fails(bench) -> None:
     wanted = bench.new_id()
     bench.ears.command(id=wanted, op="cancel")
     answer = bench.ears.final(wanted, "cancel")
     assert (answer["state"], answer["error"]) == ("failed", "no running task has this id")
 
 
-def test_what_takes_too_long_fails_with_its_limit(shared) -> None:
+def test_action_that_exceeds_its_timeout_fails_with_the_limit(shared) -> None:
     late = []
     for action in (each for each in shared.long() if each.timeout_s):
         # The world has a clock of its own: what moved a robot for a while would take the face from the next.
@@ -346,7 +346,7 @@ def test_what_takes_too_long_fails_with_its_limit(shared) -> None:
     assert late or not any(takes_time(shared, action) for action in shared.long() if action.timeout_s)
 
 
-def test_busy_is_handled_as_the_description_says(shared) -> None:
+def test_busy_robot_behaves_as_declared_in_its_description(shared) -> None:
     for action in (each for each in shared.long() if each.uses):
         with at_its_start(shared.kind, f"Busy {shared.kind.model}") as bench:
             first = bench.invoke(action)
@@ -370,7 +370,7 @@ def test_busy_is_handled_as_the_description_says(shared) -> None:
             bench.running(second)
 
 
-def test_it_stops_when_the_program_that_moves_it_falls_silent(bench) -> None:
+def test_robot_stops_when_its_moving_program_falls_silent(bench) -> None:
     wanted = bench.begun("silent")
     bench.clock.advance((bench.robot.safe_stop.watchdog_s or 0) + 0.05)
     ended = bench.ears.final(wanted)
@@ -378,7 +378,7 @@ def test_it_stops_when_the_program_that_moves_it_falls_silent(bench) -> None:
     assert "has been silent" in str(ended["error"])
 
 
-def test_it_tells_that_it_lives_while_it_does_something(bench) -> None:
+def test_robot_sends_heartbeats_while_active(bench) -> None:
     def beats() -> int:
         return sum(1 for answer in list(bench.ears.heard["answer"]) if answer["op"] == "alive")
 
@@ -391,7 +391,7 @@ def test_it_tells_that_it_lives_while_it_does_something(bench) -> None:
 # ---- what is wrong ---------------------------------------------------------------------------------
 
 
-def test_wrong_inputs_are_refused_with_a_sentence_and_nothing_runs(bench) -> None:
+def test_invalid_inputs_are_rejected_with_a_message_and_no_action_runs(bench) -> None:
     for action in bench.actions():
         inputs: list[object] = [{"no such thing": 1}, "text", [1, 2]]
         inputs += [{**required(action), p.name: wrong_for(p.kind)} for p in action.parameters]
@@ -407,7 +407,7 @@ def test_wrong_inputs_are_refused_with_a_sentence_and_nothing_runs(bench) -> Non
             assert bench.ears.states(wanted) == ["failed"]
 
 
-def test_an_action_that_it_has_not_is_refused(bench) -> None:
+def test_unknown_action_is_rejected(bench) -> None:
     wanted = bench.new_id()
     bench.ears.invoke(wanted, "fly to the moon")
     assert "can't “fly to the moon”" in str(bench.ears.final(wanted)["error"])
@@ -419,7 +419,7 @@ def test_an_action_that_it_has_not_is_refused(bench) -> None:
      {"id": "", "op": "invoke"}, {"id": None, "op": None}],
     ids=repr,
 )  # fmt: skip
-def test_messages_that_are_no_commands_change_nothing(bench, message) -> None:
+def test_messages_that_are_not_commands_are_ignored(bench, message) -> None:
     before = len(bench.ears.heard["answer"])
     bench.ears._command.publish(message)
     wanted = bench.new_id()
@@ -441,7 +441,7 @@ def test_robot_stops_after_every_hostile_message(bench) -> None:
     eventually(lambda: bench.ears.states(wanted))
 
 
-def test_the_same_command_twice_runs_once(bench) -> None:
+def test_duplicate_command_runs_once(bench) -> None:
     action = bench.any_action(long=True)
     wanted = bench.invoke(action)
     bench.running(wanted)
@@ -456,7 +456,7 @@ def test_the_same_command_twice_runs_once(bench) -> None:
 # ---- its life --------------------------------------------------------------------------------------
 
 
-def test_closing_answers_what_is_open_and_leaves_no_thread(kind) -> None:
+def test_close_answers_open_actions_and_leaves_no_thread(kind) -> None:
     name = f"Closing {kind.model}"
     with at_its_start(kind, name) as bench:  # closes it once more
         ears = bench.ears
@@ -470,7 +470,7 @@ def test_closing_answers_what_is_open_and_leaves_no_thread(kind) -> None:
     assert [t.name for t in threading.enumerate() if t.name.startswith(name)] == []
 
 
-def test_what_its_description_suggests_can_be_done(kind) -> None:
+def test_all_described_actions_succeed_with_the_real_clock(kind) -> None:
     """With the computer's own clock, all at once where they use different things."""
     with at_its_start(kind, f"Real_{kind.model}", real_clock=True) as bench:
         robot, ears = bench.robot, bench.ears

@@ -90,7 +90,7 @@ def test_correct_drivers_are_accepted(tmp_path):
     assert "pepper" not in done.stdout
 
 
-def test_one_that_does_not_end_is_found(tmp_path):
-    done = contract(tmp_path, DEAF, only="test_a_stop_ends_whatever_runs")
+def test_driver_that_ignores_stop_fails_the_contract(tmp_path):
+    done = contract(tmp_path, DEAF, only="test_stop_ends_running_and_queued_actions")
     assert done.returncode == 1, done.stdout
     assert "1 failed" in done.stdout

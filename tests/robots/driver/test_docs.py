@@ -32,7 +32,7 @@ def rover(monkeypatch):
     return module.ROBOT
 
 
-def test_the_listing_works(rover, node):
+def test_documented_driver_listing_works(rover, node):
     assert parse(dict(rover.thing_model)).action("drive").text == "%robot drive %distance m"
     with nep.node("listener", "memory") as other:
         ears = Ears(other, "Fido")
@@ -46,14 +46,14 @@ def test_the_listing_works(rover, node):
             assert ears.final("2")["state"] == "canceled"
 
 
-def test_the_how_to_shows_the_example_and_it_has_thirty_lines():
+def test_how_to_shows_the_example_of_at_most_thirty_lines():
     page = (ROOT / "docs" / "write-a-driver.md").read_text(encoding="utf-8")
     (listing,) = re.findall(r"```python\n(.*?)```", page, re.DOTALL)
     assert listing == EXAMPLE.read_text(encoding="utf-8")
     assert len([line for line in listing.splitlines() if line.strip()]) <= 30
 
 
-def test_the_example_is_a_robot_of_its_own_process(network):
+def test_example_driver_runs_as_a_separate_process(network):
     process = start(str(EXAMPLE), "--name", "Table", network=network)
     try:
         with nep.node("me", master=network) as node:

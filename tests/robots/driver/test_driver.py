@@ -16,7 +16,7 @@ from app.robots.kit import Failed
 from tests.robots.conftest import TURTLE, Ears, eventually
 
 
-def test_the_description_is_there_for_whoever_comes_later(turtle, node):
+def test_late_subscriber_receives_the_description(turtle, node):
     _, _, _ = turtle
     with nep.node("late", "memory") as late:
         message = late.new_sub("/Turtle/description", "robot/description").receive(30.0)
@@ -28,7 +28,7 @@ def test_the_description_is_there_for_whoever_comes_later(turtle, node):
         assert ready.payload == {"robot": "ready", "name": "Turtle"}
 
 
-def test_an_action_is_accepted_runs_and_succeeds(turtle):
+def test_action_is_accepted_runs_and_succeeds(turtle):
     body, ears, _ = turtle
     ears.invoke("1", "move", distance=1)
     eventually(lambda: {"moved": 0.0} in [a["feedback"] for a in ears.answers("1")])
@@ -43,7 +43,7 @@ def test_an_action_is_accepted_runs_and_succeeds(turtle):
     assert isinstance(body.done[0][1], float)
 
 
-def test_bad_input_never_reaches_the_function(turtle):
+def test_invalid_input_never_reaches_the_function(turtle):
     body, ears, _ = turtle
     ears.invoke("1", "move", distance=3)
     assert ears.final("1")["error"] == "move: distance must be between -2 and 2 m"
@@ -57,7 +57,7 @@ def test_bad_input_never_reaches_the_function(turtle):
     assert ears.states("1") == ["failed"]
 
 
-def test_noise_on_the_command_topic_is_survived(turtle, node):
+def test_malformed_messages_on_the_command_topic_are_ignored(turtle, node):
     _, ears, _ = turtle
     noise = node.new_pub("/Turtle/command", "robot/command")
     for payload in (None, 5, [], "x", {}, {"id": 5, "op": "invoke"}, {"id": "x" * 300, "op": "invoke"}):
@@ -67,7 +67,7 @@ def test_noise_on_the_command_topic_is_survived(turtle, node):
     assert ears.final("1")["state"] == "succeeded"
 
 
-def test_a_function_that_fails_is_answered_with_its_sentence(turtle, caplog):
+def test_exception_in_a_function_is_reported_as_failure(turtle, caplog):
     body, ears, _clock = turtle
     ears.invoke("1", "fail")
     assert (ears.final("1")["state"], ears.final("1")["error"]) == ("failed", "no fuel")
@@ -79,7 +79,7 @@ def test_a_function_that_fails_is_answered_with_its_sentence(turtle, caplog):
     assert ears.final("2")["error"] == "fail failed: ZeroDivisionError"
 
 
-def test_cancel_ends_what_runs_and_what_waits(turtle):
+def test_cancel_ends_running_and_queued_actions(turtle):
     body, ears, _ = turtle
     ears.invoke("1", "say", text="a")
     ears.invoke("2", "say", text="b")
@@ -93,7 +93,7 @@ def test_cancel_ends_what_runs_and_what_waits(turtle):
     assert body.done == []
 
 
-def test_too_long_is_a_failure(turtle):
+def test_action_that_exceeds_its_timeout_fails(turtle):
     _, ears, clock = turtle
     ears.invoke("1", "move")
     eventually(lambda: "running" in ears.states("1"))
@@ -101,7 +101,7 @@ def test_too_long_is_a_failure(turtle):
     assert ears.final("1")["error"] == "move took longer than 5 s"
 
 
-def test_a_function_that_ignores_its_call_is_answered_for(turtle):
+def test_function_that_ignores_its_timeout_is_answered_as_failed(turtle):
     body, ears, clock = turtle
     ears.invoke("1", "ignore")
     eventually(lambda: "running" in ears.states("1"))
@@ -114,7 +114,7 @@ def test_a_function_that_ignores_its_call_is_answered_for(turtle):
     assert ears.states("1").count("failed") == 1
 
 
-def test_queue_replace_and_reject(turtle):
+def test_busy_policies_queue_replace_and_reject(turtle):
     body, ears, _ = turtle
     ears.invoke("1", "say", text="one")
     ears.invoke("2", "say", text="two")
@@ -132,14 +132,14 @@ def test_queue_replace_and_reject(turtle):
     assert [entry for entry in body.done if entry[0] == "say"] == [("say", "one"), ("say", "two")]
 
 
-def test_what_can_not_be_canceled_says_so(turtle):
+def test_non_cancellable_call_reports_it(turtle):
     body, ears, _ = turtle
     ears.invoke("1", "light", colour="#102030")
     assert ears.final("1")["state"] == "succeeded"
     assert body.done == [("light", "#102030", True)]
 
 
-def test_the_same_command_twice_runs_once(turtle):
+def test_duplicate_command_runs_once(turtle):
     body, ears, _ = turtle
     ears.invoke("1", "say", text="once")
     ears.invoke("1", "say", text="once")
@@ -150,7 +150,7 @@ def test_the_same_command_twice_runs_once(turtle):
     assert body.done.count(("say", "once")) == 1
 
 
-def test_a_flood_of_waiting_actions_is_refused(turtle):
+def test_queued_actions_beyond_the_limit_are_rejected(turtle):
     _, ears, _ = turtle
     for number in range(60):
         ears.invoke(str(number), "say", text="x")
@@ -160,7 +160,7 @@ def test_a_flood_of_waiting_actions_is_refused(turtle):
 # ---- stop -----------------------------------------------------------------------------------------
 
 
-def test_stop_answers_only_when_the_robot_stands_still(turtle):
+def test_stop_is_answered_after_the_robot_stands_still(turtle):
     body, ears, _ = turtle
     body.may_stop.clear()
     for wanted, action, given in (
@@ -183,7 +183,7 @@ def test_stop_answers_only_when_the_robot_stands_still(turtle):
     assert body.stops == 1
 
 
-def test_a_stop_that_does_not_work_is_said(turtle):
+def test_ineffective_stop_is_reported_as_failure(turtle):
     body, ears, clock = turtle
     ears.invoke("1", "ignore")
     eventually(lambda: "running" in ears.states("1"))
@@ -208,7 +208,7 @@ def test_a_stop_that_does_not_work_is_said(turtle):
     assert len(ears.states("s")) == 1
 
 
-def test_a_robot_that_can_not_stop_says_why(turtle, caplog):
+def test_failing_stop_function_reports_its_reason(turtle, caplog):
     body, ears, _ = turtle
     body.stop_fails = Failed("the brake does not answer")
     ears.command(id="s", op="stop")
@@ -233,7 +233,7 @@ class SpeechlessError(Exception):
 @pytest.mark.parametrize(
     "how", [SystemExit(3), KeyboardInterrupt(), GeneratorExit(), SpeechlessError()], ids=repr
 )
-def test_a_function_that_ends_the_program_is_answered_and_can_be_stopped(turtle, how):
+def test_function_that_exits_the_program_is_reported_and_the_robot_can_be_stopped(turtle, how):
     body, ears, _ = turtle
     body.breaks = how
     ears.invoke("1", "fail", how="broken")
@@ -247,7 +247,7 @@ def test_a_function_that_ends_the_program_is_answered_and_can_be_stopped(turtle,
     assert ears.final("t", "stop")["state"] == "succeeded"
 
 
-def test_a_stop_that_hangs_is_said_each_time_and_nothing_is_accepted(turtle):
+def test_hanging_stop_is_reported_to_each_caller_and_commands_are_rejected(turtle):
     body, ears, clock = turtle
     body.may_stop.clear()
     ears.command(id="s", op="stop")
@@ -265,11 +265,11 @@ def test_a_stop_that_hangs_is_said_each_time_and_nothing_is_accepted(turtle):
     assert ears.final("2")["state"] == "succeeded"
 
 
-def test_the_kit_answers_a_stop_well_before_studio_gives_up():
+def test_stop_answer_timeout_is_at_most_half_of_the_studio_timeout():
     assert 0 < STOP_ANSWER_S <= STOP_TIMEOUT_S / 2
 
 
-def test_a_late_command_of_a_stopped_program_moves_nothing(turtle):
+def test_late_command_of_a_stopped_program_is_canceled(turtle):
     """A command that was on its way when its program was ended comes after the stop."""
     body, ears, _ = turtle
     ears.command(id="s", op="stop", ends="key")
@@ -282,7 +282,7 @@ def test_a_late_command_of_a_stopped_program_moves_nothing(turtle):
     assert ears.final("2")["state"] == "succeeded"
 
 
-def test_a_stop_of_a_stranger_locks_no_program_out(turtle):
+def test_stop_with_a_forged_program_name_locks_no_program_out(turtle):
     """Everybody reads who a command is from: that name alone, or anything like it, ends no program."""
     body, ears, _ = turtle
     name = program_of("key")
@@ -295,14 +295,14 @@ def test_a_stop_of_a_stranger_locks_no_program_out(turtle):
         assert ears.final(f"{number}")["state"] == "succeeded"
 
 
-def test_the_stop_can_also_be_invoked_as_an_action(turtle):
+def test_stop_can_be_invoked_as_an_action(turtle):
     body, ears, _ = turtle
     ears.invoke("1", "stop")
     assert ears.final("1")["state"] == "succeeded"
     assert body.stops == 1
 
 
-def test_a_program_that_falls_silent_stops_the_robot(turtle):
+def test_silent_program_stops_the_robot(turtle):
     body, ears, clock = turtle
     ears.invoke("1", "move", program="p")
     eventually(lambda: body.moving)
@@ -324,7 +324,7 @@ def told_of_itself(ears):
     return (signs[-1]["not_ended"], signs[-1]["error"]) if signs else None
 
 
-def test_a_stop_of_the_watchdog_that_fails_is_told_until_one_succeeds(turtle, caplog):
+def test_failed_watchdog_stop_is_reported_until_a_stop_succeeds(turtle, caplog):
     """Nobody asked for it, so there is nobody to answer to: whoever listens is told."""
     body, ears, clock = turtle
     body.stop_fails = Failed("the brake does not answer")
@@ -347,7 +347,7 @@ def test_a_stop_of_the_watchdog_that_fails_is_told_until_one_succeeds(turtle, ca
     eventually(lambda: told_of_itself(ears) == ([], None))
 
 
-def test_a_stop_of_the_watchdog_that_hangs_is_told(turtle):
+def test_hanging_watchdog_stop_is_reported(turtle):
     body, ears, clock = turtle
     body.may_stop.clear()
     ears.invoke("1", "move", program="p")
@@ -359,7 +359,7 @@ def test_a_stop_of_the_watchdog_that_hangs_is_told(turtle):
     eventually(lambda: told_of_itself(ears) == ([], None))
 
 
-def test_a_stop_that_hangs_and_then_fails_is_told(turtle):
+def test_stop_that_hangs_and_then_fails_is_reported(turtle):
     body, ears, clock = turtle
     body.may_stop.clear()
     ears.command(id="s", op="stop")
@@ -370,13 +370,13 @@ def test_a_stop_that_hangs_and_then_fails_is_told(turtle):
     eventually(lambda: told_of_itself(ears) == still)
 
 
-def test_a_stop_at_the_drivers_end_that_fails_is_logged(node, caplog):
+def test_failed_stop_on_driver_close_is_logged(node, caplog):
     with Driver(TURTLE, "Turtle", node) as driver:
         driver.body.stop_fails = Failed("the brake is stuck")
     assert [record.getMessage() for record in caplog.records] == ["Turtle may still move: the brake is stuck"]
 
 
-def test_a_forged_sign_of_life_keeps_no_robot_going(turtle, node):
+def test_forged_heartbeat_does_not_keep_the_robot_moving(turtle, node):
     body, ears, clock = turtle
     attacker = node.new_pub("/Turtle/command", "robot/command")
     ears.invoke("1", "move", program="p")
@@ -391,7 +391,7 @@ def test_a_forged_sign_of_life_keeps_no_robot_going(turtle, node):
     assert not body.moving
 
 
-def test_a_forged_sign_of_life_keeps_no_speed_going():
+def test_forged_heartbeat_does_not_sustain_motion_after_the_action():
     """Also after the action: what it left in motion is its own program's, whoever writes its name."""
     dog = Watchdog(1.0)
     program, forger = ProgramId("p", 1), ProgramId("p", 2)
@@ -405,7 +405,7 @@ def test_a_forged_sign_of_life_keeps_no_speed_going():
     assert dog.bites(1.0, [])
 
 
-def test_only_who_asked_can_cancel_and_anybody_can_stop(turtle, node):
+def test_only_the_caller_can_cancel_and_everyone_can_stop(turtle, node):
     body, ears, _ = turtle
     attacker = node.new_pub("/Turtle/command", "robot/command")
     ears.invoke("1", "move", program="p")
@@ -419,7 +419,7 @@ def test_only_who_asked_can_cancel_and_anybody_can_stop(turtle, node):
     assert not body.moving
 
 
-def test_a_flood_of_commands_or_stops_is_bounded_and_a_stop_gets_through(node, clock):
+def test_flood_of_commands_is_bounded_and_a_stop_is_still_executed(node, clock):
     gate = threading.Event()
     with nep.node("listener", "memory") as other, Driver(TURTLE, "Turtle", node, clock=clock) as driver:
         ears = Ears(other, "Turtle")
@@ -436,7 +436,7 @@ def test_a_flood_of_commands_or_stops_is_bounded_and_a_stop_gets_through(node, c
         assert driver.body.stops >= 1
 
 
-def test_programs_that_only_listen_or_have_stopped_are_not_watched(turtle):
+def test_programs_without_running_actions_or_after_a_stop_are_not_watched(turtle):
     body, ears, clock = turtle
     ears.command(op="alive", **{"from": "looker"})
     ears.invoke("1", "dig", program="p")
@@ -449,7 +449,7 @@ def test_programs_that_only_listen_or_have_stopped_are_not_watched(turtle):
     assert body.stops == 1
 
 
-def test_closing_stops_the_robot_and_answers_everything(node, clock):
+def test_close_stops_the_robot_and_answers_all_actions(node, clock):
     with nep.node("listener", "memory") as other:
         ears = Ears(other, "Turtle")
         driver = Driver(TURTLE, "Turtle", node, clock=clock)
@@ -467,7 +467,7 @@ def test_closing_stops_the_robot_and_answers_everything(node, clock):
 # ---- what the robot tells -------------------------------------------------------------------------
 
 
-def test_sensors_events_and_the_blackboard(turtle):
+def test_sensors_and_events_are_published_with_blackboard_entries(turtle):
     body, ears, _ = turtle
     bumps = ears.listen("bumped")
     board = ears.listen("board", topic="/blackboard")

@@ -61,7 +61,7 @@ def test_moving_robot_is_stopped_after_a_deep_command(turtle, node):
     assert not body.moving
 
 
-def test_one_rize_message_does_not_disable_the_robots_it_names(node, clock):
+def test_deep_rize_message_does_not_disable_the_robots_it_names(node, clock):
     deep = (
         b'{"node":"action","robots":["Ann","Bob"],"state":"idle","primitives":{"primitive":'
         + b"[" * 1000
@@ -79,7 +79,7 @@ def test_one_rize_message_does_not_disable_the_robots_it_names(node, clock):
         assert stops(bob, "2")
 
 
-def test_command_of_more_than_64_kb_is_rejected_with_a_sentence(turtle, caplog):
+def test_command_of_more_than_64_kb_is_rejected_with_a_message(turtle, caplog):
     body, ears, _clock = turtle
     ears.invoke("1", "say", text="a" * MAX_COMMAND_BYTES)
     assert ears.final("1")["error"] == "the message has 64 kB; the limit is 64 kB"
@@ -113,7 +113,7 @@ def busy(node, clock):
         driver.body.go_on.set()
 
 
-def test_stop_is_carried_out_while_the_deciding_thread_is_busy(busy):
+def test_stop_is_executed_while_the_command_thread_is_busy(busy):
     driver, ears, go_on = busy
     ears.command(id="s", op="stop")
     eventually(lambda: driver.body.stops >= 1 and not driver.body.moving)
@@ -157,7 +157,7 @@ def test_command_after_a_stop_in_the_same_batch_is_run(turtle):
 
 
 @pytest.mark.parametrize("order", [("id", "op", "ends"), ("ends", "op", "id")], ids=" ".join)
-def test_large_stop_is_carried_out(busy, order):
+def test_large_stop_command_is_executed(busy, order):
     driver, ears, go_on = busy
     stop = {"id": "s", "op": "stop", "ends": "z" * 1_000_000}
     ears.command(**{name: stop[name] for name in order})
@@ -166,7 +166,7 @@ def test_large_stop_is_carried_out(busy, order):
     assert ears.final("s", "stop")["state"] == "succeeded"
 
 
-def test_stop_is_proven_by_a_run_that_ended_after_the_last_action(turtle):
+def test_stop_is_confirmed_by_a_run_that_ended_after_the_last_action(turtle):
     """An action that outlives the stop function may have moved the robot again."""
     body, ears, _clock = turtle
     ears.invoke("1", "ignore")
@@ -191,7 +191,7 @@ def kill(name: str) -> threading.Thread:
     return thread
 
 
-def test_deciding_thread_that_is_killed_stops_the_robot_and_runs_again(turtle, caplog):
+def test_killed_command_thread_stops_the_robot_and_restarts(turtle, caplog):
     body, ears, _clock = turtle
     ears.invoke("1", "move")
     eventually(lambda: body.moving)
@@ -232,7 +232,7 @@ def test_stops_from_many_threads_are_each_answered_once(node):
 
 
 @pytest.mark.parametrize("error", [ValueError(), RecursionError(), MemoryError(), SystemExit(3)], ids=repr)
-def test_exception_of_one_item_is_counted_and_the_next_one_runs(node, error, caplog):
+def test_exception_in_one_queued_call_is_counted_and_the_next_one_runs(node, error, caplog):
     with Driver(TURTLE, "Other", node) as driver:
 
         def fail() -> None:
@@ -251,7 +251,7 @@ def test_exception_of_one_item_is_counted_and_the_next_one_runs(node, error, cap
         assert other.final("1")["state"] == "succeeded"
 
 
-def test_answer_that_raises_keeps_no_other_stop_from_being_answered(node):
+def test_answer_callback_that_raises_does_not_block_other_stop_answers(node):
     with Driver(TURTLE, "Other", node) as driver:
         told: list[object] = []
 

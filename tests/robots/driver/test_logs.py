@@ -27,7 +27,7 @@ class Clumsy:
         """Stands still at once."""
 
 
-def test_a_drivers_own_records_and_what_breaks_off_are_on_the_bus(master):
+def test_driver_log_records_and_exceptions_are_published(master):
     ended, records = threading.Event(), []
     with nep.node("page") as page:
         page.new_sub("/nep/log", "nep/log", sink=lambda batch: records.extend(each.payload for each in batch))

@@ -53,7 +53,7 @@ def has_robot(network: str) -> bool:
     return any(topic.msg_type == "robot/description" for topic in found(network).topics.values())
 
 
-def test_the_virtual_robot_runs_and_leaves_when_told(network):
+def test_virtual_robot_process_runs_until_terminated(network):
     process = start("-m", "app.robots.simulated", "--name", "Miss Pepper", "--seed", "3", network=network)
     try:
         with nep.node("me", master=network) as node:
@@ -74,7 +74,7 @@ def test_the_virtual_robot_runs_and_leaves_when_told(network):
     eventually(lambda: not has_robot(network))
 
 
-def test_it_ends_with_its_owner(network):
+def test_driver_process_exits_with_its_owner(network):
     owner = subprocess.Popen([sys.executable, "-c", SLEEPER], stdin=subprocess.PIPE)
     robot = start("-m", "app.robots.simulated", "--owner-pid", str(owner.pid), network=network)
     try:
@@ -93,7 +93,7 @@ def test_it_ends_with_its_owner(network):
     eventually(lambda: not has_robot(network))
 
 
-def test_it_does_not_begin_without_its_owner(network):
+def test_driver_process_does_not_start_without_its_owner(network):
     gone = max(psutil.pids()) + 100_000
     assert ended(start("-m", "app.robots.simulated", "--owner-pid", str(gone), network=network), 15) == (
         0,
@@ -101,7 +101,7 @@ def test_it_does_not_begin_without_its_owner(network):
     )
 
 
-def test_it_says_what_it_is_that_it_waits_and_when_the_master_is_there():
+def test_driver_prints_its_name_and_when_it_waits_for_and_finds_the_master():
     with nep.Master("127.0.0.1:0") as gone:
         address = gone.address
     process = start("examples/thirty_line_driver.py", "--name", "Table", network=address)
@@ -122,7 +122,7 @@ def test_it_says_what_it_is_that_it_waits_and_when_the_master_is_there():
     assert (code, errors) == (0, "")
 
 
-def test_it_can_be_ended_while_it_waits_for_a_master():
+def test_driver_can_be_terminated_while_waiting_for_a_master():
     process = start("-m", "app.robots.simulated", network="127.0.0.1:1")
     assert process.stdout is not None
     try:
@@ -135,14 +135,14 @@ def test_it_can_be_ended_while_it_waits_for_a_master():
 
 
 @pytest.mark.parametrize("given", [("--master", "127.0.0.1:x"), ("--name", "x" * 65)], ids=str)
-def test_what_can_not_be_used_is_one_sentence(given, network):
+def test_invalid_driver_options_print_one_line_without_traceback(given, network):
     code, errors = ended(start("examples/thirty_line_driver.py", *given, network=network), 15)
     assert code == 1
     assert "Traceback" not in errors
     assert errors.count("\n") == 1
 
 
-def test_wrong_arguments_are_told(network):
+def test_unknown_driver_argument_is_reported(network):
     code, errors = ended(start("-m", "app.robots.simulated", "--color", "red", network=network), 15)
     assert code == 2
     assert "--color" in errors
@@ -170,7 +170,7 @@ if __name__ == "__main__":
 """
 
 
-def test_a_driver_whose_terminal_takes_nothing_answers_and_ends(network, tmp_path):
+def test_driver_with_a_full_output_pipe_answers_and_exits(network, tmp_path):
     """Nobody reads its pipe, which has room for 64 kB; a terminal with Ctrl+S has less."""
     (tmp_path / "box.py").write_text(CHATTERBOX, encoding="utf-8")
     process = start(str(tmp_path / "box.py"), network=network)
@@ -251,7 +251,7 @@ TYPES = {
     ],
     ids=["works", "types"],
 )
-def test_what_a_driver_declares_is_what_happens(network, tmp_path, functions, given, answers):
+def test_declared_actions_return_the_declared_results(network, tmp_path, functions, given, answers):
     """Over the network, as another program sees it; a Stop behind it is answered in any case."""
     actions = "".join(
         f'{DO}    {head}:\n        """What the test says."""\n        {body}\n'

@@ -24,7 +24,7 @@ def robot():
     return rize.robot("Pepper")
 
 
-def test_a_robot_of_rize_is_marked(robot):
+def test_rize_robot_has_the_rize_dialect_and_capabilities(robot):
     assert (robot.name, robot.dialect, robot.virtual) == ("Pepper", "rize", False)
     assert not robot.safe_stop.confirmed
     assert robot.safe_stop.watchdog_s is None
@@ -50,7 +50,7 @@ def test_a_robot_of_rize_is_marked(robot):
          '{"primitive":"track_people_with","input":"Head","options":{"LeftArm":false,"RightArm":false}}'),
     ],
 )  # fmt: skip
-def test_the_command_is_the_exact_json_of_rize(robot, action, given, primitive):
+def test_command_is_the_exact_json_of_rize(robot, action, given, primitive):
     command = rize.to_command(robot, action, given, "acti20261120075304-0")
     expected = (
         '{"node":"action","primitives":' + primitive + ',"robots":"Pepper","state":"idle","times":0,'
@@ -59,7 +59,7 @@ def test_the_command_is_the_exact_json_of_rize(robot, action, given, primitive):
     assert json.dumps(command, separators=(",", ":")) == expected
 
 
-def test_bad_input_never_leaves(robot):
+def test_invalid_input_is_rejected_before_sending(robot):
     with pytest.raises(RobotInputError) as caught:
         rize.to_command(robot, "walk", {"direction": "sideways"}, "1")
     assert caught.value.sentences == ("walk: direction must be forwards or backwards",)
@@ -67,14 +67,14 @@ def test_bad_input_never_leaves(robot):
         rize.to_command(robot, "fly", {}, "1")
 
 
-def test_the_stop_is_what_older_drivers_know(robot):
+def test_stop_command_has_the_fields_that_older_drivers_read(robot):
     stop = rize.to_command(robot, "stop", {}, "7")
     assert stop["node"] == "cancel"
     action = rize.to_command(robot, "say", {"text": "hi"}, "8")
     assert stop.keys() == action.keys()  # drivers that do not know a cancel read what every action has
 
 
-def test_answers_are_read(robot):
+def test_rize_answers_are_parsed(robot):
     sent = rize.to_command(robot, "say", {"text": "hello"}, "1")
     good = rize.from_answer({**sent, "state": "success"})
     assert (good["id"], good["op"], good["state"], good["error"]) == ("1", "invoke", "succeeded", None)
@@ -85,7 +85,7 @@ def test_answers_are_read(robot):
     assert rize.from_answer({"state": "success"}) is None
 
 
-def test_a_ready_robot_is_heard():
+def test_ready_message_of_a_robot_is_parsed():
     assert rize.ready({"robot": "ready", "name": "Pepper"}) == "Pepper"
     assert rize.ready({"robot": "connection_error", "name": "Pepper"}) is None
     assert rize.ready(["x"]) is None
@@ -159,7 +159,7 @@ def speaker(request: pytest.FixtureRequest) -> Speaker:
     )
 
 
-def test_rize_gets_its_own_object_back(speaker):
+def test_rize_receives_its_command_back_with_the_result(speaker):
     speaker.let()
     command = speaker.command(SAY)
     (answer,) = speaker.answered()
@@ -167,7 +167,7 @@ def test_rize_gets_its_own_object_back(speaker):
     assert [each for each in speaker.ears.heard["answer"] if each["op"] != "alive"] == []
 
 
-def test_several_primitives_are_one_answer_and_numbers_come_as_text_and_go_by_name(speaker):
+def test_several_primitives_are_answered_once_with_text_numbers_and_named_inputs(speaker):
     speaker.let()
     command = speaker.command(speaker.several)
     assert speaker.answered() == [{**command, "state": "success"}]
@@ -186,13 +186,13 @@ def test_several_primitives_are_one_answer_and_numbers_come_as_text_and_go_by_na
         [SAY, {"primitive": "fly"}],
     ],
 )
-def test_what_rize_can_not_have_is_a_failure(speaker, primitives):
+def test_unsupported_rize_command_is_answered_with_failure(speaker, primitives):
     speaker.let()
     command = speaker.command(speaker.beyond if primitives == "beyond" else primitives)
     assert speaker.answered() == [{**command, "state": "failure"}]
 
 
-def test_commands_for_other_robots_are_left_alone(speaker):
+def test_commands_for_other_robots_are_ignored(speaker):
     speaker.let()
     for robots in (f"{speaker.ears.name}2", ["a", "b"], None):
         speaker.command(SAY, robots=robots, id="another's")
@@ -200,7 +200,7 @@ def test_commands_for_other_robots_are_left_alone(speaker):
     assert [answer["id"] for answer in speaker.answered()] == ["mine"]
 
 
-def test_rize_is_told_of_a_stop_and_can_cancel(speaker):
+def test_stop_is_reported_to_rize_and_rize_can_cancel(speaker):
     first = speaker.command(speaker.long)
     eventually(lambda: speaker.ears.invoke("q", "say", text="x") or speaker.ears.states("q"))
     speaker.ears.command(id="s", op="stop")
@@ -210,7 +210,7 @@ def test_rize_is_told_of_a_stop_and_can_cancel(speaker):
     assert speaker.answered(2)[1] == {**second, "state": "failure"}
 
 
-def test_a_program_and_a_driver_understand_each_other(speaker):
+def test_program_and_rize_driver_exchange_commands_and_results(speaker):
     """The program takes it for a robot of RIZE, which tells nothing of itself."""
     speaker.let()
     robot = rize.robot(speaker.ears.name)
@@ -231,7 +231,7 @@ def test_a_program_and_a_driver_understand_each_other(speaker):
 # ---- one driver ------------------------------------------------------------------------------------------
 
 
-def test_the_kit_does_what_was_said_to_it_alone(turtle):
+def test_driver_kit_executes_only_commands_for_its_robot(turtle):
     body, ears, _ = turtle
     body.go_on.set()
     command = {"node": "action", "primitives": SAY, "state": "idle", "times": 0, "id": "1"}
@@ -242,7 +242,7 @@ def test_the_kit_does_what_was_said_to_it_alone(turtle):
     assert ears.heard["answer"] == []
 
 
-def test_the_kit_runs_a_list_of_primitives_side_by_side(turtle):
+def test_driver_kit_runs_a_list_of_primitives_in_parallel(turtle):
     body, ears, clock = turtle
     wait = primitive("wait", "2")
     both = {"node": "action", "primitives": [SAY, wait], "robots": ["Other", "Turtle"], "id": "1"}
@@ -255,7 +255,7 @@ def test_the_kit_runs_a_list_of_primitives_side_by_side(turtle):
     assert ears.heard["action_state"][0]["primitives"] == [SAY, wait]
 
 
-def test_the_virtual_robot_walks_backwards(pepper):
+def test_virtual_robot_walks_backwards(pepper):
     walk = primitive("walk", "backwards", {"meters": 0.1})
     pepper.rize(
         {"node": "action", "primitives": walk, "robots": "Pepper", "state": "idle", "times": 0, "id": "2"}
@@ -265,7 +265,7 @@ def test_the_virtual_robot_walks_backwards(pepper):
     eventually(lambda: pepper.newest("state")["x"] < -0.55)
 
 
-def test_the_example_driver_of_rize_is_driven(network):
+def test_example_rize_driver_executes_commands(network):
     """The same 30 lines run on the original nep; here on ours, which has the paper's spelling."""
     process = start("examples/rize_driver.py", "Turtle", network=network)
     robot = rize.robot("Turtle")

@@ -56,7 +56,7 @@ def ran(world: World, *names: str) -> Callable[[], bool]:
     return lambda: world.began == [*names]
 
 
-def test_nobody_overtakes_who_waits_for_more(world: World) -> None:
+def test_tasks_do_not_overtake_one_waiting_for_more_resources(world: World) -> None:
     world.ask("wave", ("arm",))
     eventually(ran(world, "wave"))
     world.ask("dance", ("arm", "legs"))
@@ -71,7 +71,7 @@ def test_nobody_overtakes_who_waits_for_more(world: World) -> None:
     eventually(ran(world, "wave", "blink", "dance", "walk"))
 
 
-def test_what_can_not_be_canceled_is_not_replaced(world: World) -> None:
+def test_non_cancellable_task_is_not_replaced(world: World) -> None:
     world.ask("kick", ("legs",), cancellable=False)
     eventually(ran(world, "kick"))
     world.ask("walk", ("legs",), on_busy="replace")
@@ -82,7 +82,7 @@ def test_what_can_not_be_canceled_is_not_replaced(world: World) -> None:
     assert world.states("kick") == ["accepted", "running", "succeeded"]
 
 
-def test_a_queue_that_is_full_refuses_with_a_sentence(world: World) -> None:
+def test_full_queue_rejects_a_task_with_a_message(world: World) -> None:
     world.ask("first", ("arm",))
     eventually(ran(world, "first"))
     for number in range(50):
@@ -93,7 +93,7 @@ def test_a_queue_that_is_full_refuses_with_a_sentence(world: World) -> None:
     assert world.states("n49") == ["accepted"]
 
 
-def test_what_uses_nothing_does_not_run_without_end(world: World) -> None:
+def test_number_of_running_tasks_without_resources_is_limited(world: World) -> None:
     for number in range(50):
         world.ask(f"n{number}", ())
     eventually(lambda: len(world.began) == 50)
@@ -105,7 +105,7 @@ def test_what_uses_nothing_does_not_run_without_end(world: World) -> None:
     eventually(lambda: world.states("later") == ["accepted", "running"])
 
 
-def test_a_stop_is_answered_when_nothing_runs_any_more(world: World) -> None:
+def test_stop_is_answered_after_all_tasks_ended(world: World) -> None:
     world.ask("kick", ("legs",), cancellable=False, obeys=False)
     eventually(ran(world, "kick"))
     stopped: list[Answer] = []

@@ -50,7 +50,7 @@ from tests.robots.conftest import Ears, eventually
          {"type": "number", "title": "how far", "default": 1.0, "rb:advanced": True}),
     ],
 )  # fmt: skip
-def test_types_become_schemas(kind, schema):
+def test_types_are_converted_to_schemas(kind, schema):
     assert schema_of(kind) == schema
 
 
@@ -69,12 +69,12 @@ def test_types_become_schemas(kind, schema):
         Annotated[float, Range(0, 1, unit=5)],
     ],
 )
-def test_what_can_not_be_described_is_refused_at_once(kind):
+def test_unsupported_types_are_rejected(kind):
     with pytest.raises(TypeError):
         schema_of(kind)
 
 
-def test_defaults_make_a_value_optional():
+def test_parameters_with_defaults_are_optional():
     def walk(self: object, call: Call, far: float, speed: float = 0.2) -> None:
         """Walk."""
 
@@ -88,7 +88,7 @@ def test_defaults_make_a_value_optional():
     }
 
 
-def test_untyped_parameters_are_refused():
+def test_untyped_parameters_are_rejected():
     def walk(self, call, far):
         """Walk."""
 
@@ -96,7 +96,7 @@ def test_untyped_parameters_are_refused():
         input_schema(walk)
 
 
-def test_a_robot_without_one_stop_is_refused():
+def test_robot_without_exactly_one_stop_is_rejected():
     class NoStop:
         @action("go", category="Movement", icon="play")
         def go(self, call: Call) -> None:
@@ -116,7 +116,7 @@ def test_a_robot_without_one_stop_is_refused():
             Kind(model="x", title="X", body=body)
 
 
-def test_a_block_text_that_names_nothing_is_refused():
+def test_block_text_with_an_unknown_parameter_is_rejected():
     class Wrong:
         @action("go %far", category="Movement", icon="play")
         def go(self, call: Call) -> None:
@@ -188,7 +188,7 @@ POSE = {
         (Literal["a", 1], {"enum": ["a", 1]}),
     ],
 )  # fmt: skip
-def test_richer_types_become_schemas(kind, schema):
+def test_composite_types_are_converted_to_schemas(kind, schema):
     assert schema_of(kind) == schema
 
 
@@ -210,7 +210,7 @@ def test_richer_types_become_schemas(kind, schema):
         (Box, {"width": 3.0}, {"width": 3}),
     ],
 )
-def test_values_go_to_python_and_back(kind, json, python):
+def test_values_round_trip_between_json_and_python(kind, json, python):
     made = given(kind, json)
     assert made == python
     assert type(made) is type(python)
@@ -239,13 +239,13 @@ def test_values_go_to_python_and_back(kind, json, python):
         (object, object(), "the value must be a JSON value, not object"),
     ],
 )
-def test_what_is_of_another_type_is_said(kind, value, sentence):
+def test_value_of_another_type_is_rejected_with_a_message(kind, value, sentence):
     with pytest.raises(RobotValueError) as caught:
         told(kind, value)
     assert str(caught.value) == sentence
 
 
-def test_numbers_and_arrays_of_numpy_are_numbers_and_lists():
+def test_numpy_numbers_and_arrays_become_numbers_and_lists():
     assert told(float, np.float32(0.5)) == 0.5
     assert told(int, np.int64(7)) == 7
     assert told(bool, np.bool_(True)) is True
@@ -253,7 +253,7 @@ def test_numbers_and_arrays_of_numpy_are_numbers_and_lists():
     assert json.dumps(told(object, {"a": [np.int8(3)]})) == '{"a": [3]}'
 
 
-def test_what_holds_itself_is_refused():
+def test_recursive_type_is_rejected():
     @dataclass
     class Tree:
         below: list[Tree]
@@ -332,7 +332,7 @@ def arm(node):
         yield driver.body, Ears(other, "Arm")
 
 
-def test_an_action_gets_values_of_its_types(arm):
+def test_action_receives_values_of_its_declared_types(arm):
     body, ears = arm
     ears.invoke("1", "take", angles=[1, 2.5])
     assert ears.final("1")["state"] == "succeeded"
@@ -361,7 +361,7 @@ def test_an_action_gets_values_of_its_types(arm):
         ({"angles": None}, "take: angles must be a list"),
     ],
 )
-def test_wrong_values_inside_others_are_refused(arm, wrong, sentence):
+def test_invalid_nested_values_are_rejected(arm, wrong, sentence):
     body, ears = arm
     ears.invoke("1", "take", **wrong)
     assert ears.final("1")["error"] == sentence
@@ -382,7 +382,7 @@ def test_wrong_values_inside_others_are_refused(arm, wrong, sentence):
         ("anything", None, {}),
     ],
 )
-def test_what_a_function_returns_is_the_output(arm, asked, returned, output):
+def test_return_value_of_a_function_is_the_output(arm, asked, returned, output):
     body, ears = arm
     body.gives = returned
     ears.invoke("1", asked)
@@ -402,7 +402,7 @@ def test_what_a_function_returns_is_the_output(arm, asked, returned, output):
         ("anything", {"a": ["\ud800"]}, "the value must be valid Unicode text"),
     ],
 )
-def test_a_wrong_return_is_a_failure_with_a_sentence(arm, asked, returned, why):
+def test_return_value_of_another_type_is_a_failure(arm, asked, returned, why):
     body, ears = arm
     body.gives = returned
     ears.invoke("1", asked)
@@ -411,7 +411,7 @@ def test_a_wrong_return_is_a_failure_with_a_sentence(arm, asked, returned, why):
     assert answer["error"] == f"{asked} finished, but its result is invalid: {why}"
 
 
-def test_the_description_tells_what_is_returned():
+def test_description_declares_the_output_of_an_action():
     actions = ARM.thing_model["actions"]
     assert actions["measure"]["output"]["properties"] == {
         "value": {"title": "width", "type": "number", "unit": "cm"}
@@ -422,7 +422,7 @@ def test_the_description_tells_what_is_returned():
     assert [(field.name, field.title, field.unit) for field in described.output] == [("value", "width", "cm")]
 
 
-def test_sensors_and_events_tell_values_of_their_types(arm):
+def test_sensors_and_events_publish_values_of_their_declared_types(arm):
     body, ears = arm
     poses, limits, heats, bumps = (ears.listen(leaf) for leaf in ("pose", "limits", "heat", "bumped"))
     body.link.sense("pose", Pose(1.0))
@@ -439,7 +439,7 @@ def test_sensors_and_events_tell_values_of_their_types(arm):
 
 
 @pytest.mark.usefixtures("pseudo")
-def test_what_is_of_another_type_is_one_translated_sentence():
+def test_type_error_message_is_translated():
     for kind, value in (
         (float, "zz"),
         (Pose, {"y": 1}),

@@ -47,7 +47,7 @@ def load(file: Path, text: str) -> object:
     return module.ROBOT
 
 
-def test_the_good_one_is_good(tmp_path):
+def test_valid_driver_is_accepted(tmp_path):
     load(tmp_path / "table.py", GOOD)
 
 
@@ -82,7 +82,7 @@ def test_the_good_one_is_good(tmp_path):
          USED + "table.py, line 9: actions.turn.rb:block.icon"),
     ],
 )  # fmt: skip
-def test_what_is_wrong_is_said_with_its_line(tmp_path, old, new, sentence):
+def test_invalid_declaration_is_reported_with_its_line(tmp_path, old, new, sentence):
     text = GOOD.replace(old, new)
     assert text != GOOD
     if sentence is None:  # a sensor whose name is taken by something else is none: nothing is wrong
@@ -94,7 +94,7 @@ def test_what_is_wrong_is_said_with_its_line(tmp_path, old, new, sentence):
     assert "\n" not in str(caught.value)
 
 
-def test_it_ends_the_program_with_the_sentence_and_no_traceback(tmp_path):
+def test_invalid_driver_exits_with_an_error_message_and_no_traceback(tmp_path):
     driver = tmp_path / "table.py"
     driver.write_text(GOOD.replace("Range(-1, 1)", 'Range(-1, 1, unit="sec")'), encoding="utf-8")
     ended = subprocess.run(

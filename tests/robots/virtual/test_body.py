@@ -27,7 +27,7 @@ def events(body: Body) -> list[tuple[str, dict[str, object]]]:
     return [(happening.event, happening.data) for happening in body.happenings]
 
 
-def test_it_turns_by_the_angle_and_not_faster_than_asked():
+def test_robot_turns_by_the_angle_within_the_requested_speed():
     body = Body()
     motion = body.turn(90, 45)
     seconds = run(body, lambda: motion.done)
@@ -38,7 +38,7 @@ def test_it_turns_by_the_angle_and_not_faster_than_asked():
     assert body.theta_deg == pytest.approx(-90, abs=1e-6)
 
 
-def test_it_walks_where_it_looks():
+def test_robot_walks_in_its_heading():
     body = Body(theta_deg=180.0)
     motion = body.walk(1.0, 0.3)
     run(body, lambda: motion.done)
@@ -49,7 +49,7 @@ def test_it_walks_where_it_looks():
     assert body.x == pytest.approx(-1.0)
 
 
-def test_it_stops_before_the_person_and_says_that_it_bumped():
+def test_robot_stops_in_front_of_a_person_and_publishes_a_bumped_event():
     body = Body()
     motion = body.walk(2.0, 0.35)
     run(body, lambda: motion.done)
@@ -62,7 +62,7 @@ def test_it_stops_before_the_person_and_says_that_it_bumped():
 
 
 @pytest.mark.parametrize("start", [lambda b: b.walk(2.0, 0.35), lambda b: b.turn(360, 90)])
-def test_it_brakes_from_full_speed_in_a_tenth_of_a_second(start):
+def test_robot_brakes_from_full_speed_within_a_tenth_of_a_second(start):
     body = Body(room=Room().moved("person", 0.0, 2.0))
     start(body)
     for _ in range(30):
@@ -78,7 +78,7 @@ def test_it_brakes_from_full_speed_in_a_tenth_of_a_second(start):
     assert (body.x, body.y, body.theta_deg) == standing
 
 
-def test_the_head_keeps_its_speed_and_its_limits():
+def test_head_stays_within_its_speed_and_angle_limits():
     body = Body()
     body.head_yaw.aim(200)
     body.step(0.5)
@@ -88,7 +88,7 @@ def test_the_head_keeps_its_speed_and_its_limits():
     assert body.head_yaw.angle == 119.0
 
 
-def test_words_take_as_long_as_their_letters():
+def test_speech_duration_depends_on_the_text_length():
     body = Body()
     speech = body.speak("x" * 50)
     assert body.speech == "x" * 50
@@ -103,7 +103,7 @@ def test_words_take_as_long_as_their_letters():
     assert (body.speech, second.done) == (None, True)
 
 
-def test_it_waves_and_puts_its_arm_down():
+def test_robot_waves_and_lowers_its_arm():
     body = Body()
     wave = body.wave("right")
     body.step(0.8)
@@ -114,7 +114,7 @@ def test_it_waves_and_puts_its_arm_down():
     assert body.still
 
 
-def test_a_touch_is_told_once_and_its_end_too():
+def test_touch_and_release_are_each_published_once():
     body = Body()
     body.touch("head", down=True)
     body.touch("head", down=True)
@@ -129,7 +129,7 @@ def test_a_touch_is_told_once_and_its_end_too():
     ]
 
 
-def test_a_short_tap_lasts_as_long_as_a_program_needs_to_see_it_and_a_hand_that_stays_longer():
+def test_short_tap_lasts_a_minimum_time_and_a_held_touch_lasts_longer():
     body = Body()
     body.touch("head", down=True)
     body.touch("head", down=False)
@@ -146,7 +146,7 @@ def test_a_short_tap_lasts_as_long_as_a_program_needs_to_see_it_and_a_hand_that_
     assert list(body.touched) == ["head"]
 
 
-def test_how_much_of_a_speech_is_spoken_is_told():
+def test_spoken_share_of_a_speech_is_published():
     body = Body()
     speech = body.speak("x" * 100)
     body.step(speech.seconds / 2)
@@ -155,7 +155,7 @@ def test_how_much_of_a_speech_is_spoken_is_told():
     assert body.spoken == 0.0
 
 
-def test_what_a_person_said_is_told_for_a_moment():
+def test_heard_word_is_shown_for_some_seconds():
     body = Body()
     assert drawable(body)["heard"] == ""
     body.hear("hello")
@@ -166,7 +166,7 @@ def test_what_a_person_said_is_told_for_a_moment():
     assert body.heard == "hello"  # the sensor keeps it
 
 
-def test_the_battery_drains_faster_when_it_moves():
+def test_battery_drains_faster_while_moving():
     standing, walking = Body(), Body(theta_deg=180.0)
     walking.walk(1.5, 0.3)
     standing.step(4)
@@ -174,7 +174,7 @@ def test_the_battery_drains_faster_when_it_moves():
     assert 84 < walking.battery < standing.battery < 84.4
 
 
-def test_reset_puts_everything_back():
+def test_reset_restores_pose_touches_and_room():
     body = Body()
     body.turn(90, 90)
     body.step(1)
@@ -185,7 +185,7 @@ def test_reset_puts_everything_back():
     assert (body.x, body.theta_deg, body.touched, body.room) == (-0.5, 0.0, {}, Room())
 
 
-def test_the_drawing_has_what_studio_draws():
+def test_drawable_state_has_the_fields_that_studio_draws():
     body = Body()
     body.touch("head", down=True)
     body.speak("Hi")
@@ -202,7 +202,7 @@ def test_the_drawing_has_what_studio_draws():
 @given(
     st.lists(st.tuples(st.sampled_from(["walk", "turn"]), st.floats(-2, 2), st.floats(0.1, 2)), max_size=6)
 )
-def test_it_is_never_inside_anything(plan):
+def test_robot_never_overlaps_obstacles(plan):
     body = Body()
     for what, amount, seconds in plan:
         if what == "walk":
@@ -217,7 +217,7 @@ def test_it_is_never_inside_anything(plan):
 
 
 @given(st.floats(-3, 3), st.floats(0.05, 0.5))
-def test_a_movement_ends_exactly(amount, speed):
+def test_motion_ends_exactly_at_its_amount(amount, speed):
     motion = Motion.walk(amount, speed)
     total = 0.0
     for _ in range(20000):
@@ -229,7 +229,7 @@ def test_a_movement_ends_exactly(amount, speed):
     assert total == pytest.approx(amount, abs=1e-9)
 
 
-def test_a_joint_holds():
+def test_joint_holds_its_angle():
     joint = Joint(100, -10, 10)
     joint.aim(5)
     joint.step(0.01)

@@ -24,7 +24,7 @@ def eyes() -> ObjectDetector:
     return ObjectDetector()
 
 
-def test_a_point_ahead_is_in_the_middle_and_left_is_left():
+def test_lens_projects_a_point_ahead_to_the_centre_and_a_left_point_to_the_left():
     lens = Lens((0, 0, 1), 0.0, 0.0)
     ahead, left, up = lens.to_pixels(
         lens.to_camera(np.array([[2, 0, 1], [2, 0.5, 1], [2, 0, 1.5]], dtype=float))
@@ -38,7 +38,7 @@ def test_a_point_ahead_is_in_the_middle_and_left_is_left():
     assert down.to_pixels(down.to_camera(np.array([[2.0, 0, 1]])))[0][1] < 120
 
 
-def test_what_is_behind_the_camera_has_no_outline():
+def test_shape_behind_the_camera_has_no_outline():
     lens = Lens((0, 0, 1), 0.0, 0.0)
     behind = np.array([[-1, -1, 0], [-1, 1, 0], [-1, 1, 2]], dtype=float)
     assert len(lens.outline(behind)) == 0
@@ -47,7 +47,7 @@ def test_what_is_behind_the_camera_has_no_outline():
 
 
 @pytest.mark.parametrize("place", [(1.95, -0.78), (1.6, -0.5), (2.5, 0.9), (2.2, -1.2)])
-def test_the_ball_is_found_where_it_lies(camera, eyes, place):
+def test_ball_is_detected_at_its_position(camera, eyes, place):
     body = Body(room=Room().moved("person", -2.0, -2.0).moved("ball", *place))
     lens = lens_of(body)
     (found,) = eyes.balls(camera.picture(body.room, lens))
@@ -61,7 +61,7 @@ def test_the_ball_is_found_where_it_lies(camera, eyes, place):
     assert left == pytest.approx(bearing, abs=1.5)
 
 
-def test_no_ball_no_detection(camera, eyes):
+def test_ball_outside_the_view_is_not_detected(camera, eyes):
     for theta in range(0, 360, 30):
         body = Body(room=Room().moved("ball", -2.2, -2.2), theta_deg=float(theta) - 60)
         lens = lens_of(body)
@@ -72,7 +72,7 @@ def test_no_ball_no_detection(camera, eyes):
 
 
 @pytest.mark.parametrize("theta", [45.0, 60.0, 75.0])
-def test_the_marker_is_read(camera, eyes, theta):
+def test_marker_is_detected(camera, eyes, theta):
     body = Body(theta_deg=theta)
     lens = lens_of(body)
     (found,) = eyes.markers(camera.picture(body.room, lens))
@@ -82,7 +82,7 @@ def test_the_marker_is_read(camera, eyes, theta):
     assert found.middle == pytest.approx(tuple(expected), abs=3)
 
 
-def test_the_face_is_where_the_skin_is(camera, eyes):
+def test_face_is_detected_at_the_skin_pixels(camera, eyes):
     body = Body()
     lens = lens_of(body)
     picture = camera.picture(body.room, lens)
@@ -97,7 +97,7 @@ def test_the_face_is_where_the_skin_is(camera, eyes):
     assert above.sum() < 250  # hair
 
 
-def test_a_face_counts_only_when_it_can_be_seen(eyes):
+def test_face_is_detected_only_while_visible(eyes):
     def seen(body: Body) -> bool:
         return bool(eyes.faces(body.room, lens_of(body)))
 
@@ -111,7 +111,7 @@ def test_a_face_counts_only_when_it_can_be_seen(eyes):
     assert not seen(hidden)
 
 
-def test_detections_name_the_largest_first(eyes):
+def test_detection_message_has_the_name_of_the_largest_detection(eyes):
     body = Body()
     told = message(eyes.faces(body.room, lens_of(body)), lens_of(body))
     assert (told["count"], told["name"], told["width"], told["height"]) == (1, "Aiko", 320, 240)
@@ -119,7 +119,7 @@ def test_detections_name_the_largest_first(eyes):
     assert message([], lens_of(body))["name"] is None
 
 
-def test_the_same_moment_gives_the_same_picture(camera):
+def test_same_state_gives_the_same_camera_image(camera):
     body = Body()
     first = camera.picture(body.room, lens_of(body))
     again = Camera(Room()).picture(body.room, lens_of(body))
@@ -131,7 +131,7 @@ def test_the_same_moment_gives_the_same_picture(camera):
     assert not np.array_equal(first, camera.picture(body.room, lens_of(body)))
 
 
-def test_every_pixel_is_painted_wherever_it_looks(camera):
+def test_every_pixel_is_painted_in_all_directions(camera):
     room = Room().moved("ball", -2.3, -2.3)
     for theta in range(0, 360, 15):
         for pitch in (-40.0, 0.0, 36.0):

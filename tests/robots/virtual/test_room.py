@@ -7,7 +7,7 @@ import pytest
 from app.robots.virtual.room import Room
 
 
-def test_the_robot_fits_where_nothing_stands():
+def test_space_is_free_only_where_no_obstacle_stands():
     room = Room()
     assert room.free(-0.5, 0.0, 0.27)
     assert not room.free(room.people[0].x + 0.3, room.people[0].y, 0.27)
@@ -15,7 +15,7 @@ def test_the_robot_fits_where_nothing_stands():
     assert not room.free(room.x_max - 0.2, 0.0, 0.27)
 
 
-def test_a_ray_ends_at_the_first_thing():
+def test_ray_ends_at_the_first_obstacle():
     room = Room().moved("Aiko", 1.0, 0.0)
     assert room.distance_ahead(-0.5, 0.0, 0.0) == pytest.approx(1.5 - room.people[0].radius)
     assert room.distance_ahead(-0.5, 0.0, 180.0) == pytest.approx(2.0)
@@ -25,7 +25,7 @@ def test_a_ray_ends_at_the_first_thing():
     assert room.distance_ahead(0.0, 1.0, 45.0) == pytest.approx(1.5 * math.sqrt(2))
 
 
-def test_things_are_moved_by_name_and_stay_inside():
+def test_objects_are_moved_by_name_and_stay_inside_the_room():
     room = Room()
     assert (room.moved("ball", 1, 1).balls[0].x, room.moved("ball", 1, 1).balls[0].y) == (1, 1)
     assert room.moved("Aiko", 99, -99).people[0].x == room.x_max - room.people[0].radius
@@ -33,7 +33,7 @@ def test_things_are_moved_by_name_and_stay_inside():
     assert room.moved("piano", 1, 1) == room
 
 
-def test_a_ball_is_pushed_away():
+def test_ball_is_pushed_away():
     room = Room().moved("ball", 0.0, 0.0)
     pushed = room.pushed_ball(-0.3, 0.0, 0.27)
     assert pushed.balls[0].x == pytest.approx(-0.3 + 0.27 + room.balls[0].radius)
@@ -41,7 +41,7 @@ def test_a_ball_is_pushed_away():
     assert room.pushed_ball(0.0, 0.0, 0.27).balls[0].x == pytest.approx(0.42)
 
 
-def test_furniture_hides_what_is_low_behind_it():
+def test_furniture_hides_low_points_behind_it():
     room = Room()
     table = room.boxes[0]
     behind = (table.x, table.y + table.depth, 0.3)

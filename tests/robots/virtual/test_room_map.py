@@ -16,11 +16,11 @@ def clock(start: int = 1000):
     return itertools.count(start).__next__
 
 
-def test_a_new_map_is_the_usual_room() -> None:
+def test_empty_map_is_the_default_room() -> None:
     assert RoomMap().room() == Room()
 
 
-def test_what_one_changes_the_others_have_too_also_by_way_of_json() -> None:
+def test_room_changes_are_merged_from_json_messages() -> None:
     one, other = RoomMap(clock_ns=clock()), RoomMap(clock_ns=clock())
     one.move("ball", 0.5, 1.0)
     one.add("person", -1.0, -1.0)
@@ -33,7 +33,7 @@ def test_what_one_changes_the_others_have_too_also_by_way_of_json() -> None:
     assert not other.merge(one.message())
 
 
-def test_maps_end_equal_whatever_order_messages_come_in() -> None:
+def test_maps_converge_for_any_order_of_messages() -> None:
     chance = random.Random(7)
     maps = [RoomMap(clock_ns=lambda: chance.randrange(5)) for _ in range(3)]  # clocks that hardly go on
     told = []
@@ -55,7 +55,7 @@ def test_maps_end_equal_whatever_order_messages_come_in() -> None:
     assert maps[0].room() == maps[1].room() == maps[2].room()
 
 
-def test_the_last_writer_wins_also_when_a_clock_goes_backwards() -> None:
+def test_last_writer_wins_even_if_a_clock_goes_backwards() -> None:
     one, other = RoomMap(clock_ns=clock(10_000)), RoomMap(clock_ns=lambda: 1)
     one.move("ball", 1.0, 1.0)
     other.merge(one.message())
@@ -64,7 +64,7 @@ def test_the_last_writer_wins_also_when_a_clock_goes_backwards() -> None:
     assert (one.room().balls[0].x, other.room().balls[0].x) == (2.0, 2.0)
 
 
-def test_things_stay_inside_and_there_are_only_so_many_of_a_kind() -> None:
+def test_objects_stay_inside_and_their_number_per_kind_is_limited() -> None:
     made = RoomMap()
     assert made.move("table", 99.0, -99.0)
     table = made.room().thing("table")
@@ -97,7 +97,7 @@ def test_damaged_messages_change_nothing(things) -> None:
     assert made.room() == Room()
 
 
-def test_a_flood_of_things_has_an_end() -> None:
+def test_number_of_merged_objects_is_limited() -> None:
     made = RoomMap()
     for start in range(0, 1000, 10):
         flood = [

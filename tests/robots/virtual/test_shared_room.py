@@ -30,7 +30,7 @@ def with_other(room: Room, other: Other = OTHER) -> Room:
 # ---- one body ---------------------------------------------------------------------------------------
 
 
-def test_a_robot_stops_before_another_one_and_its_distance_sees_it() -> None:
+def test_robot_stops_in_front_of_another_robot_and_measures_its_distance() -> None:
     body = Body(room=with_other(Room()))
     assert body.distance == pytest.approx(1.1 - RADIUS - OTHER.radius, abs=0.01)
     motion = body.walk(2.0, 0.35)
@@ -44,7 +44,7 @@ def test_a_robot_stops_before_another_one_and_its_distance_sees_it() -> None:
     assert not away.blocked
 
 
-def test_one_that_stands_in_another_may_leave_it() -> None:
+def test_overlapping_robot_can_only_move_away() -> None:
     body = WheelBody(room=with_other(Room()), x=0.65, y=0.0, theta_deg=0.0)
     body.drive(0.3, 0.0)
     body.step(1.0)
@@ -55,7 +55,7 @@ def test_one_that_stands_in_another_may_leave_it() -> None:
     assert body.x == 0.65
 
 
-def test_the_camera_sees_the_other_robots() -> None:
+def test_camera_shows_the_other_robots() -> None:
     body = Body()
     camera = Camera(body.room)
     empty = replace(with_other(Room()), others=())
@@ -70,7 +70,7 @@ def test_the_camera_sees_the_other_robots() -> None:
 # ---- held by a person -----------------------------------------------------------------------------
 
 
-def test_one_that_is_held_stands_still_and_goes_on_when_it_is_put_down() -> None:
+def test_held_robot_stands_still_and_continues_after_release() -> None:
     body = Body(theta_deg=180.0)
     motion = body.walk(0.5, 0.3)
     body.step(0.5)
@@ -86,7 +86,7 @@ def test_one_that_is_held_stands_still_and_goes_on_when_it_is_put_down() -> None
     assert body.y == -1.0
 
 
-def test_a_stop_ends_what_one_does_that_is_held() -> None:
+def test_stop_ends_the_motion_of_a_held_robot() -> None:
     body = Body(theta_deg=180.0)
     motion = body.walk(0.5, 0.3)
     body.step(0.5)
@@ -98,7 +98,7 @@ def test_a_stop_ends_what_one_does_that_is_held() -> None:
 
 
 @pytest.mark.parametrize("body", [Body(), WheelBody()], ids=["pepper", "turtle"])
-def test_a_robot_is_carried_to_walls_and_furniture_and_not_into_them(body) -> None:
+def test_robot_is_carried_up_to_walls_and_furniture_but_not_into_them(body) -> None:
     body.carry(99.0, 0.6)
     assert body.room.x_max - 0.3 < body.x < body.room.x_max
     before = (body.x, body.y)
@@ -111,7 +111,7 @@ def test_a_robot_is_carried_to_walls_and_furniture_and_not_into_them(body) -> No
 # ---- who is there ------------------------------------------------------------------------------------
 
 
-def test_who_tells_nothing_any_more_is_gone() -> None:
+def test_silent_robot_is_removed_from_the_neighbours() -> None:
     time = FakeClock()
     seen = Neighbours("Pepper", time, began_ns=5)
     told: list[dict[str, object]] = []
@@ -125,7 +125,7 @@ def test_who_tells_nothing_any_more_is_gone() -> None:
     assert seen.others() == ()
 
 
-def test_the_one_that_came_later_makes_way() -> None:
+def test_later_robot_makes_way() -> None:
     time = FakeClock()
     first, second = Neighbours("A", time, began_ns=1), Neighbours("B", time, began_ns=2)
     first.publish_position(Other("A", 0, 0, 0, 0.27, 1.2), second.hear)
@@ -176,7 +176,7 @@ def place(ears: Ears, name: str) -> tuple[float, float]:
     return next(((t["x"], t["y"]) for t in things if t["name"] == name), (99.0, 99.0))
 
 
-def test_what_a_person_moves_moves_for_all_also_for_one_that_starts_later(robots: Robots) -> None:
+def test_object_moved_by_a_person_moves_for_all_robots_including_later_ones(robots: Robots) -> None:
     pepper = robots.start(PEPPER, "Pepper")
     here = RoomMap()
     here.move("ball", 0.3, -1.5)
@@ -191,7 +191,7 @@ def test_what_a_person_moves_moves_for_all_also_for_one_that_starts_later(robots
         eventually(lambda ears=ears: place(ears, "shelf") == (99.0, 99.0))
 
 
-def test_what_one_robot_pushes_is_elsewhere_for_the_other(robots: Robots) -> None:
+def test_pushed_ball_moves_for_the_other_robot(robots: Robots) -> None:
     here = RoomMap()
     here.move("ball", -0.5, -0.62)  # ahead of the small robot
     robots.room.publish(here.message())
@@ -203,7 +203,7 @@ def test_what_one_robot_pushes_is_elsewhere_for_the_other(robots: Robots) -> Non
     eventually(lambda: place(pepper, "ball") == place(turtle, "ball"))
 
 
-def test_the_distance_of_one_sees_the_other_until_that_has_ended(robots: Robots) -> None:
+def test_distance_sensor_measures_another_robot_until_its_process_ends(robots: Robots) -> None:
     here = RoomMap()
     here.remove("Aiko")
     robots.room.publish(here.message())
@@ -219,7 +219,7 @@ def test_the_distance_of_one_sees_the_other_until_that_has_ended(robots: Robots)
     eventually(lambda: pepper.heard["distance"][-1]["value"] > 3.0)
 
 
-def test_two_of_a_kind_do_not_stand_in_each_other(robots: Robots) -> None:
+def test_two_robots_of_a_kind_do_not_start_overlapping(robots: Robots) -> None:
     first, second = robots.start(PEPPER, "Ada"), robots.start(PEPPER, "Bob")
 
     def gap() -> float:
@@ -230,7 +230,7 @@ def test_two_of_a_kind_do_not_stand_in_each_other(robots: Robots) -> None:
     assert (first.heard["state"][-1]["x"], first.heard["state"][-1]["y"]) == (-0.5, 0.0)
 
 
-def test_robots_go_back_to_where_they_came_and_the_things_of_the_room_stay(robots: Robots) -> None:
+def test_robots_return_to_their_start_and_objects_of_the_room_stay(robots: Robots) -> None:
     ears = {name: robots.start(PEPPER, name) for name in ("Ada", "Bob")}
 
     def pose(name: str) -> tuple[float, float, float]:

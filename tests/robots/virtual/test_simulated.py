@@ -64,7 +64,7 @@ QUICK = {
 }
 
 
-def test_every_action_can_be_done(pepper):
+def test_every_action_succeeds(pepper):
     assert set(QUICK) == {action.name for action in pepper.driver.robot.actions}
     for name, given in QUICK.items():
         pepper.invoke(name, name, **given)
@@ -106,7 +106,7 @@ def test_every_long_action_can_be_canceled_and_stopped(pepper, action, given):
 
 
 @pytest.mark.parametrize("action", [name for name in QUICK if name not in {"stand", "stop", "wave"}])
-def test_every_action_refuses_bad_input(pepper, action):
+def test_every_action_rejects_invalid_input(pepper, action):
     parameter = pepper.driver.robot.action(action).parameters[0]
     pepper.invoke("1", action, **{parameter.name: [1, 2]})
     answer = pepper.final("1")
@@ -115,7 +115,7 @@ def test_every_action_refuses_bad_input(pepper, action):
     assert pepper.states("1") == ["failed"]
 
 
-def test_it_answers_stop_while_it_moves(pepper):
+def test_stop_is_answered_while_moving(pepper):
     pepper.world(move="Aiko", x=0.0, y=2.0)
     for number, (action, given) in enumerate(
         [("walk", {"distance": 1, "speed": 0.35}), ("turn", {"angle": 360})]
@@ -126,13 +126,13 @@ def test_it_answers_stop_while_it_moves(pepper):
         eventually(lambda: not pepper.newest("state")["moving"])
 
 
-def test_its_program_gone_it_stops_by_itself(pepper):
+def test_robot_stops_when_its_program_falls_silent(pepper):
     pepper.invoke("1", "turn", program="p", angle=360, speed=20)
     assert pepper.final("1")["error"] == "its program has been silent for 1 s"
     eventually(lambda: not pepper.newest("state")["moving"])
 
 
-def test_it_moves_and_tells_where_it_is(pepper):
+def test_moving_robot_publishes_pose_and_distance(pepper):
     pepper.listen("pose")
     pepper.listen("distance")
     pepper.invoke("1", "turn", direction="left", angle=90, speed=90)
@@ -141,7 +141,7 @@ def test_it_moves_and_tells_where_it_is(pepper):
     eventually(lambda: pepper.newest("distance") == {"value": pytest.approx(2.5 - 0.27, abs=0.01)})
 
 
-def test_a_person_in_the_way_fails_the_walk(pepper):
+def test_person_in_the_way_fails_the_walk(pepper):
     bumps = pepper.listen("bumped")
     pepper.world(move="Aiko", x=0.1, y=0.0)
     eventually(lambda: any(o["x"] == 0.1 for o in pepper.newest("state")["objects"]))
@@ -150,7 +150,7 @@ def test_a_person_in_the_way_fails_the_walk(pepper):
     eventually(lambda: bumps == [{"side": "front"}])
 
 
-def test_it_feels_and_hears(pepper):
+def test_touch_and_heard_words_are_published(pepper):
     for leaf in ("touched", "released", "heard", "head_touched", "heard_word"):
         pepper.listen(leaf)
     board = pepper.listen("board", topic="/blackboard")
@@ -168,7 +168,7 @@ def test_it_feels_and_hears(pepper):
     assert {"primitive": "word", "input": {"hello": 1}, "robot": "Pepper"} in board
 
 
-def test_a_tap_is_seen_by_who_only_looks_at_the_sensor(pepper):
+def test_short_tap_is_visible_in_the_touch_sensor(pepper):
     told = pepper.listen("head_touched")
     pepper.world(touch="head", down=True)
     pepper.world(touch="head", down=False)
@@ -176,7 +176,7 @@ def test_a_tap_is_seen_by_who_only_looks_at_the_sensor(pepper):
     eventually(lambda: told[-1] == {"value": False})
 
 
-def test_a_person_lets_anything_happen_that_its_description_knows(pepper):
+def test_person_can_trigger_every_event_of_the_description(pepper):
     for leaf in ("touched", "released", "heard", "bumped", "face_seen"):
         pepper.listen(leaf)
     pepper.world(happen="bumped", side="back")
@@ -196,7 +196,7 @@ def test_a_person_lets_anything_happen_that_its_description_knows(pepper):
     assert pepper.heard["touched"] == [{"place": "left_hand"}]
 
 
-def test_it_sees(pepper):
+def test_detections_of_faces_balls_and_markers_are_published(pepper):
     for leaf in ("faces", "balls", "markers", "sees_face", "sees_ball", "face_seen", "face_lost"):
         pepper.listen(leaf)
     eventually(lambda: pepper.newest("sees_face") == pepper.newest("sees_ball") == {"value": True})
@@ -211,7 +211,7 @@ def test_it_sees(pepper):
     assert pepper.final("2")["error"] == "look at: no ball in the picture"
 
 
-def test_it_looks_at_the_ball(pepper):
+def test_robot_looks_at_the_ball(pepper):
     pepper.listen("balls")
     eventually(lambda: pepper.newest("balls"))
     pepper.invoke("1", "look_at", target="ball")
@@ -223,7 +223,7 @@ def test_it_looks_at_the_ball(pepper):
     assert y + height / 2 == pytest.approx(120, abs=12)
 
 
-def test_pictures_come_while_somebody_looks(node, pepper):
+def test_camera_images_are_published_while_subscribed(node, pepper):
     with nep.node("watcher", "memory") as watcher:
         camera = watcher.new_sub("/Pepper/camera", "image")
         picture = camera.receive(30.0)
@@ -234,13 +234,13 @@ def test_pictures_come_while_somebody_looks(node, pepper):
         assert cv2.Laplacian(picture.payload, cv2.CV_64F).var() > 20  # something is on it
 
 
-def test_a_seed_puts_things_elsewhere_the_same_each_time():
+def test_seed_determines_the_object_positions():
     assert room_of(5) == room_of(5)
     assert room_of(5) != room_of(6)
     assert room_of(None).balls[0].x == 1.95
 
 
-def test_reset(pepper):
+def test_reset_restores_robot_and_room(pepper):
     pepper.invoke("1", "turn", angle=45, speed=90)
     pepper.final("1")
     pepper.world(move="ball", x=1.0, y=1.0)
@@ -249,13 +249,13 @@ def test_reset(pepper):
     eventually(lambda: pepper.newest("state")["objects"][0]["x"] == 1.95)
 
 
-def test_its_model_is_the_one_that_is_shipped():
+def test_shipped_thing_model_matches_the_robot():
     from tests.robots.test_description import model
 
     assert model("pepper") == ROBOT.thing_model
 
 
-def test_it_tells_what_it_plays_each_sound_with_a_number_of_its_own(pepper):
+def test_each_played_sound_is_published_with_a_unique_number(pepper):
     numbers = set()
     for call, (action, given, title) in enumerate(
         [

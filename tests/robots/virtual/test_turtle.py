@@ -30,7 +30,7 @@ def near(value: float, expected: float, within: float) -> bool:
 # ---- the body --------------------------------------------------------------------------------------
 
 
-def test_it_gets_to_the_speed_that_is_asked_for_and_brakes_within_a_tenth_of_a_second() -> None:
+def test_wheels_reach_the_requested_speed_and_brake_within_a_tenth_of_a_second() -> None:
     body = WheelBody(x=0.0, y=-1.0, theta_deg=180.0)
     body.drive(0.5, 0.0)
     body.step(1.0)
@@ -44,7 +44,7 @@ def test_it_gets_to_the_speed_that_is_asked_for_and_brakes_within_a_tenth_of_a_s
     assert body.x == x
 
 
-def test_it_turns_to_its_left_and_drives_in_a_circle() -> None:
+def test_positive_turn_is_left_and_driving_with_turn_follows_a_circle() -> None:
     body = WheelBody(x=0.0, y=0.6, theta_deg=180.0)
     body.drive(0.0, 90.0)
     body.step(1.0)
@@ -64,7 +64,7 @@ def test_it_turns_to_its_left_and_drives_in_a_circle() -> None:
         ((-1.5, -2.2, -45.0), 0.4, "right"),
     ],
 )
-def test_it_stops_at_what_it_bumps_into_and_says_with_which_side(start, speed, side) -> None:
+def test_robot_stops_at_an_obstacle_and_publishes_the_bumped_side(start, speed, side) -> None:
     body = WheelBody(x=start[0], y=start[1], theta_deg=start[2])
     body.drive(speed, 0.0)
     body.step(3.0)
@@ -76,7 +76,7 @@ def test_it_stops_at_what_it_bumps_into_and_says_with_which_side(start, speed, s
     assert body.bumped == ""
 
 
-def test_it_pushes_the_ball_and_measures_what_is_ahead() -> None:
+def test_robot_pushes_the_ball_and_measures_the_distance_ahead() -> None:
     body = WheelBody(x=1.2, y=-0.78, theta_deg=0.0)
     ball = body.room.balls[0].x
     body.drive(0.5, 0.0)
@@ -85,7 +85,7 @@ def test_it_pushes_the_ball_and_measures_what_is_ahead() -> None:
     assert near(body.distance, body.room.x_max - body.x - RADIUS, 0.01)
 
 
-def test_a_hand_on_its_bumper_stops_it_and_is_felt_for_a_moment() -> None:
+def test_pressed_bumper_stops_the_robot_and_is_released_after_a_moment() -> None:
     body = WheelBody(x=0.0, y=-1.0, theta_deg=180.0)
     body.drive(0.5, 0.0)
     body.step(0.5)
@@ -100,7 +100,7 @@ def test_a_hand_on_its_bumper_stops_it_and_is_felt_for_a_moment() -> None:
 # ---- what it sees ----------------------------------------------------------------------------------
 
 
-def test_it_sees_the_red_ball_and_the_blue_shirt() -> None:
+def test_camera_detects_the_red_ball_and_the_blue_shirt() -> None:
     room = Room()
     picture = Camera(room).picture(room, Lens((0.9, -0.78, 0.22), 0.0, -6.0))
     found = colours_in(picture)
@@ -110,7 +110,7 @@ def test_it_sees_the_red_ball_and_the_blue_shirt() -> None:
     assert "blue" in colours_in(person)
 
 
-def test_a_grey_picture_and_specks_have_no_colour() -> None:
+def test_grey_image_and_small_specks_have_no_colour() -> None:
     picture = np.full((240, 320, 3), 120, np.uint8)
     assert colours_in(picture) == {}
     cv2.circle(picture, (160, 120), 3, (0, 0, 230), -1)
@@ -123,7 +123,7 @@ def test_a_grey_picture_and_specks_have_no_colour() -> None:
 # ---- its description -------------------------------------------------------------------------------
 
 
-def test_the_thing_model_is_made_from_it() -> None:
+def test_shipped_thing_model_matches_the_driver() -> None:
     kept = json.loads(resources.path("robots", "diffdrive.tm.jsonld").read_text(encoding="utf-8"))
     for part in ("properties", "actions", "events"):
         for described in kept[part].values():
@@ -150,7 +150,7 @@ def pose(ears: Ears) -> tuple[float, float, float]:
     return told["x"], told["y"], told["theta"]
 
 
-def test_it_moves_turns_and_goes_to_a_place(turtle) -> None:
+def test_robot_moves_turns_and_goes_to_a_place(turtle) -> None:
     _, ears = turtle
     x, y, theta = START
     ears.invoke("1", "move", distance=0.3)
@@ -168,7 +168,7 @@ def test_it_moves_turns_and_goes_to_a_place(turtle) -> None:
     assert ears.final("4")["state"] == "succeeded"  # it is there
 
 
-def test_carrying_it_does_not_count_as_the_way_that_it_was_to_move(turtle) -> None:
+def test_carrying_the_robot_does_not_count_as_moved_distance(turtle) -> None:
     body, ears = turtle
     ears.invoke("1", "move", distance=0.4)
     eventually(lambda: ears.answers("1") and any(a["feedback"] for a in ears.answers("1")))
@@ -179,7 +179,7 @@ def test_carrying_it_does_not_count_as_the_way_that_it_was_to_move(turtle) -> No
     eventually(lambda: math.hypot(pose(ears)[0] - 0.5, pose(ears)[1] - 1.2) > 0.15)
 
 
-def test_a_colour_that_a_person_lets_it_see_is_as_it_is_described(turtle) -> None:
+def test_triggered_colour_event_is_validated_against_the_description(turtle) -> None:
     body, ears = turtle
     for wrong in ({"name": "pink"}, {"name": "red", "area": 3}, {"name": "red", "x": "left"}, {}):
         body.wheels.act({"happen": "colour", **wrong})
@@ -190,7 +190,7 @@ def test_a_colour_that_a_person_lets_it_see_is_as_it_is_described(turtle) -> Non
     assert ears.heard["bump"] == []
 
 
-def test_it_drives_until_its_program_falls_silent(turtle) -> None:
+def test_driving_robot_stops_when_its_program_falls_silent(turtle) -> None:
     body, ears = turtle
     ears.invoke("1", "drive", program="test", speed=-0.2, turn=30)
     assert ears.final("1")["state"] == "succeeded"
@@ -199,7 +199,7 @@ def test_it_drives_until_its_program_falls_silent(turtle) -> None:
     assert ears.heard["state"][-1]["figure"] == "turtle"
 
 
-def test_it_drives_on_while_its_program_lives_and_until_it_is_told_to_stop(turtle) -> None:
+def test_robot_keeps_driving_while_its_program_sends_heartbeats_until_stopped(turtle) -> None:
     body, ears = turtle
     ears.invoke("1", "drive", program="test", speed=0.0, turn=60)
     ears.final("1")
@@ -214,7 +214,7 @@ def test_it_drives_on_while_its_program_lives_and_until_it_is_told_to_stop(turtl
     assert body.wheels.still()
 
 
-def test_a_stop_in_the_middle_of_a_move_ends_it_still(turtle) -> None:
+def test_stop_during_a_move_ends_it_immediately(turtle) -> None:
     body, ears = turtle
     ears.invoke("1", "move", distance=1.0)
     eventually(lambda: not body.wheels.still())
@@ -228,7 +228,7 @@ def test_a_stop_in_the_middle_of_a_move_ends_it_still(turtle) -> None:
     assert pose(ears) == where
 
 
-def test_something_in_the_way_fails_the_move_and_is_told(turtle) -> None:
+def test_obstacle_fails_the_move_and_is_published(turtle) -> None:
     _, ears = turtle
     ears.invoke("1", "go_to", x=0.3, y=-2.2)  # into the shelf
     ended = ears.final("1")
@@ -237,7 +237,7 @@ def test_something_in_the_way_fails_the_move_and_is_told(turtle) -> None:
     eventually(lambda: any(told["value"] for told in ears.heard["bumper"]))
 
 
-def test_wheels_that_go_on_turning_fail_the_stop(node: nep.Node) -> None:
+def test_stop_fails_while_the_wheels_keep_turning(node: nep.Node) -> None:
     class Stubborn(ROBOT.body):  # type: ignore[name-defined, misc]
         def __init__(self, link: object) -> None:
             super().__init__(link)

@@ -99,7 +99,7 @@ def show(them: Person, key: str) -> None:
     them.wait_for(f"{SHOWN} !== null && true")
 
 
-def test_a_stack_dropped_on_it_is_kept_and_stays_where_it_was(qtbot, view, them, window) -> None:
+def test_stack_dropped_on_the_backpack_is_stored_and_stays_on_the_canvas(qtbot, view, them, window) -> None:
     before, edits = them.newest(), []
     view.changed.connect(lambda key, _program: edits.append(key))
     put_in(them, window, "one")
@@ -114,9 +114,7 @@ def test_a_stack_dropped_on_it_is_kept_and_stays_where_it_was(qtbot, view, them,
     them.wait_for("document.querySelector('.nepBackpack').classList.contains('nepFull')", False)
 
 
-def test_it_is_dragged_into_another_file_and_another_program_as_often_as_wanted(
-    qtbot, view, them, window
-) -> None:
+def test_backpack_stack_can_be_dragged_into_another_file_repeatedly(qtbot, view, them, window) -> None:
     put_in(them, window, "one")
     show(them, "b")
     for count in (1, 2):
@@ -131,7 +129,7 @@ def test_it_is_dragged_into_another_file_and_another_program_as_often_as_wanted(
     assert window.types == [["wait", "wait"]], "it stays in the backpack"
 
 
-def test_a_click_lays_it_free_as_one_step(qtbot, view, them, window) -> None:
+def test_click_on_a_backpack_stack_adds_it_to_the_canvas_as_one_undo_step(qtbot, view, them, window) -> None:
     put_in(them, window, "two")
     show(them, "b")
     open_it(them, 1)
@@ -142,7 +140,7 @@ def test_a_click_lays_it_free_as_one_step(qtbot, view, them, window) -> None:
     them.until(lambda: chains(them) == [["started"]], "one step")
 
 
-def test_with_keys_alone(qtbot, view, them, window) -> None:
+def test_backpack_works_with_the_keyboard_only(qtbot, view, them, window) -> None:
     them.click(BLOCK.format("two"))
     held = Qt.KeyboardModifier.ControlModifier | Qt.KeyboardModifier.ShiftModifier
     them.press(Qt.Key.Key_P, held)
@@ -166,7 +164,7 @@ def test_with_keys_alone(qtbot, view, them, window) -> None:
     them.wait_for(SHEET, "none")
 
 
-def test_one_is_removed_all_are_removed_and_undo_brings_them_back(qtbot, view, them, window) -> None:
+def test_removing_one_or_all_backpack_stacks_can_be_undone(qtbot, view, them, window) -> None:
     put_in(them, window, "one")
     put_in(them, window, "two")
     open_it(them, 2)
@@ -184,7 +182,7 @@ def test_one_is_removed_all_are_removed_and_undo_brings_them_back(qtbot, view, t
     them.wait_for(f"{STACKS}.length", 2)
 
 
-def test_its_menus(qtbot, view, them, window) -> None:
+def test_backpack_context_menus(qtbot, view, them, window) -> None:
     them.click(BLOCK.format("one"))
     them.press(Qt.Key.Key_F10, Qt.KeyboardModifier.ShiftModifier)
     row = "[...document.querySelectorAll('.blocklyMenuItem')].find(e => e.textContent.includes({}))"
@@ -202,7 +200,7 @@ def test_its_menus(qtbot, view, them, window) -> None:
     assert not them.ask(f"!!{row.format(json.dumps('Add to'))}")
 
 
-def test_variables_are_meant_by_their_names(qtbot, view, them, window) -> None:
+def test_variables_of_backpack_stacks_are_matched_by_name(qtbot, view, them, window) -> None:
     def gets(id: str, name: str, block: str, y: int) -> dict:
         field = {"id": id, "name": name, "type": ""}
         return {"type": "variables_get", "id": block, "x": 300, "y": y, "fields": {"VAR": field}}
@@ -229,7 +227,7 @@ def test_variables_are_meant_by_their_names(qtbot, view, them, window) -> None:
     assert names["own"] == "score"
 
 
-def test_what_another_studio_puts_in_comes_and_what_is_strange_is_shown_and_kept(
+def test_backpack_of_another_studio_is_loaded_and_unknown_blocks_are_preserved(
     qtbot, view, them, window, tmp_path
 ) -> None:
     strange = {
@@ -248,7 +246,7 @@ def test_what_another_studio_puts_in_comes_and_what_is_strange_is_shown_and_kept
     assert set(made) == {"type", "fields", "next", "id", "x", "y"}
 
 
-def test_nothing_of_the_backpack_itself_goes_into_it_again(qtbot, view, them, window) -> None:
+def test_stack_dragged_from_the_backpack_is_not_stored_again(qtbot, view, them, window) -> None:
     put_in(them, window, "two")
     open_it(them, 1)
     end = centre(them, ".nepBackpack")
@@ -262,7 +260,7 @@ def test_nothing_of_the_backpack_itself_goes_into_it_again(qtbot, view, them, wi
 
 
 @pytest.mark.parametrize("held", ["block", "note"])
-def test_of_blocks_and_notes_chosen_together_it_takes_the_blocks_and_says_so(
+def test_only_blocks_of_a_mixed_selection_are_stored_and_the_user_is_notified(
     qtbot, view, them, window, held: str
 ) -> None:
     note = {"height": 100, "width": 160, "id": "note", "x": 520, "y": 56, "text": "Look"}

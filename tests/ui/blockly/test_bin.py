@@ -57,7 +57,7 @@ def centre(them: Person, selector: str) -> QPoint:
     return QPoint(round(box["left"] + box["right"]) // 2, round(box["top"] + box["bottom"]) // 2)
 
 
-def test_a_block_over_the_toolbox_sees_the_bin_and_goes_with_an_offer(qtbot, view, them, told):
+def test_block_dragged_over_the_toolbox_shows_the_bin_and_is_deleted_with_undo_offer(qtbot, view, them, told):
     start = them.hold("[data-id=one] > .blocklyPath")
     them.move(start, QPoint(500, 300))
     assert them.ask(HINT) is False
@@ -76,7 +76,7 @@ def test_a_block_over_the_toolbox_sees_the_bin_and_goes_with_an_offer(qtbot, vie
     qtbot.waitUntil(lambda: ids(them) == ["one", "start"], timeout=WAIT_MS)
 
 
-def test_the_open_blocks_delete_as_well(qtbot, view, them, told):
+def test_dropping_a_block_on_the_open_flyout_deletes_it(qtbot, view, them, told):
     view.set_toolbox_pinned(True)
     them.box(".nepCategory.blocklyFlyout .blocklyBlock")
     right = them.box(".nepCategory.blocklyFlyout")["right"]
@@ -88,7 +88,7 @@ def test_the_open_blocks_delete_as_well(qtbot, view, them, told):
     qtbot.waitUntil(lambda: told == [2], timeout=WAIT_MS)
 
 
-def test_a_block_that_goes_back_to_the_toolbox_is_no_deletion(qtbot, view, them, told):
+def test_new_block_returned_to_the_toolbox_is_not_a_deletion(qtbot, view, them, told):
     them.open_category("Control")
     start = them.hold(".nepCategory .control_wait")
     them.move(start, QPoint(600, 300))
@@ -102,7 +102,7 @@ def test_a_block_that_goes_back_to_the_toolbox_is_no_deletion(qtbot, view, them,
     assert told == []
 
 
-def test_dropping_on_the_bin_deletes_and_the_newest_is_first_in_it(qtbot, view, them, told):
+def test_dropping_on_the_bin_deletes_and_the_newest_is_listed_first(qtbot, view, them, told):
     delete_the_hat(them)
     bin_ = centre(them, ".nepBin")
     start = them.hold("[data-id=one] > .blocklyPath")
@@ -116,7 +116,7 @@ def test_dropping_on_the_bin_deletes_and_the_newest_is_first_in_it(qtbot, view, 
     them.wait_for(IN_BIN, ["one", "start"])
 
 
-def test_a_click_in_the_bin_brings_it_back_to_where_it_can_be_seen(qtbot, view, them, told):
+def test_click_in_the_bin_restores_the_block_at_a_visible_place(qtbot, view, them, told):
     start = them.hold("[data-id=one] > .blocklyPath")
     them.move(start, TOOLBOX)
     them.drop(TOOLBOX)
@@ -135,7 +135,7 @@ def test_a_click_in_the_bin_brings_it_back_to_where_it_can_be_seen(qtbot, view, 
     qtbot.waitUntil(lambda: ids(them) == ["start"], timeout=WAIT_MS)
 
 
-def test_dragged_out_of_the_bin_it_is_on_the_canvas(qtbot, them):
+def test_block_dragged_out_of_the_bin_is_restored_on_the_canvas(qtbot, them):
     delete_the_hat(them)
     open_bin(them)
     them.drag(".nepSheet [data-id=start] > .blocklyPath", QPoint(500, 400))
@@ -143,7 +143,7 @@ def test_dragged_out_of_the_bin_it_is_on_the_canvas(qtbot, them):
     them.wait_for(SHEET, "none")
 
 
-def test_the_bin_works_with_keys_alone(qtbot, them):
+def test_bin_works_with_the_keyboard_only(qtbot, them):
     delete_the_hat(them)
     them.ask("document.querySelector('.nepBin').focus()")
     them.press(Qt.Key_Return)
@@ -158,7 +158,7 @@ def test_the_bin_works_with_keys_alone(qtbot, them):
     them.wait_for("document.activeElement.closest('[data-id=start]') !== null")
 
 
-def test_undo_empties_the_bin_and_redo_fills_it_again(qtbot, view, them, told):
+def test_undo_empties_the_bin_and_redo_fills_it(qtbot, view, them, told):
     delete_the_hat(them)
     full = "document.querySelector('.nepBin').classList.contains('nepFull')"
     them.wait_for(full)
@@ -169,7 +169,7 @@ def test_undo_empties_the_bin_and_redo_fills_it_again(qtbot, view, them, told):
     assert told == [1]
 
 
-def test_what_an_undo_takes_away_was_not_deleted(qtbot, view, them, told):
+def test_block_removed_by_undo_is_not_in_the_bin(qtbot, view, them, told):
     them.open_category("Control")
     them.drag(".nepCategory .control_wait", QPoint(700, 300))
     qtbot.waitUntil(lambda: len(them.tops()) == 3, timeout=WAIT_MS)
@@ -179,7 +179,7 @@ def test_what_an_undo_takes_away_was_not_deleted(qtbot, view, them, told):
     assert (them.ask(IN_BIN), told) == ([], [])
 
 
-def test_a_mend_that_hangs_blocks_elsewhere_deletes_nothing(qtbot, view, them, told):
+def test_fix_that_moves_blocks_is_not_a_deletion(qtbot, view, them, told):
     hat = {**START, "id": "other", "x": 400, "next": {"block": {"type": "control_wait", "id": "three"}}}
     view.change(workspace(START, WAITS, hat))
     them.wait_for("!!document.querySelector('[data-id=other] [data-id=three]')")
@@ -194,7 +194,7 @@ def test_a_mend_that_hangs_blocks_elsewhere_deletes_nothing(qtbot, view, them, t
     them.wait_for(IN_BIN, ["two"])
 
 
-def test_what_was_deleted_comes_back_although_other_edits_came_after_it(qtbot, view, them, told):
+def test_deletion_can_be_undone_after_later_edits(qtbot, view, them, told):
     delete_the_hat(them)
     qtbot.waitUntil(lambda: told == [1], timeout=WAIT_MS)
     them.drag("[data-id=one] > .blocklyPath", QPoint(700, 400))
@@ -205,7 +205,7 @@ def test_what_was_deleted_comes_back_although_other_edits_came_after_it(qtbot, v
     assert all(top["x"] > 300 for top in them.tops() if top["id"] == "one")
 
 
-def test_the_bin_keeps_the_last_fifty_of_its_own_behaviour(qtbot, view, them):
+def test_bin_keeps_the_last_fifty_deletions_of_its_behaviour(qtbot, view, them):
     many = [START | {"id": f"s{n}", "x": 60 * (n % 10), "y": 90 * (n // 10)} for n in range(53)]
     view.show_tab("many", workspace(*many))
     them.wait_for("!!document.querySelector('[data-id=s52]')")

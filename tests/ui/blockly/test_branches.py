@@ -60,7 +60,7 @@ def press_button(them: Person, number: int) -> None:
     them.click(f"[data-id=if] > [data-test='{pressed}']", dx=9, dy=9)
 
 
-def test_a_file_with_branches_comes_back_as_it_was_and_an_old_one_too(person):
+def test_file_with_branches_round_trips_and_an_old_file_is_loaded(person):
     them: Person = person(state=full())
     assert the_if(them) == full()["blocks"]["blocks"][0]["next"]["block"] | the_if(them)
     assert {"CONDITION2", "BODY2", "ELSE"} <= set(the_if(them)["inputs"])
@@ -72,7 +72,7 @@ def test_a_file_with_branches_comes_back_as_it_was_and_an_old_one_too(person):
     assert "ELSE" in the_if(them)["inputs"]
 
 
-def test_the_plus_adds_else_then_else_if_above_it_and_undo_knows(qtbot, view, person):
+def test_plus_button_adds_else_then_else_if_with_undo(qtbot, view, person):
     them: Person = person(state=choice())
     press_button(them, 0)
     qtbot.waitUntil(lambda: shape(them) == {"elseIfs": 0, "else": True}, timeout=WAIT_MS)
@@ -89,7 +89,7 @@ def test_the_plus_adds_else_then_else_if_above_it_and_undo_knows(qtbot, view, pe
     qtbot.waitUntil(lambda: shape(them) == {"elseIfs": 1, "else": True}, timeout=WAIT_MS)
 
 
-def test_the_minus_takes_its_branch_away_and_what_was_in_it_lies_free(qtbot, view, person):
+def test_minus_button_removes_a_branch_and_detaches_its_blocks(qtbot, view, person):
     them: Person = person(state=full())
     before = them.newest()
     press_button(them, 1)
@@ -109,7 +109,7 @@ def test_the_minus_takes_its_branch_away_and_what_was_in_it_lies_free(qtbot, vie
     assert {top["id"] for top in them.tops()[1:]} == {"last"}
 
 
-def test_the_menu_adds_branches_by_keys_alone(qtbot, view, person):
+def test_context_menu_adds_branches_with_the_keyboard_only(qtbot, view, person):
     them: Person = person(state=choice())
     rows = open_menu(them, "if")
     assert {"Add “else if”", "Add “else”"} <= set(rows)
@@ -123,7 +123,7 @@ def test_the_menu_adds_branches_by_keys_alone(qtbot, view, person):
     them.press(Qt.Key_Escape)
 
 
-def test_folded_up_it_still_says_its_branches(person):
+def test_collapsed_if_block_shows_its_branches(person):
     them: Person = person(state=full())
     choose(them, "if", "Collapse")
     them.wait_for("document.querySelector('[data-id=if]').classList.contains('blocklyCollapsed')")

@@ -5,7 +5,7 @@ import json
 from app.ui.blockly.bridge import BlocklyBridge
 
 
-def test_tells_the_page_in_json(qtbot):
+def test_bridge_sends_json_to_the_page(qtbot):
     bridge = BlocklyBridge(dict)
     with qtbot.waitSignal(bridge.told) as told:
         bridge.send_command("errors", {"a": "“no”"})
@@ -14,12 +14,12 @@ def test_tells_the_page_in_json(qtbot):
     assert json.loads(payload) == {"a": "“no”"}
 
 
-def test_gives_the_page_its_beginning():
+def test_bridge_provides_the_initial_state_to_the_page():
     bridge = BlocklyBridge(lambda: {"language": "de"})
     assert json.loads(bridge.beginning()) == {"language": "de"}
 
 
-def test_passes_on_what_the_page_says(qtbot):
+def test_bridge_forwards_page_calls_as_signals(qtbot):
     bridge = BlocklyBridge(dict)
     for slot, signal, args in [
         (bridge.changed, bridge.edited, ["a", 3, "{}"]),

@@ -43,7 +43,7 @@ def name_of(them: Person, place: int) -> str:
     return (top["next"]["block"] if top["type"] == "events_started" else top)["fields"]["NAME"]
 
 
-def test_the_names_of_the_behaviour_are_offered_and_one_is_chosen(qtbot, person):
+def test_broadcast_names_of_the_behaviour_are_offered_and_selectable(qtbot, person):
     them = person(state=scripts())
     them.click("[data-id=r] .blocklyDropdownField", dx=8, dy=8)
     them.wait_for(OFFERED, ["start quiz", "the end", "New message…"])
@@ -52,7 +52,7 @@ def test_the_names_of_the_behaviour_are_offered_and_one_is_chosen(qtbot, person)
     assert compile_behaviour(them.newest(), []).problems == ()
 
 
-def test_a_new_message_is_typed_and_offered_to_the_other_blocks(qtbot, person):
+def test_new_broadcast_name_is_offered_to_other_blocks(qtbot, person):
     them = person(state=scripts())
     them.click("[data-id=b] .blocklyDropdownField", dx=8, dy=8)
     them.wait_for(f"{OFFERED}.length", 3)
@@ -66,7 +66,7 @@ def test_a_new_message_is_typed_and_offered_to_the_other_blocks(qtbot, person):
     them.press(Qt.Key_Escape)
 
 
-def test_the_name_that_is_suggested_can_be_taken_with_the_mouse(qtbot, person):
+def test_suggested_broadcast_name_can_be_accepted_with_the_mouse(qtbot, person):
     them = person(state=scripts())
     for name in ("message 1", "message 2"):
         them.click("[data-id=b] .blocklyDropdownField", dx=8, dy=8)
@@ -77,7 +77,7 @@ def test_the_name_that_is_suggested_can_be_taken_with_the_mouse(qtbot, person):
         qtbot.waitUntil(lambda name=name: name_of(them, 0) == name, timeout=WAIT_MS)
 
 
-def test_an_empty_name_changes_nothing(qtbot, person):
+def test_empty_broadcast_name_changes_nothing(qtbot, person):
     them = person(state=scripts())
     them.click("[data-id=b] .blocklyDropdownField", dx=8, dy=8)
     them.wait_for(f"{OFFERED}.length", 3)

@@ -36,7 +36,7 @@ def shown_beside(
 
 
 @pytest.mark.parametrize(("x", "y"), [(20, 20), (760, 20), (760, 540), (20, 540)])
-def test_a_bubble_is_in_sight_beside_its_block(qtbot, view, person, x: int, y: int) -> None:
+def test_bubble_is_visible_next_to_its_block(qtbot, view, person, x: int, y: int) -> None:
     corners = [wait_block("first", 0, 0), wait_block("w", x, y), wait_block("last", 780, 560)]
     them = person(state=workspace(*corners))
     bubble, its = shown_beside(qtbot, them, view, "w")
@@ -46,7 +46,7 @@ def test_a_bubble_is_in_sight_beside_its_block(qtbot, view, person, x: int, y: i
     assert apart, (bubble, its)
 
 
-def test_its_words_can_be_read_from_afar(qtbot, view, person) -> None:
+def test_bubble_text_stays_readable_when_zoomed_out(qtbot, view, person) -> None:
     them = person(state=workspace(wait_block("w", 20, 20)))
     near, _its = shown_beside(qtbot, them, view, "w")
     for _ in range(12):
@@ -56,7 +56,7 @@ def test_its_words_can_be_read_from_afar(qtbot, view, person) -> None:
     assert far["right"] - far["left"] > 0.9 * (near["right"] - near["left"])
 
 
-def test_a_block_that_is_scrolled_out_of_sight_takes_its_bubble_along(qtbot, view, person) -> None:
+def test_bubble_scrolls_with_its_block(qtbot, view, person) -> None:
     them = person(state=workspace(wait_block("w", 0, 0), wait_block("far", 0, 3000)))
     bubble, _its = shown_beside(qtbot, them, view, "w")
     view.show_block("far")

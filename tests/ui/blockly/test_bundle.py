@@ -41,14 +41,14 @@ def files(folder: Path) -> dict[str, bytes]:
 
 @built
 @pytest.mark.timeout(300)
-def test_building_again_gives_the_committed_bundle(tools, tmp_path):
+def test_rebuild_reproduces_the_committed_bundle(tools, tmp_path):
     subprocess.run([node, "build.mjs", str(tmp_path / "out")], cwd=EDITOR, check=True, timeout=280)
     assert files(tmp_path / "out") == files(resources.path("blockly"))
 
 
 @built
 @pytest.mark.timeout(300)
-def test_a_build_that_fails_leaves_the_bundle_as_it_was(tools, tmp_path):
+def test_failed_build_keeps_the_existing_bundle(tools, tmp_path):
     here, out = tmp_path / "editor", tmp_path / "out"
     shutil.copytree(EDITOR / "src", here / "src")
     shutil.copy(EDITOR / "build.mjs", here)
@@ -67,7 +67,7 @@ def test_a_build_that_fails_leaves_the_bundle_as_it_was(tools, tmp_path):
 
 @built
 @pytest.mark.timeout(300)
-def test_the_sources_are_strictly_typed(tools):
+def test_editor_sources_pass_strict_type_checking(tools):
     tsc = EDITOR / "node_modules" / "typescript" / "bin" / "tsc"
     done = subprocess.run(
         [node, str(tsc), "--noEmit"], cwd=EDITOR, capture_output=True, text=True, timeout=280, check=False
@@ -76,13 +76,13 @@ def test_the_sources_are_strictly_typed(tools):
     assert done.returncode == 0
 
 
-def test_the_lock_file_names_no_registry():
+def test_lock_file_contains_no_registry_urls():
     lock = json.loads((EDITOR / "package-lock.json").read_text())
     assert lock["packages"]
     assert all("resolved" not in package for package in lock["packages"].values())
 
 
-def test_nothing_is_loaded_from_elsewhere():
+def test_bundle_loads_no_external_resources():
     bundle = resources.path("blockly", "editor.js").read_text()
     addresses = set(re.findall(r"https?://[a-z0-9.-]+", bundle))
     # Names of XML formats, a comment, help texts, and Blockly's default media folder, which the page
@@ -96,7 +96,7 @@ def test_nothing_is_loaded_from_elsewhere():
     assert "url(http" not in resources.path("blockly", "style.css").read_text()
 
 
-def test_every_token_icon_and_licence_is_there():
+def test_bundle_contains_every_category_icon_and_licence():
     bundle = resources.path("blockly", "editor.js").read_text()
     tokens = json.loads(resources.path("theme", "tokens.json").read_text())
     for category in tokens["block"].values():

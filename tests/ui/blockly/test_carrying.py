@@ -95,7 +95,7 @@ BEFORE = [["started"], ["wait", "wait", "wait"]]
 
 
 @pytest.mark.parametrize("to", [ABOVE, LEFT])
-def test_what_is_let_go_outside_is_where_it_was_and_no_edit(qtbot, view, them, told, to) -> None:
+def test_block_dropped_outside_the_page_returns_without_an_edit(qtbot, view, them, told, to) -> None:
     before, changes = them.newest(), []
     view.changed.connect(lambda key, _program: changes.append(key))
     carry(them, told, TWO, to)
@@ -107,7 +107,7 @@ def test_what_is_let_go_outside_is_where_it_was_and_no_edit(qtbot, view, them, t
     assert them.ask("document.querySelector('.nepDropHere').hidden") is True
 
 
-def test_the_window_is_told_where_it_is_outside_and_when_it_is_back(qtbot, view, them, told) -> None:
+def test_window_is_notified_while_a_drag_is_outside_the_page(qtbot, view, them, told) -> None:
     start = them.hold(TWO)
     them.move(start, start + QPoint(60, 30))
     them.move(start + QPoint(60, 30), ABOVE)
@@ -119,7 +119,7 @@ def test_the_window_is_told_where_it_is_outside_and_when_it_is_back(qtbot, view,
     assert told.dropped == []
 
 
-def test_it_moves_with_what_hangs_below_as_one_step_in_each(qtbot, view, them, told) -> None:
+def test_stack_moved_to_another_tab_is_one_undo_step_in_each_tab(qtbot, view, them, told) -> None:
     carry(them, told, TWO, ABOVE)
     bring(qtbot, view, told)
     assert told.brought == [(2, "moved")]
@@ -136,7 +136,7 @@ def test_it_moves_with_what_hangs_below_as_one_step_in_each(qtbot, view, them, t
 
 
 @pytest.mark.parametrize("edited", [False, True])
-def test_undo_of_the_toast_takes_it_back_in_both(qtbot, view, them, told, edited: bool) -> None:
+def test_undo_from_the_toast_reverts_the_move_in_both_tabs(qtbot, view, them, told, edited: bool) -> None:
     carry(them, told, TWO, ABOVE)
     bring(qtbot, view, told)
     rest = [["started"]]
@@ -152,7 +152,7 @@ def test_undo_of_the_toast_takes_it_back_in_both(qtbot, view, them, told, edited
     qtbot.waitUntil(lambda: chains(them) == rest, timeout=WAIT_MS)
 
 
-def test_several_chosen_ones_go_together_or_stay_where_they_were(qtbot, view, them, told) -> None:
+def test_multi_selection_is_moved_together_or_stays_in_place(qtbot, view, them, told) -> None:
     before = them.newest()
     path = ".nepTab:not([hidden]) [data-id='{}'] > .blocklyPath"
     them.click(path.format("one"))
@@ -175,7 +175,7 @@ def test_several_chosen_ones_go_together_or_stay_where_they_were(qtbot, view, th
     assert told.deleted == []
 
 
-def test_with_ctrl_a_copy_goes(qtbot, view, them, told) -> None:
+def test_ctrl_drag_copies_to_another_tab(qtbot, view, them, told) -> None:
     carry(them, told, TWO, ABOVE, Qt.KeyboardModifier.ControlModifier)
     bring(qtbot, view, told)
     assert told.brought == [(2, "copied")]
@@ -184,7 +184,7 @@ def test_with_ctrl_a_copy_goes(qtbot, view, them, told) -> None:
     qtbot.waitUntil(lambda: chains(them) == BEFORE, timeout=WAIT_MS)
 
 
-def test_a_block_of_the_toolbox_goes_straight_to_another_tab(qtbot, view, them, told) -> None:
+def test_toolbox_block_is_dropped_directly_on_another_tab(qtbot, view, them, told) -> None:
     them.open_category("Control")
     carry(them, told, ".nepTab:not([hidden]) .nepCategory .control_wait", ABOVE)
     bring(qtbot, view, told)
@@ -194,7 +194,7 @@ def test_a_block_of_the_toolbox_goes_straight_to_another_tab(qtbot, view, them, 
     qtbot.waitUntil(lambda: chains(them) == BEFORE, timeout=WAIT_MS)
 
 
-def test_a_note_moves_too(qtbot, view, them, told) -> None:
+def test_note_is_moved_to_another_tab(qtbot, view, them, told) -> None:
     carry(them, told, ".nepTab:not([hidden]) .blocklyCommentTopbar", ABOVE)
     bring(qtbot, view, told)
     assert told.brought == [(0, "moved")]
@@ -245,7 +245,7 @@ def drop_at(them: Person, place: QPoint, start: QPoint = ABOVE) -> None:
     them.wait_for("!!document.querySelector('.blocklyDragging')", False)
 
 
-def test_in_the_tab_that_opened_it_is_dragged_on_and_joins(qtbot, view, them, told) -> None:
+def test_drag_continues_in_the_opened_tab_and_connects_to_a_script(qtbot, view, them, told) -> None:
     hold_outside(them, told, TWO)
     open_tab(view, them, "b", "start")
     drop_at(them, below(them, "start"))
@@ -265,7 +265,7 @@ def test_in_the_tab_that_opened_it_is_dragged_on_and_joins(qtbot, view, them, to
     assert told.deleted == []
 
 
-def test_it_may_pass_through_a_tab_and_leaves_nothing_there(qtbot, view, them, told) -> None:
+def test_drag_through_a_tab_leaves_no_changes_in_it(qtbot, view, them, told) -> None:
     changes: list[str] = []
     view.changed.connect(lambda key, _program: changes.append(key))
     histories: list[tuple[bool, bool]] = []
@@ -290,7 +290,9 @@ def test_it_may_pass_through_a_tab_and_leaves_nothing_there(qtbot, view, them, t
 
 
 @pytest.mark.parametrize("how", ["outside", "toolbox", "escape"])
-def test_let_go_elsewhere_it_is_where_it_was(qtbot, view, them, told, how: str) -> None:
+def test_drag_released_elsewhere_or_cancelled_after_opening_a_tab_restores_the_block(
+    qtbot, view, them, told, how: str
+) -> None:
     before = them.newest()
     hold_outside(them, told, TWO)
     open_tab(view, them, "b", "start")
@@ -315,7 +317,7 @@ def test_let_go_elsewhere_it_is_where_it_was(qtbot, view, them, told, how: str) 
     assert (told.brought, told.deleted) == ([], [])
 
 
-def test_a_block_of_the_toolbox_goes_through_a_tab_too(qtbot, view, them, told) -> None:
+def test_toolbox_block_is_dragged_through_an_opened_tab(qtbot, view, them, told) -> None:
     them.open_category("Control")
     hold_outside(them, told, ".nepTab:not([hidden]) .nepCategory .control_wait")
     open_tab(view, them, "b", "start")
@@ -337,7 +339,9 @@ def choose_mixed(them: Person) -> None:
 
 
 @pytest.mark.parametrize("through", [False, True])
-def test_blocks_and_notes_chosen_together_go_to_another_tab(qtbot, view, them, told, through: bool) -> None:
+def test_mixed_selection_of_blocks_and_notes_is_moved_to_another_tab(
+    qtbot, view, them, told, through: bool
+) -> None:
     choose_mixed(them)
     path = ".nepTab:not([hidden]) [data-id='3'] > .blocklyPath"
     if through:
@@ -362,7 +366,7 @@ def test_blocks_and_notes_chosen_together_go_to_another_tab(qtbot, view, them, t
     assert "workspaceComments" not in them.newest()
 
 
-def test_the_window_gets_a_picture_of_what_is_carried(qtbot, view, them, told) -> None:
+def test_window_receives_an_image_of_the_dragged_blocks(qtbot, view, them, told) -> None:
     hold_outside(them, told, TWO)
     qtbot.waitUntil(lambda: bool(told.pictures), timeout=WAIT_MS)
     data, ratio = told.pictures[-1]

@@ -28,7 +28,7 @@ def drawn(*names: str) -> str:
     return f"{list(names)}.filter(name => {DRAWN}.some(e => e.dataset.id === name))"
 
 
-def test_a_script_is_drawn_when_the_view_comes_near(person):
+def test_script_is_rendered_when_the_viewport_comes_near(person):
     them = person(script("here", 40, 40), script("below", 40, 1400), script("right", 2400, 40))
     them.wait_for(drawn("here", "below", "right"), ["here"])
     them.view.show_block("below_wait")
@@ -39,7 +39,7 @@ def test_a_script_is_drawn_when_the_view_comes_near(person):
     assert [each["id"] for each in them.tops()] == ["here", "below", "right"]
 
 
-def test_the_script_with_the_keys_stays_drawn_and_keeps_them(person):
+def test_focused_script_stays_rendered_and_focused_outside_the_viewport(person):
     them = person(script("here", 40, 40), script("below", 40, 1400))
     them.view.show_block("here_wait")
     them.wait_for(FOCUSED, "here_wait")
@@ -50,7 +50,7 @@ def test_the_script_with_the_keys_stays_drawn_and_keeps_them(person):
     assert them.ask(FOCUSED) == "here_wait"
 
 
-def test_a_script_with_a_note_is_drawn_wherever_it_is(person):
+def test_script_with_a_note_is_always_rendered(person):
     # Blockly looks where the picture of its block is when it puts the note down.
     below = script("below", 40, 1400)
     below["icons"] = {"comment": {"text": "look", "pinned": True, "height": 80, "width": 160}}
@@ -59,7 +59,7 @@ def test_a_script_with_a_note_is_drawn_wherever_it_is(person):
     assert them.ask(drawn("here", "below")) == ["here", "below"]
 
 
-def test_what_lies_over_what_stays(person):
+def test_culling_preserves_the_stacking_order(person):
     them = person(script("under", 40, 1400), script("here", 40, 40), script("over", 60, 1410))
     them.wait_for(drawn("under", "over", "here"), ["here"])
     them.view.zoom_to_fit()
@@ -67,7 +67,7 @@ def test_what_lies_over_what_stays(person):
     them.wait_for(order, ["under", "here", "over"])
 
 
-def test_a_far_script_joins_another_by_undo_and_is_drawn_with_it(person):
+def test_far_script_is_rendered_after_joining_another_by_redo(person):
     below = script("below", 40, 1400)
     them = person(script("here", 40, 40), below)
     them.wait_for(drawn("here", "below"), ["here"])
@@ -82,7 +82,7 @@ def test_a_far_script_joins_another_by_undo_and_is_drawn_with_it(person):
     them.wait_for("document.querySelectorAll('.nepFar').length", 0)
 
 
-def test_every_block_gets_its_words_for_a_screen_reader(person):
+def test_every_block_has_an_aria_label(person):
     them = person(*(script(f"s{number}", 40, 40 + 400 * number) for number in range(30)))
     silent = f"[...document.querySelectorAll('{SHOWN} .blocklyBlockCanvas [data-id] > .blocklyPath')]"
     them.wait_for(f"{silent}.filter(e => !e.closest('[data-id$=_n]') && !e.ariaLabel).length", 0)

@@ -45,12 +45,12 @@ LOOPS = at(
 VALUES = at(compare("whole", compare("part", {"type": "values_number", "id": "number"})), 420, 56)
 
 
-def test_a_block_in_one_of_its_own_colour_has_an_edge(person) -> None:
+def test_block_nested_in_one_of_its_colour_has_an_outline(person) -> None:
     them = person(LOOPS, VALUES, at(repeat("other", SAY), 420, 200))
     assert them.ask(INSIDE) == ["beside", "deep", "deeper", "inner", "number", "part"]
 
 
-def test_edges_follow_a_script_that_goes_elsewhere(qtbot, view, person) -> None:
+def test_outlines_follow_a_moved_script(qtbot, view, person) -> None:
     them = person(at(repeat("outer", wait("first", wait("second", wait("third")))), 56, 56))
     them.wait_for(INSIDE, ["first", "second", "third"])
     start = them.hold("[data-id=first] > .blocklyPath")
@@ -63,7 +63,7 @@ def test_edges_follow_a_script_that_goes_elsewhere(qtbot, view, person) -> None:
 
 
 @pytest.mark.parametrize("mode", ["light", "dark"])
-def test_an_edge_is_seen_on_every_colour(view, person, mode) -> None:
+def test_outline_has_enough_contrast_on_every_colour(view, person, mode) -> None:
     them = person(LOOPS)
     view.set_theme(TOKENS, dark=mode == "dark")
     style = "getComputedStyle(document.querySelector('[data-id=inner] > .blocklyPath'))"
@@ -81,7 +81,7 @@ def mixed(front: str, back: str, share: float) -> str:
 
 
 @pytest.mark.parametrize("mode", ["light", "dark"])
-def test_the_selected_block_has_two_tones_that_are_seen_on_any_colour(view, person, mode) -> None:
+def test_selected_block_has_two_tones_with_enough_contrast(view, person, mode) -> None:
     them = person(LOOPS, at(SAY, 420, 56))
     view.set_theme(TOKENS, dark=mode == "dark")
     tones = "[...document.querySelectorAll('.nepSelection path')].map(e => getComputedStyle(e).stroke)"
@@ -108,7 +108,7 @@ def rings(them: Person) -> list[str]:
     )
 
 
-def test_a_click_never_shows_a_ring_and_the_first_key_that_leads_does(view, person) -> None:
+def test_focus_ring_is_hidden_after_a_click_and_shown_by_the_first_navigation_key(view, person) -> None:
     them = person(START)
     shown = "document.querySelector('.nepTab:not([hidden])')"
     keys = "document.documentElement.classList.contains('nepKeys')"

@@ -18,11 +18,11 @@ pytestmark = pytest.mark.web
 WAIT = {"type": "control_wait", "id": "w", "x": 28, "y": 28}
 
 
-def test_what_was_loaded_is_what_is_saved(person):
+def test_loaded_program_is_saved_unchanged(person):
     assert person(state=PICTURE).newest() == PICTURE
 
 
-def test_loading_says_nothing_is_changed(qtbot, view, person):
+def test_loading_emits_no_change(qtbot, view, person):
     with qtbot.assertNotEmitted(view.changed, wait=400):
         them = person(state=PICTURE)
         view.load(workspace(START))
@@ -31,7 +31,7 @@ def test_loading_says_nothing_is_changed(qtbot, view, person):
     assert them.newest() == workspace(START)
 
 
-def test_a_stack_of_700_blocks_comes_back(person):
+def test_stack_of_700_blocks_round_trips(person):
     block: dict = {"type": "control_wait", "id": "b0"}
     for number in range(1, 700):
         block = {"type": "control_wait", "id": f"b{number}", "next": {"block": block}}
@@ -40,30 +40,30 @@ def test_a_stack_of_700_blocks_comes_back(person):
     assert deep_json.dumps(them.newest()).count("control_wait") == 700
 
 
-def test_parts_of_the_file_that_are_not_blocks_are_kept(person):
+def test_file_parts_other_than_blocks_are_preserved(person):
     state = {**workspace(START), "variables": [{"name": "count", "id": "v1"}], "fromLater": {"a": [1]}}
     assert person(state=state).newest() == state
 
 
-def test_a_damaged_file_is_kept_as_it_is(person):
+def test_damaged_file_is_preserved_unchanged(person):
     damaged = {**workspace({"id": "no type", "x": 0, "y": 0}), "variables": {"not": "a list"}}
     assert person(state=damaged).newest() == damaged
 
 
-def test_before_the_page_exists_the_view_knows_its_program(qtbot, view):
+def test_view_returns_its_program_before_the_page_is_loaded(qtbot, view):
     got: list[WorkspaceJson] = []
     view.load(PICTURE)
     view.flush(got.append)
     assert [each.blocks for each in got] == [PICTURE]
 
 
-def test_blocks_nobody_knows_come_back_as_they_were(person):
+def test_unknown_blocks_round_trip(person):
     them = person(state=UNKNOWN)
     assert them.newest() == UNKNOWN
     assert them.ask("document.querySelectorAll('.blocklyBlockCanvas .nepAbsent').length") >= 7
 
 
-def test_a_stack_that_cannot_be_made_is_kept_whole(person):
+def test_stack_that_cannot_be_created_is_preserved(person):
     number = {"type": "values_number", "id": "n", "fields": {"NUMBER": 1}}
     compare = {"type": "values_compare", "id": "c", "fields": {"OP": "<"}, "inputs": {"A": {"block": number}}}
     # A shadow block cannot hold a real one.
@@ -72,7 +72,7 @@ def test_a_stack_that_cannot_be_made_is_kept_whole(person):
     assert person(state=state).newest() == state
 
 
-def test_unknown_blocks_survive_moving_copying_and_undo(qtbot, view, person):
+def test_unknown_blocks_survive_moving_deleting_and_undo(qtbot, view, person):
     rover = {"type": "robot_rover_do_wave", "id": "r", "x": 140, "y": 140, "fields": {"A": 1}}
     them = person(rover)
     them.drag("[data-id=r]", QPoint(640, 400))
@@ -86,7 +86,7 @@ def test_unknown_blocks_survive_moving_copying_and_undo(qtbot, view, person):
     qtbot.waitUntil(lambda: them.tops() == [moved], timeout=WAIT_MS)
 
 
-def test_a_definition_that_comes_later_wakes_the_kept_block(qtbot, view, person):
+def test_unknown_block_becomes_active_when_its_definition_arrives(qtbot, view, person):
     rover = {"type": "robot_rover_do_wave", "id": "r", "x": 140, "y": 140, "fields": {"TIMES": 2}}
     them = person(rover)
     more = copy.deepcopy(DEFINITIONS)
@@ -156,7 +156,7 @@ class Maker:
         return workspace(*tops)
 
 
-def test_random_programs_come_back_as_they_were(view, person):
+def test_random_programs_round_trip(view, person):
     them = person()
     for seed in range(60):
         program = Maker(seed).program()
@@ -164,7 +164,7 @@ def test_random_programs_come_back_as_they_were(view, person):
         assert them.newest() == program, f"seed {seed}"
 
 
-def test_canvas_is_covered_before_the_blocks_of_a_long_program_are_made(view, person):
+def test_canvas_is_covered_while_the_blocks_of_a_long_program_are_created(view, person):
     them = person({**WAIT, "id": "old"})
     them.ask("""(seen => new MutationObserver(() => window.seen = [...(window.seen ?? []), seen()])
         .observe(document.body, {childList: true}) ?? 0)(() => [!!document.querySelector('.nepOpening'),

@@ -42,7 +42,7 @@ def click_canvas(them: Person) -> None:
     QTest.mouseClick(them.target, Qt.LeftButton, pos=CANVAS)
 
 
-def test_on_a_wide_page_the_first_category_is_open_and_stays(qtbot, opened):
+def test_first_category_is_open_and_stays_open_on_a_wide_page(qtbot, opened):
     them = opened(WIDE)
     them.box(".blocklyFlyout .events_started")
     assert them.ask(TITLE) == "Events"
@@ -54,7 +54,7 @@ def test_on_a_wide_page_the_first_category_is_open_and_stays(qtbot, opened):
     assert (them.ask(SHOWN), them.ask(TITLE)) == ("block", "Movement")
 
 
-def test_what_floats_over_the_canvas_leaves_the_open_blocks_free(opened):
+def test_find_bar_does_not_cover_the_open_flyout(opened):
     them = opened(860)
     them.open_category("Movement")
     pin = ".nepTab:not([hidden]) .nepFlyoutHead.nepCategory button"
@@ -66,7 +66,7 @@ def test_what_floats_over_the_canvas_leaves_the_open_blocks_free(opened):
     assert them.box(".nepFind")["left"] >= them.box(".nepFlyoutHead.nepCategory")["right"]
 
 
-def test_on_a_narrow_page_it_closes_after_each_use(qtbot, opened):
+def test_flyout_closes_after_each_use_on_a_narrow_page(qtbot, opened):
     them = opened(NARROW)
     assert them.ask(SHOWN) == "none"
     them.open_category("Movement")
@@ -75,7 +75,7 @@ def test_on_a_narrow_page_it_closes_after_each_use(qtbot, opened):
     qtbot.waitUntil(lambda: len(them.tops()) == 2, timeout=WAIT_MS)
 
 
-def test_it_opens_and_closes_by_itself_with_the_width_of_the_page(opened):
+def test_flyout_opens_and_closes_with_the_page_width(opened):
     them = opened(NARROW)
     them.view.resize(WIDE, 640)
     them.wait_for(SHOWN, "block")
@@ -83,7 +83,7 @@ def test_it_opens_and_closes_by_itself_with_the_width_of_the_page(opened):
     them.wait_for(SHOWN, "none")
 
 
-def test_the_pin_is_a_choice_that_is_told_and_kept_whatever_the_width(qtbot, opened):
+def test_pin_of_the_flyout_is_reported_and_overrides_the_page_width(qtbot, opened):
     them = opened(WIDE)
     with qtbot.waitSignal(them.view.toolbox_pinned, timeout=WAIT_MS) as told:
         them.click(PIN)
@@ -100,13 +100,13 @@ def test_the_pin_is_a_choice_that_is_told_and_kept_whatever_the_width(qtbot, ope
     assert them.ask(SHOWN) == "block"
 
 
-def test_what_was_chosen_at_the_last_start_counts(opened):
+def test_saved_pin_setting_applies_at_start(opened):
     assert opened(WIDE, pinned=False).ask(SHOWN) == "none"
     them = opened(NARROW, pinned=True)
     them.wait_for(SHOWN, "block")
 
 
-def test_everything_is_shown_beside_the_open_blocks(opened):
+def test_blocks_are_shown_next_to_the_open_flyout(opened):
     far = {"type": "events_started", "id": "far", "x": 1500, "y": 900}
     them = opened(WIDE, far)
     right = them.box(".blocklyFlyout")["right"]
@@ -116,7 +116,7 @@ def test_everything_is_shown_beside_the_open_blocks(opened):
     assert them.box("[data-id=start] > .blocklyPath")["left"] > right
 
 
-def test_the_canvas_keeps_its_place_from_one_open_category_to_the_next(opened):
+def test_canvas_keeps_its_position_when_the_category_changes(opened):
     them = opened(WIDE)
     them.open_category("Lists")
     before = them.box("[data-id=start] > .blocklyPath")
@@ -126,7 +126,7 @@ def test_the_canvas_keeps_its_place_from_one_open_category_to_the_next(opened):
         assert them.box("[data-id=start] > .blocklyPath") == before
 
 
-def test_the_blocks_are_as_large_at_any_zoom_and_come_out_under_the_mouse(opened):
+def test_flyout_blocks_keep_their_size_at_any_zoom_and_are_dragged_under_the_mouse(opened):
     them = opened(WIDE)
     them.open_category("Movement")
     before = them.box(f"{TURN} > .blocklyPath")
@@ -147,7 +147,7 @@ def test_the_blocks_are_as_large_at_any_zoom_and_come_out_under_the_mouse(opened
     assert box["top"] < CANVAS.y() < box["bottom"]
 
 
-def test_wide_blocks_are_whole_or_can_be_scrolled_to(opened):
+def test_wide_flyout_blocks_fit_or_can_be_scrolled_to(opened):
     them = opened(WIDE)
     paths = (
         "[...document.querySelectorAll('.blocklyFlyout .blocklyBlockCanvas > .blocklyBlock')]"
@@ -170,7 +170,7 @@ def test_wide_blocks_are_whole_or_can_be_scrolled_to(opened):
 
 
 @pytest.mark.parametrize("width", [WIDE, NARROW])
-def test_no_scrollbar_of_the_canvas_lies_over_the_blocks(opened, width):
+def test_canvas_scrollbar_does_not_cover_the_flyout_blocks(opened, width):
     them = opened(width)
     them.open_category("Movement")
     box = them.box(".blocklyFlyout")
@@ -180,7 +180,7 @@ def test_no_scrollbar_of_the_canvas_lies_over_the_blocks(opened, width):
 
 
 @pytest.mark.parametrize("width", [WIDE, NARROW])
-def test_a_choice_in_the_flyout_is_what_is_dragged_out_next(qtbot, opened, width):
+def test_dropdown_choice_in_the_flyout_applies_to_the_dragged_block(qtbot, opened, width):
     them = opened(width)
     them.open_category("Movement")
     them.ask(
@@ -199,7 +199,7 @@ def test_a_choice_in_the_flyout_is_what_is_dragged_out_next(qtbot, opened, width
 
 
 @pytest.mark.parametrize("width", [WIDE, NARROW])
-def test_a_new_variable_is_offered_at_once(qtbot, opened, width):
+def test_new_variable_appears_in_the_flyout_immediately(qtbot, opened, width):
     them = opened(width)
     them.open_category("Variables")
     with qtbot.waitSignal(them.view.command_wanted, timeout=WAIT_MS) as asked:
@@ -215,7 +215,7 @@ def test_a_new_variable_is_offered_at_once(qtbot, opened, width):
 
 
 @pytest.mark.parametrize("width", [WIDE, NARROW])
-def test_a_block_that_is_brought_back_leaves_nothing_to_undo(opened, width):
+def test_block_returned_to_the_flyout_leaves_nothing_to_undo(opened, width):
     them = opened(width)
     told: list[tuple[bool, bool]] = []
     them.view.history_changed.connect(lambda *history: told.append(history))

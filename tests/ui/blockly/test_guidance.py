@@ -30,7 +30,7 @@ def empty(view: BlocklyView, person: Callable[..., Person]) -> Person:
     return made
 
 
-def test_who_asks_before_the_page_is_there_is_shown_the_block_as_soon_as_it_is(
+def test_hint_requested_before_the_page_is_loaded_is_shown_after_loading(
     view: BlocklyView, person: Callable[..., Person]
 ) -> None:
     view.point_at("events_started", "when started")
@@ -42,7 +42,7 @@ def middle_of(person: Person, selector: str) -> QPoint:
     return QPoint(round((box["left"] + box["right"]) / 2), round((box["top"] + box["bottom"]) / 2))
 
 
-def test_the_empty_canvas_says_what_to_drag_and_offers_a_robot_until_there_is_one(
+def test_empty_canvas_shows_the_first_step_and_offers_a_robot_until_one_exists(
     empty: Person, view: BlocklyView
 ) -> None:
     assert empty.ask(SAID) == "Drag “when started” here"
@@ -56,7 +56,7 @@ def test_the_empty_canvas_says_what_to_drag_and_offers_a_robot_until_there_is_on
     empty.wait_for(BUTTONS, ["Show me", "Open an example"])
 
 
-def test_in_a_low_page_the_words_do_not_lie_below_the_buttons_of_the_canvas(
+def test_empty_canvas_hint_does_not_overlap_the_zoom_buttons_on_a_low_page(
     empty: Person, view: BlocklyView
 ) -> None:
     view.resize(700, 200)
@@ -67,7 +67,7 @@ def test_in_a_low_page_the_words_do_not_lie_below_the_buttons_of_the_canvas(
     empty.wait_for(low)
 
 
-def test_a_block_can_be_dropped_onto_the_words_and_takes_them_away(empty: Person) -> None:
+def test_block_dropped_on_the_empty_canvas_hint_hides_it(empty: Person) -> None:
     empty.open_category("Events")
     place = middle_of(empty, ".nepBeginPlace")
     start = empty.hold(FIRST)
@@ -83,7 +83,7 @@ def test_a_block_can_be_dropped_onto_the_words_and_takes_them_away(empty: Person
     assert empty.tops() == []
 
 
-def test_the_words_are_beside_the_open_blocks(empty: Person) -> None:
+def test_empty_canvas_hint_is_next_to_the_open_flyout(empty: Person) -> None:
     empty.open_category("Events")
     flyout = empty.box(".blocklyFlyout")
     empty.wait_for(
@@ -91,14 +91,16 @@ def test_the_words_are_beside_the_open_blocks(empty: Person) -> None:
     )
 
 
-def test_a_behaviour_with_blocks_has_no_such_words(view: BlocklyView, person: Callable[..., Person]) -> None:
+def test_behaviour_with_blocks_has_no_empty_canvas_hint(
+    view: BlocklyView, person: Callable[..., Person]
+) -> None:
     view.set_first_step("when started", False)
     made = person(START)
     made.wait_for("document.querySelectorAll('.blocklyBlockCanvas [data-id=start]').length", 1)
     made.wait_for(SHOWN, False)
 
 
-def test_show_me_leads_to_the_category_then_to_the_block_and_ends_with_it(empty: Person) -> None:
+def test_show_me_points_to_the_category_then_to_the_block_until_it_is_placed(empty: Person) -> None:
     empty.click(".nepBegin button:nth-child(2)", dx=20)
     empty.wait_for(BUBBLE, "You'll find “when started” under Events")
     ring, row = empty.box(".nepRing"), empty.box(".blocklyToolboxCategory")
@@ -111,7 +113,7 @@ def test_show_me_leads_to_the_category_then_to_the_block_and_ends_with_it(empty:
     assert len(empty.tops()) == 1
 
 
-def test_who_uses_the_keys_is_told_of_keys_and_led_to_the_category(empty: Person) -> None:
+def test_keyboard_user_is_shown_keyboard_hints_and_led_to_the_category(empty: Person) -> None:
     said = "document.querySelector('.nepBeginKeys').textContent"
     assert empty.ask(said).startswith("With the keyboard: press Ctrl+B, choose it with the arrow keys")
     empty.view.setFocus()
@@ -127,7 +129,7 @@ def test_who_uses_the_keys_is_told_of_keys_and_led_to_the_category(empty: Person
     empty.wait_for(f"({BUBBLE}).startsWith('Press Enter to pick it up')")
 
 
-def test_escape_and_the_window_take_the_ring_away(empty: Person, view: BlocklyView) -> None:
+def test_escape_and_the_window_remove_the_hint_ring(empty: Person, view: BlocklyView) -> None:
     view.point_at("events_started", "when started", "Drag it")
     empty.wait_for(RING)
     empty.click(".blocklySvg", 500, 20)
@@ -139,7 +141,7 @@ def test_escape_and_the_window_take_the_ring_away(empty: Person, view: BlocklyVi
     empty.wait_for(RING, False)
 
 
-def test_a_block_that_nobody_has_is_not_ringed(empty: Person, view: BlocklyView) -> None:
+def test_unknown_block_gets_no_hint_ring(empty: Person, view: BlocklyView) -> None:
     view.point_at("robot_nobody_do_say", "say", "Drag it")
     empty.open_category("Events")
     assert not empty.ask(RING)

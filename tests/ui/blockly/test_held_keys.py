@@ -37,7 +37,7 @@ def keys(field) -> HeldKeys:
     return keys
 
 
-def test_keys_wait_and_come_in_their_order(field, keys):
+def test_held_keys_are_delivered_in_order(field, keys):
     QTest.keyClicks(field, "a")
     keys.hold()
     QTest.keyClicks(field, "bc")
@@ -48,7 +48,7 @@ def test_keys_wait_and_come_in_their_order(field, keys):
 
 
 @pytest.mark.parametrize("how", ["mouse", "focus"])
-def test_who_goes_elsewhere_lets_go_what_was_kept(field, keys, how):
+def test_click_or_focus_change_delivers_held_keys(field, keys, how):
     keys.hold()
     QTest.keyClicks(field, "ab")
     if how == "mouse":
@@ -59,7 +59,7 @@ def test_who_goes_elsewhere_lets_go_what_was_kept(field, keys, how):
     assert field.text() == "abc"
 
 
-def test_what_was_typed_for_a_page_that_died_is_gone(field, keys):
+def test_keys_held_for_a_crashed_page_are_discarded(field, keys):
     keys.hold()
     QTest.keyClicks(field, "ab")
     keys.forget()

@@ -34,7 +34,7 @@ def text_of(payload: bytes) -> str:
     return payload.decode("utf-8", "replace")
 
 
-def test_values_of_the_page_are_read_or_empty() -> None:
+def test_page_values_are_parsed_or_empty() -> None:
     for text in map(text_of, LISTS):
         assert all(isinstance(each, str) for each in texts(text))
         assert all(len(each) == 2 for each in pairs(text))
@@ -44,7 +44,7 @@ def test_values_of_the_page_are_read_or_empty() -> None:
     assert data_url("data:image/png;base64,aGk=") == b"hi"
 
 
-def test_stacks_and_behaviours_are_read_or_refused() -> None:
+def test_stacks_and_behaviours_are_parsed_or_rejected() -> None:
     read = set()
     for payload in hostile.payloads(STACK):
         try:
@@ -60,7 +60,7 @@ def test_stacks_and_behaviours_are_read_or_refused() -> None:
     assert {Stack, ValueError, DocumentError} < read
 
 
-def test_dragged_field_is_read_or_nothing() -> None:
+def test_dragged_field_is_parsed_or_none() -> None:
     for payload in LISTS:
         data = QMimeData()
         data.setData(MIME, payload)

@@ -54,7 +54,7 @@ def sheet_is_seen(them: Person, seen: bool) -> None:
 
 
 @pytest.mark.parametrize("dark", [False, True])
-def test_a_mark_for_each_kind_is_on_the_folded_block_and_says_what_is_inside(view, them, dark):
+def test_collapsed_block_has_a_mark_for_each_kind_of_hidden_content(view, them, dark):
     view.set_theme(TOKENS, dark)
     them.wait_for(MARKS, BOTH)
     sheet_is_seen(them, False)
@@ -63,7 +63,7 @@ def test_a_mark_for_each_kind_is_on_the_folded_block_and_says_what_is_inside(vie
 
 
 @pytest.mark.parametrize(("name", "id"), [("note", "b"), ("pause", "a")])
-def test_a_click_on_a_mark_unfolds_the_block_and_leads_to_what_is_meant(qtbot, view, them, name, id):
+def test_click_on_a_mark_expands_the_block_and_focuses_the_marked_item(qtbot, view, them, name, id):
     before = them.newest()
     them.click(f".nepInside-{name}", dx=11, dy=11)
     them.wait_for(MARKS, [])
@@ -75,7 +75,7 @@ def test_a_click_on_a_mark_unfolds_the_block_and_leads_to_what_is_meant(qtbot, v
     sheet_is_seen(them, False)
 
 
-def test_the_menu_leads_there_and_names_only_what_is_inside(them):
+def test_block_menu_leads_to_the_hidden_items_that_exist(them):
     double_click(them, "loop")
     them.wait_for(MARKS, [])
     choose(them, "a", "Don't pause here")

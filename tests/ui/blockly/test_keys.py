@@ -78,7 +78,7 @@ def to_the_canvas(them: Person) -> None:
     hold(them, Qt.Key_B, Qt.ControlModifier | Qt.ShiftModifier)
 
 
-def test_a_behaviour_is_built_with_keys_alone(qtbot, view, person):
+def test_behaviour_is_built_with_the_keyboard_only(qtbot, view, person):
     them = person(state=workspace())
     take_the_keys(them)
     press(them, Qt.Key_Tab)
@@ -114,7 +114,7 @@ def test_a_behaviour_is_built_with_keys_alone(qtbot, view, person):
     assert not program.problems
 
 
-def test_a_robots_block_is_found_by_its_words_and_put_in_its_place(qtbot, view, them):
+def test_robot_block_is_found_by_search_and_inserted_at_the_focus(qtbot, view, them):
     press(them, Qt.Key_Tab)
     to_the_canvas(them)
     press(them, Qt.Key_Down)
@@ -135,7 +135,7 @@ def test_a_robots_block_is_found_by_its_words_and_put_in_its_place(qtbot, view, 
     goes_to(them, "Pepper")
 
 
-def test_synonyms_and_parts_of_words_find_blocks_and_nothing_is_said(view, them):
+def test_search_finds_blocks_by_synonyms_and_word_parts_and_reports_no_match(view, them):
     first = "document.querySelector('.blocklyFlyout .blocklyBlock')?.getAttribute('class') ?? ''"
     labels = "[...document.querySelectorAll('.blocklyFlyoutLabel')]"
     shown = f"{labels}.map(each => each.textContent.replace(/\\u00a0/g, ' '))"
@@ -156,14 +156,14 @@ def test_synonyms_and_parts_of_words_find_blocks_and_nothing_is_said(view, them)
     them.wait_for("getComputedStyle(document.querySelector('.blocklyFlyout')).display", "none")
 
 
-def test_down_in_an_empty_search_goes_to_the_categories(view, them):
+def test_down_in_an_empty_search_focuses_the_categories(view, them):
     view.open_search()
     goes_to(them, "Find a block")
     press(them, Qt.Key_Down)
     goes_to(them, "events")
 
 
-def test_finding_blocks_in_the_workspace_goes_round_and_leaves_the_keys_there(view, them):
+def test_find_in_workspace_wraps_around_and_focuses_the_match_on_close(view, them):
     view.open_find()
     goes_to(them, "Find in blocks")
     count = "document.querySelector('.nepFind span').textContent"
@@ -187,7 +187,7 @@ def test_finding_blocks_in_the_workspace_goes_round_and_leaves_the_keys_there(vi
     goes_to(them, "wait")
 
 
-def test_f1_explains_the_block_that_the_keys_are_on_and_else_is_the_windows(qtbot, view, them):
+def test_f1_explains_the_focused_block_and_otherwise_reaches_the_window(qtbot, view, them):
     window = QMainWindow()
     qtbot.addWidget(window)
     pressed: list[str] = []
@@ -219,7 +219,7 @@ def test_f1_explains_the_block_that_the_keys_are_on_and_else_is_the_windows(qtbo
     view.setParent(None)  # it is the test's, not the window's
 
 
-def test_the_context_menu_explains_blocks_also_in_the_toolbox(view, them):
+def test_context_menu_help_explains_blocks_on_canvas_and_in_the_toolbox(view, them):
     box = them.box("[data-id=w] > .blocklyPath")
     at = (round(box["left"] + 14), round(box["top"] + 20))
     QTest.mouseClick(them.target, Qt.RightButton, pos=QPoint(*at))
@@ -231,7 +231,7 @@ def test_the_context_menu_explains_blocks_also_in_the_toolbox(view, them):
     them.wait_for(f"({CARD}).includes('Waits that many seconds')")
 
 
-def test_a_colour_is_chosen_with_keys(qtbot, view, person):
+def test_colour_is_chosen_with_the_keyboard(qtbot, view, person):
     light = block("robot_pepper_do_light", "l", ROBOT="Pepper", WHERE="eyes", COLOUR="#ffffff")
     them = person(state=workspace(light | {"x": 60, "y": 60}))
     take_the_keys(them)
@@ -248,7 +248,7 @@ def test_a_colour_is_chosen_with_keys(qtbot, view, person):
     assert them.tops()[0]["fields"]["COLOUR"] == "#0a5cff"
 
 
-def test_what_blocks_are_called_is_words_without_pictures(them):
+def test_aria_labels_of_blocks_contain_only_words(them):
     press(them, Qt.Key_Tab)
     to_the_canvas(them)
     press(them, Qt.Key_Down)
@@ -258,7 +258,7 @@ def test_what_blocks_are_called_is_words_without_pictures(them):
     assert "empty" not in them.ask("document.activeElement.getAttribute('aria-label')").lower()
 
 
-def test_a_button_on_a_block_has_its_words_and_obeys_enter(qtbot, view, person):
+def test_button_on_a_block_has_a_label_and_is_activated_by_enter(qtbot, view, person):
     them = person(state=workspace(list_of() | {"id": "l", "x": 60, "y": 60}))
     take_the_keys(them)
     press(them, Qt.Key_Tab)
@@ -271,7 +271,7 @@ def test_a_button_on_a_block_has_its_words_and_obeys_enter(qtbot, view, person):
     qtbot.waitUntil(lambda: them.tops()[0]["extraState"] == {"items": 1}, timeout=WAIT_MS)
 
 
-def test_enter_on_a_text_opens_it(qtbot, view, person):
+def test_enter_on_a_text_field_opens_its_editor(qtbot, view, person):
     say = block("robot_pepper_do_say", "s", ROBOT="Pepper")
     say["inputs"] = {"TEXT": {"shadow": {"type": "values_text", "id": "t", "fields": {"TEXT": "Hello"}}}}
     them = person(state=workspace(say | {"x": 60, "y": 60}))
@@ -287,7 +287,7 @@ def test_enter_on_a_text_opens_it(qtbot, view, person):
     qtbot.waitUntil(lambda: "Good day" in str(them.tops()), timeout=WAIT_MS)
 
 
-def test_a_value_that_does_not_fit_where_the_keys_were_says_why(qtbot, view, them):
+def test_value_that_does_not_fit_the_focused_slot_shows_the_reason(qtbot, view, them):
     to_the_canvas(them)
     press(them, Qt.Key_Down, Qt.Key_Down, Qt.Key_Right)
     goes_to(them, "Edit number: 5")
@@ -301,7 +301,7 @@ def test_a_value_that_does_not_fit_where_the_keys_were_says_why(qtbot, view, the
     qtbot.waitUntil(lambda: len(them.tops()) == 2, timeout=WAIT_MS)
 
 
-def test_shift_tab_leads_out_of_the_search(them):
+def test_shift_tab_leaves_the_search(them):
     begin_to_search(them)
     them.press(Qt.Key_Tab, Qt.ShiftModifier)
     them.wait_for("document.activeElement.closest('.blocklyToolbox') === null")

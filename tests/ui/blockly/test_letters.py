@@ -72,7 +72,7 @@ def on_a_block_of_the_toolbox(them: Person) -> None:
 
 
 @pytest.mark.parametrize("go", [on_the_canvas, on_a_block, on_a_block_of_the_toolbox])
-def test_no_letter_and_no_digit_does_anything(them, go):
+def test_letters_and_digits_without_a_modifier_do_nothing(them, go):
     go(them)
     program, shown = them.newest(), them.ask(SHOWN)
     assert len(json.loads(shown)) == 7
@@ -85,7 +85,7 @@ def test_no_letter_and_no_digit_does_anything(them, go):
     them.wait_for(SHOWN, shown)
 
 
-def test_a_block_is_moved_with_keys_and_put_down(qtbot, them):
+def test_block_is_moved_and_dropped_with_the_keyboard(qtbot, them):
     on_a_block(them)
     them.press(Qt.Key_M, Qt.ControlModifier)
     them.wait_for("!!document.querySelector('.blocklyDragging')")
@@ -98,7 +98,7 @@ def test_a_block_is_moved_with_keys_and_put_down(qtbot, them):
     qtbot.waitUntil(lambda: len(them.tops()) == 2, timeout=WAIT_MS)
 
 
-def test_the_block_commands_have_keys_with_ctrl(qtbot, them):
+def test_block_commands_have_ctrl_shortcuts(qtbot, them):
     on_a_block(them)
     them.press(Qt.Key_X, Qt.ControlModifier | Qt.ShiftModifier)
     qtbot.waitUntil(lambda: len(them.tops()) == 2, timeout=WAIT_MS)
@@ -108,7 +108,7 @@ def test_the_block_commands_have_keys_with_ctrl(qtbot, them):
     them.wait_for("document.activeElement.closest('.blocklyToolbox') === null")
 
 
-def test_a_second_delete_takes_nothing_more(qtbot, them):
+def test_second_delete_deletes_nothing_more(qtbot, them):
     on_a_block(them)
     them.press(Qt.Key_Delete)
     qtbot.waitUntil(lambda: "next" not in them.tops()[0], timeout=WAIT_MS)
@@ -120,7 +120,7 @@ def test_a_second_delete_takes_nothing_more(qtbot, them):
     assert [top["id"] for top in them.tops()] == ["start"]
 
 
-def test_keys_stay_where_the_deleted_block_was(qtbot, them):
+def test_focus_stays_where_the_deleted_block_was(qtbot, them):
     on_a_block(them)
     them.press(Qt.Key_Up)
     them.press(Qt.Key_Down)
@@ -133,6 +133,6 @@ def test_keys_stay_where_the_deleted_block_was(qtbot, them):
     assert [top["id"] for top in them.tops()] == ["start"]
 
 
-def test_every_key_of_the_blocks_is_listed():
+def test_every_block_shortcut_is_listed():
     listed = {key for fixed in FIXED if fixed.place == "Blocks" for key in fixed.key.split(", ")}
     assert {"Ctrl+D", "Ctrl+M", "Ctrl+L", "Ctrl+B", "Delete", "Alt+Down"} <= listed

@@ -12,7 +12,7 @@ pytest_plugins = ["tests.ui.blockly_fixtures"]
 pytestmark = pytest.mark.web
 
 
-def test_a_change_of_theme_keeps_program_and_undo(qtbot, view, person):
+def test_theme_change_keeps_program_and_undo(qtbot, view, person):
     them = person(START)
     them.click("[data-id=start] > .blocklyPath", dy=30)
     them.press(Qt.Key_Delete)
@@ -31,7 +31,7 @@ def test_a_change_of_theme_keeps_program_and_undo(qtbot, view, person):
     )
 
 
-def test_the_flat_tokens_of_the_theme_do_as_well(view, person):
+def test_flat_theme_tokens_are_supported(view, person):
     them = person(START)
     light = TOKENS["colour"]["light"]
     flat = {
@@ -45,7 +45,7 @@ def test_the_flat_tokens_of_the_theme_do_as_well(view, person):
     them.wait_for("document.documentElement.classList.contains('reduced')")
 
 
-def test_running_blocks_glow_in_the_page(view, person):
+def test_running_blocks_are_outlined(view, person):
     them = person(state=PICTURE)
     view.highlight(["say_touch", "battery"])
     them.wait_for(outlined("running") + ".sort()", ["battery", "say_touch"])
@@ -62,7 +62,7 @@ def test_running_blocks_glow_in_the_page(view, person):
     them.wait_for(outlined("stopped"), ["say_touch"])
 
 
-def test_thirty_highlights_a_second_are_cheap(qtbot, view, person):
+def test_frequent_highlights_are_cheap(qtbot, view, person):
     them = person(state=PICTURE)
     ids = ["say_touch", "battery", "wave"]
     for number in range(300):
@@ -75,7 +75,7 @@ def test_thirty_highlights_a_second_are_cheap(qtbot, view, person):
     assert them.ask(script) < 100
 
 
-def test_an_error_has_its_sentence_beside_the_block(view, person):
+def test_error_is_shown_in_a_bubble_next_to_its_block(view, person):
     them = person(state=PICTURE)
     view.set_errors({"say_touch": "Pepper is not responding."})
     them.wait_for("document.querySelector('.nepBubble')?.textContent", "Pepper is not responding.")
@@ -88,7 +88,7 @@ def test_an_error_has_its_sentence_beside_the_block(view, person):
     them.wait_for("document.querySelectorAll('.nepBubble, .nepState').length", 0)
 
 
-def test_a_warning_has_its_sentence_and_no_outline(view, person):
+def test_warning_is_shown_in_a_bubble_without_an_outline(view, person):
     them = person(state=PICTURE)
     view.set_warnings({"say_touch": "“say” was replaced by “turn”"})
     them.wait_for("document.querySelector('.nepBubble-warning')?.textContent", "“say” was replaced by “turn”")
@@ -106,7 +106,7 @@ def test_a_warning_has_its_sentence_and_no_outline(view, person):
     them.wait_for("document.querySelectorAll('.nepBubble').length", 0)
 
 
-def test_an_error_never_comes_without_its_sentence(view, person):
+def test_error_outline_appears_together_with_its_message(view, person):
     them = person(state=PICTURE)
     them.ask(
         "(() => { window.seen = []; new MutationObserver(() => document.querySelector('.nepState-error') &&"
@@ -119,7 +119,7 @@ def test_an_error_never_comes_without_its_sentence(view, person):
 
 
 @pytest.mark.parametrize("percent", [100, 150, 200])
-def test_large_text_leaves_the_find_bar_whole_beside_the_toolbox(view, person, percent):
+def test_find_bar_fits_next_to_the_toolbox_with_large_text(view, person, percent):
     view.set_theme({**TOKENS, "textPercent": percent}, False)
     them = person(state=PICTURE)
     view.open_find()
@@ -139,7 +139,7 @@ def test_large_text_leaves_the_find_bar_whole_beside_the_toolbox(view, person, p
     assert them.ask(beside) >= 0
 
 
-def test_absent_robots_are_grey_with_the_reason(view, person):
+def test_blocks_of_absent_robots_are_grey(view, person):
     them = person(state=PICTURE)
     view.set_absent(["wave"])
     grey = "[...document.querySelectorAll('.nepAbsent')].map(e => e.dataset.id)"
@@ -149,7 +149,7 @@ def test_absent_robots_are_grey_with_the_reason(view, person):
     them.wait_for(grey, [])
 
 
-def test_live_values_are_shown_but_no_edit(qtbot, view, person):
+def test_live_values_are_shown_without_an_edit(qtbot, view, person):
     them = person(state=PICTURE)
     shown = "document.querySelector('[data-id=battery] .nepLive').textContent.replaceAll('\\u00a0', ' ')"
     with qtbot.assertNotEmitted(view.changed, wait=300), qtbot.assertNotEmitted(view.history_changed):
@@ -160,7 +160,7 @@ def test_live_values_are_shown_but_no_edit(qtbot, view, person):
     assert them.newest() == PICTURE
 
 
-def test_an_empty_program_is_nothing_but_dots(person):
+def test_empty_program_shows_only_the_grid(person):
     them = person()
     assert them.ask("document.querySelectorAll('.blocklyBlockCanvas .blocklyBlock').length") == 0
     assert them.ask("document.querySelectorAll('.blocklyTrash, .blocklyZoom').length") == 0
@@ -184,7 +184,7 @@ def test_zoom_and_fit(qtbot, view, person):
     them.wait_for("!!document.querySelector('[data-id=battery].blocklySelected')")
 
 
-def test_the_toolbox_is_that_of_the_picture(person):
+def test_toolbox_matches_the_design(person):
     them = person()
     labels = them.ask(
         "[...document.querySelectorAll('.nepHeading, .blocklyToolboxCategoryLabel')].map(e => e.textContent)"
@@ -202,7 +202,7 @@ def test_the_toolbox_is_that_of_the_picture(person):
     assert them.ask(tile) == "rgb({}, {}, {})".format(*events)
 
 
-def test_without_a_robot_the_toolbox_says_so(view, person):
+def test_toolbox_reports_that_no_robot_is_connected(view, person):
     them = person()
     contents = DEFINITIONS["toolbox"]["contents"][:7]
     view.set_definitions({**DEFINITIONS, "toolbox": {"kind": "categoryToolbox", "contents": contents}})
@@ -212,7 +212,7 @@ def test_without_a_robot_the_toolbox_says_so(view, person):
     them.wait_for(headings, [["Blocks", ""], ["", "No robot", "connected"]])
 
 
-def test_the_window_hears_which_sensors_the_open_toolbox_shows(view, person):
+def test_window_is_notified_of_sensors_shown_in_the_open_toolbox(view, person):
     them = person(START)
     told: list[tuple] = []
     view.sensors_offered.connect(told.append)
@@ -229,7 +229,7 @@ def test_the_window_hears_which_sensors_the_open_toolbox_shows(view, person):
     assert len(told) == count + 3
 
 
-def test_live_values_are_in_the_flyout_too(view, person):
+def test_live_values_are_shown_in_the_flyout(view, person):
     them = person()
     view.set_live_values({"Pepper/battery": "84 %"})
     them.open_category("Sensors")
@@ -237,7 +237,7 @@ def test_live_values_are_in_the_flyout_too(view, person):
     them.wait_for(live, "84 %")
 
 
-def test_old_values_are_faint_and_figures_do_not_move_the_block(view, person):
+def test_stale_live_values_are_faint_and_changing_digits_keep_the_block_width(view, person):
     them = person(state=PICTURE)
     view.set_live_values({"Pepper/battery": "84 %"})
     live = "document.querySelector('.blocklyBlockCanvas .nepLive')"

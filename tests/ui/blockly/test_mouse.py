@@ -15,7 +15,7 @@ pytest_plugins = ["tests.ui.blockly_fixtures"]
 pytestmark = pytest.mark.web
 
 
-def test_a_block_dragged_under_the_hat_snaps_there(qtbot, view, person):
+def test_block_dragged_under_the_event_block_snaps_to_it(qtbot, view, person):
     them = person(START)
     hat = them.box("[data-id=start] > .blocklyPath")
     them.open_category("Control")
@@ -31,7 +31,7 @@ def test_a_block_dragged_under_the_hat_snaps_there(qtbot, view, person):
     assert them.newest() == changed.args[1].blocks
 
 
-def test_a_fast_hand_joins_the_gap_that_it_aimed_at(qtbot, person):
+def test_fast_drag_connects_to_the_targeted_gap(qtbot, person):
     """The preview of a gap on the way pushes the blocks below it apart, and nobody could see that yet."""
     wait = {"type": "control_wait", "inputs": {"SECONDS": {"shadow": {"type": "math_number"}}}}
     last = {**wait, "id": "last"}
@@ -54,7 +54,7 @@ def test_a_fast_hand_joins_the_gap_that_it_aimed_at(qtbot, person):
     assert len(order) == 4
 
 
-def test_what_is_flushed_while_a_block_is_in_the_hand_is_a_program(qtbot, view, person):
+def test_flush_during_a_drag_returns_a_valid_program(qtbot, view, person):
     them = person(START)
     hat = them.box("[data-id=start] > .blocklyPath")
     them.open_category("Control")
@@ -70,7 +70,7 @@ def test_what_is_flushed_while_a_block_is_in_the_hand_is_a_program(qtbot, view, 
     qtbot.waitUntil(lambda: "next" in them.tops()[0], timeout=WAIT_MS)
 
 
-def test_undo_redo_and_their_announcement(qtbot, view, person):
+def test_undo_and_redo_emit_history_changes(qtbot, view, person):
     them = person(START)
     history: list[tuple[bool, bool]] = []
     view.history_changed.connect(lambda *each: history.append(each))
@@ -86,7 +86,7 @@ def test_undo_redo_and_their_announcement(qtbot, view, person):
     assert history == [(True, False), (False, True), (True, False), (False, True)]
 
 
-def test_copy_and_paste_by_keys(qtbot, person):
+def test_copy_and_paste_with_the_keyboard(qtbot, person):
     them = person(START)
     them.click("[data-id=start] > .blocklyPath", dy=30)
     them.press(Qt.Key_C, Qt.ControlModifier)
@@ -94,13 +94,13 @@ def test_copy_and_paste_by_keys(qtbot, person):
     qtbot.waitUntil(lambda: [top["type"] for top in them.tops()] == ["events_started"] * 2, timeout=WAIT_MS)
 
 
-def test_the_selected_block_is_told(qtbot, view, person):
+def test_selected_block_is_reported(qtbot, view, person):
     them = person(START)
     with qtbot.waitSignal(view.block_selected, timeout=WAIT_MS, check_params_cb=lambda id: id == "start"):
         them.click("[data-id=start] > .blocklyPath", dy=30)
 
 
-def test_typing_in_a_text_changes_the_program(qtbot, view, person):
+def test_typing_in_a_text_field_changes_the_program(qtbot, view, person):
     text = {"shadow": {"type": "values_text", "id": "t", "fields": {"TEXT": "x"}}}
     say = {"type": "robot_pepper_do_say", "id": "say", "x": 28, "y": 28, "inputs": {"TEXT": text}}
     them = person(say)
@@ -115,7 +115,7 @@ def test_typing_in_a_text_changes_the_program(qtbot, view, person):
     qtbot.waitUntil(lambda: typed() == "Hello, you", timeout=WAIT_MS)
 
 
-def test_a_colour_is_chosen_from_the_palette_or_typed(qtbot, view, person):
+def test_colour_is_chosen_from_the_palette_or_typed(qtbot, view, person):
     them = person({"type": "robot_pepper_do_light", "id": "light", "x": 28, "y": 28})
 
     def colour() -> str:
@@ -133,7 +133,7 @@ def test_a_colour_is_chosen_from_the_palette_or_typed(qtbot, view, person):
     qtbot.waitUntil(lambda: colour() == "#01abef", timeout=WAIT_MS)
 
 
-def test_a_topic_that_is_not_there_yet_can_be_typed(qtbot, view, person):
+def test_topic_that_does_not_exist_yet_can_be_typed(qtbot, view, person):
     them = person({"type": "events_message", "id": "on", "x": 56, "y": 56})
     them.click("[data-id=on] .blocklyDropdownField", dx=12, dy=10)
     topics = "[...document.querySelectorAll('.blocklyMenuItemContent')].map(e => e.textContent)"
@@ -146,7 +146,7 @@ def test_a_topic_that_is_not_there_yet_can_be_typed(qtbot, view, person):
     qtbot.waitUntil(lambda: them.tops()[0]["fields"] == {"TOPIC": "/not/yet"}, timeout=WAIT_MS)
 
 
-def test_a_program_is_made_with_the_keyboard_alone(qtbot, view, person):
+def test_program_is_built_with_the_keyboard_only(qtbot, view, person):
     them = person(START)
     them.click("[data-id=start] > .blocklyPath", dy=30)
     them.press(Qt.Key_B, Qt.ControlModifier)
@@ -165,7 +165,7 @@ def test_a_program_is_made_with_the_keyboard_alone(qtbot, view, person):
     qtbot.waitUntil(lambda: next_type() == "control_wait", timeout=WAIT_MS)
 
 
-def test_f12_reaches_the_window_while_the_page_has_the_keyboard(qtbot, view, person):
+def test_f12_reaches_the_window_while_the_page_has_the_focus(qtbot, view, person):
     them = person(START)
     them.click("[data-id=start] > .blocklyPath", dy=30)
     with qtbot.waitSignal(view.key_pressed, timeout=WAIT_MS) as pressed:
@@ -173,7 +173,7 @@ def test_f12_reaches_the_window_while_the_page_has_the_keyboard(qtbot, view, per
     assert pressed.args == ["F12"]
 
 
-def test_a_shortcut_of_the_window_wins_over_the_page_and_runs_once(qtbot):
+def test_window_shortcut_takes_precedence_over_the_page_and_runs_once(qtbot):
     window = QMainWindow()
     qtbot.addWidget(window)
     view = BlocklyView()

@@ -71,7 +71,7 @@ def all_blocks(saved: dict) -> dict[str, dict]:
     return found
 
 
-def test_lists_and_functions_come_back_as_they_were(person):
+def test_lists_and_functions_round_trip(person):
     state = greeting()
     state["blocks"]["blocks"].append(at(list_of(text("a"), number(2)), 500, 28))
     state["blocks"]["blocks"].append(
@@ -82,7 +82,7 @@ def test_lists_and_functions_come_back_as_they_were(person):
     assert person(state=state).newest()["blocks"] == lone["blocks"]
 
 
-def test_a_list_gets_and_loses_gaps_and_undo_knows(qtbot, view, person):
+def test_list_slots_are_added_and_removed_with_undo(qtbot, view, person):
     them = person(state=workspace(at(list_of(text("a"), text("b")) | {"id": "l"}, 28, 28)))
     them.click("[data-id=l] .nepButton:last-of-type", dx=8, dy=8)
     qtbot.waitUntil(lambda: them.tops()[0]["extraState"] == {"items": 3}, timeout=WAIT_MS)
@@ -96,7 +96,7 @@ def test_a_list_gets_and_loses_gaps_and_undo_knows(qtbot, view, person):
     qtbot.waitUntil(lambda: [len(top.get("inputs", ())) for top in them.tops()] == [2], timeout=WAIT_MS)
 
 
-def test_the_number_is_there_only_for_an_item_by_number(qtbot, view, person):
+def test_number_input_is_visible_only_for_an_item_by_number(qtbot, view, person):
     it = block("lists_get", "i", WHERE="number", NUMBER=number(7) | {"id": "n"}, LIST=list_of())
     them = person(state=workspace(at(it, 28, 28)))
     shown = "document.querySelector('[data-id=n]').getBoundingClientRect().width > 0"
@@ -112,7 +112,7 @@ def test_the_number_is_there_only_for_an_item_by_number(qtbot, view, person):
     them.wait_for(shown)
 
 
-def test_uses_follow_when_a_function_is_renamed(qtbot, view, person):
+def test_calls_follow_a_renamed_function(qtbot, view, person):
     them = person(state=greeting())
     type_into(them, qtbot, "[data-id=g] .blocklyInputField", "say hello")
     qtbot.waitUntil(lambda: "say hello" in parts(them, "c"), timeout=WAIT_MS)
@@ -121,7 +121,7 @@ def test_uses_follow_when_a_function_is_renamed(qtbot, view, person):
     qtbot.waitUntil(lambda: "greet" in parts(them, "c") and "greet" in parts(them, "g"), timeout=WAIT_MS)
 
 
-def test_uses_and_inputs_follow_when_an_input_is_renamed_added_or_taken_away(qtbot, view, person):
+def test_calls_follow_renamed_added_and_removed_function_inputs(qtbot, view, person):
     them = person(state=greeting())
     type_into(them, qtbot, "[data-id=g] .blocklyInputField ~ .blocklyInputField", "name")
     qtbot.waitUntil(lambda: "name" in parts(them, "c") and "name" in parts(them, "inside"), timeout=WAIT_MS)
@@ -139,7 +139,7 @@ def test_uses_and_inputs_follow_when_an_input_is_renamed_added_or_taken_away(qtb
     qtbot.waitUntil(lambda: them.newest() == before, timeout=WAIT_MS)
 
 
-def test_a_deleted_function_leaves_its_uses(qtbot, view, person):
+def test_deleted_function_keeps_its_calls_as_errors(qtbot, view, person):
     them = person(state=greeting())
     them.click("[data-id=g] > .blocklyPath", dx=6, dy=8)
     them.press(Qt.Key_Delete)
@@ -149,7 +149,7 @@ def test_a_deleted_function_leaves_its_uses(qtbot, view, person):
     assert problem.block_id == "c"
 
 
-def test_a_copied_function_gets_a_name_of_its_own(qtbot, view, person):
+def test_copied_function_gets_a_unique_name(qtbot, view, person):
     them = person(state=greeting())
     them.click("[data-id=g] > .blocklyPath", dx=6, dy=8)
     them.press(Qt.Key_C, Qt.ControlModifier)
@@ -159,7 +159,7 @@ def test_a_copied_function_gets_a_name_of_its_own(qtbot, view, person):
     assert sorted(names) == ["greet", "greet 2"]
 
 
-def test_the_toolbox_offers_what_people_made(qtbot, view, person):
+def test_toolbox_offers_user_defined_functions(qtbot, view, person):
     them = person(state=workspace(at(started(), 28, 28)))
     them.open_category("Functions")
     start = them.hold(".blocklyFlyout .functions_define_result")
@@ -177,7 +177,7 @@ def test_the_toolbox_offers_what_people_made(qtbot, view, person):
 @pytest.mark.parametrize(
     "extra", [None, 7, {"items": -3}, {"items": 10**9}, {"inputs": [1, {"id": 3}]}, {"inputs": "x"}]
 )
-def test_whatever_a_file_says_of_shapes_is_shown_and_kept_safe(person, extra):
+def test_blocks_with_invalid_extra_state_are_loaded_and_preserved(person, extra):
     tops = [
         at(block(each) | {"extraState": extra}, 28, 100 * y)
         for y, each in enumerate(["functions_define", "functions_call", "lists_create", "functions_result"])
@@ -186,7 +186,7 @@ def test_whatever_a_file_says_of_shapes_is_shown_and_kept_safe(person, extra):
     assert [top["type"] for top in them.tops()] == [top["type"] for top in tops]
 
 
-def test_gaps_that_a_shape_does_not_have_are_kept(person):
+def test_inputs_beyond_the_shape_of_a_block_are_preserved(person):
     odd = call("g", who=text("Ada"))
     odd["inputs"]["IN_other"] = {"block": text("kept")}  # type: ignore[index]
     state = workspace(at(odd, 28, 28), at(list_of(text("a")) | {"extraState": {"items": 0}}, 28, 140))
@@ -195,7 +195,7 @@ def test_gaps_that_a_shape_does_not_have_are_kept(person):
     }
 
 
-def test_a_variable_in_a_list_block_of_the_toolbox_is_made(qtbot, view, person):
+def test_variable_in_a_list_block_from_the_toolbox_is_created(qtbot, view, person):
     them = person(state=workspace(at(started(), 28, 28)))
     them.open_category("Lists")
     them.drag(".blocklyFlyout .lists_length", QPoint(900, 500))

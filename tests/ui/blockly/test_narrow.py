@@ -36,7 +36,9 @@ def first_tile(them: Person, number: int = 0) -> QPoint:
 @pytest.mark.parametrize(
     ("width", "percent", "tiles"), [(780, 100, False), (740, 100, True), (900, 150, True)]
 )
-def test_a_narrow_page_or_large_text_leaves_a_column_of_tiles(view, person, width, percent, tiles) -> None:
+def test_narrow_page_or_large_text_collapses_the_toolbox_to_tiles(
+    view, person, width, percent, tiles
+) -> None:
     them = person(START)
     view.set_theme({**TOKENS, "textPercent": percent}, False)
     view.resize(width, 420)
@@ -51,7 +53,7 @@ def test_a_narrow_page_or_large_text_leaves_a_column_of_tiles(view, person, widt
     assert room >= 420
 
 
-def test_a_tile_says_its_name_under_the_mouse_and_opens_its_blocks(view, person) -> None:
+def test_tile_shows_its_name_on_hover_and_opens_its_blocks_on_click(view, person) -> None:
     them = narrow(view, person)
     assert them.ask(SHOWN) == []
     QTest.mouseMove(them.target, first_tile(them))
@@ -68,7 +70,7 @@ def test_a_tile_says_its_name_under_the_mouse_and_opens_its_blocks(view, person)
     them.box(".nepTab:not([hidden]) .blocklyFlyout .blocklyBlock")
 
 
-def test_whoever_looks_for_a_block_has_the_whole_toolbox_meanwhile(qtbot, view, person) -> None:
+def test_search_expands_the_narrow_toolbox_until_it_ends(qtbot, view, person) -> None:
     them = narrow(view, person)
     them.click(".nepTab:not([hidden]) .nepSearch input")
     them.wait_for(WIDE, 196)

@@ -83,7 +83,7 @@ def one_step(qtbot, them: Person, told: list[dict], which: str, before: dict) ->
 
 
 @pytest.mark.parametrize("which", WHICH)
-def test_a_moved_note_is_told_and_is_one_step(qtbot, them, told, which):
+def test_moving_a_note_is_reported_and_is_one_undo_step(qtbot, them, told, which):
     before = them.newest()
     drag(them, HEADS[which], QPoint(60, 8), QPoint(84, 56))
     after = one_step(qtbot, them, told, which, before)
@@ -93,7 +93,7 @@ def test_a_moved_note_is_told_and_is_one_step(qtbot, them, told, which):
 
 
 @pytest.mark.parametrize("which", WHICH)
-def test_a_resized_note_is_told_and_is_one_step(qtbot, them, told, which):
+def test_resizing_a_note_is_reported_and_is_one_undo_step(qtbot, them, told, which):
     before = them.newest()
     drag(them, CORNERS[which], QPoint(4, 4), QPoint(60, 40))
     after = one_step(qtbot, them, told, which, before)
@@ -102,7 +102,7 @@ def test_a_resized_note_is_told_and_is_one_step(qtbot, them, told, which):
     assert after["height"] > was["height"] + 20
 
 
-def test_a_closed_note_is_told_is_one_step_and_opens_where_it_was(qtbot, them, told):
+def test_closing_a_note_is_reported_and_is_one_undo_step_and_it_reopens_in_place(qtbot, them, told):
     before = them.newest()
     them.click(".nepNoteSign", dx=8, dy=8)
     assert one_step(qtbot, them, told, "block", before)["pinned"] is False
@@ -111,13 +111,13 @@ def test_a_closed_note_is_told_is_one_step_and_opens_where_it_was(qtbot, them, t
     qtbot.waitUntil(lambda: told[-1] == before, timeout=WAIT_MS)
 
 
-def test_a_folded_note_on_the_canvas_is_told_and_is_one_step(qtbot, them, told):
+def test_collapsing_a_canvas_note_is_reported_and_is_one_undo_step(qtbot, them, told):
     before = them.newest()
     them.click(".blocklyComment .blocklyFoldoutIcon", dx=6, dy=6)
     assert one_step(qtbot, them, told, "canvas", before)["collapsed"] is True
 
 
-def test_a_note_that_was_removed_comes_back_as_it_was(qtbot, them, told):
+def test_undo_restores_a_removed_note_unchanged(qtbot, them, told):
     before = them.newest()
     them.click(".nepNoteButton:last-of-type", dx=8, dy=8)
     qtbot.waitUntil(lambda: told and "icons" not in str(told[-1]), timeout=WAIT_MS)

@@ -57,7 +57,7 @@ def boxes_of_blocks(them: Person) -> list[list[float]]:
 
 
 @pytest.mark.parametrize("dark", [False, True])
-def test_a_new_note_has_the_keys_stands_beside_its_block_and_keeps_what_is_typed(view, them, dark):
+def test_new_note_is_focused_placed_next_to_its_block_and_saves_typed_text(view, them, dark):
     view.set_theme(TOKENS, dark)
     add_note(them)
     looked_at(them, f"note-{'dark' if dark else 'light'}")
@@ -73,7 +73,7 @@ def test_a_new_note_has_the_keys_stands_beside_its_block_and_keeps_what_is_typed
     assert "Inter" in them.ask(f"{shown}.fontFamily")
 
 
-def test_where_the_page_is_full_a_new_note_is_brought_into_sight(view, them):
+def test_new_note_is_scrolled_into_view_on_a_full_page(view, them):
     view.resize(420, 300)
     them.wait_for("innerHeight", 300)
     add_note(them)
@@ -82,7 +82,7 @@ def test_where_the_page_is_full_a_new_note_is_brought_into_sight(view, them):
     assert room["top"] <= sheet["top"] < sheet["bottom"] <= room["bottom"]
 
 
-def test_what_is_typed_stays_when_another_tab_comes(qtbot, view, them):
+def test_typed_note_text_is_saved_when_the_tab_changes(qtbot, view, them):
     view.show_tab("one", them.newest())
     them.wait_for("!!document.querySelector('.nepTab:not([hidden]) [data-id=first]')")
     choose(them, "first", "Add a note")
@@ -93,7 +93,7 @@ def test_what_is_typed_stays_when_another_tab_comes(qtbot, view, them):
     qtbot.waitUntil(lambda: WORDS in str(view.workspace_of("one")), timeout=WAIT_MS)
 
 
-def test_escape_leaves_the_note_for_its_block_and_undo_takes_it_back(qtbot, view, them):
+def test_escape_returns_the_focus_from_note_to_block_and_undo_reverts_the_text(qtbot, view, them):
     add_note(them)
     them.press(Qt.Key_Escape)
     them.wait_for("document.activeElement.closest('[data-id]')?.dataset.id", "first")
@@ -104,14 +104,14 @@ def test_escape_leaves_the_note_for_its_block_and_undo_takes_it_back(qtbot, view
     qtbot.waitUntil(lambda: note_of(them).get("text") == WORDS, timeout=WAIT_MS)
 
 
-def test_a_note_without_a_word_goes_when_it_is_left(qtbot, them):
+def test_empty_note_is_removed_on_leaving_it(qtbot, them):
     choose(them, "first", "Add a note")
     them.wait_for(TYPES)
     them.press(Qt.Key_Escape)
     them.wait_for("document.querySelector('.nepNoteSign') === null")
 
 
-def test_the_sign_on_the_block_hides_and_shows_the_note(qtbot, them):
+def test_note_icon_of_the_block_toggles_the_note(qtbot, them):
     add_note(them)
     them.click(".nepNoteSign", dx=8, dy=8)
     them.wait_for("document.querySelector('.nepNote') === null")
@@ -120,7 +120,7 @@ def test_the_sign_on_the_block_hides_and_shows_the_note(qtbot, them):
     them.wait_for("document.querySelector('.nepNote textarea')?.value", WORDS)
 
 
-def test_a_note_is_dragged_by_its_head_and_follows_its_block(qtbot, them):
+def test_note_is_dragged_by_its_title_bar_and_follows_its_block(qtbot, them):
     add_note(them)
     box = them.box(".nepNote .blocklyDraggable")
     start = QPoint(round(box["left"] + 60), round(box["top"] + 8))
@@ -137,7 +137,7 @@ def test_a_note_is_dragged_by_its_head_and_follows_its_block(qtbot, them):
     qtbot.waitUntil(lambda: note_of(them)["x"] > moved["x"] + 20, timeout=WAIT_MS)
 
 
-def test_a_note_can_be_read_from_afar(view, them):
+def test_note_stays_readable_when_zoomed_out(view, them):
     add_note(them)
     for _ in range(8):
         view.zoom_out()
@@ -147,7 +147,7 @@ def test_a_note_can_be_read_from_afar(view, them):
     them.wait_for(f"{note}.getBoundingClientRect().width < 120 && {seen}({note}) > 8.5")
 
 
-def test_a_note_on_the_canvas_is_saved_and_removed_by_its_menu(qtbot, them):
+def test_canvas_note_is_saved_and_removed_with_its_menu(qtbot, them):
     QTest.mouseClick(them.target, Qt.RightButton, pos=QPoint(700, 300))
     them.wait_for("!!document.querySelector('.blocklyContextMenu')")
     rows = them.ask(ROWS)
@@ -170,7 +170,7 @@ def test_a_note_on_the_canvas_is_saved_and_removed_by_its_menu(qtbot, them):
 NOTES = "[...document.querySelectorAll('.nepTab:not([hidden]) .blocklyComment')]"
 
 
-def test_no_note_of_an_example_lies_over_its_blocks_or_under_them(qtbot):
+def test_notes_of_examples_do_not_overlap_blocks(qtbot):
     pepper = parse(td_for(PEPPER.thing_model, "Pepper"))
     view = editor(qtbot, editor_definitions([pepper]), 1320, 760)
     view.set_toolbox_pinned(False)

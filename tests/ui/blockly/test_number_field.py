@@ -37,7 +37,7 @@ console.log(JSON.stringify({
 
 @built
 @pytest.mark.timeout(120)
-def test_editor_reads_numbers_like_the_window(tools) -> None:  # noqa: F811
+def test_editor_parses_numbers_like_the_window(tools) -> None:  # noqa: F811
     examples = json.loads(EXAMPLES.read_text("utf-8"))
     command = [node, "--input-type=module", "-e", RUN_EXAMPLES, str(EXAMPLES)]
     done = subprocess.run(command, cwd=EDITOR, capture_output=True, text=True, check=True, timeout=100)
@@ -72,7 +72,7 @@ def seconds(them: Person) -> object:
 
 
 @pytest.mark.web
-def test_typed_and_pasted_numbers_in_a_block(them: Person) -> None:
+def test_typed_and_pasted_numbers_in_a_block_are_parsed_or_rejected(them: Person) -> None:
     open_field(them)
     QTest.keyClicks(them.target, "0,2")
     them.press(Qt.Key_Return)

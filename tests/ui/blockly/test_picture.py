@@ -39,7 +39,7 @@ def taken(qtbot, view: BlocklyView, kind: str, white: bool = True) -> bytes:
     return got[0]
 
 
-def test_a_picture_shows_all_blocks_twice_as_large_on_white(qtbot, view, them):
+def test_exported_image_shows_all_blocks_at_double_scale_on_white(qtbot, view, them):
     them.wait_for("!!document.querySelector('.nepFar')")  # the one that is far away is not drawn
     image = QImage.fromData(taken(qtbot, view, "png"))
     assert image.height() > 2 * 3940
@@ -50,19 +50,19 @@ def test_a_picture_shows_all_blocks_twice_as_large_on_white(qtbot, view, them):
     assert orange in column[-200:]
 
 
-def test_a_picture_without_background_is_clear_beside_the_blocks(qtbot, view, them):
+def test_exported_image_without_background_is_transparent_around_blocks(qtbot, view, them):
     image = QImage.fromData(taken(qtbot, view, "png", white=False))
     assert image.pixelColor(2, 2).alpha() == 0
 
 
-def test_the_dark_theme_takes_the_same_picture_and_stays(qtbot, view, them):
+def test_exported_image_is_the_same_in_dark_theme_and_theme_is_kept(qtbot, view, them):
     light = taken(qtbot, view, "svg")
     view.set_theme(TOKENS, dark=True)
     assert taken(qtbot, view, "svg") == light
     them.wait_for("getComputedStyle(document.documentElement).colorScheme", "dark")
 
 
-def test_an_svg_needs_nothing_else(qtbot, view, them):
+def test_exported_svg_is_self_contained(qtbot, view, them):
     svg = taken(qtbot, view, "svg").decode()
     assert "@font-face" in svg
     assert "var(--" not in svg
@@ -70,7 +70,7 @@ def test_an_svg_needs_nothing_else(qtbot, view, them):
     assert "data:font/otf" in svg or "data:application" in svg
 
 
-def test_what_a_person_has_chosen_is_not_in_the_picture(qtbot, view, them):
+def test_exported_image_omits_the_selection(qtbot, view, them):
     before = taken(qtbot, view, "svg")
     them.click("[data-id=a] > .blocklyPath")
     them.wait_for("document.querySelector('.blocklySelected')?.dataset.id", "a")
@@ -82,6 +82,6 @@ def test_what_a_person_has_chosen_is_not_in_the_picture(qtbot, view, them):
     )  # what is selected lies above what is below it
 
 
-def test_an_empty_canvas_has_no_picture(qtbot, view, them):
+def test_empty_canvas_exports_no_image(qtbot, view, them):
     view.load(workspace())
     assert taken(qtbot, view, "png") == b""

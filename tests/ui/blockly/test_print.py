@@ -65,9 +65,7 @@ def colours(image: QImage) -> set[str]:
     }
 
 
-def test_stacks_go_whole_to_the_next_page_and_a_long_one_is_parted_between_its_blocks(
-    qtbot, view, person
-) -> None:
+def test_stacks_move_whole_to_next_page_and_long_stack_is_split_between_blocks(qtbot, view, person) -> None:
     person(
         state=workspace(
             started(stack(16)) | {"id": "start", "x": 60, "y": 60},
@@ -93,7 +91,7 @@ def test_stacks_go_whole_to_the_next_page_and_a_long_one_is_parted_between_its_b
         assert ORANGE in colours(pages.picture(page))
 
 
-def test_a_wide_block_is_made_to_fit_and_the_page_is_as_before_on_the_screen(qtbot, view, person) -> None:
+def test_wide_block_is_scaled_to_the_page_and_canvas_is_unchanged_after_printing(qtbot, view, person) -> None:
     items = [text(f"this is item {number}") for number in range(16)]
     wide = stack(1) | {"id": "wide", "x": 60, "y": 60, "inputs": {"SECONDS": {"block": list_of(*items)}}}
     them: Person = person(state=workspace(wide))
@@ -110,7 +108,7 @@ def test_a_wide_block_is_made_to_fit_and_the_page_is_as_before_on_the_screen(qtb
     them.wait_for("document.querySelectorAll('.nepPrint').length", 0)
 
 
-def test_large_text_of_the_screen_is_not_larger_on_paper(qtbot, view, person) -> None:
+def test_screen_text_size_does_not_enlarge_the_printout(qtbot, view, person) -> None:
     person(state=workspace(stack(3) | {"x": 60, "y": 60}))
     usual = printed(qtbot, view)
     view.set_theme({**TOKENS, "textPercent": 200}, dark=False)
@@ -121,7 +119,7 @@ def test_large_text_of_the_screen_is_not_larger_on_paper(qtbot, view, person) ->
     assert large.picture(0) == usual.picture(0)
 
 
-def test_notes_are_printed_with_all_their_words(qtbot, view, person) -> None:
+def test_notes_are_printed_with_full_text(qtbot, view, person) -> None:
     words = " ".join(f"word{number:02}" for number in range(60))
     sheet = {"text": f"{words} of the block", "pinned": True, "height": 60, "width": 160}
     noted = stack(2) | {"id": "noted", "x": 60, "y": 60, "icons": {"comment": sheet}}
@@ -134,6 +132,6 @@ def test_notes_are_printed_with_all_their_words(qtbot, view, person) -> None:
     assert "…" not in pages.texts[0]
 
 
-def test_an_empty_canvas_has_no_pages(qtbot, view, person) -> None:
+def test_empty_canvas_prints_no_pages(qtbot, view, person) -> None:
     person(state=workspace())
     assert printed(qtbot, view) is None

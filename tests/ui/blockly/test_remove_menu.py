@@ -74,7 +74,7 @@ def right_click(them: Person, selector: str) -> None:
     QTest.mouseClick(them.target, Qt.RightButton, pos=at)
 
 
-def test_with_keys_a_grey_value_goes_out_of_a_list_in_a_gap(view, person):
+def test_list_item_with_shadow_block_is_removed_by_keyboard_menu(view, person):
     them = person(state=workspace(started(write(words_list())) | {"x": 40, "y": 40}))
     view.setFocus()
     them.wait_for("document.hasFocus()")
@@ -90,7 +90,7 @@ def test_with_keys_a_grey_value_goes_out_of_a_list_in_a_gap(view, person):
     them.until(lambda: them.newest() == before, "all as it was")
 
 
-def test_with_the_mouse_the_item_under_it_goes(view, person):
+def test_list_item_under_mouse_is_removed_by_context_menu(view, person):
     them = person(state=workspace(words_list() | {"x": 40, "y": 40}))
     before = them.newest()
     right_click(them, "[data-id=b] > .blocklyPath")
@@ -106,7 +106,7 @@ def test_with_the_mouse_the_item_under_it_goes(view, person):
     assert not any(words.startswith("Remove item") for words in them.ask(MENU))
 
 
-def test_any_input_of_a_function_goes_and_its_uses_follow(view, person):
+def test_removing_a_function_input_updates_its_calls_and_undo_restores_it(view, person):
     greet = define("g", "greet", ("who", "when"), write(given("who")))
     use = call("g", id="c", who=text("Ada"), when=text("now"))
     them = person(state=workspace(started(use) | {"x": 28, "y": 28}, greet | {"x": 28, "y": 252}))

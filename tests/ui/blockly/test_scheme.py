@@ -11,7 +11,7 @@ from app.ui.blockly.scheme import content, register_scheme
 register_scheme()
 
 
-def test_the_scheme_is_secure_and_registered_once():
+def test_scheme_is_secure_and_registered_once():
     register_scheme()
     scheme = QWebEngineUrlScheme.schemeByName(QByteArray(b"app"))
     assert scheme.name() == b"app"
@@ -19,7 +19,7 @@ def test_the_scheme_is_secure_and_registered_once():
     assert not scheme.flags() & QWebEngineUrlScheme.Flag.LocalAccessAllowed
 
 
-def test_serves_the_bundle():
+def test_scheme_serves_the_editor_bundle():
     kind, data = content("/index.html")
     assert kind == "text/html"
     assert b"Content-Security-Policy" in data
@@ -40,11 +40,11 @@ def test_serves_the_bundle():
         "//etc/passwd",
     ],
 )
-def test_nothing_else_can_be_read(path):
+def test_scheme_rejects_paths_outside_the_bundle(path):
     assert content(path) is None
 
 
-def test_fonts_come_from_the_shipped_ones():
+def test_scheme_serves_the_shipped_fonts():
     kind, css = content("/fonts.css")
     assert kind == "text/css"
     for name, weight, kind in (("Inter-SemiBold.otf", 600, "otf"), ("MPLUS1p-Bold.ttf", 700, "ttf")):
@@ -53,18 +53,18 @@ def test_fonts_come_from_the_shipped_ones():
         assert content(f"/fonts/{name}") == (f"font/{kind}", file.read_bytes())
 
 
-def test_no_font_is_no_failure(tmp_path):
+def test_missing_fonts_yield_an_empty_stylesheet(tmp_path):
     assert content("/fonts.css", tmp_path) == ("text/css", b"")
 
 
-def test_a_link_out_of_the_folder_is_not_followed(tmp_path):
+def test_symlink_out_of_the_folder_is_not_followed(tmp_path):
     (tmp_path / "blockly").mkdir()
     (tmp_path / "secret.txt").write_text("secret")
     (tmp_path / "blockly" / "link.txt").symlink_to(tmp_path / "secret.txt")
     assert content("/link.txt", tmp_path) is None
 
 
-def test_the_page_names_no_other_place():
+def test_page_references_no_external_origin():
     page = content("/index.html")[1].decode()
     assert "http:" not in page
     assert "https:" not in page

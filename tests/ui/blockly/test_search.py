@@ -236,19 +236,19 @@ def found(them: Person, words: str) -> str:
 
 
 @pytest.mark.parametrize(("wanted", "table"), [("en", ENGLISH), ("es", SPANISH)])
-def test_the_words_of_people_find_the_block_that_they_mean(opened, wanted, table):
+def test_search_terms_and_synonyms_find_the_intended_block(opened, wanted, table):
     them = opened(wanted)
     assert {words: found(them, words) for words in table} == table
 
 
 @pytest.mark.parametrize(("wanted", "table"), [("en", LEADING), ("es", LEADING_SPANISH)])
-def test_what_a_person_from_scratch_types_is_among_the_first_two(opened, wanted, table):
+def test_scratch_search_terms_rank_the_block_among_the_first_two(opened, wanted, table):
     them = opened(wanted)
     first = {words: first_two(them, words) for words in table}
     assert {words: types for words, types in first.items() if not set(table[words]) <= set(types)} == {}
 
 
-def test_typed_words_show_blocks_and_enter_takes_the_first(qtbot, opened):
+def test_search_shows_blocks_and_enter_takes_the_first(qtbot, opened):
     them = opened("en")
     them.click(FIELD)
     QTest.keyClicks(them.target, "nap pause")
@@ -258,7 +258,7 @@ def test_typed_words_show_blocks_and_enter_takes_the_first(qtbot, opened):
     qtbot.waitUntil(lambda: "control_wait" in json.dumps(them.tops()), timeout=WAIT_MS)
 
 
-def test_who_finds_nothing_is_told_what_to_try(opened):
+def test_search_without_results_suggests_what_to_try(opened):
     them = opened("en")
     them.click(FIELD)
     QTest.keyClicks(them.target, "zzyzx")
@@ -277,7 +277,7 @@ def shown(them: Person) -> int:
     return them.ask(f"document.querySelectorAll('{FLYOUT} .blocklyBlockCanvas > .blocklyDraggable').length")
 
 
-def test_a_word_is_looked_for_once_and_not_each_of_its_letters(opened):
+def test_search_runs_once_per_query_and_not_per_letter(opened):
     them = opened("en")
     them.ask(
         "(window.made = 0, new MutationObserver(all => window.made +="
@@ -294,7 +294,7 @@ def test_a_word_is_looked_for_once_and_not_each_of_its_letters(opened):
     assert found(them, "turn") == "robot_pepper_do_turn"
 
 
-def test_enter_takes_what_was_typed_and_not_what_was_found_before(qtbot, opened):
+def test_enter_uses_the_typed_query_and_not_older_results(qtbot, opened):
     them = opened("en")
     them.click(FIELD)
     assert found(them, "wait") == "control_wait"
@@ -306,7 +306,7 @@ def test_enter_takes_what_was_typed_and_not_what_was_found_before(qtbot, opened)
     qtbot.waitUntil(lambda: "robot_pepper_do_say" in json.dumps(them.tops()), timeout=WAIT_MS)
 
 
-def test_more_is_found_than_fits_and_a_button_shows_it(opened):
+def test_more_results_button_shows_the_remaining_blocks(opened):
     them = opened("en")
     found(them, "e")
     few = shown(them)
@@ -321,7 +321,7 @@ def test_more_is_found_than_fits_and_a_button_shows_it(opened):
 
 
 @pytest.mark.parametrize("wanted", ["search", "find"])
-def test_letters_typed_right_after_a_new_behaviour_and_a_search_all_arrive(opened, wanted):
+def test_keys_typed_right_after_new_behaviour_and_search_all_arrive(opened, wanted):
     them = opened("en")
     them.click("[data-id=start] > .blocklyPath", dy=30)
     them.view.show_tab("new", workspace(*({**START, "id": f"many{at}"} for at in range(60))))
@@ -333,7 +333,7 @@ def test_letters_typed_right_after_a_new_behaviour_and_a_search_all_arrive(opene
     them.wait_for(f"document.querySelector('{field}').value", "wait a")
 
 
-def test_letters_that_are_typed_before_the_page_is_there_arrive(qtbot):
+def test_keys_typed_before_the_page_is_loaded_reach_the_search_field(qtbot):
     view = editor(qtbot, editor_definitions([robot("Pepper")]), 1320, 700)
     view.show()
     qtbot.waitUntil(lambda: view.web is not None and view.web.keyboard() is not None, timeout=WAIT_MS)
@@ -351,7 +351,7 @@ SAYS = f"document.querySelectorAll('{FLYOUT} .blocklyBlockCanvas > .robot_pepper
 """How many blocks that let a Pepper speak the toolbox shows."""
 
 
-def test_typed_words_and_the_focus_stay_when_a_robot_arrives(opened):
+def test_search_text_and_focus_are_kept_when_a_robot_connects(opened):
     them = opened("en")
     them.click(FIELD)
     QTest.keyClicks(them.target, "sa")
@@ -363,7 +363,7 @@ def test_typed_words_and_the_focus_stay_when_a_robot_arrives(opened):
     them.wait_for(f"document.activeElement === document.querySelector({FIELD!r})")
 
 
-def test_half_a_name_keeps_its_marked_letters_when_a_robot_arrives(opened):
+def test_partial_name_keeps_its_text_selection_when_a_robot_connects(opened):
     them = opened("en")
     them.click(FIELD)
     QTest.keyClicks(them.target, "wait")
@@ -380,7 +380,7 @@ def test_half_a_name_keeps_its_marked_letters_when_a_robot_arrives(opened):
 FOCUSED = "(it => [it.getAttribute('aria-label') ?? '', it.textContent])(document.activeElement)"
 
 
-def test_keys_stay_on_a_category_when_a_robot_arrives(opened):
+def test_keyboard_focus_stays_on_a_category_when_a_robot_connects(opened):
     them = opened("en")
     them.open_category("Control")
     before = them.ask(FOCUSED)
@@ -390,7 +390,7 @@ def test_keys_stay_on_a_category_when_a_robot_arrives(opened):
     assert them.ask(FOCUSED) == before
 
 
-def test_keys_stay_on_a_block_of_the_toolbox_when_a_robot_arrives(opened):
+def test_keyboard_focus_stays_on_a_flyout_block_when_a_robot_connects(opened):
     them = opened("en")
     them.click(FIELD)
     QTest.keyClicks(them.target, "say")

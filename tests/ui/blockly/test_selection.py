@@ -86,7 +86,7 @@ def ids(top: dict) -> list[str]:
     return [top["id"], *(ids(below) if below else [])]
 
 
-def test_a_frame_chooses_what_it_touches_and_the_canvas_stays(them):
+def test_rubber_band_selects_the_blocks_it_touches_without_scrolling_the_canvas(them):
     before = them.box("[data-id=e] > .blocklyPath")
     frame(them, "d", "e")
     them.wait_for(CHOSEN, ["d", "e"])
@@ -96,7 +96,7 @@ def test_a_frame_chooses_what_it_touches_and_the_canvas_stays(them):
     them.wait_for(CHOSEN, [])
 
 
-def test_the_button_lets_a_drag_draw_one_frame(them):
+def test_selection_button_makes_the_next_drag_draw_one_rubber_band(them):
     them.click(".nepFrameButton")
     frame(them, "d", "e", Qt.NoModifier)
     them.wait_for(CHOSEN, ["d", "e"])
@@ -104,7 +104,7 @@ def test_the_button_lets_a_drag_draw_one_frame(them):
 
 
 @pytest.mark.parametrize("key", [Qt.ControlModifier, Qt.ShiftModifier])
-def test_clicks_add_and_take_away_and_a_plain_one_lets_go(them, key):
+def test_modifier_click_toggles_selection_and_plain_click_clears_it(them, key):
     click(them, "d")
     click(them, "e", key)
     click(them, "b", key)
@@ -115,7 +115,7 @@ def test_clicks_add_and_take_away_and_a_plain_one_lets_go(them, key):
     them.wait_for(CHOSEN, [])
 
 
-def test_one_drag_moves_all_and_one_undo_takes_it_back(qtbot, them, can_undo):
+def test_dragging_moves_all_selected_blocks_and_one_undo_reverts_it(qtbot, them, can_undo):
     before = them.tops()
     click(them, "d")
     click(them, "e", Qt.ControlModifier)
@@ -133,7 +133,7 @@ def test_one_drag_moves_all_and_one_undo_takes_it_back(qtbot, them, can_undo):
     qtbot.waitUntil(lambda: them.tops() == before, timeout=WAIT_MS)
 
 
-def test_blocks_out_of_the_middle_of_a_script_come_along_and_the_rest_closes(qtbot, them, can_undo):
+def test_selected_blocks_inside_a_script_move_along_and_the_gap_closes(qtbot, them, can_undo):
     before = them.tops()
     click(them, "a")
     click(them, "b", Qt.ControlModifier)
@@ -149,7 +149,7 @@ def test_blocks_out_of_the_middle_of_a_script_come_along_and_the_rest_closes(qtb
     qtbot.waitUntil(lambda: them.tops() == before, timeout=WAIT_MS)
 
 
-def test_delete_takes_all_that_are_chosen_in_one_step(qtbot, them, can_undo):
+def test_delete_removes_all_selected_blocks_in_one_undo_step(qtbot, them, can_undo):
     before = by_id(them)
     click(them, "b")
     click(them, "d", Qt.ControlModifier)
@@ -160,7 +160,7 @@ def test_delete_takes_all_that_are_chosen_in_one_step(qtbot, them, can_undo):
     qtbot.waitUntil(lambda: by_id(them) == before, timeout=WAIT_MS)
 
 
-def test_the_bin_takes_all_that_are_in_the_hand(qtbot, them, can_undo):
+def test_dropping_on_the_bin_deletes_all_dragged_blocks(qtbot, them, can_undo):
     before = by_id(them)
     frame(them, "d", "e")
     them.wait_for(CHOSEN, ["d", "e"])
@@ -174,7 +174,7 @@ def test_the_bin_takes_all_that_are_in_the_hand(qtbot, them, can_undo):
     qtbot.waitUntil(lambda: by_id(them) == before, timeout=WAIT_MS)
 
 
-def test_copies_keep_their_places_beside_each_other(qtbot, them, can_undo):
+def test_copies_keep_their_relative_positions(qtbot, them, can_undo):
     before = by_id(them)
     frame(them, "d", "e")
     them.wait_for(CHOSEN, ["d", "e"])
@@ -190,7 +190,7 @@ def test_copies_keep_their_places_beside_each_other(qtbot, them, can_undo):
     qtbot.waitUntil(lambda: by_id(them) == before, timeout=WAIT_MS)
 
 
-def test_all_are_chosen_and_the_menu_counts_them(qtbot, them):
+def test_select_all_selects_every_block_and_the_menu_shows_the_count(qtbot, them):
     click(them, "d")
     them.press(Qt.Key_A, Qt.ControlModifier)
     them.wait_for(CHOSEN, ["a", "b", "c", "d", "e", "start"])
@@ -202,7 +202,7 @@ def test_all_are_chosen_and_the_menu_counts_them(qtbot, them):
     assert "Add a note" not in them.ask(rows)
 
 
-def test_all_chosen_are_switched_off_together(qtbot, them):
+def test_all_selected_blocks_are_disabled_together(qtbot, them):
     click(them, "d")
     click(them, "e", Qt.ControlModifier)
     them.wait_for(CHOSEN, ["d", "e"])

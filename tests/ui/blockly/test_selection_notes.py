@@ -83,7 +83,7 @@ def way(one: dict, other: dict) -> tuple[float, float]:
     return other["x"] - one["x"], other["y"] - one["y"]
 
 
-def test_a_frame_takes_notes_and_delete_takes_all_in_one_step(qtbot, them, can_undo):
+def test_rubber_band_selects_notes_and_delete_removes_all_in_one_step(qtbot, them, can_undo):
     before = them.newest()
     frame_right(them)
     looked_at(them, "chosen-notes")
@@ -95,7 +95,7 @@ def test_a_frame_takes_notes_and_delete_takes_all_in_one_step(qtbot, them, can_u
     assert blocks(them.newest()) == blocks(before)
 
 
-def test_all_are_blocks_and_notes_and_a_note_among_them_deletes_all(qtbot, them, can_undo):
+def test_select_all_includes_notes_and_deleting_from_a_note_deletes_all(qtbot, them, can_undo):
     before = them.newest()
     click_head(them, "one")
     them.press(Qt.Key_A, Qt.ControlModifier)
@@ -112,7 +112,7 @@ def test_all_are_blocks_and_notes_and_a_note_among_them_deletes_all(qtbot, them,
     assert blocks(them.newest()) == blocks(before)
 
 
-def test_clicks_add_a_note_and_take_it_away(them):
+def test_modifier_click_toggles_selection_of_a_note(them):
     click(them, "d")
     click_head(them, "two", Qt.ControlModifier)
     click_head(them, "one", Qt.ControlModifier)
@@ -124,7 +124,7 @@ def test_clicks_add_a_note_and_take_it_away(them):
 
 
 @pytest.mark.parametrize("held", ["d", "one"])
-def test_one_drag_moves_blocks_and_notes_and_one_undo_takes_it_back(qtbot, them, can_undo, held):
+def test_dragging_moves_blocks_and_notes_and_one_undo_reverts_it(qtbot, them, can_undo, held):
     before = them.newest()
     frame_right(them)
     start = press_head(them, "one") if held == "one" else them.hold("[data-id=d] > .blocklyPath")
@@ -145,7 +145,7 @@ def test_one_drag_moves_blocks_and_notes_and_one_undo_takes_it_back(qtbot, them,
     assert blocks(them.newest()) == blocks(before)
 
 
-def test_copies_of_blocks_and_notes_keep_their_places_beside_each_other(qtbot, them, can_undo):
+def test_copies_of_blocks_and_notes_keep_their_relative_positions(qtbot, them, can_undo):
     before = them.newest()
     frame_right(them)
     them.press(Qt.Key_C, Qt.ControlModifier)
@@ -161,7 +161,7 @@ def test_copies_of_blocks_and_notes_keep_their_places_beside_each_other(qtbot, t
     qtbot.waitUntil(lambda: notes(them.newest()) == notes(before), timeout=WAIT_MS)
 
 
-def test_several_notes_alone_are_cut_and_pasted(qtbot, them):
+def test_several_selected_notes_are_cut_and_pasted(qtbot, them):
     click_head(them, "one")
     click_head(them, "two", Qt.ControlModifier)
     them.wait_for(CHOSEN, ["one", "two"])

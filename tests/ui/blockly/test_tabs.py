@@ -22,7 +22,7 @@ SHOWN = "document.querySelector('.nepTab:not([hidden])')"
 TABS = "document.querySelectorAll('.nepTab').length"
 
 
-def test_the_first_tab_goes_when_a_real_one_comes() -> None:
+def test_placeholder_tab_is_replaced_by_the_first_document() -> None:
     tabs = Tabs()
     assert tabs.shown.program.blocks == EMPTY
     assert tabs.show("a", WorkspaceJson.of(A)) == ""
@@ -32,7 +32,7 @@ def test_the_first_tab_goes_when_a_real_one_comes() -> None:
     assert tabs.shown.program.blocks == A
 
 
-def test_edits_of_a_closed_or_replaced_program_do_not_count() -> None:
+def test_edits_of_a_closed_or_replaced_program_are_ignored() -> None:
     tabs = Tabs()
     tabs.show("a", WorkspaceJson.of(A))
     before = tabs.shown.generation
@@ -69,7 +69,7 @@ def turn_to(them, key: str) -> None:
 
 
 @pytest.mark.web
-def test_each_tab_has_its_own_undo(qtbot, view, two) -> None:
+def test_each_tab_has_its_own_undo_stack(qtbot, view, two) -> None:
     history: list[tuple[bool, bool]] = []
     view.history_changed.connect(lambda *each: history.append(each))
     delete_the_hat(qtbot, two)
@@ -87,7 +87,7 @@ def test_each_tab_has_its_own_undo(qtbot, view, two) -> None:
 
 
 @pytest.mark.web
-def test_zoom_and_place_stay_with_the_tab(qtbot, view, two) -> None:
+def test_zoom_and_scroll_position_are_kept_per_tab(qtbot, view, two) -> None:
     box = "document.querySelector('[data-id=start]').getBoundingClientRect()"
     place = f"(r => [r.left, r.top, r.width])({box})"
     first = two.ask(place)
@@ -104,7 +104,7 @@ def test_zoom_and_place_stay_with_the_tab(qtbot, view, two) -> None:
 
 
 @pytest.mark.web
-def test_an_edit_just_before_leaving_is_told_with_its_tab(qtbot, view, two) -> None:
+def test_pending_edit_is_reported_with_its_tab_when_switching(qtbot, view, two) -> None:
     two.open_category("Control")
     told: list[tuple[str, WorkspaceJson]] = []
     view.changed.connect(lambda *each: told.append(each))
@@ -119,7 +119,7 @@ def test_an_edit_just_before_leaving_is_told_with_its_tab(qtbot, view, two) -> N
 
 
 @pytest.mark.web
-def test_every_tab_comes_back_after_the_web_process_was_killed(qtbot, view, two) -> None:
+def test_every_tab_is_restored_after_the_web_process_is_killed(qtbot, view, two) -> None:
     delete_the_hat(qtbot, two)
     view.highlight(["start"])
     turn_to(two, "b")
@@ -140,7 +140,7 @@ def test_every_tab_comes_back_after_the_web_process_was_killed(qtbot, view, two)
 
 
 @pytest.mark.web
-def test_what_changed_meanwhile_is_made_up_for_when_a_tab_is_shown(qtbot, view, two) -> None:
+def test_tab_applies_missed_definitions_and_theme_when_it_is_shown(qtbot, view, two) -> None:
     changed = copy.deepcopy(DEFINITIONS)
     next(each for each in changed["blocks"] if each["type"] == "control_wait")["message0"] = "%1 pause %2 s"
     view.set_definitions(changed)
@@ -154,7 +154,7 @@ def test_what_changed_meanwhile_is_made_up_for_when_a_tab_is_shown(qtbot, view, 
 
 
 @pytest.mark.web
-def test_a_closed_tab_is_forgotten(qtbot, view, two) -> None:
+def test_closed_tab_is_discarded(qtbot, view, two) -> None:
     view.close_tab("b")
     two.wait_for(TABS, 1)
     assert two.tops() == [START]
@@ -167,7 +167,7 @@ def test_a_closed_tab_is_forgotten(qtbot, view, two) -> None:
 
 
 @pytest.mark.web
-def test_the_keys_go_to_the_tab_that_is_shown(qtbot, view, two) -> None:
+def test_keyboard_focus_follows_the_shown_tab(qtbot, view, two) -> None:
     with qtbot.waitSignal(view.block_selected, timeout=WAIT_MS, check_params_cb=lambda id: id == "start"):
         two.click(PATH, dy=30)
     two.press(Qt.Key_C, Qt.ControlModifier)
@@ -183,7 +183,9 @@ def test_the_keys_go_to_the_tab_that_is_shown(qtbot, view, two) -> None:
 
 
 @pytest.mark.parametrize("full", [False, True], ids=["room", "full"])
-def test_a_script_that_a_change_adds_lies_free_and_in_sight(qtbot, person, view, full) -> None:
+def test_script_added_by_an_external_change_is_placed_in_free_visible_space(
+    qtbot, person, view, full
+) -> None:
     wide = {"type": "control_wait", "x": 40, "y": 40}
     filled = [
         {**wide, "id": f"w{x}.{y}", "x": x, "y": y} for x in range(0, 1300, 100) for y in range(0, 900, 60)
@@ -205,7 +207,7 @@ def test_a_script_that_a_change_adds_lies_free_and_in_sight(qtbot, person, view,
     assert sorted(them.tops(), key=str) == sorted(before, key=str)
 
 
-def test_a_change_from_outside_is_one_edit_that_undo_takes_back(qtbot, two, view) -> None:
+def test_external_change_is_one_undo_step(qtbot, two, view) -> None:
     told: list[tuple[str, WorkspaceJson]] = []
     view.changed.connect(lambda key, program: told.append((key, program)))
     here = f"[...{SHOWN}.querySelectorAll('.blocklyBlockCanvas .blocklyDraggable')].map(e => e.dataset.id)"

@@ -23,7 +23,7 @@ def asked(view) -> list[dict]:
     return made
 
 
-def test_a_click_in_the_toolbox_tries_the_block_and_adds_nothing(qtbot, view, person, asked):
+def test_click_in_the_flyout_tries_the_block_and_adds_nothing(qtbot, view, person, asked):
     them = person(START)
     them.open_category("Control")
     them.click(".blocklyFlyout .control_wait > .blocklyPath", dx=8, dy=8)
@@ -41,7 +41,7 @@ def test_a_click_in_the_toolbox_tries_the_block_and_adds_nothing(qtbot, view, pe
     )
 
 
-def test_dragging_out_of_the_toolbox_tries_nothing(qtbot, view, person, asked):
+def test_dragging_out_of_the_flyout_tries_nothing(qtbot, view, person, asked):
     them = person(START)
     them.open_category("Control")
     start = them.hold(".blocklyFlyout .control_wait")
@@ -52,7 +52,7 @@ def test_dragging_out_of_the_toolbox_tries_nothing(qtbot, view, person, asked):
     assert asked == []
 
 
-def test_the_round_button_tries_the_selected_block(qtbot, view, person, asked):
+def test_round_button_tries_the_selected_block(qtbot, view, person, asked):
     them = person(state=PICTURE)
     them.wait_for(f"document.querySelectorAll('{HANDLE}').length", 0)
     them.click("[data-id=wave] > .blocklyPath", dx=10, dy=10)
@@ -67,14 +67,14 @@ def test_the_round_button_tries_the_selected_block(qtbot, view, person, asked):
     assert asked[1] == asked[0]
 
 
-def test_a_hat_runs_what_is_below_it(qtbot, view, person, asked):
+def test_trying_an_event_block_runs_its_script(qtbot, view, person, asked):
     them = person(START)
     them.click("[data-id=start] > .blocklyPath", dy=30)
     them.click(HANDLE, dx=10, dy=10)
     qtbot.waitUntil(lambda: asked == [{"id": "start", "kind": "hat"}], timeout=WAIT_MS)
 
 
-def test_a_value_is_shown_beside_its_block_until_the_next_press(qtbot, view, person):
+def test_value_is_shown_at_its_block_until_the_next_press(qtbot, view, person):
     them = person(state=PICTURE)
     view.show_value("wave", "84 %")
     them.wait_for(ANSWER, "84 %")

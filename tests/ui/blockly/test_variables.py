@@ -42,7 +42,7 @@ def values(**held: object) -> dict[str, dict[str, object]]:
     return {id: brief(id, value).to_json() for id, value in held.items()}
 
 
-def test_a_watched_variable_has_a_card_with_its_value_that_is_kept_in_the_file(qtbot, view, them) -> None:
+def test_watched_variable_shows_a_value_card_that_is_saved_in_the_file(qtbot, view, them) -> None:
     with qtbot.waitSignal(view.values_watched, timeout=WAIT_MS) as watched:
         view.edit_variable({"do": "watch", "id": "score"})
     assert watched.args == [("score",)]
@@ -58,7 +58,7 @@ def test_a_watched_variable_has_a_card_with_its_value_that_is_kept_in_the_file(q
     qtbot.waitUntil(lambda: "nepWatched" not in them.newest(), timeout=WAIT_MS)
 
 
-def test_a_card_is_moved_by_hand_stays_in_the_page_and_comes_back_with_the_file(qtbot, view, them) -> None:
+def test_dragged_variable_card_stays_inside_the_page_and_its_position_is_saved(qtbot, view, them) -> None:
     view.edit_variable({"do": "watch", "id": "score"})
     them.wait_for("document.querySelectorAll('.nepWatch').length", 1)
     them.drag(".nepWatch", QPoint(500, 300))
@@ -74,7 +74,9 @@ def test_a_card_is_moved_by_hand_stays_in_the_page_and_comes_back_with_the_file(
     qtbot.waitUntil(lambda: them.box(".nepWatch") == box, timeout=WAIT_MS)
 
 
-def test_the_dropdown_offers_a_new_one_and_leads_to_the_windows_questions(qtbot, view, them) -> None:
+def test_variable_dropdown_offers_a_new_variable_and_opens_the_dialogs_of_the_window(
+    qtbot, view, them
+) -> None:
     asked: list[str] = []
     view.command_wanted.connect(asked.append)
     them.click("[data-id=get] .blocklyDropdownField")
@@ -103,7 +105,7 @@ def choose(them: Person, words: str) -> None:
     them.click("[data-test=entry]", 30, 8)
 
 
-def test_rename_and_delete_are_one_step_each_that_undo_takes_back(qtbot, view, them) -> None:
+def test_rename_and_delete_of_a_variable_are_one_undo_step_each(qtbot, view, them) -> None:
     before = them.newest()
     view.edit_variable({"do": "rename", "id": "score", "name": "points"})
     qtbot.waitUntil(lambda: "points" in str(them.newest()["variables"]), timeout=WAIT_MS)
@@ -120,7 +122,7 @@ def test_rename_and_delete_are_one_step_each_that_undo_takes_back(qtbot, view, t
     )
 
 
-def test_the_menu_of_a_block_shows_the_value_of_its_variable(qtbot, view, them) -> None:
+def test_block_menu_shows_the_value_of_its_variable(qtbot, view, them) -> None:
     asked: list[str] = []
     view.command_wanted.connect(asked.append)
     them.click("[data-id=set] > .blocklyPath", 10, 8)
@@ -130,7 +132,7 @@ def test_the_menu_of_a_block_shows_the_value_of_its_variable(qtbot, view, them) 
     qtbot.waitUntil(lambda: asked == ["variable.watch:score"], timeout=WAIT_MS)
 
 
-def test_only_its_own_commands_reach_the_window(qtbot, view, them) -> None:
+def test_page_only_sends_known_commands_to_the_window(qtbot, view, them) -> None:
     asked: list[str] = []
     view.command_wanted.connect(asked.append)
     view._bridge.command("file.quit")
@@ -138,7 +140,7 @@ def test_only_its_own_commands_reach_the_window(qtbot, view, them) -> None:
     assert asked == ["variable.new"]
 
 
-def test_a_new_list_is_at_once_what_the_blocks_of_lists_are_about(qtbot, view, them) -> None:
+def test_new_list_becomes_the_default_of_the_list_blocks(qtbot, view, them) -> None:
     asked: list[str] = []
     view.command_wanted.connect(asked.append)
     them.open_category("Lists")
@@ -161,7 +163,7 @@ def test_a_new_list_is_at_once_what_the_blocks_of_lists_are_about(qtbot, view, t
     assert len(them.newest()["variables"]) == 3
 
 
-def test_without_a_new_one_they_are_about_the_list_that_a_block_makes(qtbot, view, person) -> None:
+def test_list_blocks_default_to_a_list_that_is_assigned_in_a_block(qtbot, view, person) -> None:
     saved = workspace(
         started(block("variables_set", VAR={"id": "names"}, VALUE=list_of(number(1)))),
         variables=("names", "x"),

@@ -42,7 +42,7 @@ def with_rover() -> dict:
 WHEELS = "document.querySelector('.blocklyToolbox').textContent.includes('Wheels')"
 
 
-def test_a_robot_that_connects_during_a_drag_does_not_break_it(qtbot, view, person):
+def test_robot_that_connects_during_a_drag_does_not_break_it(qtbot, view, person):
     them = person(START)
     hat = them.box("[data-id=start] > .blocklyPath")
     them.open_category("Control")
@@ -60,7 +60,7 @@ def test_a_robot_that_connects_during_a_drag_does_not_break_it(qtbot, view, pers
     assert top["next"]["block"]["type"] == "control_wait"
 
 
-def test_an_open_category_stays_open_when_robots_come(qtbot, view, person):
+def test_open_category_stays_open_when_robots_connect(qtbot, view, person):
     them = person(START)
     them.open_category("Control")
     them.ask("document.querySelector('.blocklyFlyout .control_wait').setAttribute('data-same', 'yes')")
@@ -72,7 +72,7 @@ def test_an_open_category_stays_open_when_robots_come(qtbot, view, person):
     qtbot.waitUntil(lambda: len(them.tops()) == 2, timeout=WAIT_MS)
 
 
-def test_equal_definitions_touch_nothing(qtbot, view, person):
+def test_equal_definitions_cause_no_update(qtbot, view, person):
     them = person(START)
     them.ask("document.querySelector('.nepHeading').setAttribute('data-same', 'yes')")
     view.set_definitions(copy.deepcopy(DEFINITIONS))
@@ -88,7 +88,7 @@ DOTS = """Object.fromEntries([...document.querySelectorAll('.nepHeading.robot')]
     .filter(([name]) => name.startsWith('Rover')))"""
 
 
-def test_a_robot_that_may_still_move_has_no_green_dot_also_while_a_block_is_in_the_hand(view, person):
+def test_robot_that_may_still_move_has_no_green_dot_even_during_a_drag(view, person):
     them = person(START)
     view.set_definitions(with_rover())
     them.wait_for(DOTS, {"Rover": "on"})
@@ -109,7 +109,7 @@ def test_a_robot_that_may_still_move_has_no_green_dot_also_while_a_block_is_in_t
     them.wait_for(DOTS, {"Rovernot connected": "off"})
 
 
-def test_a_page_that_comes_back_knows_which_robots_may_still_move(qtbot, view, person):
+def test_reloaded_page_shows_which_robots_may_still_move(qtbot, view, person):
     them = person(START)
     view.set_definitions(with_rover())
     view.set_alarms({"Rover": ("error", "may still move")})
@@ -118,7 +118,7 @@ def test_a_page_that_comes_back_knows_which_robots_may_still_move(qtbot, view, p
     them.wait_for(DOTS, {"Rovermay still move": "error"})
 
 
-def test_a_block_whose_definition_changes_keeps_its_place_and_undo(qtbot, view, person):
+def test_block_whose_definition_changes_keeps_its_position_and_undo_stack(qtbot, view, person):
     wait = {"type": "control_wait", "id": "w", "x": 140, "y": 140}
     them = person(wait, START)
     them.click("[data-id=start] > .blocklyPath", dy=30)
@@ -133,7 +133,7 @@ def test_a_block_whose_definition_changes_keeps_its_place_and_undo(qtbot, view, 
     assert next(top for top in them.tops() if top["id"] == "w") == wait
 
 
-def test_new_robots_are_offered_and_unknown_ones_stay(view, person):
+def test_blocks_of_new_robots_are_offered_and_unknown_blocks_are_kept(view, person):
     say = {"type": "robot_pepper_do_say", "id": "say", "x": 28, "y": 28, "fields": {"ROBOT": "Old one"}}
     them = person(say)
     view.set_definitions(with_rover())
@@ -144,7 +144,7 @@ def test_new_robots_are_offered_and_unknown_ones_stay(view, person):
     assert them.tops() == [say]
 
 
-def test_a_killed_web_process_loses_nothing(qtbot, view, person, caplog):
+def test_killed_web_process_loses_no_edits(qtbot, view, person, caplog):
     them = person(START)
     them.open_category("Control")
     with qtbot.waitSignal(view.changed, timeout=WAIT_MS):
@@ -171,7 +171,7 @@ def test_a_killed_web_process_loses_nothing(qtbot, view, person, caplog):
 @pytest.mark.parametrize(
     ("language", "words"), [("de", "Baustein löschen"), ("pt-BR", "Deletar bloco"), ("xx", "Delete")]
 )
-def test_blockly_speaks_the_language_or_english(qtbot, language, words):
+def test_blockly_uses_the_chosen_language_or_falls_back_to_english(qtbot, language, words):
     view = BlocklyView(language=language)
     qtbot.addWidget(view)
     view.set_definitions(DEFINITIONS)
@@ -186,7 +186,7 @@ def test_blockly_speaks_the_language_or_english(qtbot, language, words):
     them.wait_for(f"!!document.querySelector('.blocklyContextMenu')?.textContent.includes({words!r})")
 
 
-def test_the_pages_own_words_come_from_the_window(qtbot, monkeypatch):
+def test_page_texts_are_translated_by_the_window(qtbot, monkeypatch):
     monkeypatch.setattr(
         "nep.i18n.editor_words", lambda: {"Find a block": "Buscar un bloque", "Duplicate": "Otra vez"}
     )
@@ -218,7 +218,7 @@ sys.exit(application.exec())
 """
 
 
-def test_the_application_ends_in_order():
+def test_application_exits_cleanly_with_an_open_editor():
     done = subprocess.run(
         [sys.executable, "-c", ENDING], cwd=ROOT, capture_output=True, text=True, timeout=140, check=False
     )

@@ -67,7 +67,7 @@ def corner(them: Person, selector: str, side: str = "top") -> QPoint:
         ("start", "[data-id=turn] > .blocklyPath", "bottom", "“when started” starts a script"),
     ],
 )
-def test_a_wrong_drop_says_why_and_uncovers_the_place(qtbot, them, id, selector, side, words):
+def test_invalid_drop_shows_the_reason_and_uncovers_the_target(qtbot, them, id, selector, side, words):
     before = them.newest()
     place = corner(them, selector, side)
     drop(them, id, place)
@@ -82,7 +82,7 @@ def test_a_wrong_drop_says_why_and_uncovers_the_place(qtbot, them, id, selector,
     qtbot.waitUntil(lambda: them.newest() == before, timeout=WAIT_MS)
 
 
-def test_what_is_moved_aside_covers_no_other_script(qtbot, view, them):
+def test_block_moved_aside_after_invalid_drop_covers_no_other_script(qtbot, view, them):
     """The way to the right of the place leads onto the script there."""
     state = workspace(START, TURN, EVER, {**FACE, "y": 476}, {**BATTERY, "x": 300, "y": 196})
     view.load(state)
@@ -95,21 +95,21 @@ def test_what_is_moved_aside_covers_no_other_script(qtbot, view, them):
         assert apart or mine["top"] >= each["bottom"] or mine["bottom"] <= each["top"]
 
 
-def test_the_sentence_goes_with_the_next_touch(them):
+def test_invalid_drop_message_disappears_on_next_touch(them):
     drop(them, "face", corner(them, "[data-id=angle] > .blocklyPath"))
     them.wait_for(f"{SAID} !== ''")
     them.click("[data-id=ever] > .blocklyPath")
     them.wait_for(SAID, "")
 
 
-def test_a_drop_on_the_empty_canvas_says_nothing(qtbot, them):
+def test_drop_on_empty_canvas_shows_no_message(qtbot, them):
     drop(them, "face", QPoint(700, 560))
     qtbot.waitUntil(lambda: them.ask("document.querySelector('.blocklyDragging')") is None, timeout=WAIT_MS)
     assert them.ask(SAID) == ""
 
 
 @pytest.mark.parametrize("zooms", [-4, 0, 3])
-def test_a_block_snaps_from_as_far_on_the_screen_at_every_zoom(qtbot, view, them, zooms):
+def test_snap_distance_on_screen_is_the_same_at_every_zoom(qtbot, view, them, zooms):
     for _ in range(abs(zooms)):
         (view.zoom_in if zooms > 0 else view.zoom_out)()
     view.show_block("turn")

@@ -101,14 +101,14 @@ def world(request: pytest.FixtureRequest) -> Iterator[World]:
     made.close()
 
 
-def test_the_master_is_found_before_the_graph_is_told(world: World) -> None:
+def test_master_is_found_before_the_graph_is_reported(world: World) -> None:
     assert world.events == []
     world.begin()
     assert [type(event) for event in world.events[:2]] == [MasterFound, GraphSeen]
     assert world.events[0] == MasterFound(world.source.address)
 
 
-def test_messages_come_to_every_sink_while_their_topic_is_watched(world: World) -> None:
+def test_messages_reach_every_sink_while_their_topic_is_watched(world: World) -> None:
     world.begin()
     world.send("nobody listens")
     assert world.heard == []
@@ -125,7 +125,7 @@ def test_messages_come_to_every_sink_while_their_topic_is_watched(world: World) 
     world.source.unwatch("/a")  # nor does this
 
 
-def test_what_was_missed_is_counted_of_topics_that_are_watched(world: World) -> None:
+def test_missed_messages_are_counted_for_watched_topics_only(world: World) -> None:
     world.begin()
     assert world.source.missed() == {}
     world.source.watch("/a")
@@ -136,7 +136,7 @@ def test_what_was_missed_is_counted_of_topics_that_are_watched(world: World) -> 
     until(lambda: world.source.missed() == {})
 
 
-def test_jobs_have_a_node_keep_their_order_and_one_that_fails_is_told(world: World) -> None:
+def test_jobs_get_a_node_run_in_order_and_failures_are_reported(world: World) -> None:
     world.begin()
     done: list[object] = []
 

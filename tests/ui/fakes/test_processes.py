@@ -76,7 +76,7 @@ def launcher(started_here: RealProcesses | MadeUpProcesses, told: list[object]) 
     made.close()
 
 
-def test_robots_come_and_go_with_their_processes(launcher: Launcher, started_here, told) -> None:
+def test_robots_appear_and_disappear_with_their_processes(launcher: Launcher, started_here, told) -> None:
     assert (launcher.virtual_robots, launcher.process_ids) == ((), ())
     launcher.start_virtual_robot("Pepper")
     launcher.start_virtual_robot("Turtle", "diffdrive")
@@ -94,7 +94,9 @@ def test_robots_come_and_go_with_their_processes(launcher: Launcher, started_her
     assert (launcher.virtual_robots, turtle.poll() is None) == ((), False)
 
 
-def test_one_that_ends_by_itself_says_its_last_words_once(launcher: Launcher, started_here, told) -> None:
+def test_robot_process_that_exits_reports_its_last_output_once(
+    launcher: Launcher, started_here, told
+) -> None:
     launcher.start_virtual_robot("Pepper")
     launcher.check()
     assert told == []
@@ -109,7 +111,7 @@ def test_one_that_ends_by_itself_says_its_last_words_once(launcher: Launcher, st
     assert (launcher.virtual_robots, launcher.ended) == (("Pepper",), frozenset())
 
 
-def test_one_that_was_ended_from_outside_says_so(launcher: Launcher, started_here, told) -> None:
+def test_process_killed_from_outside_is_reported_as_such(launcher: Launcher, started_here, told) -> None:
     launcher.start_virtual_robot("Pepper")
     killed = started_here.made[0]
     killed.kill()
@@ -120,7 +122,7 @@ def test_one_that_was_ended_from_outside_says_so(launcher: Launcher, started_her
     assert failed.detail == (ended if os.name == "posix" else "It gave no reason (exit code 1).")
 
 
-def test_one_that_is_started_anew_is_another_process(launcher: Launcher, started_here, told) -> None:
+def test_restarted_process_is_a_new_process(launcher: Launcher, started_here, told) -> None:
     launcher.start_virtual_robot("Pepper")
     launcher.restart_virtual_robot("Pepper")
     before, now = started_here.made
@@ -134,7 +136,7 @@ def test_one_that_is_started_anew_is_another_process(launcher: Launcher, started
     assert told == []
 
 
-def test_waiting_for_one_that_lives_takes_no_longer_than_it_may(launcher: Launcher, started_here) -> None:
+def test_waiting_for_a_running_process_respects_the_timeout(launcher: Launcher, started_here) -> None:
     launcher.start_virtual_robot("Pepper")
     with pytest.raises(subprocess.TimeoutExpired):
         started_here.made[0].wait(0.01)

@@ -152,7 +152,7 @@ RUNNING = ("running", False, True, True, "Restart", "Stop")
 PAUSED = ("paused", True, False, True, "Resume", "Stop")
 
 
-def test_run_pause_step_go_on_and_stop(run: Run) -> None:
+def test_program_runs_pauses_steps_resumes_and_stops(run: Run) -> None:
     runs = run.session.runs
     run.session.document.edited(endless())
     assert (shown(run), runs.active) == (READY, False)
@@ -184,7 +184,7 @@ def test_run_pause_step_go_on_and_stop(run: Run) -> None:
     assert (runs.running_blocks, runs.stopped_blocks) == ((), ("c",))
 
 
-def test_pause_here_counts_at_once_and_is_no_edit_that_waits_for_a_run(run: Run) -> None:
+def test_pause_at_a_block_applies_at_once_and_is_not_a_pending_edit(run: Run) -> None:
     runs, blocks = run.session.runs, endless()
     run.session.document.edited(blocks)
     runs.run()
@@ -207,7 +207,7 @@ def pressed_long_ago(run: Run) -> None:
     runs._run = replace(runs._run, started_s=runs._run.started_s - 10)
 
 
-def test_run_again_stops_what_runs_and_begins_anew(run: Run) -> None:
+def test_run_again_stops_the_running_program_and_restarts_it(run: Run) -> None:
     runs = run.session.runs
     run.session.document.edited(endless())
     runs.run()
@@ -233,7 +233,7 @@ def test_run_again_stops_what_runs_and_begins_anew(run: Run) -> None:
     assert runs.view().title.startswith("Stopped after ")
 
 
-def test_stop_takes_back_a_restart(run: Run) -> None:
+def test_stop_cancels_a_restart(run: Run) -> None:
     runs = run.session.runs
     run.session.document.edited(endless())
     runs.run()
@@ -245,7 +245,7 @@ def test_stop_takes_back_a_restart(run: Run) -> None:
     assert not runs.active
 
 
-def test_a_paused_program_is_restarted_from_its_beginning(run: Run) -> None:
+def test_paused_program_is_restarted_from_its_beginning(run: Run) -> None:
     runs = run.session.runs
     run.session.document.edited(endless())
     runs.step()
@@ -257,7 +257,7 @@ def test_a_paused_program_is_restarted_from_its_beginning(run: Run) -> None:
     tick_until(run.session, lambda: runs.view().state == "ready")
 
 
-def test_edits_while_it_runs_say_that_they_apply_later_until_they_are_undone(run: Run) -> None:
+def test_edits_during_a_run_are_reported_as_pending_until_undone(run: Run) -> None:
     runs, document = run.session.runs, run.session.document
 
     def says() -> bool:
@@ -292,7 +292,7 @@ def test_edits_while_it_runs_say_that_they_apply_later_until_they_are_undone(run
     tick_until(run.session, lambda: runs.view().state == "ready")
 
 
-def test_a_stack_is_tried_alone_and_never_beside_another_program(run: Run) -> None:
+def test_tried_stack_runs_alone_and_never_beside_another_program(run: Run) -> None:
     runs = run.session.runs
     run.session.document.edited(endless())
     runs.run()
@@ -313,7 +313,7 @@ def test_a_stack_is_tried_alone_and_never_beside_another_program(run: Run) -> No
     assert (view.title, view.detail) == ("Tried “change by”", "Finished")
 
 
-def test_a_variable_that_is_tried_is_what_the_run_gave_it_and_stops_nothing(run: Run) -> None:
+def test_tried_variable_has_the_value_of_the_run_and_stops_nothing(run: Run) -> None:
     runs = run.session.runs
     run.session.document.edited(endless())
     tried = Stack("toolbox", "value", block("variables_get", VAR={"id": "n"}))
@@ -334,7 +334,7 @@ def test_a_variable_that_is_tried_is_what_the_run_gave_it_and_stops_nothing(run:
     assert runs.active
 
 
-def test_stop_ends_a_try(run: Run) -> None:
+def test_stop_ends_a_tried_stack(run: Run) -> None:
     runs = run.session.runs
     run.session.document.edited(endless())
     runs.try_stack(Stack("loop"))
@@ -345,7 +345,7 @@ def test_stop_ends_a_try(run: Run) -> None:
     assert runs.stopped_blocks == ("c",)
 
 
-def test_a_gap_of_what_is_tried_is_told_on_its_block(run: Run) -> None:
+def test_empty_slot_of_a_tried_stack_is_reported_on_its_block(run: Run) -> None:
     runs = run.session.runs
     run.session.document.edited(workspace(started(block("control_wait_until", "gap"))))
     runs.try_stack(Stack("gap"))
@@ -353,7 +353,7 @@ def test_a_gap_of_what_is_tried_is_told_on_its_block(run: Run) -> None:
     assert "needs a condition" in runs.block_errors["gap"]
 
 
-def test_what_is_told_of_a_program_and_its_state(run: Run) -> None:
+def test_runner_reports_program_events_and_state(run: Run) -> None:
     told: list[RunnerEvent] = []
     runner = run.make_runner(told.append)
 
@@ -386,7 +386,7 @@ def test_what_is_told_of_a_program_and_its_state(run: Run) -> None:
     assert runner.program_key != run.make_runner(told.append).program_key
 
 
-def test_step_begins_a_program_at_its_first_block(run: Run) -> None:
+def test_step_starts_a_program_at_its_first_block(run: Run) -> None:
     runs = run.session.runs
     run.session.document.edited(workspace(started(write(text("Hi")) | {"id": "w"})))
     runs.step()
@@ -398,7 +398,7 @@ def test_step_begins_a_program_at_its_first_block(run: Run) -> None:
     tick_until(run.session, lambda: runs.view().state == "ready")
 
 
-def test_a_program_that_ends_has_finished_and_another_can_run(run: Run) -> None:
+def test_program_that_ends_is_finished_and_another_can_run(run: Run) -> None:
     runs = run.session.runs
     run.session.document.edited(workspace(started(write(text("Hi")))))
     for _ in range(2):
@@ -411,7 +411,7 @@ def test_a_program_that_ends_has_finished_and_another_can_run(run: Run) -> None:
     assert not run.session.alerts.active
 
 
-def test_a_block_that_fails_ends_the_program_and_is_marked(run: Run) -> None:
+def test_failing_block_ends_the_program_and_is_marked(run: Run) -> None:
     runs = run.session.runs
     half = block("values_arithmetic", "v", A=number(1), SIGN="/", B=number(0))
     run.session.document.edited(workspace(started(write(half))))
@@ -424,7 +424,7 @@ def test_a_block_that_fails_ends_the_program_and_is_marked(run: Run) -> None:
     assert not run.session.alerts.active, "it stands on its block"
 
 
-def test_a_process_that_is_killed_is_told(run: Run) -> None:
+def test_killed_program_process_is_reported(run: Run) -> None:
     runs = run.session.runs
     run.session.document.edited(endless())
     runs.run()
@@ -437,7 +437,7 @@ def test_a_process_that_is_killed_is_told(run: Run) -> None:
     assert runs.view().title.startswith("Stopped after ")
 
 
-def test_what_an_earlier_run_still_says_is_ignored(run: Run) -> None:
+def test_late_events_of_an_earlier_run_are_ignored(run: Run) -> None:
     runs = run.session.runs
     run.session.document.edited(endless())
     runs.run()

@@ -31,7 +31,7 @@ def settings(is_real: bool, tmp_path: Path) -> Settings:
     return Settings(tmp_path / "home") if is_real else storage.Settings()
 
 
-def test_a_value_is_kept_and_one_of_another_type_is_not_taken(settings: Settings) -> None:
+def test_setting_is_kept_and_value_of_another_type_is_ignored(settings: Settings) -> None:
     assert settings.get("theme", "light") == "light"
     settings.set("theme", "dark")
     assert settings.get("theme", "light") == "dark"
@@ -43,7 +43,7 @@ def test_a_value_is_kept_and_one_of_another_type_is_not_taken(settings: Settings
 
 
 @pytest.mark.parametrize("value", [object(), {"a": {1, 2}}, b"bytes"])
-def test_what_json_cannot_say_is_refused_and_not_kept(settings: Settings, value: object) -> None:
+def test_value_that_json_cannot_encode_is_rejected_and_not_saved(settings: Settings, value: object) -> None:
     settings.set("theme", "dark")
     with pytest.raises(TypeError):
         settings.set("theme", value)
@@ -93,7 +93,7 @@ FIRST = workspace(started(write(text("one"))))
 SECOND = workspace(started(write(text("two"))))
 
 
-def test_an_edit_is_in_the_journal_until_it_is_saved(kept: Kept, tmp_path: Path) -> None:
+def test_edit_is_in_the_journal_until_it_is_saved(kept: Kept, tmp_path: Path) -> None:
     document = kept.document
     assert (kept.blocks, document.dirty, document.edits) == (None, False, 0)
     document.edited(FIRST)
@@ -105,7 +105,7 @@ def test_an_edit_is_in_the_journal_until_it_is_saved(kept: Kept, tmp_path: Path)
     assert (kept.blocks, document.dirty, document.name) == (None, False, "mine")
 
 
-def test_each_behaviour_has_a_journal_of_its_own(kept: Kept) -> None:
+def test_each_behaviour_has_its_own_journal(kept: Kept) -> None:
     document = kept.document
     document.edited(FIRST)
     before = document.journal
@@ -118,7 +118,7 @@ def test_each_behaviour_has_a_journal_of_its_own(kept: Kept) -> None:
     assert document.journal_error is None
 
 
-def test_its_program_is_that_of_its_blocks_and_compiled_once_an_edit(kept: Kept) -> None:
+def test_document_compiles_its_blocks_once_per_edit(kept: Kept) -> None:
     document = kept.document
     document.edited(FIRST)
     program = document.program()
@@ -132,7 +132,7 @@ def test_its_program_is_that_of_its_blocks_and_compiled_once_an_edit(kept: Kept)
     assert document.newest() is not program
 
 
-def test_a_test_tells_what_a_compiler_says() -> None:
+def test_fake_document_returns_the_given_compiler_results() -> None:
     document = storage.Document()
     document.edited(FIRST)
     told = (Problem("info", "b", None, "x", "x is slow."),)
@@ -170,7 +170,7 @@ def look(is_real: bool) -> Callable[[list[Finding]], Doctor]:
     return found
 
 
-def test_a_doctor_keeps_what_it_found(look: Callable[[object], Doctor]) -> None:
+def test_doctor_keeps_its_findings(look: Callable[[object], Doctor]) -> None:
     fine = Finding("master", "ok", "A master runs.")
     doctor = look([fine])
     assert (tuple(doctor.findings), doctor.looking) == ((fine,), False)
@@ -182,7 +182,7 @@ def test_a_doctor_keeps_what_it_found(look: Callable[[object], Doctor]) -> None:
     assert doctor.revision > seen
 
 
-def test_a_doctor_that_breaks_off_says_so(look: Callable[[object], Doctor]) -> None:
+def test_doctor_that_crashes_reports_the_error(look: Callable[[object], Doctor]) -> None:
     (finding,) = look(None).findings
     assert (finding.id, finding.severity) == ("doctor", "error")
     assert finding.sentence.startswith("The doctor could not finish: TypeError")

@@ -39,7 +39,7 @@ def ends(session: fakes.Session) -> None:
     session.runs.confirm_still()  # the robot of the test does not answer a stop
 
 
-def test_a_real_robot_is_asked_for_once_and_then_does_what_was_tried(session: fakes.Session) -> None:
+def test_real_robot_asks_once_for_permission_and_then_runs_the_tried_block(session: fakes.Session) -> None:
     session.join(ROVER, virtual=False)
     assert tried(session, LIGHT) == "", "what does not move needs no answer"
     assert tried(session, TURN) == "Allow Rover to move?"
@@ -49,7 +49,7 @@ def test_a_real_robot_is_asked_for_once_and_then_does_what_was_tried(session: fa
     assert tried(session, TURN) == ""
 
 
-def test_after_a_no_nothing_moves_and_the_next_try_asks_again(session: fakes.Session) -> None:
+def test_after_denied_permission_nothing_moves_and_the_next_try_asks_again(session: fakes.Session) -> None:
     session.join(ROVER, virtual=False)
     assert tried(session, TURN) == "Allow Rover to move?"
     session.fleet.permission.answer(let=False)
@@ -57,6 +57,6 @@ def test_after_a_no_nothing_moves_and_the_next_try_asks_again(session: fakes.Ses
     assert tried(session, TURN) == "Allow Rover to move?"
 
 
-def test_a_virtual_robot_is_never_asked_for(session: fakes.Session) -> None:
+def test_virtual_robot_never_asks_for_permission(session: fakes.Session) -> None:
     session.join(ROVER, virtual=True)
     assert tried(session, TURN) == ""

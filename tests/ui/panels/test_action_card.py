@@ -48,13 +48,13 @@ def tried(state: str = "running", **more: object) -> Invocation:
         (tried(elapsed_s=2.14), "for 2.1 s"),
     ],
 )
-def test_it_says_what_is_going_on(card, made, words) -> None:
+def test_card_shows_the_current_state_of_the_action(card, made, words) -> None:
     card.show_invocation(made)
     assert card.words.text() == words
     assert card.try_button.text() == "Cancel"
 
 
-def test_the_time_that_is_left_is_counted_down(card) -> None:
+def test_remaining_time_is_counted_down(card) -> None:
     card.show_invocation(tried(left_s=7.3))
     assert card.left.text() == "8 s left"
     assert card.left.isVisible()
@@ -64,13 +64,13 @@ def test_the_time_that_is_left_is_counted_down(card) -> None:
     assert not card.left.isVisible()
 
 
-def test_too_late_is_a_sentence_below(card) -> None:
+def test_missed_deadline_is_shown_as_a_sentence_below_the_card(card) -> None:
     card.show_invocation(tried("failed", error="go far took longer than 10 s"))
     assert (card.result.text, card.error.text()) == ("failed", "Go far took longer than 10 s.")
     assert card.try_button.text() == "Try"
 
 
-def test_what_was_replaced_says_by_what_and_a_plain_stop_says_no_more(card) -> None:
+def test_replaced_action_names_its_replacement_and_plain_stop_adds_no_text(card) -> None:
     card.show_invocation(tried("canceled", error="replaced by turn", elapsed_s=1.0))
     assert (card.result.text, card.error.text()) == ("stopped after 1.0 s", "Replaced by turn.")
     assert card.error.property("role") == "textSecondary"  # that is no error
@@ -80,7 +80,7 @@ def test_what_was_replaced_says_by_what_and_a_plain_stop_says_no_more(card) -> N
     assert not card.error.isVisible()
 
 
-def test_what_the_robot_answers_stands_beside_the_result(card) -> None:
+def test_robot_reply_is_shown_beside_the_result(card) -> None:
     card.show_invocation(tried("succeeded", output={"moved": 0.5, "seconds": 1.4}, elapsed_s=1.5))
     assert card.words.text() == "moved 0.50 m"
 
@@ -95,7 +95,7 @@ def test_what_the_robot_answers_stands_beside_the_result(card) -> None:
         ({}, None),
     ],
 )
-def test_a_share_of_what_was_asked_is_a_bar(card, feedback, share) -> None:
+def test_feedback_as_a_fraction_of_the_input_is_a_progress_bar(card, feedback, share) -> None:
     assert progress_of(MOVE, {"distance": -0.5}, feedback) == share
     card.show_invocation(tried(feedback=feedback))
     assert card.progress.isVisible() == (share is not None)
@@ -104,7 +104,7 @@ def test_a_share_of_what_was_asked_is_a_bar(card, feedback, share) -> None:
 @pytest.mark.parametrize(
     "field", [DataField("percent", "done", "number"), DataField("charge", "charge", "number", "%")]
 )
-def test_per_cents_are_bars_too(field) -> None:
+def test_feedback_in_per_cent_is_a_progress_bar(field) -> None:
     action = Action("load", "load", "x", "X", (), "load", None, "/c", "/a", feedback=(field,))
     assert progress_of(action, {}, {field.name: 40}) == 0.4
     assert field_words((DataField("open", "open", "boolean"),), {"open": True}) == "open yes"
@@ -115,7 +115,7 @@ def show(card: ActionCard, tries: Sequence[Invocation]) -> list[str]:
     return [f"{row.given}: {row.result}" for row in card.tries.rows]
 
 
-def test_the_last_tries_are_listed_and_give_their_values_back(card) -> None:
+def test_last_tries_are_listed_and_restore_their_input_values(card) -> None:
     assert not card.past.isVisible()
     done = Invocation(
         "1", "go_far", "succeeded", given={"distance": 0.25}, output={"moved": 0.25}, elapsed_s=1
@@ -137,7 +137,7 @@ def test_the_last_tries_are_listed_and_give_their_values_back(card) -> None:
     assert len(show(card, many)) == 5
 
 
-def test_ctrl_enter_tries_it(card, qtbot) -> None:
+def test_ctrl_enter_tries_the_action(card, qtbot) -> None:
     with qtbot.waitSignal(card.tried) as told:
         QTest.keyClick(card, Qt.Key.Key_Return, Qt.KeyboardModifier.ControlModifier)
     assert told.args == [{"distance": 0.5}]

@@ -82,7 +82,7 @@ def type_in(panel: AlarmsPanel, text: str, key: Qt.Key = Qt.Key.Key_Return) -> N
     QTest.keyClick(field, key)
 
 
-def test_an_empty_panel_says_how_an_alarm_is_made(panel, window) -> None:
+def test_empty_panel_explains_how_to_create_an_alarm(panel, window) -> None:
     assert panel.pages.currentIndex() == 0
     panel.begin()
     assert panel.pages.currentIndex() == 1
@@ -94,7 +94,7 @@ def test_an_empty_panel_says_how_an_alarm_is_made(panel, window) -> None:
     assert window.session.alarms.alarms.evaluator.topics == {"/robot/camera"}
 
 
-def test_the_words_of_a_sentence_are_chosen_by_keys(panel) -> None:
+def test_words_of_an_alarm_sentence_are_chosen_by_keyboard(panel) -> None:
     panel.alarms.put(BELOW)
     panel.refresh()
     press(slot(panel, "kind"))
@@ -115,7 +115,7 @@ def test_the_words_of_a_sentence_are_chosen_by_keys(panel) -> None:
     assert said(panel) == "When robots.Pepper.battery of /blackboard is above 20 for 90 s , show a banner"
 
 
-def test_the_values_of_a_topic_are_offered(panel, window) -> None:
+def test_values_of_a_topic_are_suggested(panel, window) -> None:
     panel.alarms.put(replace(BELOW, condition=replace(BELOW.condition, path="")))
     panel.refresh()
     press(slot(panel, "value"))
@@ -126,7 +126,7 @@ def test_the_values_of_a_topic_are_offered(panel, window) -> None:
     assert panel.field.completer().model().stringList() == ["pose.x", "pose.y[0]"]
 
 
-def test_everything_in_a_row_has_a_name_for_a_screen_reader(panel) -> None:
+def test_every_control_in_a_row_has_an_accessible_name(panel) -> None:
     panel.alarms.put(replace(BELOW, actions=(AlarmAction("call", payload={"n": 1}), AlarmAction("stop"))))
     panel.refresh()
     assert unsaid(panel) == []
@@ -134,7 +134,7 @@ def test_everything_in_a_row_has_a_name_for_a_screen_reader(panel) -> None:
     assert slot(panel, "limit").accessibleName() == "Limit: 20"
 
 
-def test_what_exists_is_taken_as_soon_as_it_is_chosen(panel, qtbot) -> None:
+def test_suggestion_is_accepted_as_soon_as_it_is_chosen(panel, qtbot) -> None:
     panel.begin()
     field = panel.field
     assert field is not None
@@ -148,7 +148,7 @@ def test_what_exists_is_taken_as_soon_as_it_is_chosen(panel, qtbot) -> None:
     assert has_keys(slot(panel, "subject"))
 
 
-def test_the_banner_tells_the_value_that_did_it(panel, window) -> None:
+def test_banner_shows_the_value_that_triggered_the_alarm(panel, window) -> None:
     session = window.session
     session.alarms.put(BELOW)
     ticks(window, panel, 1)
@@ -160,7 +160,7 @@ def test_the_banner_tells_the_value_that_did_it(panel, window) -> None:
     assert "is 12, below 20" in alert.title
 
 
-def test_actions_are_added_named_and_removed(panel) -> None:
+def test_actions_are_added_renamed_and_removed(panel) -> None:
     panel.alarms.put(BELOW)
     panel.refresh()
     press(slot(panel, "add"))
@@ -178,7 +178,7 @@ def test_actions_are_added_named_and_removed(panel) -> None:
     assert [action.kind for action in panel.alarms.rules[0].actions] == ["call"]
 
 
-def test_what_is_on_is_told_in_the_row_the_title_the_alerts_and_the_history(panel, window) -> None:
+def test_active_alarm_is_shown_in_row_title_alerts_and_history(panel, window) -> None:
     session = window.session
     session.alarms.put(BELOW)
     ticks(window, panel, 2)
@@ -203,7 +203,7 @@ def test_what_is_on_is_told_in_the_row_the_title_the_alerts_and_the_history(pane
     assert "snoozed" not in panel.rows[0].chip.text
 
 
-def test_an_alarm_is_switched_off_deleted_and_put_back(panel, window) -> None:
+def test_alarm_is_disabled_deleted_and_restored(panel, window) -> None:
     panel.alarms.put(BELOW)
     panel.refresh()
     press(panel.rows[0].switch)
@@ -223,7 +223,7 @@ def test_an_alarm_is_switched_off_deleted_and_put_back(panel, window) -> None:
     assert len({rule.id for rule in panel.alarms.rules}) == 2
 
 
-def test_a_limit_that_is_asked_for_switches_the_alarm_on(panel) -> None:
+def test_entering_a_limit_enables_the_alarm(panel) -> None:
     panel.alarms.put(replace(BELOW, is_on=False))
     panel.edit("d", "limit")
     type_in(panel, "15")
@@ -231,7 +231,7 @@ def test_a_limit_that_is_asked_for_switches_the_alarm_on(panel) -> None:
     assert panel.alarms.rules[0].condition.limit == 15
 
 
-def test_the_history_is_filtered_and_saved(panel, tmp_path) -> None:
+def test_history_is_filtered_and_saved(panel, tmp_path) -> None:
     record = AlarmRecord("x", "=cmd|' /C calc'!A0", panel.now_s() - 60, 4.0, count=2)
     record.add(AlarmDeed("call", "restart replied"))
     panel.alarms.history.add(record)
@@ -248,7 +248,7 @@ def test_the_history_is_filtered_and_saved(panel, tmp_path) -> None:
 
 
 @pytest.mark.parametrize("kind", KINDS)
-def test_every_kind_has_a_sentence_and_each_slot_takes_what_it_shows(kind: str) -> None:
+def test_every_alarm_kind_has_a_sentence_and_each_slot_accepts_what_it_shows(kind: str) -> None:
     rule = with_kind(AlarmRule("r", AlarmCondition("silent", "/t", for_s=2.0)), kind)
     condition = rule.condition
     name = condition.name or "node"
@@ -267,11 +267,11 @@ def test_every_kind_has_a_sentence_and_each_slot_takes_what_it_shows(kind: str) 
      ("-1", None), ("soon", None), ("nan", None), ("1e9", None), ("s", None),
      ("1.234,5 s", None), ("1 234 s", None)],
 )  # fmt: skip
-def test_times_are_read_as_people_write_them(text: str, seconds: float | None) -> None:
+def test_durations_are_parsed_in_common_notations(text: str, seconds: float | None) -> None:
     assert read_time(text) == seconds
 
 
-def test_limits_are_numbers_where_numbers_are_compared_and_else_what_json_says() -> None:
+def test_limits_are_parsed_as_numbers_for_comparisons_and_otherwise_as_json() -> None:
     number, text = AlarmCondition("below"), AlarmCondition("equals")
     assert read_limit(number, "20 %") == 20
     assert read_limit(number, "0,4") == 0.4
@@ -283,7 +283,7 @@ def test_limits_are_numbers_where_numbers_are_compared_and_else_what_json_says()
     ]  # fmt: skip
 
 
-def test_the_menus_of_topics_and_nodes_offer_an_alarm(qtbot, window) -> None:
+def test_menus_of_topics_and_nodes_offer_an_alarm(qtbot, window) -> None:
     for panel, key, wanted in (
         (topics.PANEL, "/odom", "alarm.topic:/odom"),
         (nodes.PANEL, "", "alarm.node:"),

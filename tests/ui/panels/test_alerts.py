@@ -22,14 +22,14 @@ def panel(qtbot, window) -> AlertsPanel:
     return made
 
 
-def test_each_alert_with_its_next_step(panel, window) -> None:
+def test_each_alert_is_shown_with_its_next_step(panel, window) -> None:
     assert panel.rows[0].accessibleName().startswith("error: /faces sends text that is not JSON")
     press(panel.rows[0].button)
     assert window.commands == ["inspect:/faces"]
     assert (panel.chip.text, panel.chip.status) == ("1", "error")
 
 
-def test_alerts_come_the_worst_first_and_go_when_they_are_cured(panel, window) -> None:
+def test_alerts_are_sorted_by_severity_and_disappear_when_resolved(panel, window) -> None:
     alerts = window.session.alerts
     alerts.put("silent:/cam", "warn", "The camera has been silent for 4 s.")
     panel.refresh()
@@ -45,7 +45,7 @@ def test_alerts_come_the_worst_first_and_go_when_they_are_cured(panel, window) -
     assert panel.chip.text == ""
 
 
-def test_a_dismissed_alert_stays_in_the_list(panel, window) -> None:
+def test_dismissed_alert_stays_in_the_list(panel, window) -> None:
     rows = list(panel.rows)
     window.session.alerts.dismiss("message:/faces")
     panel.refresh()

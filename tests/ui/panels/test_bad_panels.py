@@ -37,7 +37,9 @@ def topics(qtbot, window: MainWindow, commands: object) -> Dock:
     return dock
 
 
-def test_the_others_go_on_and_it_comes_back_when_it_is_opened_again(window: MainWindow, topics: Dock) -> None:
+def test_failed_panel_does_not_affect_others_and_works_again_when_reopened(
+    window: MainWindow, topics: Dock
+) -> None:
     bench = window.bench
     assert bench is not None
     topics.panel.explode = True
@@ -60,7 +62,7 @@ def test_the_others_go_on_and_it_comes_back_when_it_is_opened_again(window: Main
     assert topics.panel.refreshed == before + 1
 
 
-def test_one_that_fails_again_is_told_again(window: MainWindow, topics: Dock) -> None:
+def test_repeated_panel_failure_is_logged_each_time(window: MainWindow, topics: Dock) -> None:
     topics.panel.explode = True
     for _ in range(3):
         window.tick()
@@ -69,7 +71,7 @@ def test_one_that_fails_again_is_told_again(window: MainWindow, topics: Dock) ->
     assert texts.count("ValueError: no such luck") == 3
 
 
-def test_one_that_cant_end_or_tell_its_state_does_not_keep_the_window_open(
+def test_panel_that_fails_to_close_or_save_state_does_not_block_closing_the_window(
     window: MainWindow, topics: Dock, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
 ) -> None:
     bench = window.bench
@@ -163,7 +165,7 @@ def told(window: MainWindow) -> list[str]:
 
 
 @pytest.mark.parametrize("where", ["make", "header_widgets"])
-def test_one_that_cant_be_made_says_so_in_its_place_until_it_can_be(
+def test_panel_that_cannot_be_created_shows_the_error_until_a_retry_succeeds(
     qtbot, theme: Theme, home: Path, bad: dict[str, BaseException], where: str
 ) -> None:
     window = with_bad(qtbot, theme, home)
@@ -189,7 +191,7 @@ def test_one_that_cant_be_made_says_so_in_its_place_until_it_can_be(
 
 
 @pytest.mark.parametrize("where", ["make", "restore_state"])
-def test_one_that_fails_at_the_start_costs_nobody_the_layout(
+def test_panel_that_fails_at_startup_does_not_lose_the_layout(
     qtbot, theme: Theme, home: Path, bad: dict[str, BaseException], where: str
 ) -> None:
     first = with_bad(qtbot, theme, home)
@@ -214,7 +216,7 @@ def test_one_that_fails_at_the_start_costs_nobody_the_layout(
     last.close()
 
 
-def test_one_that_is_made_later_gets_what_it_had(
+def test_panel_created_by_a_later_retry_restores_its_saved_state(
     qtbot, theme: Theme, home: Path, bad: dict[str, BaseException]
 ) -> None:
     first = with_bad(qtbot, theme, home)
@@ -231,7 +233,7 @@ def test_one_that_is_made_later_gets_what_it_had(
     again.close()
 
 
-def test_one_whose_state_json_cant_say_keeps_nothing_else_from_being_kept(
+def test_panel_with_state_that_json_cannot_encode_does_not_prevent_saving_the_layout(
     qtbot, theme: Theme, home: Path, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
 ) -> None:
     window = with_bad(qtbot, theme, home)
@@ -244,7 +246,7 @@ def test_one_whose_state_json_cant_say_keeps_nothing_else_from_being_kept(
     assert "bad" in layouts["developer"]["open"]
 
 
-def test_one_that_cant_tell_what_it_can_do_can_be_closed(
+def test_panel_that_fails_to_list_its_actions_can_be_closed(
     qtbot, theme: Theme, home: Path, bad: dict[str, BaseException]
 ) -> None:
     window = with_bad(qtbot, theme, home)
@@ -257,7 +259,7 @@ def test_one_that_cant_tell_what_it_can_do_can_be_closed(
 
 
 @pytest.mark.parametrize("where", ["make", "refresh", "sizeHint"])
-def test_one_that_calls_exit_does_not_end_the_window(
+def test_panel_that_calls_exit_does_not_end_the_window(
     qtbot,
     theme: Theme,
     home: Path,

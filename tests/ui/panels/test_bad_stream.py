@@ -47,7 +47,7 @@ def window(qtbot, theme, session: Session) -> Iterator[MainWindow]:
     made.close()
 
 
-def test_it_is_one_alert_with_the_exact_count_and_no_dialog(
+def test_undecodable_stream_raises_one_alert_with_exact_count_and_no_dialog(
     qtbot, window: MainWindow, commands: Commands, session: Session
 ) -> None:
     window.show()

@@ -85,7 +85,7 @@ def editor(panel: BehaviourPanel) -> Editor:
     return panel.editor
 
 
-def test_the_editor_is_given_definitions_before_the_blocks_once(panel, window) -> None:
+def test_editor_receives_definitions_once_before_the_blocks(panel, window) -> None:
     names = [call[0] for call in editor(panel).told]
     assert names.index("set_theme") < names.index("set_definitions") < names.index("show_tab")
     ticks(window, panel, 10)
@@ -93,7 +93,7 @@ def test_the_editor_is_given_definitions_before_the_blocks_once(panel, window) -
     assert ("show_tab", "behaviour-1", window.session.document.workspace) in editor(panel).told
 
 
-def test_only_replacing_the_document_loads_it_anew(panel, window) -> None:
+def test_only_replacing_the_document_reloads_the_editor(panel, window) -> None:
     document = window.session.document
     editor(panel).changed.emit("behaviour-1", {"blocks": {"blocks": [{"type": "x"}]}})
     panel.refresh()
@@ -106,7 +106,7 @@ def test_only_replacing_the_document_loads_it_anew(panel, window) -> None:
     assert editor(panel).count("set_definitions") == 2
 
 
-def test_what_runs_glows_and_what_failed_says_so_on_its_block(panel, window) -> None:
+def test_running_block_is_highlighted_and_failed_block_shows_its_error(panel, window) -> None:
     session = window.session
     session.runs.run()
     session.runner.does("b1")
@@ -121,7 +121,7 @@ def test_what_runs_glows_and_what_failed_says_so_on_its_block(panel, window) -> 
     assert editor(panel).last("set_errors") == {"b2": "“turn left” needs a number."}
 
 
-def test_a_warning_stands_at_its_block_until_the_blocks_are_changed(panel, window) -> None:
+def test_warning_stays_on_its_block_until_the_blocks_change(panel, window) -> None:
     session = window.session
     session.runs.run()
     session.runner.does("b1")
@@ -150,7 +150,7 @@ def test_blocks_of_absent_robots_are_grey(panel, window) -> None:
     assert editor(panel).last("set_absent") == ()
 
 
-def test_the_toolbox_says_which_robots_may_move_or_do_not_answer(panel, window, monkeypatch) -> None:
+def test_toolbox_shows_which_robots_may_still_move_or_do_not_respond(panel, window, monkeypatch) -> None:
     link = window.session.fleet.links[0]
     assert editor(panel).last("set_alarms") == {}
     for fact, state, words, status in (
@@ -175,7 +175,7 @@ def test_the_toolbox_says_which_robots_may_move_or_do_not_answer(panel, window, 
     assert editor(panel).last("set_alarms") == {}
 
 
-def test_sensor_blocks_say_their_newest_value(panel, window) -> None:
+def test_sensor_blocks_show_their_newest_value(panel, window) -> None:
     document = window.session.document
     document.sensors, document.edits = (("Pepper", "battery"), ("NAO", "battery")), 5
     ticks(window, panel, 6)
@@ -186,7 +186,7 @@ def test_sensor_blocks_say_their_newest_value(panel, window) -> None:
     assert window.session.looked_at == []
 
 
-def test_sensors_in_the_open_toolbox_are_watched_until_it_closes(panel, window) -> None:
+def test_sensors_in_the_open_flyout_are_watched_until_it_closes(panel, window) -> None:
     window.session.document.sensors, window.session.document.edits = (), 5
     panel.refresh()
     assert window.session.looked_at == []
@@ -198,7 +198,7 @@ def test_sensors_in_the_open_toolbox_are_watched_until_it_closes(panel, window) 
     assert editor(panel).last("set_live_values") == {}
 
 
-def test_a_robot_that_comes_while_its_sensors_are_shown_is_watched(panel, window) -> None:
+def test_robot_that_connects_while_its_sensors_are_shown_is_watched(panel, window) -> None:
     window.session.document.sensors, window.session.document.edits = (), 5
     panel.refresh()
     editor(panel).sensors_offered.emit((("Ada", "battery"),))
@@ -208,7 +208,7 @@ def test_a_robot_that_comes_while_its_sensors_are_shown_is_watched(panel, window
     assert window.session.looked_at == ["Ada"]
 
 
-def test_python_shows_the_newest_program_and_copies_it(panel, window) -> None:
+def test_python_view_shows_the_newest_program_and_copies_it(panel, window) -> None:
     editor(panel).late = {"blocks": {"blocks": [{"type": "late"}]}}
     panel.replaces_title().show()
     press(button(panel.replaces_title(), "Python"))
@@ -223,7 +223,7 @@ def test_python_shows_the_newest_program_and_copies_it(panel, window) -> None:
     assert panel.program.toPlainText() == "pass\n"
 
 
-def test_undo_and_redo_are_offered_when_there_is_something(panel, window) -> None:
+def test_undo_and_redo_are_enabled_when_available(panel, window) -> None:
     title = panel.replaces_title()
     title.show()
     undo, redo = button(title, "Undo"), button(title, "Redo")
@@ -234,13 +234,13 @@ def test_undo_and_redo_are_offered_when_there_is_something(panel, window) -> Non
     assert editor(panel).count("undo") == 1
 
 
-def test_function_keys_in_the_page_are_the_windows_commands(panel, window) -> None:
+def test_function_keys_in_the_page_trigger_window_commands(panel, window) -> None:
     for key in ("F12", "F5"):
         editor(panel).key_pressed.emit(key)
     assert window.commands == ["key:F12", "key:F5"]  # the window knows what a person made of them
 
 
-def test_the_title_names_the_behaviour_and_says_whether_it_is_saved(panel, window) -> None:
+def test_title_shows_the_name_of_the_behaviour_and_whether_it_is_saved(panel, window) -> None:
     (tab,) = panel._bar.tabs.tabs.values()
     assert tab.accessibleName() == "Greeting"
     window.session.document.dirty = True
@@ -248,12 +248,12 @@ def test_the_title_names_the_behaviour_and_says_whether_it_is_saved(panel, windo
     assert tab.accessibleName() == "Greeting, not saved"
 
 
-def test_a_change_of_theme_reaches_the_page(panel, window) -> None:
+def test_theme_change_reaches_the_page(panel, window) -> None:
     window.theme.set_mode("dark")
     assert [call for call in editor(panel).told if call[0] == "set_theme"][-1][2] is True
 
 
-def test_an_empty_canvas_is_told_its_first_step_and_its_buttons_do_something(qtbot, qapp) -> None:
+def test_empty_canvas_shows_the_first_step_and_its_buttons_run_commands(qtbot, qapp) -> None:
     window = Window(Session())
     panel = window.make(PANEL, (1032, 600))
     qtbot.addWidget(panel)
@@ -268,7 +268,7 @@ def test_an_empty_canvas_is_told_its_first_step_and_its_buttons_do_something(qtb
     assert [call for call in editor(panel).told if call[0] == "set_first_step"][-1][2] is True
 
 
-def test_who_is_shown_a_block_reads_its_name_and_where_it_goes(panel, window) -> None:
+def test_highlighted_block_shows_its_name_and_where_to_drag_it(panel, window) -> None:
     panel.set_mode("python")
     panel.point_at("events_started")
     assert panel.mode == "blocks"
@@ -284,7 +284,7 @@ def test_who_is_shown_a_block_reads_its_name_and_where_it_goes(panel, window) ->
     assert editor(panel).told[-1] == ("point_at", "")
 
 
-def test_showing_a_block_comes_back_from_python(panel) -> None:
+def test_highlighting_a_block_switches_from_python_to_blocks(panel) -> None:
     panel.restore_state({"mode": "python"})
     assert panel.save_state() == {"mode": "python"}
     panel.show_block("b3")
@@ -292,7 +292,7 @@ def test_showing_a_block_comes_back_from_python(panel) -> None:
     assert editor(panel).last("show_block") == "b3"
 
 
-def test_the_program_is_coloured(qtbot, qapp) -> None:
+def test_python_program_has_syntax_highlighting(qtbot, qapp) -> None:
     view = ProgramView(Theme("light"))
     qtbot.addWidget(view)
     view.show_program(PROGRAM)
@@ -303,7 +303,7 @@ def test_the_program_is_coloured(qtbot, qapp) -> None:
     assert len(block.layout().formats()) == 3  # for, in, 3
 
 
-def test_whether_the_blocks_stay_open_is_kept_for_the_next_start(qtbot, panel, window) -> None:
+def test_toolbox_pinned_setting_is_saved(qtbot, panel, window) -> None:
     assert editor(panel).last("set_toolbox_pinned") is None
     editor(panel).toolbox_pinned.emit(False)
     assert window.session.settings.get("toolbox_pinned", True) is False
@@ -315,7 +315,7 @@ def test_whether_the_blocks_stay_open_is_kept_for_the_next_start(qtbot, panel, w
 
 
 @pytest.mark.parametrize(("count", "words"), [(1, "Deleted 1 block"), (4, "Deleted 4 blocks")])
-def test_what_was_deleted_can_be_brought_back_from_the_toast(panel, window, count, words) -> None:
+def test_deleted_blocks_are_restored_from_the_toast(panel, window, count, words) -> None:
     editor(panel).blocks_deleted.emit(count)
     button, run = window.toast_buttons[-1]
     assert (window.toasts[-1], button) == (words, "Undo")
@@ -335,11 +335,11 @@ def test_what_was_deleted_can_be_brought_back_from_the_toast(panel, window, coun
         (0, "copied", "Copied the note to Quiz"),
     ],
 )
-def test_words_say_what_became_of_blocks_let_go_on_a_tab(count: int, how: str, words: str) -> None:
+def test_toast_describes_the_result_of_dropping_blocks_on_a_tab(count: int, how: str, words: str) -> None:
     assert brought_words(count, how, "Quiz") == words
 
 
-def test_a_block_let_go_on_its_own_tab_or_elsewhere_stays(panel, window) -> None:
+def test_block_dropped_on_its_own_tab_or_outside_tabs_is_not_moved(panel, window) -> None:
     title = panel.replaces_title()
     title.resize(900, 34)
     title.show()
@@ -353,7 +353,7 @@ def test_a_block_let_go_on_its_own_tab_or_elsewhere_stays(panel, window) -> None
     assert editor(panel).count("bring_blocks") == 0
 
 
-def test_a_block_held_at_the_end_of_the_row_brings_tabs_until_there_are_no_more(
+def test_dragging_a_block_to_the_end_of_the_tab_bar_scrolls_to_hidden_tabs(
     qtbot, panel, window, monkeypatch
 ) -> None:
     title = panel.replaces_title()
@@ -377,7 +377,7 @@ def test_a_block_held_at_the_end_of_the_row_brings_tabs_until_there_are_no_more(
     assert not scrolling.isActive()
 
 
-def test_a_tab_under_a_held_block_opens_and_its_picture_follows(qtbot, panel, window) -> None:
+def test_tab_under_a_dragged_block_opens_and_the_drag_image_follows(qtbot, panel, window) -> None:
     session = window.session
     home = session.document
     home.edited(WorkspaceJson.of({"blocks": {"blocks": [{"type": "events_started"}]}}))
@@ -414,7 +414,7 @@ def test_a_tab_under_a_held_block_opens_and_its_picture_follows(qtbot, panel, wi
     assert not shown.isVisible(), "it came too late"
 
 
-def test_let_go_on_the_tab_that_opened_meanwhile_it_goes_there(panel, window) -> None:
+def test_block_dropped_on_a_tab_opened_during_the_drag_goes_to_that_tab(panel, window) -> None:
     session = window.session
     home = session.document
     home.edited(WorkspaceJson.of({"blocks": {"blocks": [{"type": "events_started"}]}}))
@@ -433,7 +433,7 @@ def test_let_go_on_the_tab_that_opened_meanwhile_it_goes_there(panel, window) ->
         assert editor(panel).count("bring_blocks") == times
 
 
-def test_plus_has_a_ring_while_a_block_is_over_it_and_makes_a_new_behaviour(panel, window) -> None:
+def test_plus_button_is_highlighted_under_a_dragged_block_and_creates_a_behaviour(panel, window) -> None:
     title = panel.replaces_title()
     title.resize(900, 34)
     title.show()
@@ -448,7 +448,7 @@ def test_plus_has_a_ring_while_a_block_is_over_it_and_makes_a_new_behaviour(pane
     assert editor(panel).count("bring_blocks") == 0, "no new one came: the block stays"
 
 
-def test_missing_system_libraries_are_told_in_place_of_the_blocks_and_the_program_is_there(
+def test_missing_system_libraries_replace_the_blocks_by_a_message_and_python_still_works(
     qtbot, window: Window
 ) -> None:
     tries: list[QWidget] = []

@@ -41,7 +41,7 @@ def press(tab, place=None, button=Qt.MouseButton.LeftButton) -> None:
     QTest.mouseClick(tab, button, pos=place if place is not None else QPoint(14, 14))
 
 
-def test_a_tab_says_its_name_that_it_is_not_saved_and_that_it_runs(tabs) -> None:
+def test_tab_shows_name_unsaved_state_and_running_state(tabs) -> None:
     tabs.show_tabs([A, TabFacts("b", "Tour guide", dirty=True, runs=True)], "a")
     assert [tab.accessibleName() for tab in tabs.tabs.values()] == [
         "Greeting",
@@ -50,7 +50,7 @@ def test_a_tab_says_its_name_that_it_is_not_saved_and_that_it_runs(tabs) -> None
     assert [tab.isChecked() for tab in tabs.tabs.values()] == [True, False]
 
 
-def test_the_mouse_chooses_and_closes(tabs) -> None:
+def test_tab_is_selected_and_closed_by_mouse(tabs) -> None:
     chosen, closed = heard(tabs.chosen), heard(tabs.closed)
     press(tabs.tabs["b"])
     press(tabs.tabs["c"], button=Qt.MouseButton.MiddleButton)
@@ -59,7 +59,7 @@ def test_the_mouse_chooses_and_closes(tabs) -> None:
     assert closed == [("c",), ("b",)]
 
 
-def test_a_press_on_close_that_moves_away_does_nothing(tabs) -> None:
+def test_press_on_close_button_released_outside_does_nothing(tabs) -> None:
     closed, chosen = heard(tabs.closed), heard(tabs.chosen)
     tab = tabs.tabs["b"]
     QTest.mousePress(tab, Qt.MouseButton.LeftButton, pos=tab.close_rect().center().toPoint())
@@ -67,7 +67,7 @@ def test_a_press_on_close_that_moves_away_does_nothing(tabs) -> None:
     assert (closed, chosen) == ([], [])
 
 
-def test_a_drag_past_the_middle_of_a_neighbour_changes_places(tabs) -> None:
+def test_tab_dragged_past_the_middle_of_its_neighbour_swaps_places(tabs) -> None:
     moved = heard(tabs.moved)
     tab, other = tabs.tabs["a"], tabs.tabs["b"]
     QTest.mousePress(tab, Qt.MouseButton.LeftButton, pos=QPoint(14, 14))
@@ -78,7 +78,7 @@ def test_a_drag_past_the_middle_of_a_neighbour_changes_places(tabs) -> None:
     QTest.mouseRelease(tab, Qt.MouseButton.LeftButton)
 
 
-def test_keys_go_along_the_tabs_and_close(tabs) -> None:
+def test_tabs_are_navigated_and_closed_by_keyboard(tabs) -> None:
     chosen, closed = heard(tabs.chosen), heard(tabs.closed)
     tab = tabs.tabs["a"]
     for key in (Qt.Key.Key_Right, Qt.Key.Key_Left, Qt.Key.Key_Return, Qt.Key.Key_Delete):
@@ -89,7 +89,7 @@ def test_keys_go_along_the_tabs_and_close(tabs) -> None:
     assert policies.count(Qt.FocusPolicy.StrongFocus) == 1, "Tab stops once"
 
 
-def test_the_focus_follows_the_tab_that_shows(qtbot, tabs) -> None:
+def test_focus_follows_the_current_tab(qtbot, tabs) -> None:
     tabs.activateWindow()
     tabs.tabs["a"].setFocus()
     qtbot.waitUntil(tabs.tabs["a"].hasFocus)
@@ -97,14 +97,14 @@ def test_the_focus_follows_the_tab_that_shows(qtbot, tabs) -> None:
     assert tabs.tabs["b"].hasFocus()
 
 
-def test_a_closed_tab_goes_and_the_others_follow(tabs) -> None:
+def test_closed_tab_disappears_and_the_others_move_up(tabs) -> None:
     before = tabs.tabs["c"].x()
     tabs.show_tabs([A, C], "a")
     assert set(tabs.tabs) == {"a", "c"}
     assert tabs.tabs["c"].x() < before
 
 
-def test_in_narrow_room_all_are_shorter_and_the_current_one_can_be_seen(tabs) -> None:
+def test_narrow_tab_bar_shortens_all_tabs_and_keeps_the_current_one_visible(tabs) -> None:
     many = [TabFacts(str(number), f"A rather long name {number}") for number in range(12)]
     tabs.show_tabs(many, "11")
     room = tabs.add.x()
@@ -116,7 +116,7 @@ def test_in_narrow_room_all_are_shorter_and_the_current_one_can_be_seen(tabs) ->
 
 
 @pytest.mark.qt_log_ignore("does not support (grabbing the keyboard|raise)", extend=True)
-def test_tabs_out_of_sight_are_reached_by_a_list_of_all(tabs) -> None:
+def test_hidden_tabs_are_listed_in_a_menu(tabs) -> None:
     tabs.show_tabs([TabFacts("0", "One"), TabFacts("1", "Two")], "1")
     assert tabs.list.isHidden(), "all are in sight"
     many = [TabFacts(str(number), f"A rather long name {number}") for number in range(12)]
@@ -134,7 +134,7 @@ def test_tabs_out_of_sight_are_reached_by_a_list_of_all(tabs) -> None:
     menu.close()
 
 
-def test_the_current_tab_is_never_wider_than_its_room(tabs) -> None:
+def test_current_tab_is_never_wider_than_the_tab_bar(tabs) -> None:
     facts = [TabFacts("0", "One"), TabFacts("1", "The rather long name of a behaviour")]
     tabs.resize(180, 32)
     tabs.show_tabs(facts, "1")
@@ -143,7 +143,7 @@ def test_the_current_tab_is_never_wider_than_its_room(tabs) -> None:
     assert tab.geometry().right() < tabs.add.x() < tabs.list.x() < tabs.width()
 
 
-def test_the_wheel_moves_the_tabs_along(tabs) -> None:
+def test_wheel_scrolls_the_tab_bar(tabs) -> None:
     many = [TabFacts(str(number), f"A rather long name {number}") for number in range(12)]
     tabs.show_tabs(many, "0")
     wheel = QWheelEvent(
@@ -154,7 +154,7 @@ def test_the_wheel_moves_the_tabs_along(tabs) -> None:
     assert tabs.tabs["0"].x() == -60
 
 
-def test_nothing_is_cut_at_twice_the_size_of_text(tabs, theme) -> None:
+def test_nothing_is_clipped_at_200_per_cent_text_size(tabs, theme) -> None:
     theme.set_text_percent(200)
     tabs.resize(1400, tabs.sizeHint().height())
     for tab in tabs.tabs.values():
@@ -164,7 +164,7 @@ def test_nothing_is_cut_at_twice_the_size_of_text(tabs, theme) -> None:
 
 
 @pytest.mark.qt_log_ignore("does not support", extend=True)
-def test_the_menu_of_a_tab_names_what_can_be_done(qtbot, tabs) -> None:
+def test_tab_menu_lists_the_available_commands(qtbot, tabs) -> None:
     asked = heard(tabs.asked)
     place = tabs.tabs["b"].geometry().center()
     QApplication.sendEvent(
@@ -193,7 +193,7 @@ def test_the_menu_of_a_tab_names_what_can_be_done(qtbot, tabs) -> None:
 
 
 @pytest.mark.parametrize("way", ["double click", "F2", "menu"])
-def test_a_name_is_edited_in_its_place(qtbot, tabs, way: str) -> None:
+def test_tab_is_renamed_in_place(qtbot, tabs, way: str) -> None:
     renamed = heard(tabs.renamed)
     tab = tabs.tabs["a"]
     if way == "double click":
@@ -210,7 +210,7 @@ def test_a_name_is_edited_in_its_place(qtbot, tabs, way: str) -> None:
     assert tabs.field is None
 
 
-def test_esc_leaves_the_name_as_it_was(tabs) -> None:
+def test_esc_cancels_renaming(tabs) -> None:
     renamed = heard(tabs.renamed)
     QTest.keyClick(tabs.tabs["a"], Qt.Key.Key_F2)
     assert not tabs.add.isVisible(), "nothing lies over the field"
@@ -220,7 +220,7 @@ def test_esc_leaves_the_name_as_it_was(tabs) -> None:
     assert tabs.add.isVisible()
 
 
-def test_a_name_that_can_not_be_had_says_why_and_stays_to_be_mended(tabs) -> None:
+def test_invalid_name_shows_the_reason_and_stays_editable(tabs) -> None:
     renamed = heard(tabs.renamed)
     tabs.why_not = lambda key, name: f"{key} can't be {name}" if name == "Taken" else ""
     QTest.keyClick(tabs.tabs["a"], Qt.Key.Key_F2)
@@ -236,13 +236,13 @@ def test_a_name_that_can_not_be_had_says_why_and_stays_to_be_mended(tabs) -> Non
     assert renamed == [("a", "Taken2")]
 
 
-def test_a_tab_that_goes_takes_its_field_along(tabs) -> None:
+def test_closing_a_tab_closes_its_rename_field(tabs) -> None:
     QTest.keyClick(tabs.tabs["a"], Qt.Key.Key_F2)
     tabs.show_tabs([B, C], "b")
     assert tabs.field is None
 
 
-def test_the_folder_that_tells_it_apart_is_not_edited(tabs) -> None:
+def test_folder_suffix_of_a_tab_is_not_editable(tabs) -> None:
     tabs.show_tabs([TabFacts("a", "Quiz — class 3", plain_name="Quiz", has_file=True), B], "a")
     QTest.keyClick(tabs.tabs["a"], Qt.Key.Key_F2)
     assert tabs.field.text() == "Quiz"
@@ -251,7 +251,7 @@ def test_the_folder_that_tells_it_apart_is_not_edited(tabs) -> None:
 # -- blocks from the page -------------------------------------------------------------------------
 
 
-def test_a_place_of_the_screen_is_a_tab_or_plus_or_nothing(qtbot, tabs) -> None:
+def test_drop_target_at_a_position_is_a_tab_or_plus_button_or_none(qtbot, tabs) -> None:
     tab = tabs.tabs["b"]
     assert tabs.target_at(tab.mapToGlobal(tab.rect().center())) == "b"
     assert tabs.target_at(tabs.add.mapToGlobal(tabs.add.rect().center())) == NEW
@@ -262,14 +262,14 @@ def test_a_place_of_the_screen_is_a_tab_or_plus_or_nothing(qtbot, tabs) -> None:
     assert tabs.target_at(tab.mapToGlobal(tab.rect().center())) == ""
 
 
-def test_a_tab_out_of_sight_is_nowhere(qtbot, tabs) -> None:
+def test_scrolled_out_tab_is_no_drop_target(qtbot, tabs) -> None:
     tabs.resize(150, 30)
     tabs.show_tabs([A, B, C], "a")
     hidden = tabs.tabs["c"]
     assert tabs.target_at(hidden.mapToGlobal(hidden.rect().center())) in {"", NEW}
 
 
-def test_what_is_held_near_an_end_brings_the_tabs_that_are_out_of_sight_there(qtbot, tabs) -> None:
+def test_dragging_near_an_end_of_the_tab_bar_scrolls_to_hidden_tabs(qtbot, tabs) -> None:
     tabs.resize(180, 30)
     tabs.show_tabs([A, B, C], "a")
     last, first = tabs.tabs["c"], tabs.tabs["a"]
@@ -287,7 +287,7 @@ def test_what_is_held_near_an_end_brings_the_tabs_that_are_out_of_sight_there(qt
     assert not tabs.scroll_at(tabs.mapToGlobal(QPoint(2, 90))), "below the row nothing is brought"
 
 
-def test_the_ring_is_round_one_of_them(tabs) -> None:
+def test_only_one_drop_target_is_highlighted(tabs) -> None:
     def ringed() -> list[bool]:
         return [tabs.tabs["a"].is_aimed, tabs.tabs["b"].is_aimed, tabs.add.is_aimed]
 

@@ -7,7 +7,7 @@ from PySide6.QtWidgets import QWidget
 from app.ui.panels.behaviour.panel import WAIT_UNTIL_S, BlocksWait
 
 
-def test_words_come_late_and_go_with_the_page(qtbot) -> None:
+def test_loading_message_appears_after_a_delay_and_disappears_with_the_page(qtbot) -> None:
     place = QWidget()
     qtbot.addWidget(place)
     place.resize(600, 400)

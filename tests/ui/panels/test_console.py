@@ -36,12 +36,12 @@ def lines(panel: ConsolePanel) -> list[str]:
     return [str(model.data(model.index(row, 0))).split(" ", 1)[1] for row in range(model.rowCount())]
 
 
-def test_the_newest_line_is_first(panel) -> None:
+def test_newest_line_is_first(panel) -> None:
     assert lines(panel)[0] == "info greeting say “Touch my head.” started"
     assert len(lines(panel)) == 6
 
 
-def test_new_lines_are_inserted_not_reset(qtmodeltester, panel, window) -> None:
+def test_new_lines_are_inserted_without_a_model_reset(qtmodeltester, panel, window) -> None:
     qtmodeltester.check(panel.model)
     reset, inserted = QSignalSpy(panel.model.modelReset), QSignalSpy(panel.model.rowsInserted)
     window.session.console.add("warn", "studio", "one")
@@ -53,7 +53,7 @@ def test_new_lines_are_inserted_not_reset(qtmodeltester, panel, window) -> None:
     assert inserted.count() == 1  # nothing new, nothing done
 
 
-def test_what_leaves_the_ring_leaves_the_list(qtbot, qapp) -> None:
+def test_evicted_records_are_removed_from_the_list(qtbot, qapp) -> None:
     session = Session()
     session.console = Console(capacity=3)
     window = Window(session)
@@ -77,7 +77,7 @@ def test_what_leaves_the_ring_leaves_the_list(qtbot, qapp) -> None:
     assert [line.split()[-1] for line in lines(panel)] == ["8", "7", "6"]
 
 
-def test_levels_can_be_left_out_and_the_choice_comes_back(qtbot, panel, window) -> None:
+def test_log_levels_are_filtered_and_the_filter_is_restored(qtbot, panel, window) -> None:
     panel.set_level("warn")
     assert [line.split()[0] for line in lines(panel)] == ["warn", "error"]
     panel.set_level("error")
@@ -92,7 +92,7 @@ def test_levels_can_be_left_out_and_the_choice_comes_back(qtbot, panel, window) 
     assert again.level == "error"
 
 
-def test_lines_are_copied_in_the_order_in_which_they_happened(panel, window) -> None:
+def test_lines_are_copied_in_chronological_order(panel, window) -> None:
     panel.list.selectAll()
     panel.copy()
     text = QGuiApplication.clipboard().text().splitlines()
@@ -101,7 +101,7 @@ def test_lines_are_copied_in_the_order_in_which_they_happened(panel, window) -> 
     assert window.toasts == ["Copied 6 lines"]
 
 
-def test_with_nothing_it_says_what_will_appear(qtbot, qapp) -> None:
+def test_empty_console_explains_what_will_appear(qtbot, qapp) -> None:
     window = Window(Session())
     panel = window.make(PANEL)
     qtbot.addWidget(panel)
@@ -120,7 +120,7 @@ def logged(window, level="info", text="hello", node="Pepper", name="app.robots.d
     window.session.console.add_messages([Message(LOG_TOPIC, json.dumps(given).encode(), "json", LOG_TYPE)])
 
 
-def test_records_of_programs_stand_among_the_lines(panel, window) -> None:
+def test_log_records_of_programs_are_listed_among_the_lines(panel, window) -> None:
     logged(window, "warning", "its stop failed", file="tasks.py", line=272)
     logged(window, "debug", "a detail")
     panel.refresh()
@@ -134,7 +134,7 @@ def test_records_of_programs_stand_among_the_lines(panel, window) -> None:
 
 
 @pytest.mark.parametrize(("percent", "width"), [(100, 446), (200, 446), (200, 700), (200, 1200)])
-def test_large_text_leaves_the_message_its_place(panel, window, percent: int, width: int) -> None:
+def test_large_text_leaves_room_for_the_message(panel, window, percent: int, width: int) -> None:
     logged(window, "warning", "its stop failed")
     panel.refresh()
     record = panel.model.index(0, 0).data(Qt.ItemDataRole.UserRole)
@@ -149,7 +149,7 @@ def test_large_text_leaves_the_message_its_place(panel, window, percent: int, wi
         assert {"time", "level"} <= shown.keys()
 
 
-def test_nothing_is_decoded_while_nobody_looks(window) -> None:
+def test_hidden_console_decodes_nothing(window) -> None:
     class Unread(Message):
         @property
         def payload(self) -> object:
@@ -159,7 +159,7 @@ def test_nothing_is_decoded_while_nobody_looks(window) -> None:
     window.session.tick()
 
 
-def test_lines_of_one_node_and_with_some_words(qtbot, panel, window) -> None:
+def test_lines_are_filtered_by_node_and_text(qtbot, panel, window) -> None:
     logged(window, text="walks 1 m")
     logged(window, text="walks 2 m", node="Turtle")
     panel.set_node("Turtle")
@@ -180,7 +180,7 @@ def test_lines_of_one_node_and_with_some_words(qtbot, panel, window) -> None:
     assert (panel.words.isVisible(), len(lines(panel))) == (False, 8)
 
 
-def test_who_reads_further_down_keeps_the_lines_he_reads(qtbot, panel, window) -> None:
+def test_scroll_position_is_kept_while_reading_older_lines(qtbot, panel, window) -> None:
     for number in range(50):
         logged(window, text=f"line {number}")
     panel.refresh()
@@ -203,7 +203,7 @@ def test_who_reads_further_down_keeps_the_lines_he_reads(qtbot, panel, window) -
     assert lines(panel)[0].endswith("newest")
 
 
-def test_clear_and_copy_all(panel, window) -> None:
+def test_console_is_cleared_and_copied(panel, window) -> None:
     _find, copy_all, clear = panel.more_actions()
     copy_all.trigger()
     assert len(QGuiApplication.clipboard().text().splitlines()) == 6
@@ -216,13 +216,13 @@ def test_clear_and_copy_all(panel, window) -> None:
     assert len(lines(panel)) == 1
 
 
-def test_a_traceback_takes_one_row_and_says_how_long_it_is() -> None:
+def test_traceback_takes_one_row_and_shows_its_line_count() -> None:
     assert first_line("it broke\nTraceback\nValueError") == "it broke (and 2 more lines)"
     assert first_line("one\ntwo") == "one (and 1 more line)"
     assert first_line("one") == "one"
 
 
-def test_larger_text_makes_rows_and_the_way_back_grow(qtbot, panel, window) -> None:
+def test_larger_text_enlarges_rows_and_the_button_to_the_newest_line(qtbot, panel, window) -> None:
     for number in range(50):
         logged(window, text=f"line {number}")
     panel.refresh()
@@ -236,7 +236,7 @@ def test_larger_text_makes_rows_and_the_way_back_grow(qtbot, panel, window) -> N
     assert after[1] >= panel.newer.sizeHint().width() > before[1]
 
 
-def test_twenty_thousand_lines_scroll_and_only_what_is_seen_is_painted(qtbot, qapp, monkeypatch) -> None:
+def test_twenty_thousand_lines_scroll_and_only_visible_rows_are_painted(qtbot, qapp, monkeypatch) -> None:
     session = Session()
     session.console = Console(capacity=20_000)
     for number in range(20_000):

@@ -68,9 +68,7 @@ def wheel(widget: QWidget, notches: int = 1) -> None:
 # ---- what was typed is kept ------------------------------------------------------------------------
 
 
-def test_a_number_out_of_its_limits_is_what_the_form_gives_so_that_it_is_never_tried_unseen(
-    qtbot, theme
-) -> None:
+def test_out_of_range_number_is_returned_by_the_form_unclamped_and_reported(qtbot, theme) -> None:
     form = form_of(qtbot, theme, Parameter("d", "distance", "number", -1, 1, 0.05, "m", 0.5))
     slider = child(form, SliderWithUnit)
     slider.field.setFocus()
@@ -89,7 +87,7 @@ def test_a_number_out_of_its_limits_is_what_the_form_gives_so_that_it_is_never_t
 @pytest.mark.parametrize(
     ("typed", "given"), [("two", "two"), ("2,5", 2.5), ("1.234,5", "1.234,5"), ("", None)]
 )
-def test_a_field_gives_numbers_and_what_is_none_as_it_was_typed(qtbot, theme, typed, given) -> None:
+def test_number_field_returns_numbers_and_keeps_invalid_text(qtbot, theme, typed, given) -> None:
     form = form_of(qtbot, theme, Parameter("x", "x", "number", minimum=0))
     field = child(form, QLineEdit)
     QTest.keyClicks(field, typed)
@@ -99,7 +97,7 @@ def test_a_field_gives_numbers_and_what_is_none_as_it_was_typed(qtbot, theme, ty
     assert bool(field.sentence) is isinstance(given, str)
 
 
-def test_a_whole_number_says_so_about_a_fraction(qtbot, theme) -> None:
+def test_integer_field_rejects_a_fraction_with_a_sentence(qtbot, theme) -> None:
     form = form_of(qtbot, theme, Parameter("n", "count", "integer", 0, 9, default=2))
     slider = child(form, SliderWithUnit)
     slider.field.setText("2.5")
@@ -117,7 +115,7 @@ def test_arrow_keys_step_a_number_without_limits(qtbot, theme) -> None:
     assert form.input() == {"n": 0}  # not below its least
 
 
-def test_a_text_that_is_too_long_is_kept_and_the_sentence_stands_below_when_it_is_done(qtbot, theme) -> None:
+def test_text_that_is_too_long_is_kept_and_reported_when_editing_ends(qtbot, theme) -> None:
     form = form_of(
         qtbot,
         theme,
@@ -135,7 +133,7 @@ def test_a_text_that_is_too_long_is_kept_and_the_sentence_stands_below_when_it_i
     assert not form._sentences["t"].isVisible()
 
 
-def test_zero_is_a_choice_and_a_wrong_advanced_value_unfolds_its_row(qtbot, theme) -> None:
+def test_zero_is_a_valid_choice_and_an_invalid_advanced_value_expands_its_row(qtbot, theme) -> None:
     form = form_of(
         qtbot,
         theme,
@@ -153,7 +151,7 @@ def test_zero_is_a_choice_and_a_wrong_advanced_value_unfolds_its_row(qtbot, them
 # ---- long texts ------------------------------------------------------------------------------------
 
 
-def test_a_long_text_grows_with_its_lines_to_five(qtbot, theme) -> None:
+def test_text_field_grows_to_at_most_five_lines(qtbot, theme) -> None:
     form = form_of(qtbot, theme, Parameter("t", "text", "text", max_length=500, required=True))
     field = child(form, LongText)
     one = field.height()
@@ -171,7 +169,7 @@ def test_a_long_text_grows_with_its_lines_to_five(qtbot, theme) -> None:
 # ---- keys, wheel, double click ---------------------------------------------------------------------
 
 
-def test_home_end_and_a_double_click_on_a_slider(qtbot, theme) -> None:
+def test_slider_supports_home_end_and_double_click(qtbot, theme) -> None:
     form = form_of(qtbot, theme, Parameter("v", "volume", "integer", 0, 100, 5, "%", 60))
     track = child(form, SliderWithUnit).track
     for key, expected in [(Qt.Key.Key_End, 100), (Qt.Key.Key_Home, 0), (Qt.Key.Key_Right, 5)]:
@@ -183,7 +181,7 @@ def test_home_end_and_a_double_click_on_a_slider(qtbot, theme) -> None:
     assert form.input() == {"v": 60}
 
 
-def test_an_angle_is_turned_by_keys_by_its_drawing_and_by_the_wheel_with_the_focus_only(qtbot, theme) -> None:
+def test_angle_is_changed_by_keys_dial_and_wheel_only_with_focus(qtbot, theme) -> None:
     form = form_of(qtbot, theme, Parameter("a", "angle", "angle", -360, 360, 5, "°", 90))
     dial, slider = child(form, AngleDial), child(form, SliderWithUnit)
     wheel(dial)
@@ -205,7 +203,7 @@ def test_an_angle_is_turned_by_keys_by_its_drawing_and_by_the_wheel_with_the_foc
     assert dial.value == -360.0  # and the drawing follows the slider
 
 
-def test_dragging_an_angle_around_adds_whole_turns_up_to_its_limit(qtbot, theme) -> None:
+def test_dragging_an_angle_dial_around_adds_full_turns_up_to_the_limit(qtbot, theme) -> None:
     form = form_of(qtbot, theme, Parameter("a", "angle", "angle", -360, 360, 5, "°", 0))
     dial = child(form, AngleDial)
     middle, reach = dial.rect().center(), dial.width() // 2 - 3
@@ -223,7 +221,7 @@ def test_dragging_an_angle_around_adds_whole_turns_up_to_its_limit(qtbot, theme)
     assert dial.direction(90).x() == pytest.approx(-1)  # left of the robot is left in the drawing
 
 
-def test_an_angle_of_nodding_is_seen_from_the_side(qtbot, theme) -> None:
+def test_pitch_angle_is_drawn_from_the_side(qtbot, theme) -> None:
     form = form_of(qtbot, theme, Parameter("pitch", "down", "angle", -40, 36, 2, "°", 8))
     assert child(form, AngleDial).direction(30).y() > 0.4  # down on the screen
 
@@ -231,7 +229,7 @@ def test_an_angle_of_nodding_is_seen_from_the_side(qtbot, theme) -> None:
 # ---- colours ---------------------------------------------------------------------------------------
 
 
-def test_swatches_tell_the_colour_that_was_pressed(qtbot, theme) -> None:
+def test_colour_swatches_emit_the_pressed_colour(qtbot, theme) -> None:
     swatches = ColourSwatches(theme, "#3AB7FF")
     qtbot.addWidget(swatches)
     told: list[str] = []
@@ -246,7 +244,7 @@ def test_swatches_tell_the_colour_that_was_pressed(qtbot, theme) -> None:
     assert (swatches.value, told) == ("#102030", ["#ff6b5e"])
 
 
-def test_another_colour_comes_from_the_strip_or_by_its_number(qtbot, theme) -> None:
+def test_custom_colour_is_chosen_from_the_strip_or_by_hex_code(qtbot, theme) -> None:
     form = form_of(qtbot, theme, Parameter("c", "colour", "colour", default="#35c26b"))
     choice, strip = child(form, ColourChoice), child(form, HueStrip)
     assert not strip.isVisible()
@@ -302,7 +300,7 @@ def drawn(path: Path, width: int, height: int) -> Path:
     return path
 
 
-def test_a_picture_file_is_shown_and_sent_as_text_at_most_1280_pixels_wide(qtbot, theme, tmp_path) -> None:
+def test_image_file_is_previewed_and_sent_as_base64_at_most_1280_px_wide(qtbot, theme, tmp_path) -> None:
     form = form_of(qtbot, theme, Parameter("p", "picture", "image", required=True))
     assert form.input() == {}
     assert form.action.check(form.input()) == ("do: picture is missing",)
@@ -315,7 +313,7 @@ def test_a_picture_file_is_shown_and_sent_as_text_at_most_1280_pixels_wide(qtbot
     assert choice.field.text() == "red.png"
 
 
-def test_a_file_that_is_no_picture_says_so_and_is_not_sent(qtbot, theme, tmp_path) -> None:
+def test_file_that_is_no_image_is_reported_and_not_sent(qtbot, theme, tmp_path) -> None:
     form = form_of(qtbot, theme, Parameter("p", "picture", "image"))
     choice = child(form, PictureChoice)
     (tmp_path / "not.png").write_text("hello")
@@ -329,7 +327,7 @@ def test_a_file_that_is_no_picture_says_so_and_is_not_sent(qtbot, theme, tmp_pat
 
 
 @pytest.mark.parametrize("name", ["bmp", "gif", "svg", "png of many pixels", "jpeg of a thousand passes"])
-def test_a_bomb_is_refused_with_a_sentence_as_a_file_and_as_an_address(qtbot, theme, tmp_path, name) -> None:
+def test_decompression_bomb_is_rejected_as_file_and_as_url(qtbot, theme, tmp_path, name) -> None:
     form = form_of(qtbot, theme, Parameter("p", "picture", "image"))
     choice = child(form, PictureChoice)
     (tmp_path / "photo.png").write_bytes(BOMBS[name])
@@ -342,7 +340,7 @@ def test_a_bomb_is_refused_with_a_sentence_as_a_file_and_as_an_address(qtbot, th
     assert choice.thumbnail.image is None
 
 
-def test_the_button_asks_for_a_picture_and_begins_where_the_last_one_was(theme, qtbot, tmp_path) -> None:
+def test_image_button_opens_the_file_dialog_in_the_last_folder(theme, qtbot, tmp_path) -> None:
     folders: list[str] = []
 
     class Asked(NoPictures):
@@ -359,7 +357,7 @@ def test_the_button_asks_for_a_picture_and_begins_where_the_last_one_was(theme, 
     assert folders == ["", str(tmp_path)]
 
 
-def test_a_folder_and_a_pipe_are_not_opened(tmp_path) -> None:
+def test_folder_and_pipe_are_not_opened_as_an_image(tmp_path) -> None:
     assert read_picture(tmp_path)[1] == f"“{tmp_path.name}” is not a file."
     if hasattr(os, "mkfifo"):
         os.mkfifo(tmp_path / "pipe.png")
@@ -368,7 +366,7 @@ def test_a_folder_and_a_pipe_are_not_opened(tmp_path) -> None:
 
 @pytest.mark.parametrize("orientation", range(1, 9))
 @pytest.mark.parametrize("kind", ["jpeg", "png"])
-def test_a_photo_stands_upright_whichever_way_the_camera_was_held(qapp, tmp_path, kind, orientation) -> None:
+def test_photo_is_rotated_by_its_exif_orientation(qapp, tmp_path, kind, orientation) -> None:
     frame = np.zeros((32, 64, 3), np.uint8)
     frame[:16, :16] = 255
     data = cv2.imencode(f".{kind}", frame)[1].tobytes()
@@ -386,7 +384,7 @@ def test_a_photo_stands_upright_whichever_way_the_camera_was_held(qapp, tmp_path
         assert (image.pixelColor(x, y).red() > 128) == (wanted[y, x, 2] > 128)
 
 
-def test_the_cameras_are_offered_in_a_menu(qtbot, theme, monkeypatch) -> None:
+def test_cameras_are_offered_in_a_menu(qtbot, theme, monkeypatch) -> None:
     dropped: list[Menu] = []
     monkeypatch.setattr(
         "app.ui.panels.robots.controls.picture.drop_below", lambda menu, _below: dropped.append(menu)
@@ -399,7 +397,7 @@ def test_the_cameras_are_offered_in_a_menu(qtbot, theme, monkeypatch) -> None:
     assert choice.field.text() == "newest picture of /Pepper/camera"
 
 
-def test_the_newest_picture_of_a_topic_at_the_moment_of_try_is_sent(qtbot, theme) -> None:
+def test_try_sends_the_newest_image_of_the_chosen_topic(qtbot, theme) -> None:
     cameras = Cameras()
     form = form_of(qtbot, theme, Parameter("p", "picture", "image"), pictures=cameras)
     choice = child(form, PictureChoice)
@@ -419,7 +417,7 @@ def test_the_newest_picture_of_a_topic_at_the_moment_of_try_is_sent(qtbot, theme
     assert not choice._timer.isActive()
 
 
-def test_an_address_is_sent_as_it_is_and_bare_base64_where_the_robot_wants_it(qtbot, theme, tmp_path) -> None:
+def test_url_is_sent_unchanged_and_bare_base64_where_the_robot_expects_it(qtbot, theme, tmp_path) -> None:
     form = form_of(qtbot, theme, Parameter("p", "picture", "image"))
     choice = child(form, PictureChoice)
     QTest.keyClicks(choice.field, "http://robot/cat.png")
@@ -436,7 +434,7 @@ def test_an_address_is_sent_as_it_is_and_bare_base64_where_the_robot_wants_it(qt
 # ---- lists and objects -----------------------------------------------------------------------------
 
 
-def test_a_list_of_numbers_and_an_object_are_typed_as_such(qtbot, theme) -> None:
+def test_number_list_and_object_fields_are_parsed_and_validated(qtbot, theme) -> None:
     speeds = parameter_of("speeds", {"type": "array", "items": {"type": "number"}}, required=True)
     pose = parameter_of("pose", {"type": "object", "properties": {"x": {"type": "number"}}}, required=True)
     form = form_of(qtbot, theme, speeds, pose)

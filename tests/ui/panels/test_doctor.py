@@ -40,7 +40,7 @@ def panel(qtbot, window) -> DoctorPanel:
     return made
 
 
-def test_it_looks_when_it_is_first_seen_and_shows_the_worst_first(panel, window) -> None:
+def test_doctor_runs_when_first_shown_and_lists_the_worst_finding_first(panel, window) -> None:
     assert window.session.doctor.looked == 1
     assert panel.shown == list(FOUND)
     assert len(panel.rows) == len(FOUND)
@@ -50,7 +50,7 @@ def test_it_looks_when_it_is_first_seen_and_shows_the_worst_first(panel, window)
     assert window.session.doctor.looked == 1  # nothing changed, nothing done
 
 
-def test_while_it_looks_rows_come_as_they_are_found(qtbot, window) -> None:
+def test_findings_are_shown_as_they_are_found(qtbot, window) -> None:
     window.session.master = MasterState("none", "127.0.0.1:7780")
     doctor = window.session.doctor
     doctor.found = (FINE, ALSO_FINE, FULL)
@@ -88,7 +88,7 @@ def test_while_it_looks_rows_come_as_they_are_found(qtbot, window) -> None:
     assert (panel.looked.text(), panel.chip.accessibleName()) == ("All 2 checks passed", "no problems")
 
 
-def test_panels_that_wait_are_listed_with_the_topic_that_was_meant(qtbot, panel, window, monkeypatch) -> None:
+def test_waiting_panels_are_listed_with_the_suggested_topic(qtbot, panel, window, monkeypatch) -> None:
     now = [time.monotonic()]
     monkeypatch.setattr("app.ui.panels.doctor.time.monotonic", lambda: now[0])
     near, far, silent = (window.make(INSPECTOR) for _ in range(3))
@@ -118,7 +118,7 @@ def test_panels_that_wait_are_listed_with_the_topic_that_was_meant(qtbot, panel,
     assert len(panel.rows) == before
 
 
-def test_a_command_is_copied(qtbot, panel, window) -> None:
+def test_command_is_copied(qtbot, panel, window) -> None:
     row = panel.rows[0]
     assert row.button.accessibleName() == "Copy the command"
     qtbot.mouseClick(row.button, Qt.MouseButton.LeftButton)
@@ -127,7 +127,7 @@ def test_a_command_is_copied(qtbot, panel, window) -> None:
     assert not panel.rows[1].button.isVisible()
 
 
-def test_studio_starts_the_master_and_looks_again_when_it_is_there(qtbot, panel, window) -> None:
+def test_doctor_starts_the_master_and_checks_again_when_it_runs(qtbot, panel, window) -> None:
     missing = Finding("master:none", "error", "No master runs.", "Start a master.", "nep master")
     window.session.doctor.found = (missing,)
     qtbot.mouseClick(panel.again, Qt.MouseButton.LeftButton)
@@ -143,7 +143,7 @@ def test_studio_starts_the_master_and_looks_again_when_it_is_there(qtbot, panel,
     assert panel.chip.accessibleName() == "no problems"
 
 
-def test_the_report_is_copied_as_text(panel, window) -> None:
+def test_report_is_copied_as_text(panel, window) -> None:
     (copy,) = panel.more_actions()
     copy.trigger()
     text = QGuiApplication.clipboard().text()
@@ -152,7 +152,7 @@ def test_the_report_is_copied_as_text(panel, window) -> None:
     assert window.toasts == ["Copied the report"]
 
 
-def test_while_it_looks_the_button_waits_and_the_last_findings_stay(panel, window) -> None:
+def test_button_is_disabled_and_last_findings_are_kept_during_a_check(panel, window) -> None:
     window.session.doctor.looking = True
     panel.refresh()
     assert not panel.again.isEnabled()
@@ -200,7 +200,9 @@ def names(panel) -> list[str]:
     return [row.button.accessibleName() for row in panel.rows if row.button.isVisibleTo(row)]
 
 
-def test_the_name_that_was_meant_is_used_by_the_panel_that_asked(qtbot, panel, window, asker) -> None:
+def test_suggested_topic_name_is_applied_to_the_panel_that_opened_the_doctor(
+    qtbot, panel, window, asker
+) -> None:
     window.session.doctor.found = (NEAR,)
     window.session.doctor.miss("/robot/deph")
     asker.paused = False
@@ -216,7 +218,7 @@ def test_the_name_that_was_meant_is_used_by_the_panel_that_asked(qtbot, panel, w
     assert panel.chip.accessibleName() == "no problems"
 
 
-def test_without_a_panel_that_asked_the_topic_is_opened_where_it_fits(qtbot, panel, window) -> None:
+def test_without_an_originating_panel_the_topic_opens_in_a_matching_panel(qtbot, panel, window) -> None:
     window.session.doctor.found = (NEAR,)
     window.session.doctor.miss("/robot/deph")
     panel.refresh()
@@ -224,7 +226,7 @@ def test_without_a_panel_that_asked_the_topic_is_opened_where_it_fits(qtbot, pan
     assert window.opened == ["/robot/depth"]
 
 
-def test_a_panel_that_is_paused_is_the_first_reason_and_goes_on(qtbot, panel, window, asker) -> None:
+def test_paused_panel_is_the_first_finding_and_is_resumed(qtbot, panel, window, asker) -> None:
     window.session.doctor.found = (NEAR,)
     window.session.doctor.miss("/robot/deph")
     panel.begin_for(asker)
@@ -237,7 +239,7 @@ def test_a_panel_that_is_paused_is_the_first_reason_and_goes_on(qtbot, panel, wi
     assert names(panel) == ["Use /robot/depth"]
 
 
-def test_a_panel_that_was_closed_is_asked_nothing(qtbot, panel, window) -> None:
+def test_closed_panel_is_not_queried(qtbot, panel, window) -> None:
     asker = Asker(window.context())
     panel.begin_for(asker)
     assert "paused" in panel.rows[0].accessibleName()
@@ -246,7 +248,7 @@ def test_a_panel_that_was_closed_is_asked_nothing(qtbot, panel, window) -> None:
     assert "paused" not in panel.rows[0].accessibleName()
 
 
-def test_a_recording_that_is_open_hides_the_live_topic(qtbot, panel, window, tmp_path) -> None:
+def test_open_recording_is_reported_as_hiding_the_live_topic(qtbot, panel, window, tmp_path) -> None:
     window.session.open_recording(tmp_path / "none.mcap")
     try:
         panel.refresh()
@@ -281,7 +283,7 @@ def test_a_recording_that_is_open_hides_the_live_topic(qtbot, panel, window, tmp
         (Finding("topic:service", "error", "A service.", instead="/x"), "Call /x", "service.call:/x"),
     ],
 )
-def test_each_reason_has_one_button(qtbot, panel, window, finding, button, command) -> None:
+def test_each_finding_has_one_button(qtbot, panel, window, finding, button, command) -> None:
     window.session.doctor.found = (finding,)
     window.session.doctor.miss("/x")
     panel.refresh()
@@ -290,7 +292,7 @@ def test_each_reason_has_one_button(qtbot, panel, window, finding, button, comma
     assert window.commands == [command]
 
 
-def test_a_person_says_what_they_miss(panel, window, asker) -> None:
+def test_missing_topic_is_entered_by_the_user(panel, window, asker) -> None:
     panel.begin_for(asker)
     panel.missed.set_value("/odom")
     panel.missed.activated.emit(panel.missed.currentIndex())
@@ -300,7 +302,7 @@ def test_a_person_says_what_they_miss(panel, window, asker) -> None:
     assert QGuiApplication.clipboard().text().startswith("Missing: /odom\n")
 
 
-def test_a_topic_of_a_network_that_does_not_answer(panel, window) -> None:
+def test_topic_of_an_unresponsive_network_is_reported(panel, window) -> None:
     network = window.session.networks.get("ros2")
     network.state, network.sentence = "lost", "no daemon answers"
     window.session.doctor.miss("ros2 /camera")
@@ -310,7 +312,7 @@ def test_a_topic_of_a_network_that_does_not_answer(panel, window) -> None:
     assert panel.terminal.text() == "In a terminal: nep doctor"
 
 
-def test_every_panel_that_may_be_empty_leads_here_with_its_topic(qtbot, qapp) -> None:
+def test_every_panel_that_may_be_empty_opens_the_doctor_with_its_topic(qtbot, qapp) -> None:
     window = Window(Session())
     window.session.master = MasterState("connected", "127.0.0.1:7780")
     for name in ("inspector", "image", "console", "services"):
@@ -325,7 +327,7 @@ def test_every_panel_that_may_be_empty_leads_here_with_its_topic(qtbot, qapp) ->
         made.shut()
 
 
-def test_panels_tell_that_they_are_paused(qtbot, window) -> None:
+def test_panels_report_that_they_are_paused(qtbot, window) -> None:
     for name in ("inspector", "image", "plot"):
         made = window.make(importlib.import_module(f"app.ui.panels.{name}").PANEL)
         qtbot.addWidget(made)
@@ -338,7 +340,7 @@ def test_panels_tell_that_they_are_paused(qtbot, window) -> None:
         made.shut()
 
 
-def test_the_console_tells_what_it_leaves_out(qtbot, window) -> None:
+def test_console_reports_its_filters(qtbot, window) -> None:
     made = window.make(console.PANEL)
     qtbot.addWidget(made)
     assert list(made.hindrances()) == []
@@ -349,7 +351,7 @@ def test_the_console_tells_what_it_leaves_out(qtbot, window) -> None:
     assert made.level == "all"
 
 
-def test_a_plot_of_nothing_leads_here(qtbot, window) -> None:
+def test_empty_plot_opens_the_doctor(qtbot, window) -> None:
     made = window.make(importlib.import_module("app.ui.panels.plot").PANEL, (900, 600))
     qtbot.addWidget(made)
     made._add_typed("/odom.speed", False)
@@ -360,7 +362,7 @@ def test_a_plot_of_nothing_leads_here(qtbot, window) -> None:
     made.shut()
 
 
-def test_before_the_first_answer_it_says_that_it_looks(qtbot, qapp) -> None:
+def test_doctor_shows_that_it_is_checking_before_the_first_result(qtbot, qapp) -> None:
     window = Window(Session())
     window.session.doctor.start = lambda: None
     panel = window.make(PANEL)

@@ -33,7 +33,7 @@ def page(*tops: dict) -> dict:
 SAYS, TURNS = "robot_pepper_do_say", "robot_pepper_do_turn"
 
 
-def test_what_hangs_below_when_started_counts_also_inside_of_others() -> None:
+def test_blocks_nested_below_when_started_count_and_loose_blocks_do_not() -> None:
     assert built_in({}) == Built()
     assert built_in(page(block("events_started"))) == Built(started=True)
     inside = block("events_started", block("control_repeat", block(TURNS), BODY=block(SAYS)))
@@ -42,14 +42,14 @@ def test_what_hangs_below_when_started_counts_also_inside_of_others() -> None:
     assert built_in(loose) == Built(True, loose=frozenset({SAY})), "it stands on the page, and does not run"
 
 
-def test_strange_files_have_no_steps() -> None:
+def test_malformed_files_complete_no_steps() -> None:
     assert built_in({"blocks": 3}) == Built()
     assert built_in({"blocks": {"blocks": [3, {"type": "events_started", "next": 3, "inputs": 4}]}}) == Built(
         True
     )
 
 
-def test_each_step_is_done_by_what_shows_it_and_stays_done() -> None:
+def test_each_step_is_completed_by_its_evidence_and_stays_completed() -> None:
     now, done = Now(), frozenset[str]()
     for change, step in (
         ({"can_speak": True}, "robot"),
@@ -65,7 +65,7 @@ def test_each_step_is_done_by_what_shows_it_and_stays_done() -> None:
     assert shown_by(Now(), done) == done == {step.id for step in STEPS}
 
 
-def test_blocks_of_an_example_teach_nothing(panel, window) -> None:
+def test_blocks_of_an_example_complete_no_step(panel, window) -> None:
     window.session.join(pepper())
     shipped = read_file(min(resources.path("examples").glob("*.nepb"))).workspace
     tops = shipped["blocks"]["blocks"]
@@ -75,17 +75,17 @@ def test_blocks_of_an_example_teach_nothing(panel, window) -> None:
     assert panel.done == {"robot", "start", "say", "turn"}
 
 
-def test_a_stop_of_other_blocks_is_not_the_last_step() -> None:
+def test_stopping_other_blocks_does_not_complete_the_last_step() -> None:
     done = {"robot", "start", "say", "run", "turn"}
     assert shown_by(Now(True, Built(), stopped=True), done) == done
 
 
-def test_a_stop_before_anything_ran_teaches_nothing() -> None:
+def test_stop_before_any_run_completes_no_step() -> None:
     built = Built(True, frozenset({"a"}), True)
     assert "stop" not in shown_by(Now(True, built, stopped=True), ())
 
 
-def test_the_types_of_the_steps_are_those_of_the_shipped_robot() -> None:
+def test_block_types_of_the_steps_match_the_shipped_robot() -> None:
     described = json.loads(resources.path("robots", "pepper.tm.jsonld").read_text("utf-8"))
     assert {"say", "turn"} <= described["actions"].keys()
     assert (SAY, TURN) == ("_do_say", "_do_turn")
@@ -128,7 +128,7 @@ def build(panel: FirstStepsPanel, *tops: dict) -> None:
     panel.refresh()
 
 
-def test_the_next_step_has_its_hint_and_its_button(panel, window) -> None:
+def test_next_step_shows_its_hint_and_button(panel, window) -> None:
     assert names(panel)[:2] == ["Use the virtual robot: the next step", "Drag “when started” onto the page"]
     assert panel.rows[0].hint.isVisible()
     assert not panel.rows[1].hint.isVisible()
@@ -145,7 +145,7 @@ def test_the_next_step_has_its_hint_and_its_button(panel, window) -> None:
     assert panel.chip.text == "1 of 6"
 
 
-def test_the_keyboard_goes_on_at_the_next_step(qtbot, panel, window) -> None:
+def test_keyboard_focus_moves_to_the_next_step(qtbot, panel, window) -> None:
     panel.activateWindow()
     qtbot.waitUntil(panel.isActiveWindow)
     panel.rows[0].button.setFocus()
@@ -154,7 +154,7 @@ def test_the_keyboard_goes_on_at_the_next_step(qtbot, panel, window) -> None:
     assert has_keys(panel.rows[1].button)
 
 
-def test_show_me_knows_the_block_of_the_robot_that_is_there(panel, window) -> None:
+def test_show_me_points_at_the_block_of_the_connected_robot(panel, window) -> None:
     window.session.join(pepper())
     build(panel, block("events_started"))
     press(panel.rows[2].button)
@@ -164,7 +164,7 @@ def test_show_me_knows_the_block_of_the_robot_that_is_there(panel, window) -> No
     assert window.commands[-1] == "point.button:run.run"
 
 
-def test_a_block_that_stands_loose_is_told_where_to_go(panel, window) -> None:
+def test_loose_block_gets_a_hint_where_to_attach_it(panel, window) -> None:
     window.session.join(pepper())
     build(panel, block("events_started"))
     assert panel.rows[2].hint.text() == "You'll find it under Speech, on the left."
@@ -173,7 +173,7 @@ def test_a_block_that_stands_loose_is_told_where_to_go(panel, window) -> None:
     assert "say" not in panel.done
 
 
-def test_what_is_done_is_there_again_at_the_next_start(panel, window, qtbot) -> None:
+def test_completed_steps_are_restored_after_restart(panel, window, qtbot) -> None:
     window.session.join(pepper())
     build(panel, block("events_started"))
     assert window.session.settings.get(KEPT, []) == ["robot", "start"]
@@ -187,7 +187,7 @@ def test_what_is_done_is_there_again_at_the_next_start(panel, window, qtbot) -> 
     assert FirstStepsPanel(window.context()).done == frozenset()
 
 
-def test_who_waits_for_twenty_seconds_is_shown_once_where_it_is(panel, window, clock) -> None:
+def test_after_twenty_idle_seconds_the_next_step_is_pointed_out_once(panel, window, clock) -> None:
     window.session.join(pepper())
     panel.refresh()
     clock.now = HINT_AFTER_S - 1
@@ -205,7 +205,7 @@ def test_who_waits_for_twenty_seconds_is_shown_once_where_it_is(panel, window, c
     assert window.commands[-1] == "point.block:-", "the ring goes with its step"
 
 
-def test_at_the_end_it_says_what_comes_then_and_can_begin_again(panel, window) -> None:
+def test_completed_first_steps_show_what_comes_next_and_can_be_restarted(panel, window) -> None:
     panel.done = frozenset(step.id for step in STEPS) - {"robot"}
     window.session.join(pepper())
     panel.refresh()

@@ -46,9 +46,7 @@ def theme(qapp) -> Theme:
     ],
     ids=lambda value: value.kind if isinstance(value, Parameter) else "",
 )
-def test_each_kind_of_parameter_has_its_control_and_its_value(
-    qtbot, theme, parameter, kind, start, other
-) -> None:
+def test_each_parameter_kind_has_its_control_and_value(qtbot, theme, parameter, kind, start, other) -> None:
     form = ActionForm(theme, action(parameter))
     qtbot.addWidget(form)
     control = form.controls["p"]
@@ -60,7 +58,7 @@ def test_each_kind_of_parameter_has_its_control_and_its_value(
     assert form.action.check(form.input()) == ()
 
 
-def test_numbers_without_limits_and_pictures_are_typed(qtbot, theme) -> None:
+def test_numbers_without_limits_and_images_have_text_fields(qtbot, theme) -> None:
     form = ActionForm(
         theme,
         action(
@@ -75,7 +73,7 @@ def test_numbers_without_limits_and_pictures_are_typed(qtbot, theme) -> None:
     assert form.input() == {"n": 7, "x": 1.5, "i": "file:///p.png"}
 
 
-def test_a_number_that_is_none_stays_as_it_was_typed_and_the_check_says_so(qtbot, theme) -> None:
+def test_invalid_number_is_kept_as_typed_and_reported_by_validation(qtbot, theme) -> None:
     form = ActionForm(theme, action(Parameter("n", "count", "integer", default=2)))
     qtbot.addWidget(form)
     field = form.findChild(QLineEdit)
@@ -89,7 +87,7 @@ def test_a_number_that_is_none_stays_as_it_was_typed_and_the_check_says_so(qtbot
     assert field.property("wrong") == "false"  # typing takes the sentence away
 
 
-def test_what_a_robot_offers_now_fills_a_list(qtbot, theme) -> None:
+def test_choices_offered_by_the_robot_at_runtime_fill_the_list(qtbot, theme) -> None:
     parameter = Parameter("name", "animation", "text", options_from="animations")
     asked: list[str] = []
 
@@ -105,7 +103,7 @@ def test_what_a_robot_offers_now_fills_a_list(qtbot, theme) -> None:
     assert isinstance(control_for(theme, parameter, []).widget, QLineEdit)
 
 
-def test_sentences_stand_below_their_rows_and_others_at_the_end(qtbot, theme) -> None:
+def test_problems_are_shown_below_their_rows_and_others_at_the_end(qtbot, theme) -> None:
     form = ActionForm(
         theme, action(Parameter("t", "text", "text", required=True), Parameter("s", "speed", "number", 0, 1))
     )
@@ -122,7 +120,7 @@ def test_sentences_stand_below_their_rows_and_others_at_the_end(qtbot, theme) ->
     assert not form.problem.isVisible()
 
 
-def test_advanced_parameters_come_with_more(qtbot, theme) -> None:
+def test_advanced_parameters_are_shown_by_more(qtbot, theme) -> None:
     form = ActionForm(
         theme, action(Parameter("a", "a", "text"), Parameter("b", "b", "text", default="x", advanced=True))
     )
@@ -150,21 +148,21 @@ def test_every_control_has_an_accessible_name(qtbot, theme) -> None:
             assert parameter.title in names
 
 
-def test_the_summary_says_the_values_in_a_few_words(qtbot, theme) -> None:
+def test_summary_lists_the_values_briefly(qtbot, theme) -> None:
     emotion = next(one for one in ACTIONS if one.name == "emotion")
     form = ActionForm(theme, emotion)
     qtbot.addWidget(form)
     assert form.summary() == "happy, for 2 s"
 
 
-def test_the_name_of_a_value_is_shown_as_it_is(qtbot, theme) -> None:
+def test_ampersand_in_a_parameter_name_is_shown_literally(qtbot, theme) -> None:
     form = ActionForm(theme, action(Parameter("p", "R&D", "text", default="hi")))
     qtbot.addWidget(form)
     (name,) = (each for each in form.findChildren(QLabel) if each.buddy() is not None)
     assert name.text() == "R&&D"  # beside its control an & would underline the D
 
 
-def test_in_every_language_a_sentence_finds_its_row(qtbot, theme, pseudo) -> None:
+def test_problems_are_matched_to_rows_in_every_language(qtbot, theme, pseudo) -> None:
     made = action(Parameter("p", "p", "number", required=True), Parameter("q", "q", "number"))
     form = ActionForm(theme, made)
     qtbot.addWidget(form)
@@ -174,6 +172,6 @@ def test_in_every_language_a_sentence_finds_its_row(qtbot, theme, pseudo) -> Non
     assert form.problem.isHidden()
 
 
-def test_in_every_language_a_time_is_said_in_a_few_words(pseudo) -> None:
+def test_duration_is_formatted_briefly_in_every_language(pseudo) -> None:
     waits = action(Parameter("s", translate("robot", "seconds"), "number", unit="s"))
     assert input_words(waits, {"s": 2.0}) == _("for {duration}").format(duration="2 s")

@@ -151,7 +151,7 @@ def words_at(panel: GraphPanel) -> set[str]:
     return {item.figures.words for item in panel.canvas.scene.lines}
 
 
-def test_nodes_lines_and_figures(panel: GraphPanel) -> None:
+def test_graph_shows_nodes_edges_and_figures(panel: GraphPanel) -> None:
     assert panel.count.text() == "5 nodes, 3 topics, 1 service"
     assert names(panel) == {"pepper_driver", "blackboard", "greeting", "studio", "RIZE"}
     assert words_at(panel) == {"/touch 20/s", "/blackboard 10/s", "robot_action 0.5/s", "remember"}
@@ -166,7 +166,7 @@ def test_nodes_lines_and_figures(panel: GraphPanel) -> None:
     assert all(item.label is not None for item in scene.lines if item.line.kind == "topic")
 
 
-def test_only_what_changed_is_painted(panel: GraphPanel, window: Window, qtbot) -> None:
+def test_only_changed_items_are_repainted(panel: GraphPanel, window: Window, qtbot) -> None:
     def renewed() -> int:
         panel.canvas.renew_soon()
         return panel.canvas.renew(panel._figures_of)
@@ -186,7 +186,9 @@ def test_only_what_changed_is_painted(panel: GraphPanel, window: Window, qtbot) 
     assert "/touch 31/s" in words_at(panel)
 
 
-def test_what_is_out_of_sight_is_renewed_when_it_comes_into_sight(panel: GraphPanel, window: Window) -> None:
+def test_items_outside_the_viewport_are_updated_when_scrolled_into_view(
+    panel: GraphPanel, window: Window
+) -> None:
     panel.canvas.zoom_to(3.0)
     panel.canvas.move_by(20_000, 0)
     more = graph()
@@ -199,7 +201,7 @@ def test_what_is_out_of_sight_is_renewed_when_it_comes_into_sight(panel: GraphPa
     assert "/touch 31/s" in words_at(panel)
 
 
-def test_a_click_on_a_line_shows_its_topic_and_inspect_opens_it(panel: GraphPanel, window: Window) -> None:
+def test_click_on_an_edge_shows_its_topic_and_inspect_opens_it(panel: GraphPanel, window: Window) -> None:
     scene = panel.canvas.scene
     assert scene is not None
     item = next(each for each in scene.lines if each.line.topics == ("/blackboard",))
@@ -228,7 +230,7 @@ def test_a_click_on_a_line_shows_its_topic_and_inspect_opens_it(panel: GraphPane
     assert not panel.card.isVisible()
 
 
-def test_a_double_click_on_a_line_opens_its_topic(panel: GraphPanel, window: Window) -> None:
+def test_double_click_on_an_edge_opens_its_topic(panel: GraphPanel, window: Window) -> None:
     scene = panel.canvas.scene
     assert scene is not None
     item = next(each for each in scene.lines if each.line.topics == ("/touch",))
@@ -238,7 +240,7 @@ def test_a_double_click_on_a_line_opens_its_topic(panel: GraphPanel, window: Win
     assert window.opened == ["/touch"]
 
 
-def test_the_card_of_a_node_leads_to_its_topics(panel: GraphPanel, window: Window) -> None:
+def test_node_card_links_to_its_topics(panel: GraphPanel, window: Window) -> None:
     click(panel.canvas, middle(panel, "blackboard"))
     content = panel.card.content
     assert content is not None
@@ -258,7 +260,7 @@ def test_the_card_of_a_node_leads_to_its_topics(panel: GraphPanel, window: Windo
     assert window.opened == []
 
 
-def test_the_card_of_a_service(panel: GraphPanel) -> None:
+def test_service_card_shows_its_details(panel: GraphPanel) -> None:
     panel.canvas.choose(GraphChoice("topic", "remember"))
     content = panel.card.content
     assert content is not None
@@ -288,7 +290,7 @@ def run_all(menu: QMenu) -> list[str]:
 
 
 @pytest.mark.qt_log_ignore("does not support (grabbing the keyboard|raise)", extend=True)
-def test_a_right_click_on_a_line_offers_what_its_topic_can(panel: GraphPanel, window: Window) -> None:
+def test_context_menu_of_an_edge_lists_the_commands_of_its_topic(panel: GraphPanel, window: Window) -> None:
     scene = panel.canvas.scene
     assert scene is not None
     item = next(each for each in scene.lines if each.line.topics == ("/blackboard",))
@@ -310,13 +312,13 @@ def test_a_right_click_on_a_line_offers_what_its_topic_can(panel: GraphPanel, wi
 
 
 @pytest.mark.qt_log_ignore("does not support (grabbing the keyboard|raise)", extend=True)
-def test_the_menu_key_opens_the_menu_of_the_chosen_node(panel: GraphPanel, window: Window) -> None:
+def test_menu_key_opens_the_menu_of_the_selected_node(panel: GraphPanel, window: Window) -> None:
     panel.canvas.choose(GraphChoice("node", key_of(panel, "pepper_driver")))
     assert run_all(menu_at(panel, QPoint(1, 1), by_keys=True)) == ["New alarm", "Copy name"]
     assert window.commands == ["alarm.node:pepper_driver"]
 
 
-def test_a_line_of_several_topics_has_a_menu_for_each(qtbot, panel: GraphPanel, window: Window) -> None:
+def test_edge_with_several_topics_has_a_submenu_for_each(qtbot, panel: GraphPanel, window: Window) -> None:
     more = graph(2)
     twin = replace(more.topics["/touch"], name="/touch&go")
     show(window, replace(more, topics={**more.topics, twin.name: twin}))
@@ -335,7 +337,7 @@ def test_a_line_of_several_topics_has_a_menu_for_each(qtbot, panel: GraphPanel, 
 
 
 @pytest.mark.parametrize("rate", [float("nan"), float("inf"), 0.0, 2.0**64, -1.0])
-def test_impossible_figures_break_nothing(panel: GraphPanel, window: Window, rate: float) -> None:
+def test_invalid_figures_do_not_break_the_graph(panel: GraphPanel, window: Window, rate: float) -> None:
     more = graph()
     odd = replace(more.topics["/touch"], rate_hz=rate, bandwidth_Bps=rate, loss_ratio=rate, lost=2**64 - 1)
     odd = replace(
@@ -349,7 +351,7 @@ def test_impossible_figures_break_nothing(panel: GraphPanel, window: Window, rat
     assert any(words.startswith("/touch") for words in words_at(panel))
 
 
-def test_another_theme_moves_nobody_and_larger_text_arranges_anew(
+def test_theme_change_keeps_the_layout_and_larger_text_recomputes_it(
     panel: GraphPanel, window: Window, qtbot
 ) -> None:
     scene = panel.canvas.scene
@@ -363,7 +365,7 @@ def test_another_theme_moves_nobody_and_larger_text_arranges_anew(
     assert node.rect.width() == 228
 
 
-def test_keys_walk_along_lines_and_say_what_is_chosen(panel: GraphPanel, window: Window) -> None:
+def test_arrow_keys_move_along_edges_and_announce_the_selection(panel: GraphPanel, window: Window) -> None:
     canvas = panel.canvas
     canvas.choose(GraphChoice("node", key_of(panel, "pepper_driver")))
     QTest.keyClick(canvas, Qt.Key.Key_Right)
@@ -380,7 +382,7 @@ def test_keys_walk_along_lines_and_say_what_is_chosen(panel: GraphPanel, window:
     assert canvas.choice is None
 
 
-def test_enter_on_a_node_goes_into_its_card(panel: GraphPanel) -> None:
+def test_enter_on_a_node_moves_focus_into_its_card(panel: GraphPanel) -> None:
     panel.canvas.choose(GraphChoice("node", key_of(panel, "studio")))
     panel.activateWindow()
     panel.canvas.setFocus()
@@ -388,7 +390,7 @@ def test_enter_on_a_node_goes_into_its_card(panel: GraphPanel) -> None:
     assert panel.card.first_stop().accessibleName() == "/blackboard"
 
 
-def test_the_filter_lets_others_fade(panel: GraphPanel) -> None:
+def test_filter_fades_items_that_do_not_match(panel: GraphPanel) -> None:
     panel.canvas.setFocus()
     QTest.keyClick(panel.canvas, Qt.Key.Key_Slash)
     panel.tools.filter.setText("TOUCH")
@@ -401,7 +403,7 @@ def test_the_filter_lets_others_fade(panel: GraphPanel) -> None:
     assert scene.dimmed == 0
 
 
-def test_quiet_nodes_are_hidden_after_a_minute_and_shown_by_a_press(
+def test_idle_nodes_are_hidden_after_a_minute_and_shown_by_a_button(
     panel: GraphPanel, window: Window, qtbot, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     now = [time.monotonic()]
@@ -430,7 +432,7 @@ def test_quiet_nodes_are_hidden_after_a_minute_and_shown_by_a_press(
     assert "RIZE" in names(panel)
 
 
-def test_a_scene_of_many_lines_is_made_in_one_tick_and_painted_in_the_next(
+def test_large_scene_is_built_in_one_tick_and_painted_in_the_next(
     panel: GraphPanel, window: Window, qtbot, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr("app.ui.panels.graph.panel.MOST_AT_ONCE", 0)
@@ -450,7 +452,7 @@ def test_a_scene_of_many_lines_is_made_in_one_tick_and_painted_in_the_next(
     assert coming.graph == panel._asked
 
 
-def test_groups_open_and_close_and_g_and_s_are_keys(panel: GraphPanel, qtbot) -> None:
+def test_groups_are_toggled_by_click_and_keyboard_shortcuts(panel: GraphPanel, qtbot) -> None:
     scene = panel.canvas.scene
     assert scene is not None
     head = next(item.rect for item in scene.groups if item.name == "This computer")
@@ -471,14 +473,14 @@ def test_groups_open_and_close_and_g_and_s_are_keys(panel: GraphPanel, qtbot) ->
     assert panel.save_state() == {"group_by": "robot", "services": False, "hides_quiet": True, "own": False}
 
 
-def test_what_was_chosen_comes_back_and_rubbish_is_left_out(panel: GraphPanel) -> None:
+def test_view_options_are_restored_and_invalid_state_is_ignored(panel: GraphPanel) -> None:
     panel.restore_state({"group_by": "nothing", "services": False, "hides_quiet": False, "own": True})
     assert panel.save_state() == {"group_by": "nothing", "services": False, "hides_quiet": False, "own": True}
     panel.restore_state({"group_by": 7, "services": "no", "hides_quiet": None, "own": 1})
     assert panel.save_state() == {"group_by": "nothing", "services": False, "hides_quiet": False, "own": True}
 
 
-def test_places_stay_when_somebody_leaves_and_comes(panel: GraphPanel, window: Window, qtbot) -> None:
+def test_positions_are_stable_when_nodes_leave_and_join(panel: GraphPanel, window: Window, qtbot) -> None:
     def places() -> dict[str, tuple[float, float]]:
         assert panel.canvas.scene is not None
         return {key: item.rect.center().toTuple() for key, item in panel.canvas.scene.nodes.items()}
@@ -500,7 +502,7 @@ def test_places_stay_when_somebody_leaves_and_comes(panel: GraphPanel, window: W
     assert len(places()) == 6
 
 
-def test_many_nodes_begin_with_closed_groups(qtbot, window: Window) -> None:
+def test_graph_with_many_nodes_starts_with_collapsed_groups(qtbot, window: Window) -> None:
     many = tuple(NodeInfo(f"{n:x}", f"n{n}", f"host{n % 3}", 1, "", "native", n) for n in range(1, 202))
     show(window, GraphView(1, 2, {node.id: node for node in many}))
     window.session.nodes.age(window.session.clock() + 100)
@@ -515,7 +517,7 @@ def test_many_nodes_begin_with_closed_groups(qtbot, window: Window) -> None:
     made.shut()
 
 
-def test_moving_and_enlarging(panel: GraphPanel) -> None:
+def test_graph_is_panned_and_zoomed(panel: GraphPanel) -> None:
     canvas = panel.canvas
     fits = canvas.scale
     assert canvas.visible().contains(canvas.scene.bounds)  # type: ignore[union-attr]
@@ -541,7 +543,7 @@ def test_moving_and_enlarging(panel: GraphPanel) -> None:
     assert not panel.overview.isVisible()
 
 
-def test_the_overview_leads_to_a_place(panel: GraphPanel) -> None:
+def test_click_in_the_overview_moves_the_viewport(panel: GraphPanel) -> None:
     panel.canvas.zoom_to(3.0)
     scene = panel.canvas.scene
     assert scene is not None
@@ -551,7 +553,7 @@ def test_the_overview_leads_to_a_place(panel: GraphPanel) -> None:
     assert panel.canvas.visible().contains(wanted)
 
 
-def test_the_card_stands_below_where_there_is_little_room(panel: GraphPanel, qtbot) -> None:
+def test_card_is_placed_below_when_space_is_narrow(panel: GraphPanel, qtbot) -> None:
     panel.show_topic("/blackboard")
     panel.resize(460, 700)
     qtbot.waitUntil(lambda: panel.card.y() > panel.canvas.y())
@@ -559,7 +561,7 @@ def test_the_card_stands_below_where_there_is_little_room(panel: GraphPanel, qtb
     qtbot.waitUntil(lambda: panel.card.x() > panel.canvas.width() - 4)
 
 
-def test_svg_and_dot_are_written(panel: GraphPanel, window: Window, tmp_path: Path) -> None:
+def test_svg_and_dot_are_exported(panel: GraphPanel, window: Window, tmp_path: Path) -> None:
     panel.save(tmp_path / "graph.svg", SVG)
     panel.save(tmp_path / "graph.dot", DOT)
     assert window.toasts == ["Saved graph.svg", "Saved graph.dot"]
@@ -573,7 +575,7 @@ def test_svg_and_dot_are_written(panel: GraphPanel, window: Window, tmp_path: Pa
     assert window.toasts[-1].startswith("Can't save the graph: ")
 
 
-def test_the_export_menu_asks_for_a_file(panel: GraphPanel, window: Window, tmp_path: Path) -> None:
+def test_export_menu_opens_a_file_dialog(panel: GraphPanel, window: Window, tmp_path: Path) -> None:
     actions = {action.text(): action for action in panel._menu.actions()}
     window.answers.path = tmp_path / "mine.dot"
     actions["Graph (DOT)"].trigger()
@@ -582,7 +584,7 @@ def test_the_export_menu_asks_for_a_file(panel: GraphPanel, window: Window, tmp_
     assert set(actions) == {"Image (SVG)", "Graph (DOT)"}
 
 
-def test_nobody_is_here_says_what_to_do(qtbot, qapp) -> None:
+def test_empty_graph_explains_what_to_do(qtbot, qapp) -> None:
     window = Window(Session())
     window.session.master = MasterState("connected", "127.0.0.1:7780")
     made = window.make(PANEL)
@@ -612,7 +614,7 @@ def test_nobody_is_here_says_what_to_do(qtbot, qapp) -> None:
         (1e6, "1\u2009000\u2009000/s"),
     ],
 )
-def test_short_rates(rate: float, words: str) -> None:
+def test_rates_are_abbreviated(rate: float, words: str) -> None:
     assert short_rate(rate) == words
 
 
@@ -620,5 +622,5 @@ def test_short_rates(rate: float, words: str) -> None:
     ("sent", "width"),
     [(0.0, 1.25), (-1.0, 1.25), (float("nan"), 1.25), (100.0, 1.25), (1e7, 3.0), (float("inf"), 3.0)],
 )
-def test_widths(sent: float, width: float) -> None:
+def test_edge_width_follows_the_sent_bandwidth(sent: float, width: float) -> None:
     assert line_width(sent) == pytest.approx(width)

@@ -7,7 +7,7 @@ from app.ui.shell.main_window import MainWindow
 pytest_plugins = ["tests.ui.shell_fixtures"]
 
 
-def test_pictures_are_refreshed_twice_as_often(qtbot, window: MainWindow, commands: object) -> None:
+def test_image_panels_are_refreshed_twice_per_tick(qtbot, window: MainWindow, commands: object) -> None:
     window.show()
     window.show_layout("developer")
     bench = window.bench

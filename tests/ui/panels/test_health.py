@@ -35,7 +35,7 @@ def said(panel: HealthPanel) -> dict[str, str]:
     return {row.title.text(): row.words.text() for row in panel.rows}
 
 
-def test_each_fact_is_a_row_and_nothing_is_to_be_looked_at(panel, asked) -> None:
+def test_healthy_robot_shows_a_row_per_fact_and_no_problems(panel, asked) -> None:
     assert said(panel)["Battery"] == "84 %"
     assert said(panel)["Stop"] == "confirmed in 41 ms, at 8:40"
     assert panel.chip.text == ""
@@ -50,7 +50,7 @@ def test_each_fact_is_a_row_and_nothing_is_to_be_looked_at(panel, asked) -> None
     assert said(panel)["Stop"] == "not confirmed, at 8:41"
 
 
-def test_what_is_to_be_looked_at_is_counted_and_first(panel, asked) -> None:
+def test_problems_are_counted_and_listed_first(panel, asked) -> None:
     asked.session.fleet.links[0].values["battery"] = 7
     panel.refresh()
     assert (panel.chip.text, panel.chip.status) == ("1 warning", "warn")
@@ -61,7 +61,7 @@ def test_what_is_to_be_looked_at_is_counted_and_first(panel, asked) -> None:
 
 
 @pytest.mark.parametrize(("virtual", "does"), [(True, "connect:Pepper"), (False, "help.doctor")])
-def test_one_that_does_not_answer_has_a_next_step(panel, asked, virtual: bool, does: str) -> None:
+def test_unresponsive_robot_shows_a_next_step(panel, asked, virtual: bool, does: str) -> None:
     link = asked.session.fleet.links[0]
     link.robot, link.mute = replace(link.robot, virtual=virtual), True
     panel.refresh()
@@ -71,7 +71,7 @@ def test_one_that_does_not_answer_has_a_next_step(panel, asked, virtual: bool, d
     assert asked.commands == [does]
 
 
-def test_without_a_robot_it_says_what_to_do(qapp) -> None:
+def test_without_a_robot_the_panel_explains_what_to_do(qapp) -> None:
     asked = Window(Session())
     panel = asked.make(PANEL, (384, 300))
     assert panel.pages.currentWidget() is panel.empty
@@ -84,7 +84,7 @@ def test_without_a_robot_it_says_what_to_do(qapp) -> None:
     panel.shut()
 
 
-def test_it_looks_at_the_robot_that_is_shown_and_names_it_when_there_are_two(panel, asked) -> None:
+def test_panel_follows_the_shown_robot_and_names_it_when_there_are_two(panel, asked) -> None:
     assert asked.session.looked_at == ["Pepper"]
     assert panel.subtitle() == ""
     asked.session.join(pepper("Turtle"))
@@ -96,7 +96,7 @@ def test_it_looks_at_the_robot_that_is_shown_and_names_it_when_there_are_two(pan
     assert asked.session.looked_at == []
 
 
-def test_rows_are_made_anew_for_another_text_size(panel) -> None:
+def test_rows_are_rebuilt_for_another_text_size(panel) -> None:
     old = panel.rows[0]
     panel.theme_changed()
     panel.refresh()
@@ -107,7 +107,9 @@ def test_rows_are_made_anew_for_another_text_size(panel) -> None:
 # -- where it stands --------------------------------------------------------------------------------------
 
 
-def test_it_comes_with_robots_below_the_sensors(qtbot, window: MainWindow, commands: Commands) -> None:
+def test_health_panel_opens_with_robots_below_the_sensors(
+    qtbot, window: MainWindow, commands: Commands
+) -> None:
     window.show()
     commands.run("layout.behaviour")
     bench = window.bench
@@ -123,7 +125,7 @@ def test_it_comes_with_robots_below_the_sensors(qtbot, window: MainWindow, comma
     assert not bench.tabifiedDockWidgets(health)
 
 
-def test_there_is_room_for_it_in_the_smallest_window_and_it_stays_in_a_wider_one(
+def test_health_panel_fits_the_smallest_window_and_stays_in_a_wider_one(
     qtbot, window: MainWindow, commands: Commands
 ) -> None:
     window.show()
@@ -142,7 +144,9 @@ def test_there_is_room_for_it_in_the_smallest_window_and_it_stays_in_a_wider_one
         assert docks["health"].geometry().bottom() <= bench.height()
 
 
-def test_closed_it_stays_closed_also_after_a_restart(qtbot, window: MainWindow, commands: Commands) -> None:
+def test_closed_health_panel_stays_closed_after_restart(
+    qtbot, window: MainWindow, commands: Commands
+) -> None:
     window.show()
     commands.run("layout.behaviour")
     bench = window.bench
@@ -160,7 +164,7 @@ def test_closed_it_stays_closed_also_after_a_restart(qtbot, window: MainWindow, 
     assert "health" not in bench.open_names()
 
 
-def test_beside_sensors_that_share_their_place_it_is_a_tab(
+def test_health_panel_is_a_tab_when_sensors_share_their_dock(
     qtbot, window: MainWindow, commands: Commands
 ) -> None:
     window.show()

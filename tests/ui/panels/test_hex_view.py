@@ -4,12 +4,12 @@ from app.ui.panels.inspector.hex_view import HexView, hex_line
 from app.ui.theme.theme import Theme
 
 
-def test_a_line_has_its_offset_its_bytes_and_what_can_be_read_of_them() -> None:
+def test_line_shows_offset_bytes_and_printable_characters() -> None:
     assert hex_line(memoryview(b'{"a"\x00\xff'), 0, 16) == ("0000", "7b 22 61 22 00 ff", '{"a"··')
     assert hex_line(memoryview(bytes(range(64))), 32, 4) == ("0020", "20 21 22 23", ' !"#')
 
 
-def test_only_what_is_seen_is_painted_and_the_place_stays(qtbot, qapp) -> None:
+def test_only_visible_lines_are_painted_and_the_scroll_position_is_kept(qtbot, qapp) -> None:
     view = HexView(Theme("light"))
     qtbot.addWidget(view)
     view.resize(600, 200)
@@ -24,7 +24,7 @@ def test_only_what_is_seen_is_painted_and_the_place_stays(qtbot, qapp) -> None:
     assert view.viewport().grab().toImage() != before
 
 
-def test_narrow_views_have_eight_bytes_in_a_line(qtbot, qapp) -> None:
+def test_narrow_view_has_eight_bytes_per_line(qtbot, qapp) -> None:
     view = HexView(Theme("light"))
     qtbot.addWidget(view)
     view.resize(330, 200)

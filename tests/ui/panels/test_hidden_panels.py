@@ -97,7 +97,7 @@ def settle(qtbot, case: Case, dock: Dock) -> None:
     case.tick()
 
 
-def test_a_closed_panel_looks_at_nothing_and_does_again_when_it_is_opened(qtbot, case: Case) -> None:
+def test_closed_panel_watches_nothing_and_resumes_when_reopened(qtbot, case: Case) -> None:
     case.window.show_layout("behaviour")
     camera = case.dock("camera")
     settle(qtbot, case, camera)
@@ -116,7 +116,9 @@ def test_a_closed_panel_looks_at_nothing_and_does_again_when_it_is_opened(qtbot,
 
 
 @pytest.mark.parametrize("how", ["closed", "behind a tab", "in the other layout", "minimised"])
-def test_by_the_computers_clock_too(qtbot, theme: Theme, home: Path, how: str) -> None:
+def test_hidden_panel_stops_watching_with_the_real_clock_too(
+    qtbot, theme: Theme, home: Path, how: str
+) -> None:
     case = Case(home, theme, own_clock=False)
     qtbot.addWidget(case.window)
     case.window.show()
@@ -141,7 +143,7 @@ def test_by_the_computers_clock_too(qtbot, theme: Theme, home: Path, how: str) -
     case.window.close()
 
 
-def test_a_panel_behind_another_tab_looks_at_nothing(qtbot, case: Case) -> None:
+def test_panel_behind_another_tab_watches_nothing(qtbot, case: Case) -> None:
     case.window.show_layout("developer")
     image, inspector = case.dock("image"), case.dock("inspector")
     image.panel.show_topic(OTHER)
@@ -158,7 +160,7 @@ def test_a_panel_behind_another_tab_looks_at_nothing(qtbot, case: Case) -> None:
     assert inspector.shown()
 
 
-def test_a_quick_change_of_tabs_subscribes_nothing_anew(qtbot, case: Case) -> None:
+def test_quick_tab_switch_does_not_resubscribe(qtbot, case: Case) -> None:
     case.window.show_layout("developer")
     image = case.dock("image")
     image.panel.show_topic(OTHER)
@@ -174,7 +176,7 @@ def test_a_quick_change_of_tabs_subscribes_nothing_anew(qtbot, case: Case) -> No
     assert len(case.source.asked) == asked
 
 
-def test_a_layout_that_does_not_show_and_its_floating_panels_look_at_nothing(qtbot, case: Case) -> None:
+def test_hidden_layout_and_its_floating_panels_watch_nothing(qtbot, case: Case) -> None:
     case.window.show_layout("developer")
     image = case.dock("image")
     image.panel.show_topic(OTHER)
@@ -189,7 +191,7 @@ def test_a_layout_that_does_not_show_and_its_floating_panels_look_at_nothing(qtb
     assert OTHER in case.source.wanted
 
 
-def test_a_minimised_window_looks_at_nothing_and_its_timer_is_slow(qtbot, case: Case) -> None:
+def test_minimised_window_watches_nothing_and_slows_its_timer(qtbot, case: Case) -> None:
     case.window.show_layout("behaviour")
     camera = case.dock("camera")
     settle(qtbot, case, camera)
@@ -210,7 +212,7 @@ def test_a_minimised_window_looks_at_nothing_and_its_timer_is_slow(qtbot, case: 
     assert case.window.timer.interval() == TICK_MS // 2
 
 
-def test_a_frozen_picture_and_a_message_are_kept_while_they_are_hidden(qtbot, case: Case) -> None:
+def test_frozen_image_and_message_are_kept_while_hidden(qtbot, case: Case) -> None:
     case.window.show_layout("developer")
     image, inspector = case.dock("image").panel, case.dock("inspector").panel
     assert isinstance(image, ImagePanel)
@@ -235,7 +237,7 @@ def test_a_frozen_picture_and_a_message_are_kept_while_they_are_hidden(qtbot, ca
     assert inspector.model.value() == {"a": 1}
 
 
-def test_what_is_wrong_is_told_also_while_its_panel_is_hidden(qtbot, case: Case) -> None:
+def test_problems_are_reported_while_their_panel_is_hidden(qtbot, case: Case) -> None:
     case.window.show_layout("developer")
     inspector = case.dock("inspector")
     inspector.panel.show_topic("/words")
@@ -251,7 +253,7 @@ def test_what_is_wrong_is_told_also_while_its_panel_is_hidden(qtbot, case: Case)
     assert not case.session.alerts.has("message:/words"), "nobody wants to know any more"
 
 
-def test_a_robot_that_was_not_looked_at_is_not_stale_when_it_is_seen_again(qtbot, case: Case) -> None:
+def test_unwatched_robot_is_not_stale_when_its_panel_is_shown_again(qtbot, case: Case) -> None:
     case.window.show_layout("behaviour")
     dock = case.dock("robot")
     settle(qtbot, case, dock)
@@ -266,7 +268,7 @@ def test_a_robot_that_was_not_looked_at_is_not_stale_when_it_is_seen_again(qtbot
     assert not panel.view.stale
 
 
-def test_what_a_robot_told_while_nobody_looked_is_not_known(qtbot, case: Case) -> None:
+def test_robot_values_from_before_hiding_are_unknown_when_shown_again(qtbot, case: Case) -> None:
     case.window.show_layout("behaviour")
     sensors, health, robot = (case.dock(name) for name in ("sensors", "health", "robot"))
     case.dock("camera")
@@ -285,7 +287,7 @@ def test_what_a_robot_told_while_nobody_looked_is_not_known(qtbot, case: Case) -
     assert "battery" not in link.values
 
 
-def test_a_panel_that_fails_looks_at_nothing_until_it_is_tried_again(qtbot, case: Case) -> None:
+def test_failed_panel_watches_nothing_until_it_is_retried(qtbot, case: Case) -> None:
     case.window.show_layout("behaviour")
     camera = case.dock("camera")
     settle(qtbot, case, camera)
@@ -302,7 +304,7 @@ def test_a_panel_that_fails_looks_at_nothing_until_it_is_tried_again(qtbot, case
     assert CAMERA in case.source.wanted
 
 
-def test_every_panel_that_watches_tells_what_it_looks_at(case: Case) -> None:
+def test_every_panel_declares_its_watches_so_that_hiding_ends_them(case: Case) -> None:
     """Whatever a panel opens is among its `looks`: nothing of it is wanted while no panel can be seen."""
     assert isinstance(case.window, QMainWindow)
     for layout in ("behaviour", "developer"):
@@ -329,7 +331,7 @@ class Paints(QObject):
 
 
 @pytest.mark.parametrize("layout", ["behaviour", "developer"])
-def test_nothing_is_painted_again_that_has_not_changed(qtbot, case: Case, layout: str) -> None:
+def test_unchanged_items_are_not_repainted(qtbot, case: Case, layout: str) -> None:
     bench = case.window.show_layout(layout)
     for name in ("health", "robots", "alerts", "console"):
         bench.open(name)
@@ -352,7 +354,7 @@ def test_nothing_is_painted_again_that_has_not_changed(qtbot, case: Case, layout
     assert set(paints.of) <= told
 
 
-def test_a_camera_that_sees_the_same_paints_nothing(qtbot, case: Case, monkeypatch) -> None:
+def test_unchanged_camera_image_is_not_repainted(qtbot, case: Case, monkeypatch) -> None:
     for module in ("app.ui.pictures.view", "app.ui.panels.camera"):
         monkeypatch.setattr(f"{module}.SILENT_AFTER_S", 1e9)  # however busy the computer is
     bench = case.window.show_layout("behaviour")

@@ -64,7 +64,7 @@ def stream_of(shown: Picture, silent_s: float = 0.01) -> ImageStream:
     return stream
 
 
-def test_a_picture_keeps_its_aspect_on_black(view) -> None:
+def test_image_keeps_its_aspect_ratio_on_black(view) -> None:
     view.show_image(stream_of(picture(320, 240)))  # type: ignore[arg-type]
     assert view.area() == QRectF(0, 50, 400, 300)
     image = view.grab().toImage()
@@ -75,7 +75,7 @@ def test_a_picture_keeps_its_aspect_on_black(view) -> None:
     assert ball.name() == "#d23e3a"  # red stays red: the bytes are blue, green, red
 
 
-def test_it_says_how_many_are_shown_and_their_size(view) -> None:
+def test_caption_shows_frame_rate_and_image_size(view) -> None:
     view.show_image(stream_of(picture(320, 240)))  # type: ignore[arg-type]
     assert view.words.startswith("60 fps (30 shown)  320\u00d7240  ")
     assert view.words.endswith(" ms")  # its age
@@ -83,7 +83,7 @@ def test_it_says_how_many_are_shown_and_their_size(view) -> None:
     assert rate_sentence(17.2, 15.0) == "15 fps (15 shown)"  # two windows of time: never more than arrive
 
 
-def test_a_rate_that_jumps_is_said_once_a_second() -> None:
+def test_fluctuating_frame_rate_is_updated_once_per_second() -> None:
     now, rates = [100.0], SimpleNamespace(shown_hz=15.4, arriving_hz=15.4)
     words = RateWords(lambda: now[0])
     assert words.of(rates) == "15 fps (15 shown)"  # type: ignore[arg-type]
@@ -96,7 +96,7 @@ def test_a_rate_that_jumps_is_said_once_a_second() -> None:
     assert words.of(rates) == ""  # type: ignore[arg-type]
 
 
-def test_the_boxes_of_a_frozen_picture_are_frozen_too(view) -> None:
+def test_detection_boxes_of_a_frozen_image_are_frozen_too(view) -> None:
     stream, boxes = stream_of(picture()), boxes_of(FACES)
     view.show_image(stream, boxes)  # type: ignore[arg-type]
     stream.hold(True)
@@ -107,7 +107,7 @@ def test_the_boxes_of_a_frozen_picture_are_frozen_too(view) -> None:
     assert view.boxes == ()
 
 
-def test_each_picture_is_told_as_shown_once(view) -> None:
+def test_each_image_is_counted_as_shown_once(view) -> None:
     stream = stream_of(picture())
     view.show_image(stream)  # type: ignore[arg-type]
     view.show_image(stream)  # type: ignore[arg-type]
@@ -117,7 +117,7 @@ def test_each_picture_is_told_as_shown_once(view) -> None:
     assert len(stream.painted) == 2
 
 
-def test_a_silent_stream_is_grey_and_says_how_old_its_picture_is(view) -> None:
+def test_silent_stream_is_grey_and_shows_the_age_of_its_image(view) -> None:
     view.show_image(stream_of(picture()))  # type: ignore[arg-type]
     before = view.grab().toImage().pixelColor(20, 80)
     view.show_image(stream_of(view._picture, silent_s=4.2))  # type: ignore[arg-type]
@@ -134,7 +134,7 @@ def camera_view(qtbot, qapp) -> PictureView:
     return view
 
 
-def test_a_camera_that_sees_the_same_is_not_painted_again(qtbot, camera_view, monkeypatch) -> None:
+def test_unchanged_image_is_not_repainted(qtbot, camera_view, monkeypatch) -> None:
     stream = stream_of(picture(320, 240))
     camera_view.show_image(stream)
     qtbot.waitExposed(camera_view)
@@ -151,7 +151,9 @@ def test_a_camera_that_sees_the_same_is_not_painted_again(qtbot, camera_view, mo
 
 
 @pytest.mark.parametrize("labelled", [True, False])
-def test_an_age_is_told_once_a_second_and_paints_its_words_alone(qtbot, monkeypatch, labelled: bool) -> None:
+def test_image_age_is_updated_once_per_second_and_repaints_only_its_text(
+    qtbot, monkeypatch, labelled: bool
+) -> None:
     clock = Clock()
     view = PictureView(Theme("light"), labelled=labelled, clock=clock)
     qtbot.addWidget(view)
@@ -177,14 +179,14 @@ def test_an_age_is_told_once_a_second_and_paints_its_words_alone(qtbot, monkeypa
     assert all(where[1] > 200 for where in asked), "not the picture above its words"
 
 
-def test_beside_the_cameras_picture_there_is_no_black(camera_view) -> None:
+def test_camera_image_has_no_black_margins(camera_view) -> None:
     camera_view.show_image(stream_of(picture(320, 240)))  # type: ignore[arg-type]
     assert camera_view.area().left() > 60
     image = camera_view.grab().toImage()
     assert all(image.pixelColor(x, 80).lightness() > 60 for x in (2, 30, 370, 397))
 
 
-def test_the_cameras_last_picture_has_no_colours_and_says_so_in_its_middle(camera_view) -> None:
+def test_last_image_of_a_lost_camera_is_grey_with_a_message_in_the_middle(camera_view) -> None:
     shown = picture(320, 240)
     camera_view.show_image(stream_of(shown, silent_s=4.2))  # type: ignore[arg-type]
     assert camera_view.words.startswith("Last image 4 s ago")
@@ -199,7 +201,7 @@ def test_the_cameras_last_picture_has_no_colours_and_says_so_in_its_middle(camer
         for x in range(100, 300)))  # fmt: skip
 
 
-def test_boxes_are_drawn_where_they_are_with_their_words(view) -> None:
+def test_detection_boxes_are_drawn_at_their_position_with_labels(view) -> None:
     boxes = boxes_of(FACES)
     assert (boxes[0].words, boxes[0].confidence) == ("face", 0.97)
     assert boxes[0].place == QRectF(0.5, 0.25, 0.25, 0.25)
@@ -212,11 +214,11 @@ def test_boxes_are_drawn_where_they_are_with_their_words(view) -> None:
 @pytest.mark.parametrize(
     "broken", [None, [], {"items": [FACE]}, {**FACES, "items": "x"}, {**FACES, "items": [{}, 3]}]
 )
-def test_what_is_no_detection_makes_no_box(broken: object) -> None:
+def test_invalid_detections_draw_no_box(broken: object) -> None:
     assert boxes_of(broken) == ()
 
 
-def test_the_value_under_the_mouse_is_said(qtbot, view) -> None:
+def test_pixel_value_under_the_mouse_is_shown(qtbot, view) -> None:
     view.show_image(stream_of(picture()))  # type: ignore[arg-type]
     QTest.mouseMove(view, QPoint(20, 60))
     qtbot.waitUntil(lambda: "(16, 8)  196 198 190  #C4C6BE" in view.words)
@@ -224,7 +226,7 @@ def test_the_value_under_the_mouse_is_said(qtbot, view) -> None:
     qtbot.waitUntil(lambda: "#" not in view.words)
 
 
-def test_the_image_panel_shows_the_first_picture_topic_and_others_on_demand(qtbot, qapp) -> None:
+def test_image_panel_shows_the_first_image_topic_and_others_on_demand(qtbot, qapp) -> None:
     window = Window(Session.full())
     panel = made(qtbot, window)
     assert panel.subtitle() == "/robot/camera"
@@ -239,7 +241,7 @@ def test_the_image_panel_shows_the_first_picture_topic_and_others_on_demand(qtbo
     assert all(one.closed for one in window.session.images.streams)
 
 
-def test_the_image_panel_marks_what_the_cameras_robot_recognises(qtbot, qapp) -> None:
+def test_image_panel_marks_detections_of_the_camera_robot(qtbot, qapp) -> None:
     window = Window(Session.full())
     window.session.put(Topic("/Pepper/camera", "image", "image"))
     panel = made(qtbot, window)
@@ -254,7 +256,7 @@ def test_the_image_panel_marks_what_the_cameras_robot_recognises(qtbot, qapp) ->
     assert window.session.looked_at == []
 
 
-def test_without_pictures_it_says_what_will_appear(qtbot, qapp) -> None:
+def test_panel_without_images_explains_what_will_appear(qtbot, qapp) -> None:
     window = Window(Session())
     window.session.images.camera = lambda _topic: None
     panel = made(qtbot, window)
@@ -267,7 +269,7 @@ def test_without_pictures_it_says_what_will_appear(qtbot, qapp) -> None:
     assert panel.empty._text.text() == "'/cam' does not send pictures."
 
 
-def test_the_camera_panel_follows_the_first_robot_with_a_camera(qtbot, qapp) -> None:
+def test_camera_panel_follows_the_first_robot_with_a_camera(qtbot, qapp) -> None:
     window = Window(Session())
     window.session.images.camera = lambda _topic: picture(32, 24)
     panel = window.make(CAMERA)
@@ -309,7 +311,7 @@ def under(view: ZoomablePicture, at: QPoint) -> str:
     return view._under_mouse()
 
 
-def test_the_wheel_zooms_where_the_mouse_is(view) -> None:
+def test_wheel_zooms_at_the_mouse_position(view) -> None:
     view.show_image(stream_of(picture()))  # type: ignore[arg-type]
     at = QPoint(313, 237)  # the ball
     before = under(view, at)
@@ -321,7 +323,7 @@ def test_the_wheel_zooms_where_the_mouse_is(view) -> None:
     assert view.grab().toImage().pixelColor(at).name() == "#d23e3a"
 
 
-def test_from_twice_its_size_on_pixels_have_edges(view) -> None:
+def test_pixels_have_sharp_edges_from_200_per_cent_zoom(view) -> None:
     corner = bytes([255] * 3 + [0] * 45)
     layout = {"shape": [4, 4, 3], "encoding": "bgr8"}
     message = Message("/c", corner, "image", "image", stamp_ns=time.time_ns(), extension=layout)
@@ -337,7 +339,7 @@ def test_from_twice_its_size_on_pixels_have_edges(view) -> None:
 
 @pytest.mark.parametrize("turned", [0, 90, 180, 270])
 @pytest.mark.parametrize("flipped", [False, True])
-def test_values_and_boxes_follow_turning_and_flipping(view, turned: int, flipped: bool) -> None:
+def test_pixel_values_and_boxes_follow_rotation_and_flipping(view, turned: int, flipped: bool) -> None:
     view.show_image(stream_of(picture()), boxes_of(FACES))  # type: ignore[arg-type]
     if flipped:
         view.place.flip(across=True)
@@ -350,7 +352,7 @@ def test_values_and_boxes_follow_turning_and_flipping(view, turned: int, flipped
     assert image.pixelColor(round(box.center().x()), round(box.bottom())).name() == "#ffc53d"
 
 
-def test_dragging_and_the_arrow_keys_move_a_zoomed_picture(qtbot, view) -> None:
+def test_drag_and_arrow_keys_pan_a_zoomed_image(qtbot, view) -> None:
     view.show_image(stream_of(picture()))  # type: ignore[arg-type]
     view.place.set_zoom(5.0)
     before = under(view, QPoint(100, 100))
@@ -363,7 +365,7 @@ def test_dragging_and_the_arrow_keys_move_a_zoomed_picture(qtbot, view) -> None:
     assert under(view, QPoint(190, 90)) == before
 
 
-def test_a_double_click_goes_between_the_whole_and_one_for_one(view) -> None:
+def test_double_click_toggles_between_fit_and_actual_size(view) -> None:
     view.show_image(stream_of(picture()))  # type: ignore[arg-type]
     QTest.mouseDClick(view, Qt.MouseButton.LeftButton, pos=QPoint(200, 200))
     assert view.scale() == pytest.approx(1.0)
@@ -371,7 +373,7 @@ def test_a_double_click_goes_between_the_whole_and_one_for_one(view) -> None:
     assert view.place.zoom is None
 
 
-def test_as_many_pixels_are_wanted_as_are_shown_and_all_of_them_under_the_mouse(view) -> None:
+def test_image_is_decoded_at_display_size_and_in_full_under_the_mouse(view) -> None:
     stream = stream_of(picture(640, 320))
     view.show_image(stream)  # type: ignore[arg-type]
     assert stream.wish == (400, 200)
@@ -387,7 +389,7 @@ def test_as_many_pixels_are_wanted_as_are_shown_and_all_of_them_under_the_mouse(
     assert stream.wish is None
 
 
-def test_the_sequence_is_recorded_and_of_a_recording_saved_as_files(qtbot, qapp, tmp_path) -> None:
+def test_image_sequence_is_recorded_and_exported_from_a_recording_as_files(qtbot, qapp, tmp_path) -> None:
     window = Window(Session.full())
     panel = made(qtbot, window)
     (action,) = [each for each in panel.more_actions() if each.text() == "Record a sequence"]
@@ -405,7 +407,7 @@ def test_the_sequence_is_recorded_and_of_a_recording_saved_as_files(qtbot, qapp,
     assert not action.isEnabled()
 
 
-def test_a_pixel_is_said_as_colour_or_number_or_not_at_all() -> None:
+def test_pixel_is_described_as_colour_or_number_or_left_out() -> None:
     assert pixel_words(1, 2, (255, 0, 16)) == "(1, 2)  255 0 16  #FF0010"
     assert pixel_words(1, 2, 820) == "(1, 2)  820"
     assert pixel_words(1, 2, 0.125) == "(1, 2)  0.125"
@@ -413,7 +415,7 @@ def test_a_pixel_is_said_as_colour_or_number_or_not_at_all() -> None:
     assert pixel_words(1, 2, None) == "(1, 2)"
 
 
-def test_every_action_has_a_key_that_works_while_the_picture_has_the_keyboard(qtbot, qapp) -> None:
+def test_every_action_has_a_shortcut_while_the_image_has_focus(qtbot, qapp) -> None:
     window = Window(Session.full())
     panel = made(qtbot, window)
     view, place = panel.view, panel.view.place
@@ -436,14 +438,14 @@ def test_every_action_has_a_key_that_works_while_the_picture_has_the_keyboard(qt
     assert words == [*(row.words for row in ROWS), "Record a sequence", "Open in the Inspector"]
 
 
-def test_the_windows_shortcuts_wait_while_the_picture_has_the_keyboard(qtbot, qapp) -> None:
+def test_window_shortcuts_are_disabled_while_the_image_has_focus(qtbot, qapp) -> None:
     panel = made(qtbot, Window(Session.full()))
     for name in ("Ctrl++", "Ctrl+-", "Ctrl+0", "Space"):
         assert name in panel.view.keys
     assert "F12" not in panel.view.keys
 
 
-def test_a_frozen_picture_stays_and_says_so(qtbot, qapp) -> None:
+def test_frozen_image_is_kept_and_labelled_as_frozen(qtbot, qapp) -> None:
     window = Window(Session.full())
     panel = made(qtbot, window)
     panel.freeze.click()
@@ -453,9 +455,7 @@ def test_a_frozen_picture_stays_and_says_so(qtbot, qapp) -> None:
     assert not panel.freeze.isChecked()
 
 
-def test_a_picture_is_saved_as_it_was_received_and_the_toast_leads_to_its_folder(
-    qtbot, qapp, tmp_path
-) -> None:
+def test_image_is_saved_as_received_and_the_toast_opens_its_folder(qtbot, qapp, tmp_path) -> None:
     window = Window(Session.full())
     panel = made(qtbot, window)
     panel.job = SnapshotJob(panel, lambda: tmp_path / "kept")
@@ -471,7 +471,7 @@ def test_a_picture_is_saved_as_it_was_received_and_the_toast_leads_to_its_folder
     assert np.array_equal(read, picture().bgra[:, :, :3])
 
 
-def test_a_picture_that_cannot_be_kept_is_an_alert_with_the_reason(qtbot, qapp, tmp_path) -> None:
+def test_image_that_cannot_be_saved_raises_an_alert_with_the_reason(qtbot, qapp, tmp_path) -> None:
     window = Window(Session.full())
     panel = made(qtbot, window)
     (tmp_path / "file").write_text("in the way")
@@ -482,7 +482,7 @@ def test_a_picture_that_cannot_be_kept_is_an_alert_with_the_reason(qtbot, qapp, 
     assert window.toasts == []
 
 
-def test_a_picture_is_copied_whole_and_made_in_another_thread(qtbot, qapp, monkeypatch) -> None:
+def test_whole_image_is_copied_and_encoded_in_another_thread(qtbot, qapp, monkeypatch) -> None:
     threads: list[int] = []
     whole = SnapshotJob._do
 
@@ -501,7 +501,7 @@ def test_a_picture_is_copied_whole_and_made_in_another_thread(qtbot, qapp, monke
     assert threading.get_ident() not in threads
 
 
-def test_how_a_person_looked_comes_back_with_the_layout(qtbot, qapp) -> None:
+def test_zoom_rotation_and_flip_are_restored_with_the_layout(qtbot, qapp) -> None:
     window = Window(Session.full())
     panel = made(qtbot, window)
     QTest.keyClicks(panel.view, "+rh")
@@ -512,7 +512,7 @@ def test_how_a_person_looked_comes_back_with_the_layout(qtbot, qapp) -> None:
     again.restore_state({"topic": 3, "place": "nonsense"})
 
 
-def test_how_a_person_looked_belongs_to_its_topic(qtbot, qapp) -> None:
+def test_zoom_rotation_and_flip_are_kept_per_topic(qtbot, qapp) -> None:
     window = Window(Session.full())
     panel = made(qtbot, window)
     QTest.keyClicks(panel.view, "+rh")
@@ -526,7 +526,7 @@ def test_how_a_person_looked_belongs_to_its_topic(qtbot, qapp) -> None:
     assert panel.actions_of["across"].isChecked()
 
 
-def test_a_job_tells_in_the_windows_thread_and_nothing_after_the_end(qtbot, qapp, tmp_path) -> None:
+def test_job_reports_in_the_gui_thread_and_not_after_closing(qtbot, qapp, tmp_path) -> None:
     window = Window(Session.full())
     panel = made(qtbot, window)
     told: list[int] = []
@@ -549,7 +549,7 @@ def test_a_job_tells_in_the_windows_thread_and_nothing_after_the_end(qtbot, qapp
     assert len(list((tmp_path / "kept").iterdir())) == 2
 
 
-def test_what_is_no_picture_offers_to_look_at_the_message(qtbot, qapp) -> None:
+def test_topic_without_images_offers_the_inspector(qtbot, qapp) -> None:
     window = Window(Session())
     window.session.put(Topic("/cam", "image", "image"))
     panel = made(qtbot, window)
@@ -561,7 +561,7 @@ def test_what_is_no_picture_offers_to_look_at_the_message(qtbot, qapp) -> None:
     assert panel.fit.isHidden()
 
 
-def test_the_camera_panel_shows_the_robot_that_was_chosen(qtbot, qapp) -> None:
+def test_camera_panel_shows_the_chosen_robot(qtbot, qapp) -> None:
     window = Window(Session())
     window.session.images.camera = lambda _topic: picture()
     for name in ("Pepper", "Nao"):
@@ -580,7 +580,7 @@ def test_the_camera_panel_shows_the_robot_that_was_chosen(qtbot, qapp) -> None:
     panel.shut()
 
 
-def test_a_narrow_title_keeps_its_name_and_the_menu_has_everything(qtbot, qapp) -> None:
+def test_narrow_title_keeps_its_name_and_the_menu_has_all_actions(qtbot, qapp) -> None:
     panel = made(qtbot, Window(Session.full()))
     assert not panel.fit.isHidden()
     panel.resize(220, 220)

@@ -60,7 +60,7 @@ def shown(panel: ImagePanel) -> np.ndarray:
     return picture.bgra
 
 
-def test_depth_has_a_colour_bar_and_colours_and_a_range_by_choice(panel, window) -> None:
+def test_depth_image_has_a_colour_bar_with_selectable_colours_and_range(panel, window) -> None:
     panel.show_topic(DEPTH)
     sends(window, panel, DEPTH, depth(), "mono16")
     assert panel.view.picture.scale is not None
@@ -85,7 +85,7 @@ def test_depth_has_a_colour_bar_and_colours_and_a_range_by_choice(panel, window)
     assert np.array_equal(shown(panel), usual)
 
 
-def test_brightness_and_contrast_change_a_frozen_picture_too(panel, window) -> None:
+def test_brightness_and_contrast_apply_to_a_frozen_image_too(panel, window) -> None:
     panel.show_topic(CAMERA)
     sends(window, panel, CAMERA, np.full((24, 32, 3), 100, np.uint8), "bgr8")
     assert panel.view.picture.scale is None
@@ -100,7 +100,7 @@ def test_brightness_and_contrast_change_a_frozen_picture_too(panel, window) -> N
     assert shown(panel)[0, 0, :3].tolist() == [125, 125, 125]
 
 
-def test_a_look_belongs_to_a_topic_and_comes_back_with_the_layout(qtbot, panel, window) -> None:
+def test_display_settings_are_kept_per_topic_and_restored_with_the_layout(qtbot, panel, window) -> None:
     panel.show_topic(DEPTH)
     panel.look_bar.contrast.setValue(150)
     panel.tune.setChecked(True)
@@ -121,7 +121,7 @@ def test_a_look_belongs_to_a_topic_and_comes_back_with_the_layout(qtbot, panel, 
     again.shut()
 
 
-def test_topics_that_draw_on_pictures_are_offered_watched_while_chosen_and_drawn(panel, window) -> None:
+def test_annotation_topics_are_offered_watched_while_selected_and_drawn(panel, window) -> None:
     panel.show_topic(CAMERA)
     assert panel.overlays.choices() == [MARKS, "/face_positions"]
     panel.overlays.choose(MARKS, shown=True)
@@ -156,7 +156,7 @@ def painted(payload: object, turned: int = 0) -> QImage:
     return image
 
 
-def test_lines_areas_points_and_texts_are_where_they_are_said_to_be(qapp) -> None:
+def test_lines_polygons_points_and_texts_are_drawn_at_their_positions(qapp) -> None:
     line = {"type": 3, "points": [{"x": 0, "y": 120}, {"x": 320, "y": 120}], "thickness": 5}
     assert painted({"points": [{**line, "outline_color": RED}]}).pixelColor(200, 120).red() == 255
     area = {"type": 2, "points": [{"x": 10, "y": 10}, {"x": 90, "y": 10}, {"x": 90, "y": 90}]}
@@ -172,7 +172,7 @@ def test_lines_areas_points_and_texts_are_where_they_are_said_to_be(qapp) -> Non
     assert painted(face).pixelColor(32, 80).red() > 100
 
 
-def test_far_away_and_huge_nothing_breaks(qapp) -> None:
+def test_extreme_annotation_coordinates_are_painted_safely(qapp) -> None:
     far = {"x": MAX_PIXELS, "y": -MAX_PIXELS}
     huge = {"position": far, "diameter": MAX_PIXELS, "thickness": MAX_PIXELS, "outline_color": RED}
     text = {"position": {"x": 5, "y": 5}, "text": "x" * 10_000, "font_size": MAX_PIXELS}
@@ -181,7 +181,7 @@ def test_far_away_and_huge_nothing_breaks(qapp) -> None:
     assert image.width() == 320
 
 
-def test_the_colour_bar_has_the_last_colour_on_top_and_gives_way_where_there_is_no_room(qapp) -> None:
+def test_colour_bar_has_the_maximum_on_top_and_is_hidden_when_space_is_short(qapp) -> None:
     colours = np.zeros((256, 3), np.uint8)
     colours[:, 0] = np.arange(256)
     scale = ColourScale(-1.5, 2500.0, colours)

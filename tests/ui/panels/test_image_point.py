@@ -78,7 +78,7 @@ def click(qtbot, window: Window, panel: ImagePanel, x: float, y: float, key=LEFT
     return told.args[0]
 
 
-def test_it_says_what_to_arm_and_one_click_is_one_message(qtbot, window, panel) -> None:
+def test_panel_names_what_to_arm_and_one_click_publishes_one_message(qtbot, window, panel) -> None:
     session, points = window.session, panel.points
     assert not points.isVisible()
     QTest.keyClick(panel.view, Qt.Key.Key_P)
@@ -119,7 +119,7 @@ def test_it_says_what_to_arm_and_one_click_is_one_message(qtbot, window, panel) 
     assert session.acting.repeat(entry.number).startswith("Not armed for")
 
 
-def test_the_keys_point_at_a_pixel_and_enter_publishes_it(qtbot, window, panel) -> None:
+def test_keys_move_the_pixel_cursor_and_enter_publishes_it(qtbot, window, panel) -> None:
     view = panel.view
     for key in (Qt.Key.Key_Left, Qt.Key.Key_Return):
         QTest.keyClick(view, key)  # not armed: nothing is pointed at
@@ -181,7 +181,7 @@ def test_the_keys_point_at_a_pixel_and_enter_publishes_it(qtbot, window, panel) 
     assert view.pointed is None
 
 
-def test_what_is_no_click_publishes_nothing(qtbot, window, panel) -> None:
+def test_drag_double_click_and_click_outside_publish_nothing(qtbot, window, panel) -> None:
     heard, view = arm(window, panel), panel.view
     told: list[PicturePoint] = []
     view.clicked.connect(told.append)
@@ -221,7 +221,7 @@ def test_what_is_no_click_publishes_nothing(qtbot, window, panel) -> None:
     assert heard.receive(0.0) is None
 
 
-def test_two_clicks_at_two_places_are_two_points(qtbot, window, panel) -> None:
+def test_two_clicks_at_two_positions_publish_two_points(qtbot, window, panel) -> None:
     arm(window, panel)
     with qtbot.waitSignals([panel.view.clicked] * 2, timeout=20_000):
         for x in (20, 300):
@@ -231,7 +231,7 @@ def test_two_clicks_at_two_places_are_two_points(qtbot, window, panel) -> None:
     assert words == ["Point (20, 50), received by 1", "Point (300, 50), received by 1"]
 
 
-def test_what_is_armed_elsewhere_is_not_armed_here_and_closing_takes_it_away(qtbot, window, panel) -> None:
+def test_arming_elsewhere_does_not_arm_the_image_and_closing_disarms(qtbot, window, panel) -> None:
     acting, points = window.session.acting, panel.points
     acting.arm()
     acting.allow(Target("topic", POINTS))
@@ -263,7 +263,7 @@ def test_what_is_armed_elsewhere_is_not_armed_here_and_closing_takes_it_away(qtb
     assert points.kind.value == TYPES[1]
 
 
-def test_a_topic_that_moves_a_robot_asks_again_and_another_source_disarms(qtbot, window, panel) -> None:
+def test_robot_command_topic_asks_again_and_another_source_disarms(qtbot, window, panel) -> None:
     acting, points = window.session.acting, panel.points
     topic = window.session.fleet.connected[0].robot.topics.command
     panel.restore_state({**panel.save_state(), "point": {"on": True, "topic": topic, "type": "json"}})
@@ -292,7 +292,7 @@ def test_a_topic_that_moves_a_robot_asks_again_and_another_source_disarms(qtbot,
     assert not points.is_armed
 
 
-def test_words_are_translated_and_fit(qtbot, pseudo, window, panel) -> None:
+def test_texts_are_translated_and_fit(qtbot, pseudo, window, panel) -> None:
     panel.resize(330, 400)
     panel.actions_of["point"].trigger()
     window.session.acting.arm()

@@ -49,14 +49,14 @@ def choose(panel: InspectorPanel, *path: str | int) -> None:
     panel.tree.setCurrentIndex(panel.model.reveal(path))
 
 
-def test_with_nothing_chosen_it_says_so_and_leads_to_the_topics(panel, window) -> None:
+def test_without_a_topic_the_inspector_links_to_the_topics_panel(panel, window) -> None:
     assert panel.body.page == NOTHING
     assert window.session.watched == []
     press(button(panel.body.empty, "Choose a topic"))
     assert window.commands == ["panel:topics"]
 
 
-def test_it_subscribes_exactly_what_it_shows(panel, window) -> None:
+def test_inspector_watches_exactly_the_shown_topic(panel, window) -> None:
     panel.show_topic("/blackboard")
     panel.show_topic("/odom")
     assert window.session.watched == ["/odom"]
@@ -65,7 +65,7 @@ def test_it_subscribes_exactly_what_it_shows(panel, window) -> None:
     assert window.session.watched == []
 
 
-def test_the_newest_message_as_a_tree_with_its_facts(panel, window) -> None:
+def test_newest_message_is_shown_as_a_tree_with_its_metadata(panel, window) -> None:
     panel.show_topic("/blackboard")
     assert panel.body.page == NOTHING
     window.session.send("/blackboard", blackboard())
@@ -78,7 +78,7 @@ def test_the_newest_message_as_a_tree_with_its_facts(panel, window) -> None:
     assert panel.live.text == "live"
 
 
-def test_a_latched_message_from_before_says_when_it_was_sent(panel, window) -> None:
+def test_latched_message_shows_when_it_was_sent(panel, window) -> None:
     now = time.time_ns()
     half_an_hour_ago = Message("/a", b"1", "json", "json")
     half_an_hour_ago.kind = kind_of("/a", "json", "json", is_latched=True)
@@ -100,14 +100,14 @@ def test_a_latched_message_from_before_says_when_it_was_sent(panel, window) -> N
         (-3_600_000_000_000, ClockDifference(10**12, 400_000), "412 B"),
     ],
 )
-def test_latency_of_another_computer_is_shown_as_surely_as_it_is_known(took_ns, known, words) -> None:
+def test_latency_of_another_computer_is_shown_with_its_uncertainty(took_ns, known, words) -> None:
     message = Message("/a", bytes(412), "bytes", "bytes", stamp_ns=10**18)
     message.kind = kind_of("/a", "bytes", "bytes", clock=PublisherClock(known))
     message.seen_ns = 10**18 + took_ns + (0 if known is None else known.add_ns)
     assert message_facts(message).split("   ")[-1] == words
 
 
-def test_a_latched_message_from_before_shows_no_latency(panel, window) -> None:
+def test_latched_message_shows_no_latency(panel, window) -> None:
     latched = Message("/blackboard", b"1", "json", "json", stamp_ns=time.time_ns() - 1800 * 10**9, seq=1)
     latched.kind = kind_of("/blackboard", "json", "json", is_latched=True)
     topic = window.session.topics["/blackboard"]
@@ -119,7 +119,7 @@ def test_a_latched_message_from_before_shows_no_latency(panel, window) -> None:
     assert "latency" not in panel.foot.facts.text()
 
 
-def test_how_long_a_message_took_does_not_grow_while_it_is_looked_at(panel, window) -> None:
+def test_latency_of_a_shown_message_does_not_grow(panel, window) -> None:
     panel.show_topic("/blackboard")
     window.session.send("/blackboard", blackboard())
     panel.refresh()
@@ -144,7 +144,7 @@ class Layouts(QObject):
         return False
 
 
-def test_facts_that_change_with_each_message_do_not_lay_out_the_window_again(qapp, panel, window) -> None:
+def test_changing_metadata_does_not_relayout_the_window(qapp, panel, window) -> None:
     panel.show_topic("/blackboard")
     layouts, told = Layouts(panel.body), set()
     for number in range(8):
@@ -161,7 +161,7 @@ def test_facts_that_change_with_each_message_do_not_lay_out_the_window_again(qap
     assert layouts.count == 0
 
 
-def test_what_comes_quickly_is_shown_ten_times_a_second_and_the_last_always(panel, window) -> None:
+def test_fast_messages_are_shown_at_ten_hertz_and_the_last_one_always(panel, window) -> None:
     now = [0.0]
     panel.clock = lambda: now[0]
     panel.show_topic("/odom")
@@ -180,7 +180,7 @@ def test_what_comes_quickly_is_shown_ten_times_a_second_and_the_last_always(pane
     assert panel.foot.facts.text().split("   ")[:2] == message_facts(panel._shown).split("   ")[:2]
 
 
-def test_another_topic_and_a_panel_that_goes_on_show_what_is_there_at_once(panel, window) -> None:
+def test_new_topic_and_resumed_panel_show_the_current_message_at_once(panel, window) -> None:
     panel.clock = lambda: 5.0
     for topic, number, size in (("/blackboard", 1, "8 B"), ("/odom", 22, "9 B")):
         panel.show_topic(topic)
@@ -196,7 +196,7 @@ def test_another_topic_and_a_panel_that_goes_on_show_what_is_there_at_once(panel
         assert panel.foot.facts.text().split("   ")[1] == size
 
 
-def test_the_next_message_keeps_what_is_expanded_and_marks_what_changed(panel, window) -> None:
+def test_next_message_keeps_expanded_items_and_marks_changes(panel, window) -> None:
     panel.show_topic("/blackboard")
     window.session.send("/blackboard", blackboard(0))
     panel.refresh()
@@ -209,7 +209,7 @@ def test_the_next_message_keeps_what_is_expanded_and_marks_what_changed(panel, w
     assert panel.model.node(panel.model.reveal(("note",))).changed_s is None
 
 
-def test_what_cannot_be_decoded_is_shown_as_bytes_with_a_sentence(panel, window) -> None:
+def test_undecodable_message_is_shown_as_bytes_with_the_reason(panel, window) -> None:
     panel.show_topic("/faces")
     window.session.send("/faces", b"not json \x00\xff")
     panel.refresh()
@@ -224,7 +224,7 @@ def test_what_cannot_be_decoded_is_shown_as_bytes_with_a_sentence(panel, window)
     assert not panel.body.sentence.isVisible()
 
 
-def test_raw_shows_the_bytes_of_a_good_message_too(panel, window) -> None:
+def test_raw_view_shows_the_bytes_of_a_valid_message_too(panel, window) -> None:
     panel.show_topic("/blackboard")
     window.session.send("/blackboard", {"a": 1})
     panel.refresh()
@@ -239,7 +239,7 @@ def test_raw_shows_the_bytes_of_a_good_message_too(panel, window) -> None:
     assert panel.model.node(panel.model.index(0, 0)).key == "b"
 
 
-def test_freezing_holds_the_message_until_it_is_pressed_again(panel, window) -> None:
+def test_freeze_holds_the_message_until_it_is_pressed_again(panel, window) -> None:
     panel.show_topic("/blackboard")
     window.session.send("/blackboard", {"n": 1})
     panel.refresh()
@@ -252,7 +252,7 @@ def test_freezing_holds_the_message_until_it_is_pressed_again(panel, window) -> 
     assert panel.model.value() == {"n": 2}
 
 
-def test_a_bad_message_that_is_held_is_shown_as_bytes_in_both_ways(panel, window) -> None:
+def test_frozen_undecodable_message_is_shown_as_bytes_in_both_views(panel, window) -> None:
     panel.show_topic("/faces")
     window.session.send("/faces", b"not json \x00\xff")
     panel.refresh()
@@ -267,7 +267,7 @@ def test_a_bad_message_that_is_held_is_shown_as_bytes_in_both_ways(panel, window
     assert panel.model.value() == {"good": 1}
 
 
-def test_copying_a_value_and_a_path(panel, window) -> None:
+def test_value_and_field_path_are_copied(panel, window) -> None:
     panel.show_topic("/blackboard")
     window.session.send("/blackboard", blackboard())
     panel.refresh()
@@ -282,7 +282,7 @@ def test_copying_a_value_and_a_path(panel, window) -> None:
     assert json.loads(QGuiApplication.clipboard().text())["y"] == pytest.approx(-0.297)
 
 
-def test_a_large_json_message_is_read_elsewhere_and_shown_when_it_is_there(qtbot, panel, window) -> None:
+def test_large_json_message_is_decoded_in_another_thread_and_shown_when_ready(qtbot, panel, window) -> None:
     panel.show_topic("/blackboard")
     rows = [{"id": number, "name": f"n{number}"} for number in range(40_000)]
     message = window.session.send("/blackboard", {"rows": rows, "end": [1, 2]})
@@ -303,7 +303,7 @@ def test_a_large_json_message_is_read_elsewhere_and_shown_when_it_is_there(qtbot
     assert panel.foot.path.text() == "rows[3999].name"
 
 
-def test_no_large_message_is_ever_decoded_in_the_windows_thread(qtbot, panel, window, monkeypatch) -> None:
+def test_large_message_is_never_decoded_in_the_gui_thread(qtbot, panel, window, monkeypatch) -> None:
     threads: dict[str, set[int]] = {"looked into": set(), "decoded": set()}
     scan, decode = lazy_json._structure, Message.payload.fget
     assert decode is not None
@@ -342,7 +342,7 @@ def shown_number(panel: InspectorPanel) -> object:
     return value.get("n") if panel.body.page == TREE and isinstance(value, Mapping) else None
 
 
-def test_other_large_messages_are_read_only_when_asked_for(qtbot, panel, window) -> None:
+def test_other_large_messages_are_decoded_only_on_request(qtbot, panel, window) -> None:
     topic = window.session.topics["/speech/words"]
     topic.newest = Message("/speech/words", b"x" * 1_200_000, "string", "string", seq=1)
     panel.show_topic("/speech/words")
@@ -356,14 +356,14 @@ def test_other_large_messages_are_read_only_when_asked_for(qtbot, panel, window)
     assert panel.model.value() == {"value": "x" * 1_200_000}
 
 
-def test_a_large_text_that_is_no_json_is_shown_as_bytes(qtbot, panel, window) -> None:
+def test_large_text_that_is_not_json_is_shown_as_bytes(qtbot, panel, window) -> None:
     panel.show_topic("/blackboard")
     window.session.send("/blackboard", b"[" * 1_100_000)
     qtbot.waitUntil(lambda: (panel.refresh(), panel.body.page == RAW)[1])
     assert panel.body.sentence.text() == "Can't be decoded as json: its brackets do not match."
 
 
-def test_pictures_are_summed_up_not_listed() -> None:
+def test_images_are_summarised() -> None:
     message = Message(
         "/c", b"\xff\xd8jpeg", "image", "image", extension={"shape": [240, 320, 3], "encoding": "jpeg"}
     )
@@ -372,7 +372,7 @@ def test_pictures_are_summed_up_not_listed() -> None:
     }  # fmt: skip
 
 
-def test_pictures_are_not_decoded_to_be_summed_up(panel, window) -> None:
+def test_images_are_not_decoded_to_be_summarised(panel, window) -> None:
     panel.show_topic("/robot/camera")
     topic = window.session.topics["/robot/camera"]
     told = {"shape": [480, 640, 3], "encoding": "jpeg"}
@@ -385,7 +385,7 @@ def test_pictures_are_not_decoded_to_be_summed_up(panel, window) -> None:
     assert panel.body.page == RAW  # nothing tells its shape, and its bytes are none
 
 
-def test_strings_are_shown_as_one_value(panel, window) -> None:
+def test_string_is_shown_as_one_value(panel, window) -> None:
     panel.show_topic("/speech/words")
     window.session.send("/speech/words", b"hello")
     panel.refresh()
@@ -393,7 +393,7 @@ def test_strings_are_shown_as_one_value(panel, window) -> None:
     assert not window.session.topics["/speech/words"].new
 
 
-def test_finding_goes_through_keys_and_values(panel, window) -> None:
+def test_search_finds_keys_and_values(panel, window) -> None:
     panel.show_topic("/blackboard")
     window.session.send("/blackboard", blackboard())
     panel.refresh()
@@ -410,7 +410,7 @@ def test_finding_goes_through_keys_and_values(panel, window) -> None:
     assert panel.finder.field.property("wrong") == "true"
 
 
-def test_a_topic_that_has_gone_says_since_when_and_keeps_its_last_message(panel, window) -> None:
+def test_vanished_topic_shows_since_when_and_keeps_its_last_message(panel, window) -> None:
     panel.show_topic("/blackboard")
     window.session.send("/blackboard", {"n": 1})
     panel.refresh()
@@ -423,7 +423,7 @@ def test_a_topic_that_has_gone_says_since_when_and_keeps_its_last_message(panel,
     assert panel.model.value() == {"n": 1}
 
 
-def test_the_topic_comes_back_with_the_layout(qtbot, panel, window) -> None:
+def test_topic_is_restored_with_the_layout(qtbot, panel, window) -> None:
     panel.show_topic("/odom")
     again = window.make(PANEL)
     qtbot.addWidget(again)
@@ -434,11 +434,11 @@ def test_the_topic_comes_back_with_the_layout(qtbot, panel, window) -> None:
 @pytest.mark.parametrize(
     ("value", "words"), [("a", "a"), (1.5, "1.5"), (None, "null"), (b"\x01\x02", "01 02"), ([1], "[\n  1\n]")]
 )
-def test_what_goes_onto_the_clipboard(value: object, words: str) -> None:
+def test_values_are_copied_to_the_clipboard_as_plain_text(value: object, words: str) -> None:
     assert plain_words(value) == words
 
 
-def test_finding_counts_and_goes_both_ways_also_when_the_next_message_came(panel, window) -> None:
+def test_search_counts_matches_and_steps_both_ways_across_messages(panel, window) -> None:
     panel.show_topic("/blackboard")
     window.session.send("/blackboard", {"a": "x1", "b": "x2", "c": "x3"})
     panel.refresh()
@@ -463,7 +463,7 @@ def test_finding_counts_and_goes_both_ways_also_when_the_next_message_came(panel
     assert panel.finder.field.count == "none"
 
 
-def test_the_message_before_is_compared_and_only_changes_can_be_shown(panel, window) -> None:
+def test_message_is_compared_with_the_previous_one_and_only_changes_can_be_shown(panel, window) -> None:
     panel.show_topic("/blackboard")
     window.session.send("/blackboard", {"same": 1, "n": 1, "gone": 2})
     panel.refresh()
@@ -485,7 +485,7 @@ def test_the_message_before_is_compared_and_only_changes_can_be_shown(panel, win
     assert [node.mark for node in top(panel)] == ["", "", ""]
 
 
-def test_a_pinned_message_stays_the_one_to_compare_with(panel, window) -> None:
+def test_pinned_message_stays_the_reference_of_the_comparison(panel, window) -> None:
     panel.show_topic("/blackboard")
     window.session.send("/blackboard", {"n": 1})
     panel.refresh()
@@ -504,7 +504,7 @@ def top(panel: InspectorPanel) -> list[TreeNode]:
     return [panel.model.node(panel.model.index(row, 0)) for row in range(panel.model.rowCount())]
 
 
-def test_the_whole_message_is_copied_as_json(panel, window) -> None:
+def test_whole_message_is_copied_as_json(panel, window) -> None:
     panel.show_topic("/blackboard")
     window.session.send("/blackboard", {"a": [1, 2]})
     panel.refresh()
@@ -520,7 +520,7 @@ def test_the_whole_message_is_copied_as_json(panel, window) -> None:
     assert words[:3] == ["Copy value", "Copy path", "Copy the message as JSON"]
 
 
-def test_comparing_comes_back_with_the_layout(qtbot, panel, window) -> None:
+def test_comparison_is_restored_with_the_layout(qtbot, panel, window) -> None:
     panel.show_topic("/odom")
     panel.compare.setChecked(True)
     panel.strip.only.setChecked(True)
@@ -534,7 +534,7 @@ def test_comparing_comes_back_with_the_layout(qtbot, panel, window) -> None:
     assert again.strip.only.isChecked()
 
 
-def test_of_a_change_deep_inside_only_the_value_counts() -> None:
+def test_nested_change_counts_only_the_changed_value() -> None:
     before, after = {"a": {"b": [1, 2, 3]}, "c": 1}, {"a": {"b": [1, 9]}, "c": 1, "d": {"e": {"f": 1}}}
     counts, whole = count_changes(after, before)
     assert whole
@@ -548,7 +548,7 @@ def test_of_a_change_deep_inside_only_the_value_counts() -> None:
     assert changes_words(*count_changes([1, *long[1:]], long)) == "at least 1 changed"
 
 
-def test_a_topic_that_nobody_publishes_says_so_while_it_waits(panel, window) -> None:
+def test_topic_without_publisher_is_reported_while_waiting(panel, window) -> None:
     panel.show_topic("/odom")
     panel.refresh()
     assert panel.body.empty._text.text() == "The next message on /odom appears here."
@@ -557,7 +557,7 @@ def test_a_topic_that_nobody_publishes_says_so_while_it_waits(panel, window) -> 
     assert panel.body.empty._text.text().startswith("No publisher now.")
 
 
-def test_its_ctrl_f_goes_before_the_window_s(qtbot, panel, window) -> None:
+def test_inspector_ctrl_f_takes_precedence_over_the_window_shortcut(qtbot, panel, window) -> None:
     panel.show_topic("/blackboard")
     window.session.send("/blackboard", blackboard())
     panel.refresh()
@@ -575,7 +575,7 @@ def test_its_ctrl_f_goes_before_the_window_s(qtbot, panel, window) -> None:
 
 
 @pytest.mark.qt_log_ignore("does not support (grabbing the keyboard|raise)", extend=True)
-def test_an_alarm_is_begun_on_a_value_whatever_its_keys_are(panel, window) -> None:
+def test_alarm_is_created_from_a_value_with_any_key_names(panel, window) -> None:
     message = {"a.b": {"c d": [{"": 7}]}, "x": 1}
     panel.show_topic("/blackboard")
     window.session.send("/blackboard", message)
@@ -592,9 +592,7 @@ def test_an_alarm_is_begun_on_a_value_whatever_its_keys_are(panel, window) -> No
         assert (command, topic, parse_path(path)) == ("alarm.value", "/blackboard", steps)
 
 
-def test_a_value_is_plotted_by_its_menu_its_key_the_foot_and_by_dragging_it(
-    panel, window, monkeypatch
-) -> None:
+def test_value_is_plotted_by_menu_shortcut_footer_and_drag_and_drop(panel, window, monkeypatch) -> None:
     plotted: list[tuple[str, str]] = []
     dragged: list[tuple[str, str]] = []
     monkeypatch.setattr(panel, "context", replace(panel.context, plot=lambda *field: plotted.append(field)))

@@ -22,11 +22,11 @@ from app.ui.panels.inspector.tree_model import TreeModel, TreeNode
         ({"a": b"x"}, {"a": b"x"}, False), ({"a": b"x"}, {"a": b"y"}, True), ("a", "a", False),
     ],
 )  # fmt: skip
-def test_differences_are_those_of_json(before: object, after: object, wanted: bool) -> None:
+def test_differences_follow_json_semantics(before: object, after: object, wanted: bool) -> None:
     assert differs(before, after) is wanted
 
 
-def test_large_texts_are_compared_as_texts() -> None:
+def test_large_texts_are_compared_as_text() -> None:
     def lazy(value: object) -> object:
         return JsonIndex(memoryview(json.dumps(value).encode())).root
 
@@ -34,14 +34,14 @@ def test_large_texts_are_compared_as_texts() -> None:
     assert differs(lazy({"a": [1]}), lazy({"a": [2]}))
 
 
-def test_what_is_not_there_is_something_else_than_null() -> None:
+def test_missing_value_differs_from_null() -> None:
     assert mark_of(None, MISSING) == "added"
     assert mark_of(MISSING, None) == "removed"
     assert mark_of(None, None) == ""
     assert mark_of(None, OFF) == ""
 
 
-def test_children_are_marked_and_removed_ones_stand_at_the_end() -> None:
+def test_changed_children_are_marked_and_removed_ones_are_listed_last() -> None:
     before, after = {"x": 1, "gone": 2, "same": 3}, {"x": 5, "same": 3, "new": {"deep": 1}}
     parts, total = parts_of(after, before, "changed", 9, changes_only=False)
     assert total == 4
@@ -80,7 +80,7 @@ BEFORE = {"pose": {"x": 1, "y": 2}, "words": ["a", "b"], "old": {"k": 1}, "same"
 AFTER = {"pose": {"x": 1, "y": 3}, "words": ["a"], "same": {"q": [1]}, "new": 4}
 
 
-def test_the_tree_marks_what_differs_from_another_message(qtmodeltester) -> None:
+def test_tree_marks_differences_from_another_message(qtmodeltester) -> None:
     model = TreeModel()
     model.set_value(AFTER, 0.0, BEFORE)
     qtmodeltester.check(model)
@@ -92,7 +92,7 @@ def test_the_tree_marks_what_differs_from_another_message(qtmodeltester) -> None
     ]  # fmt: skip
 
 
-def test_changes_only_leaves_out_the_rest_and_coming_back_shows_all(qtmodeltester) -> None:
+def test_changes_only_hides_equal_items_and_switching_back_shows_all(qtmodeltester) -> None:
     model = TreeModel()
     model.set_value(AFTER, 0.0)
     shown(model)  # everything is opened
@@ -107,14 +107,14 @@ def test_changes_only_leaves_out_the_rest_and_coming_back_shows_all(qtmodelteste
     qtmodeltester.check(model)
 
 
-def test_without_a_difference_changes_only_is_empty() -> None:
+def test_changes_only_is_empty_without_differences() -> None:
     model = TreeModel()
     model.set_value(AFTER, 0.0)
     model.set_value(AFTER, 1.0, dict(AFTER), changes_only=True)
     assert model.rowCount() == 0
 
 
-def test_a_message_that_is_no_container_is_compared_too() -> None:
+def test_scalar_messages_are_compared_too() -> None:
     model = TreeModel()
     model.set_value(5, 0.0, 4)
     node = model.node(model.index(0, 0))
@@ -122,7 +122,7 @@ def test_a_message_that_is_no_container_is_compared_too() -> None:
     assert (node.key, node.value, node.base, node.mark) == ("value", 5, 4, "changed")
 
 
-def test_expanded_parts_survive_while_messages_are_compared() -> None:
+def test_expanded_items_are_kept_during_comparison() -> None:
     model = TreeModel()
     model.set_value(AFTER, 0.0, BEFORE)
     pose = model.index(0, 0)
@@ -134,7 +134,7 @@ def test_expanded_parts_survive_while_messages_are_compared() -> None:
     assert [child.key for child in first.children or ()] == ["x", "y"]
 
 
-def test_of_a_long_list_only_what_is_asked_for_is_compared() -> None:
+def test_only_requested_items_of_a_long_list_are_compared() -> None:
     class Watched(list[object]):
         asked = 0
 

@@ -65,7 +65,7 @@ def rows(panel: InspectorPanel) -> list[str]:
     return [model.node(model.index(row, 0)).path for row in range(model.rowCount())]
 
 
-def test_what_begins_with_a_dollar_is_a_query_and_the_tree_shows_what_it_finds(panel, window, soon) -> None:
+def test_input_starting_with_dollar_is_a_query_and_the_tree_shows_its_results(panel, window, soon) -> None:
     send(window, panel, seen(7, 41))
     panel.compare.setChecked(True)
     panel.finder.field.setText("$.people[?@.age > 18].name")
@@ -90,7 +90,7 @@ def test_what_begins_with_a_dollar_is_a_query_and_the_tree_shows_what_it_finds(p
     assert panel.strip.isVisible()
 
 
-def test_a_wrong_query_is_a_sentence_and_the_next_letters_may_mend_it(panel, window, soon) -> None:
+def test_invalid_query_shows_an_error_until_it_is_corrected(panel, window, soon) -> None:
     send(window, panel, seen(7))
     panel.finder.field.setText("$.people[")
     assert panel.query.words.text().startswith("the query is incomplete: ")
@@ -105,7 +105,7 @@ def test_a_wrong_query_is_a_sentence_and_the_next_letters_may_mend_it(panel, win
     assert rows(panel) == []
 
 
-def test_a_query_comes_back_with_the_layout_and_rests_in_raw(qtbot, panel, window, soon) -> None:
+def test_query_is_restored_with_the_layout_and_inactive_in_raw_view(qtbot, panel, window, soon) -> None:
     send(window, panel, seen(7))
     panel.finder.field.setText("$..age")
     soon(lambda: rows(panel) == ["people[0].age"])
@@ -141,7 +141,7 @@ def head(panel: InspectorPanel, section: int) -> None:
     shown.horizontalHeader().sectionClicked.emit(section)
 
 
-def test_a_list_of_objects_is_a_table_whose_order_holds_while_values_change(panel, window) -> None:
+def test_list_of_objects_is_a_table_whose_order_is_stable_while_values_change(panel, window) -> None:
     now = panel.clock()
     panel.clock = lambda: now
     send(window, panel, seen(7, 41, 30))
@@ -165,7 +165,7 @@ def test_a_list_of_objects_is_a_table_whose_order_holds_while_values_change(pane
     assert window.toasts[-1] == "Copied 4 rows as CSV"
 
 
-def test_the_first_list_where_none_is_chosen_another_by_choice_and_none_says_so(panel, window) -> None:
+def test_table_shows_the_first_or_the_chosen_list_and_reports_when_there_is_none(panel, window) -> None:
     send(window, panel, seen(7))
     as_table(panel)
     assert table(panel) == [["0", "Ann", "7"]]
@@ -181,7 +181,7 @@ def test_the_first_list_where_none_is_chosen_another_by_choice_and_none_says_so(
     assert not panel.body.objects.copy.isEnabled()
 
 
-def test_what_a_query_finds_is_a_table_too(panel, window, soon) -> None:
+def test_query_result_is_shown_as_a_table_too(panel, window, soon) -> None:
     send(window, panel, seen(7, 41, 30))
     panel.finder.field.setText("$.people[?@.age > 18]")
     as_table(panel)
@@ -189,7 +189,7 @@ def test_what_a_query_finds_is_a_table_too(panel, window, soon) -> None:
     assert table(panel) == [["people[1]", "Bea", "41"], ["people[2]", "Cy", "30"]]
 
 
-def test_heads_are_the_messages_words_whatever_they_mean_in_studio(panel, window) -> None:
+def test_column_headers_are_the_untranslated_keys_of_the_message(panel, window) -> None:
     send(window, panel, {"people": [{"": 1, "Age": 2, "Topic": 3}]})
     as_table(panel)
     model = panel.body.objects.table.model()
@@ -203,7 +203,7 @@ def shown_stamp(panel: InspectorPanel) -> object:
     return value["stamp"]
 
 
-def test_a_person_goes_back_through_what_came_and_compares_with_any_of_it(panel, window) -> None:
+def test_history_steps_back_through_messages_and_compares_with_any(panel, window) -> None:
     for number in range(5):
         send(window, panel, seen(number, stamp=number))
     panel.history.refresh(at_once=True)
@@ -230,7 +230,7 @@ def test_a_person_goes_back_through_what_came_and_compares_with_any_of_it(panel,
     assert panel.live.text == "live"
 
 
-def test_the_one_before_is_compared_with_the_one_before_it(panel, window) -> None:
+def test_earlier_message_is_compared_with_its_predecessor(panel, window) -> None:
     for number in (0, 0, 5):
         send(window, panel, seen(number, stamp=number))
     panel.compare.setChecked(True)
@@ -239,7 +239,7 @@ def test_the_one_before_is_compared_with_the_one_before_it(panel, window) -> Non
     assert panel.strip.words.text() == "Previous message: no difference"
 
 
-def test_another_topic_has_a_history_of_its_own_and_who_is_not_seen_keeps_nothing(panel, window) -> None:
+def test_history_is_kept_per_topic_and_hidden_panel_records_none(panel, window) -> None:
     send(window, panel, seen(1, stamp=1))
     send(window, panel, seen(2, stamp=2))
     panel.rest()

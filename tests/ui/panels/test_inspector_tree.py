@@ -25,7 +25,7 @@ def at(model: TreeModel, *path: str | int) -> QModelIndex:
     return index
 
 
-def test_the_model_keeps_all_of_qts_rules_while_messages_change_their_shape(qtmodeltester, model) -> None:
+def test_model_obeys_qt_rules_while_messages_change_shape(qtmodeltester, model) -> None:
     at(model, "robots", "Pepper", "pose", "x")
     at(model, "list", 2)
     qtmodeltester.check(model)  # it goes on listening: a broken rule is a Qt warning, which fails the test
@@ -42,7 +42,7 @@ def test_the_model_keeps_all_of_qts_rules_while_messages_change_their_shape(qtmo
     assert [model.node(model.index(row, 0)).key for row in range(model.rowCount())] == ["again"]
 
 
-def test_nodes_are_made_only_where_somebody_looks() -> None:
+def test_tree_nodes_are_created_lazily() -> None:
     model = TreeModel()
     model.set_value({"large": list(range(100_000)), "other": {"deep": {}}}, 0.0)
     large = at(model, "large")
@@ -55,7 +55,7 @@ def test_nodes_are_made_only_where_somebody_looks() -> None:
     assert model.rowCount(large) == 1000
 
 
-def test_what_is_expanded_and_chosen_stays_across_messages(qtbot, model) -> None:
+def test_expansion_and_selection_are_kept_across_messages(qtbot, model) -> None:
     view = TreeView(Theme("light"), model)
     qtbot.addWidget(view)
     view.resize(300, 400)
@@ -73,7 +73,7 @@ def test_what_is_expanded_and_chosen_stays_across_messages(qtbot, model) -> None
     assert model.node(view.currentIndex()).value == 4
 
 
-def test_the_scroll_position_stays_across_messages(qtbot) -> None:
+def test_scroll_position_is_kept_across_messages(qtbot) -> None:
     model = TreeModel()
     model.set_value({f"key{number}": number for number in range(300)}, 0.0)
     view = TreeView(Theme("light"), model)
@@ -85,7 +85,7 @@ def test_the_scroll_position_stays_across_messages(qtbot) -> None:
     assert view.verticalScrollBar().value() == 2000
 
 
-def test_changed_values_are_marked_and_others_are_not(model) -> None:
+def test_only_changed_values_are_marked(model) -> None:
     for path in (("stamp",), ("robots", "Pepper", "pose", "x"), ("list", 0)):
         assert model.node(at(model, *path)).changed_s is None  # the first message marks nothing
     told = QSignalSpy(model.dataChanged)
@@ -97,14 +97,14 @@ def test_changed_values_are_marked_and_others_are_not(model) -> None:
     assert told.count() == 2  # one for each container with changes
 
 
-def test_nan_that_stays_nan_has_not_changed() -> None:
+def test_nan_that_stays_nan_is_not_a_change() -> None:
     model = TreeModel()
     model.set_value({"x": float("nan")}, 0.0)
     model.set_value({"x": float("nan")}, 1.0)
     assert model.node(at(model, "x")).changed_s is None
 
 
-def test_a_mark_fades_and_without_motion_stays_for_a_second(qtbot, model) -> None:
+def test_change_mark_fades_and_with_reduced_motion_stays_for_a_second(qtbot, model) -> None:
     now = [7.0]
     theme = Theme("light")
     view = TreeView(theme, model, clock=lambda: now[0])
@@ -122,7 +122,7 @@ def test_a_mark_fades_and_without_motion_stays_for_a_second(qtbot, model) -> Non
     assert view.share_changed(node) == 0.0
 
 
-def test_changed_values_are_painted_otherwise(qtbot, model) -> None:
+def test_changed_values_are_painted_differently(qtbot, model) -> None:
     now = [7.0]
     view = TreeView(Theme("light"), model, clock=lambda: now[0])
     qtbot.addWidget(view)
@@ -134,7 +134,7 @@ def test_changed_values_are_painted_otherwise(qtbot, model) -> None:
     assert view.grab().toImage() != marked
 
 
-def test_the_chevron_and_the_keyboard_open_and_close(qtbot, model) -> None:
+def test_chevron_and_keyboard_expand_and_collapse(qtbot, model) -> None:
     view = TreeView(Theme("light"), model)
     qtbot.addWidget(view)
     view.resize(300, 300)
@@ -147,13 +147,13 @@ def test_the_chevron_and_the_keyboard_open_and_close(qtbot, model) -> None:
     assert not view.isExpanded(robots)
 
 
-def test_paths_lead_back_to_their_values(model) -> None:
+def test_field_paths_resolve_to_their_values(model) -> None:
     assert model.node(at(model, "list", 1)).path == "list[1]"
     assert model.node(at(model, "robots", "Pepper", "pose", "x")).path == "robots.Pepper.pose.x"
     assert not model.reveal(("robots", "nobody")).isValid()
 
 
-def test_search_finds_keys_and_values_in_the_order_of_the_tree() -> None:
+def test_search_finds_keys_and_values_in_tree_order() -> None:
     assert list(search(FIRST, "p")) == [("stamp",), ("robots", "Pepper"), ("robots", "Pepper", "pose")]
     assert list(search(FIRST, "TWO")) == [("list", 1)]
     assert list(search({"a": list(range(1000))}, "999", limit=100)) == []
@@ -167,9 +167,9 @@ def test_search_finds_keys_and_values_in_the_order_of_the_tree() -> None:
         (b"\x00\xff", "00 ff  (2 bytes)"),
     ],
 )  # fmt: skip
-def test_values_in_words(value: object, words: str) -> None:
+def test_values_are_formatted_as_text(value: object, words: str) -> None:
     assert words_of(value) == words
 
 
-def test_very_long_text_is_cut() -> None:
+def test_very_long_text_is_truncated() -> None:
     assert len(words_of("x" * 100_000)) < 500

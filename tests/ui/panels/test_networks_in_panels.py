@@ -84,7 +84,7 @@ def tips(panel: TopicsPanel | NodesPanel, key: str) -> dict[str, str]:
     return {column.name: column.tip(row) for column in panel.table.columns if column.tip}  # type: ignore[arg-type]
 
 
-def test_without_other_networks_topics_are_as_ever(qtbot, window: Window, look: Look) -> None:
+def test_network_column_is_hidden_without_other_networks(qtbot, window: Window, look: Look) -> None:
     panel = window.make(TOPICS)
     qtbot.addWidget(panel)
     assert isinstance(panel, TopicsPanel)
@@ -99,7 +99,7 @@ def test_without_other_networks_topics_are_as_ever(qtbot, window: Window, look: 
     assert panel.table.isColumnHidden(place)
 
 
-def test_topics_of_ros_stand_beside_the_native_ones_and_say_what_is_not_known(
+def test_ros_topics_are_listed_with_native_ones_and_mark_unknown_values(
     qtbot, window: Window, look: Look
 ) -> None:
     panel = window.make(TOPICS)
@@ -124,7 +124,9 @@ def test_topics_of_ros_stand_beside_the_native_ones_and_say_what_is_not_known(
     assert window.opened == ["ros /camera"]
 
 
-def test_what_one_looks_at_there_is_counted_here(qtbot, window: Window, look: Look) -> None:
+def test_messages_of_watched_topics_on_another_network_are_counted_locally(
+    qtbot, window: Window, look: Look
+) -> None:
     session = window.session
     panel = window.make(TOPICS)
     qtbot.addWidget(panel)
@@ -144,9 +146,7 @@ def test_what_one_looks_at_there_is_counted_here(qtbot, window: Window, look: Lo
     watch.close()
 
 
-def test_a_network_that_is_lost_is_grey_and_says_why_where_its_rows_are(
-    qtbot, window: Window, look: Look
-) -> None:
+def test_rows_of_a_lost_network_are_grey_and_show_the_reason(qtbot, window: Window, look: Look) -> None:
     topics, nodes = window.make(TOPICS), window.make(NODES)
     for each in (topics, nodes):
         qtbot.addWidget(each)
@@ -170,7 +170,7 @@ def test_a_network_that_is_lost_is_grey_and_says_why_where_its_rows_are(
     assert topics.model.cell_at(topics.model.index_of("ros /camera").row(), 0).role == "text"
 
 
-def test_nodes_of_ros_say_where_they_are_and_what_nobody_tells(qtbot, window: Window, look: Look) -> None:
+def test_ros_nodes_show_their_network_and_mark_unknown_values(qtbot, window: Window, look: Look) -> None:
     panel = window.make(NODES)
     qtbot.addWidget(panel)
     assert isinstance(panel, NodesPanel)
@@ -192,7 +192,7 @@ def test_nodes_of_ros_say_where_they_are_and_what_nobody_tells(qtbot, window: Wi
     assert window.opened == ["ros /camera"]
 
 
-def test_the_inspector_shows_messages_of_another_network(qtbot, window: Window, look: Look) -> None:
+def test_inspector_shows_messages_of_another_network(qtbot, window: Window, look: Look) -> None:
     panel = window.make(INSPECTOR)
     qtbot.addWidget(panel)
     assert isinstance(panel, InspectorPanel)
@@ -220,7 +220,7 @@ def test_the_inspector_shows_messages_of_another_network(qtbot, window: Window, 
     assert ros.wanted == set()
 
 
-def test_the_inspector_says_why_a_topic_can_not_be_read(qtbot, window: Window, look: Look) -> None:
+def test_inspector_shows_why_a_topic_cannot_be_decoded(qtbot, window: Window, look: Look) -> None:
     panel = window.make(INSPECTOR)
     qtbot.addWidget(panel)
     assert isinstance(panel, InspectorPanel)
@@ -235,7 +235,7 @@ def test_the_inspector_says_why_a_topic_can_not_be_read(qtbot, window: Window, l
     panel.shut()
 
 
-def test_pictures_of_another_network_are_shown_where_pictures_are(qtbot, window: Window, look: Look) -> None:
+def test_images_of_another_network_are_shown_in_the_image_panel(qtbot, window: Window, look: Look) -> None:
     panel = window.make(IMAGE)
     qtbot.addWidget(panel)
     ros = look("ros")
@@ -249,7 +249,7 @@ def test_pictures_of_another_network_are_shown_where_pictures_are(qtbot, window:
 
 
 @pytest.mark.parametrize("panel", [TOPICS, NODES, INSPECTOR], ids=lambda panel: panel.name)
-def test_words_are_translated_and_fit(qtbot, pseudo, window: Window, look: Look, panel) -> None:
+def test_texts_are_translated_and_fit(qtbot, pseudo, window: Window, look: Look, panel) -> None:
     made = window.make(panel)
     qtbot.addWidget(made)
     ros = look("ros")

@@ -18,7 +18,7 @@ pytest_plugins = ["tests.ui.shell_fixtures"]
 
 
 @pytest.mark.parametrize("panel", [health.PANEL, robot.PANEL, robots.PANEL, sensors.PANEL])
-def test_a_panel_says_that_the_robot_is_coming(qapp, panel) -> None:
+def test_panel_shows_that_the_virtual_robot_is_starting(qapp, panel) -> None:
     session = fakes.Session()
     made = Window(session).make(panel, (384, 300))
 
@@ -37,7 +37,7 @@ def test_a_panel_says_that_the_robot_is_coming(qapp, panel) -> None:
     made.close()
 
 
-def test_the_camera_offers_no_robot_that_is_already_coming(qtbot) -> None:
+def test_camera_does_not_offer_a_robot_that_is_already_starting(qtbot) -> None:
     session = fakes.Session()
     made = Window(session).make(camera.PANEL, (384, 300))
 
@@ -58,7 +58,7 @@ def test_the_camera_offers_no_robot_that_is_already_coming(qtbot) -> None:
     made.close()
 
 
-def test_the_bars_say_that_the_robot_is_coming() -> None:
+def test_bars_show_that_the_virtual_robot_is_starting() -> None:
     session = fakes.Session()
     facts = StatusFacts(session)
     said = (robots_chip(session)[0], facts.health()[1], session.runs.view().detail)
@@ -69,7 +69,7 @@ def test_the_bars_say_that_the_robot_is_coming() -> None:
     assert said == ("Pepper is starting",) * 3
 
 
-def test_a_toast_goes_once_what_it_says_has_happened(qtbot, theme: Theme) -> None:
+def test_toast_closes_once_its_condition_is_met(qtbot, theme: Theme) -> None:
     window = QLabel()
     qtbot.addWidget(window)
     window.resize(600, 300)
@@ -87,7 +87,7 @@ def test_a_toast_goes_once_what_it_says_has_happened(qtbot, theme: Theme) -> Non
 
 
 @pytest.mark.parametrize("panel", [camera.PANEL, health.PANEL, robot.PANEL, robots.PANEL, sensors.PANEL])
-def test_a_panel_that_opens_shows_the_robot_at_once(qtbot, panel) -> None:
+def test_newly_opened_panel_shows_the_robot_at_once(qtbot, panel) -> None:
     made = panel.make(Window(fakes.Session.full()).context())
     qtbot.addWidget(made)
     for widget in made.header_widgets():

@@ -100,7 +100,7 @@ def world(qtbot, robot: tuple[Window, nep.Node]) -> Iterator[World]:
     made.panel.shut()
 
 
-def test_they_are_shown_with_what_they_may_be(world: World) -> None:
+def test_parameters_are_shown_with_their_allowed_values(world: World) -> None:
     assert world.part.isVisibleTo(world.panel)
     assert world.part.title.text() == "Parameters of robot"
     assert world.cells()[:4] == [
@@ -115,7 +115,7 @@ def test_they_are_shown_with_what_they_may_be(world: World) -> None:
     assert world.part.sentence.text() == "Choose a parameter to change its value."
 
 
-def test_a_value_is_set_with_return_and_what_was_typed_stays_when_it_is_refused(qtbot, world: World) -> None:
+def test_value_is_set_with_return_and_rejected_input_is_kept(qtbot, world: World) -> None:
     part = world.part
     part.table.choose("speed")
     assert (part.editors.currentIndex(), part.field.text()) == (LINE, "0.5")
@@ -145,7 +145,7 @@ def test_a_value_is_set_with_return_and_what_was_typed_stays_when_it_is_refused(
     assert part.model.cell_at(0, 1).tint == ""
 
 
-def test_what_is_typed_is_not_overwritten_by_what_comes_and_esc_leaves_it(world: World) -> None:
+def test_typed_text_is_not_overwritten_by_updates_and_esc_discards_it(world: World) -> None:
     part = world.part
     part.table.choose("speed")
     part.field.selectAll()
@@ -160,7 +160,7 @@ def test_what_is_typed_is_not_overwritten_by_what_comes_and_esc_leaves_it(world:
     assert part.field.text() == "1.0"
 
 
-def test_a_choice_applies_at_once(qtbot, world: World) -> None:
+def test_choice_applies_at_once(qtbot, world: World) -> None:
     part = world.part
     part.table.choose("gait")
     assert part.editors.currentIndex() == CHOICE
@@ -177,7 +177,7 @@ def test_a_choice_applies_at_once(qtbot, world: World) -> None:
     assert world.robot.parameters["lights"] is False
 
 
-def test_what_can_not_be_set_says_why(world: World) -> None:
+def test_disabled_field_explains_why_a_parameter_cannot_be_set(world: World) -> None:
     part = world.part
     part.table.choose("serial")
     assert not part.field.isEnabled()
@@ -190,7 +190,7 @@ def test_what_can_not_be_set_says_why(world: World) -> None:
     assert part.model.cell_at(0, 0).role == "textDisabled"
 
 
-def test_a_node_without_any_says_so_and_what_to_do(world: World) -> None:
+def test_node_without_parameters_explains_what_to_do(world: World) -> None:
     world.choose("bare")
     assert not world.part.isVisibleTo(world.panel)
     assert (
@@ -202,7 +202,7 @@ def test_a_node_without_any_says_so_and_what_to_do(world: World) -> None:
     assert "no parameters" not in world.panel.foot.text()
 
 
-def test_a_panel_that_nobody_sees_hears_nothing(world: World) -> None:
+def test_hidden_panel_does_not_watch_the_parameters(world: World) -> None:
     world.panel.rest()
     assert world.window.session.watched == []
     world.panel.wake()
@@ -221,12 +221,12 @@ def test_a_panel_that_nobody_sees_hears_nothing(world: World) -> None:
         (ShownParameter("a", 1, "int", minimum=0, read_only=True), "read only"),
     ],
 )
-def test_what_is_allowed_is_said(parameter: ShownParameter, words: str) -> None:
+def test_allowed_values_of_a_parameter_are_described(parameter: ShownParameter, words: str) -> None:
     assert allowed_words(parameter) == words
 
 
 @pytest.mark.parametrize("size", [(430, 340), (900, 700)])
-def test_words_are_translated_and_fit(
+def test_texts_are_translated_and_fit(
     qtbot, pseudo, robot: tuple[Window, nep.Node], size: tuple[int, int]
 ) -> None:
     made = World(*robot)

@@ -77,7 +77,7 @@ def shown(panel: NodesPanel) -> list[list[str]]:
     return [[model.data(model.index(row, place)) for place in places] for row in range(model.rowCount())]
 
 
-def test_every_node_with_its_facts(panel) -> None:
+def test_every_node_is_listed_with_its_facts(panel) -> None:
     here = platform.node()
     assert shown(panel) == [
         ["camera_driver", "native", "Python", "lab-pc", "411", "12 %", "2", "0"],
@@ -86,7 +86,7 @@ def test_every_node_with_its_facts(panel) -> None:
     ]
 
 
-def test_an_opened_node_shows_its_topics_and_a_click_leads_there(panel, window) -> None:
+def test_expanded_node_shows_its_topics_and_a_click_opens_one(panel, window) -> None:
     panel.table.choose(NodeRow(next(iter(window.session.nodes))).key)
     QTest.keyClick(panel.table, Qt.Key.Key_Return)
     assert [line[:2] for line in shown(panel)][:3] == [
@@ -102,7 +102,7 @@ def test_an_opened_node_shows_its_topics_and_a_click_leads_there(panel, window) 
     assert len(shown(panel)) == 3
 
 
-def test_the_arrow_keys_open_and_close(panel, window) -> None:
+def test_arrow_keys_expand_and_collapse(panel, window) -> None:
     panel.table.setFocus(Qt.FocusReason.TabFocusReason)
     QTest.keyClick(panel.table, Qt.Key.Key_Right)
     assert len(shown(panel)) == 5
@@ -116,7 +116,7 @@ def test_the_arrow_keys_open_and_close(panel, window) -> None:
     assert panel.table.chosen_key() == NodeRow(window.session.nodes.get("1")).key
 
 
-def test_a_node_without_topics_opens_too(panel, window) -> None:
+def test_node_without_topics_expands_too(panel, window) -> None:
     window.session.nodes.update(graph(2, (*NODES, NodeInfo("4", "idle", "h", 1, "", "native", 1))), 1.0)
     panel.refresh()
     place = [line[0] for line in shown(panel)].index("idle")
@@ -124,7 +124,7 @@ def test_a_node_without_topics_opens_too(panel, window) -> None:
     assert panel.model.data(panel.model.index(place, 0), CELL_ROLE).icon == "chevron-down"
 
 
-def test_new_nodes_are_bold_until_opened_and_studio_is_no_news(panel, window) -> None:
+def test_new_nodes_are_bold_until_expanded_except_studio(panel, window) -> None:
     nodes = window.session.nodes
     more = (NodeInfo("4", "arm", "h", 1, "", "native", 1), NodeInfo("5", "Pepper", "h", 1, "", "native", 1))
     window.session.launcher.restart_virtual_robot("Pepper")
@@ -143,7 +143,7 @@ def test_new_nodes_are_bold_until_opened_and_studio_is_no_news(panel, window) ->
     assert chip("arm") is None
 
 
-def test_a_vanished_node_is_struck_through_for_ten_seconds(panel, window) -> None:
+def test_vanished_node_is_struck_through_for_ten_seconds(panel, window) -> None:
     nodes = window.session.nodes
     nodes.update(graph(2, NODES[1:]), 1.0)
     nodes.age(5.2)
@@ -157,7 +157,7 @@ def test_a_vanished_node_is_struck_through_for_ten_seconds(panel, window) -> Non
     assert [line[0] for line in shown(panel)] == ["rize", "studio"]
 
 
-def test_what_an_original_cannot_do_is_said_for_the_chosen_one(panel, window) -> None:
+def test_limitations_of_a_selected_original_nep_node_are_shown(panel, window) -> None:
     panel.table.choose(NodeRow(window.session.nodes.get("2")).key)
     assert panel.foot.text().startswith("rize, on this computer, pid 512, JavaScript, connected since ")
     assert "up to 0.5.4.5" in panel.foot.text()
@@ -175,7 +175,7 @@ def test_what_an_original_cannot_do_is_said_for_the_chosen_one(panel, window) ->
         ("C", "NEP C", "NEP."),
     ],
 )
-def test_generations_have_words(generation, words, version) -> None:
+def test_nep_generations_have_labels(generation, words, version) -> None:
     node = NodeEntry("1", "old", generation=generation)
     assert generation_cell(NodeRow(node)).text == words
     assert version in limits_of(node)
@@ -183,20 +183,20 @@ def test_generations_have_words(generation, words, version) -> None:
     assert limits_of(NodeEntry("1", "new")) == ""
 
 
-def test_a_version_that_nobody_understands_is_named_with_its_mend() -> None:
+def test_unsupported_version_is_flagged_with_the_fix() -> None:
     node = NodeEntry("1", "old", generation="0.5.4.6")
     cell = generation_cell(NodeRow(node))
     assert (cell.text, cell.icon, cell.role) == ("NEP 0.5.4.6", "triangle-alert", "warn")
     assert limits_of(node).endswith("Install 0.5.4.8 or 0.5.4.5.")
 
 
-def test_what_is_not_known_is_left_out() -> None:
+def test_unknown_facts_are_left_out() -> None:
     assert facts_of(NodeEntry("1", "bare")) == "bare"
     assert cpu_words(None) == ""
     assert (cpu_words(0.0), cpu_words(0.099), cpu_words(0.0999)) == ("0.0 %", "9.9 %", "10 %")
 
 
-def test_the_filter_finds_names_topics_and_languages(panel, window) -> None:
+def test_filter_finds_names_topics_and_languages(panel, window) -> None:
     panel.filter.setText("javascript")
     assert [line[0] for line in shown(panel)] == ["rize"]
     panel.filter.setText("/robot/cam")
@@ -206,7 +206,7 @@ def test_the_filter_finds_names_topics_and_languages(panel, window) -> None:
     assert len(shown(panel)) == 3
 
 
-def test_the_load_is_renewed_when_it_was_told_and_sorted_once_a_second(panel, window) -> None:
+def test_cpu_load_is_updated_when_reported_and_sorted_once_per_second(panel, window) -> None:
     place = [column.name for column in panel.table.columns].index("cpu")
     panel.table.horizontalHeader().sectionClicked.emit(place)
     assert [line[0] for line in shown(panel)] == ["rize", "camera_driver", "studio"]
@@ -222,7 +222,7 @@ def test_the_load_is_renewed_when_it_was_told_and_sorted_once_a_second(panel, wi
     ("kind", "words", "pressed"),
     [("none", "No master is running", "Start a master here"), ("connected", "No nodes yet", None)],
 )
-def test_with_nothing_it_says_what_to_do_next(qtbot, qapp, kind, words, pressed) -> None:
+def test_empty_panel_explains_what_to_do_next(qtbot, qapp, kind, words, pressed) -> None:
     window = Window(Session())
     window.session.master = MasterState(kind, window.session.master.address)
     panel = window.make(PANEL)
@@ -235,7 +235,7 @@ def test_with_nothing_it_says_what_to_do_next(qtbot, qapp, kind, words, pressed)
         assert window.session.launcher.masters_asked_for == 1
 
 
-def test_order_and_columns_come_back_with_the_layout(qtbot, panel, window) -> None:
+def test_sort_order_and_columns_are_restored_with_the_layout(qtbot, panel, window) -> None:
     panel.table.choice.show("pid", False)
     panel.table.horizontalHeader().sectionClicked.emit(3)
     again = window.make(PANEL, (900, 400))
@@ -246,7 +246,7 @@ def test_order_and_columns_come_back_with_the_layout(qtbot, panel, window) -> No
     assert again.save_state() == panel.save_state()
 
 
-def test_a_bridge_is_called_one_and_says_where_its_counts_are(panel, window) -> None:
+def test_bridge_is_labelled_and_refers_to_its_counters(panel, window) -> None:
     bridge = NodeInfo("7", "bridge-lab-to-ros", "lab-pc", 9, "Python", "native", 1, 0.02)
     view = graph(2, (*NODES, bridge))
     told = {**view.topics, BRIDGES_TOPIC: topic(BRIDGES_TOPIC, "7"), "/chat": topic("/chat", "7", "7")}
@@ -264,7 +264,7 @@ def test_a_bridge_is_called_one_and_says_where_its_counts_are(panel, window) -> 
     assert [line[0] for line in shown(panel)] == [bridge.name]
 
 
-def test_a_subscription_with_wildcards_stands_with_its_node_and_is_no_topic(panel, window) -> None:
+def test_wildcard_subscription_is_listed_at_its_node_and_not_as_a_topic(panel, window) -> None:
     wide = PatternInfo("/robot/*/camera", "image", (SubscriberInfo(7, "3", 0, 0),))
     window.session.nodes.update(replace(graph(2), patterns={wide.name: wide}), 1.0)
     window.session.topics.update(replace(graph(2), patterns={wide.name: wide}), 1.0)

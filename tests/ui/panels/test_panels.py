@@ -47,7 +47,7 @@ def description(name: str) -> Panel:
 
 
 @pytest.mark.parametrize("name", NAMES)
-def test_each_module_binds_one_panel_of_its_name_with_a_known_icon(name) -> None:
+def test_each_module_exports_one_panel_of_its_name_with_a_known_icon(name) -> None:
     panel = description(name)
     assert panel.name == name
     assert panel.icon in icons.names()
@@ -55,7 +55,7 @@ def test_each_module_binds_one_panel_of_its_name_with_a_known_icon(name) -> None
 
 @pytest.mark.parametrize("name", NAMES)
 @pytest.mark.parametrize("session", [Session, Session.full], ids=["empty", "full"])
-def test_each_panel_lives_through_everything(qtbot, qapp, name, session) -> None:
+def test_each_panel_survives_its_whole_life_cycle(qtbot, qapp, name, session) -> None:
     window = Window(session())
     panel = window.make(description(name), (500, 400))
     qtbot.addWidget(panel)
@@ -84,7 +84,7 @@ def test_each_panel_lives_through_everything(qtbot, qapp, name, session) -> None
 
 
 @pytest.mark.parametrize("name", NAMES)
-def test_everything_that_can_be_pressed_or_typed_into_has_a_name(qtbot, qapp, name) -> None:
+def test_every_control_has_an_accessible_name(qtbot, qapp, name) -> None:
     window = Window(Session.full())
     panel = window.make(description(name), (1000, 700))
     qtbot.addWidget(panel)
@@ -104,7 +104,7 @@ def test_everything_that_can_be_pressed_or_typed_into_has_a_name(qtbot, qapp, na
 @pytest.mark.parametrize(
     "name", sorted(set(NAMES) - {"behaviour"})
 )  # its page of the web says it: test_guidance
-def test_a_panel_with_nothing_says_what_to_do_next(qtbot, qapp, name) -> None:
+def test_empty_panel_explains_what_to_do_next(qtbot, qapp, name) -> None:
     from PySide6.QtWidgets import QLabel
 
     window = Window(Session())
@@ -134,5 +134,5 @@ def test_panels_do_not_import_panels() -> None:
 
 
 @pytest.mark.parametrize("name", sorted(BASES))
-def test_what_panels_derive_from_is_no_panel(name) -> None:
+def test_panel_base_modules_export_no_panel(name) -> None:
     assert not hasattr(importlib.import_module(f"app.ui.panels.{name}"), "PANEL")

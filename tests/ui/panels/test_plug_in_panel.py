@@ -70,7 +70,9 @@ def menu_named(where: QMenuBar | QMenu, name: str) -> QMenu:
     )
 
 
-def test_a_panel(qtbot, plug_in: None, theme: Theme, session: Session) -> None:
+def test_plug_in_panel_is_listed_docked_refreshed_and_restored(
+    qtbot, plug_in: None, theme: Theme, session: Session
+) -> None:
     window = MainWindow(session, theme, {**PANELS, "counter": PanelRegistry()["counter"]}, [])
     qtbot.addWidget(window)
     window.show_layout("developer")

@@ -28,7 +28,7 @@ def panel(qtbot, window) -> ProblemsPanel:
     return made
 
 
-def test_each_problem_with_its_sentence_and_what_mends_it(panel, window) -> None:
+def test_each_problem_is_shown_with_its_sentence_and_fix(panel, window) -> None:
     assert [row.problem.subject for row in panel.rows] == ["wave", "wait until"]
     assert panel.rows[0].accessibleName() == "warning: NAO is not connected, so wave will be skipped."
     assert (panel.chip.text, panel.chip.status) == ("2", "warn")
@@ -36,13 +36,13 @@ def test_each_problem_with_its_sentence_and_what_mends_it(panel, window) -> None
     assert window.commands == ["add_time_limit"]
 
 
-def test_a_press_or_return_shows_the_block(panel, window) -> None:
+def test_click_or_return_shows_the_block(panel, window) -> None:
     QTest.mouseClick(panel.rows[0], Qt.MouseButton.LeftButton, pos=QPoint(200, 15))
     QTest.keyClick(panel.rows[1], Qt.Key.Key_Return)
     assert window.commands == ["block:b8", "block:b3"]
 
 
-def test_it_is_checked_only_when_the_behaviour_changed(panel, window) -> None:
+def test_behaviour_is_checked_only_after_an_edit(panel, window) -> None:
     rows = list(panel.rows)
     document = window.session.document
     panel.refresh()
@@ -64,7 +64,7 @@ def test_it_is_checked_only_when_the_behaviour_changed(panel, window) -> None:
     assert panel.rows == rows[:1]  # what is cured goes
 
 
-def test_with_nothing_to_mend_it_says_so(qtbot, qapp) -> None:
+def test_panel_without_problems_shows_an_empty_state(qtbot, qapp) -> None:
     window = Window(Session())
     panel = window.make(PANEL)
     qtbot.addWidget(panel)
@@ -75,7 +75,7 @@ def test_with_nothing_to_mend_it_says_so(qtbot, qapp) -> None:
     assert (panel.chip.text, panel.chip.status) == ("No problems", "ok")
 
 
-def test_a_missing_robot_is_one_line_with_the_robots_that_can_do_it(panel, window, monkeypatch) -> None:
+def test_missing_robot_is_one_row_with_the_robots_that_can_replace_it(panel, window, monkeypatch) -> None:
     document = window.session.document
     absent = [
         Problem("warning", f"b{n}", "robot", "say", "Pepper 2 is not connected, so say will be skipped.",
@@ -95,7 +95,7 @@ def test_a_missing_robot_is_one_line_with_the_robots_that_can_do_it(panel, windo
     assert panel.chip.toolTip() == "1 warning"
 
 
-def test_the_arrow_keys_go_along_the_problems(panel, window) -> None:
+def test_arrow_keys_move_through_the_problems(panel, window) -> None:
     panel.activateWindow()
     panel.rows[0].setFocus()
     QTest.keyClick(panel.rows[0], Qt.Key.Key_Down)
@@ -106,7 +106,7 @@ def test_the_arrow_keys_go_along_the_problems(panel, window) -> None:
     assert has_keys(panel.rows[0])
 
 
-def test_tab_goes_along_the_problems_also_those_that_came_later(qtbot, panel, window) -> None:
+def test_tab_moves_through_the_problems_including_later_ones(qtbot, panel, window) -> None:
     document = window.session.document
     document.found = (Problem("error", None, None, "x", "x is not known."), *document.found)
     document.edits += 1
@@ -118,7 +118,7 @@ def test_tab_goes_along_the_problems_also_those_that_came_later(qtbot, panel, wi
     assert len(places) > len(panel.rows), "buttons come behind their rows"
 
 
-def test_while_a_long_behaviour_is_checked_the_old_problems_stay(panel, window, monkeypatch) -> None:
+def test_old_problems_are_kept_while_a_long_behaviour_is_checked(panel, window, monkeypatch) -> None:
     rows = list(panel.rows)
     monkeypatch.setattr(window.session.document, "newest", lambda: None)
     panel.refresh()
@@ -126,7 +126,7 @@ def test_while_a_long_behaviour_is_checked_the_old_problems_stay(panel, window, 
     assert panel.checked.text() == "Checking"
 
 
-def test_a_cured_problem_leaves_the_keyboard_in_the_panel(panel, window) -> None:
+def test_fixing_a_problem_keeps_keyboard_focus_in_the_panel(panel, window) -> None:
     panel.activateWindow()
     document = window.session.document
     panel.rows[0].buttons[0].setFocus()
@@ -138,7 +138,7 @@ def test_a_cured_problem_leaves_the_keyboard_in_the_panel(panel, window) -> None
     assert has_keys(panel)
 
 
-def test_hundreds_of_problems_are_counted_and_the_first_are_shown(panel, window) -> None:
+def test_hundreds_of_problems_are_counted_and_only_the_first_are_listed(panel, window) -> None:
     document = window.session.document
     document.found = tuple(
         Problem("error", f"x{n}", None, f"b{n}", f"b{n} needs a number.") for n in range(500)
@@ -156,7 +156,7 @@ def test_hundreds_of_problems_are_counted_and_the_first_are_shown(panel, window)
     assert not panel.others.isVisibleTo(panel)
 
 
-def test_an_editor_that_cannot_open_is_a_problem_whatever_the_blocks_are(panel, window) -> None:
+def test_unavailable_block_editor_is_a_problem_regardless_of_the_blocks(panel, window) -> None:
     before = len(panel.rows)
     tell_missing(window.session.alerts, MissingLibraries(("libnss3.so",), ("libnss3",)))
     panel.refresh()

@@ -52,7 +52,7 @@ def states(panel: PublishPanel) -> list[str]:
     return [panel.list.cell_at(row, 1).text for row in rows]
 
 
-def test_a_fault_is_said_where_it_is_and_put_right_by_a_press(window, panel) -> None:
+def test_syntax_error_is_located_and_fixed_by_a_button(window, panel) -> None:
     form = panel.form
     assert form.message == LOOK
     assert form.sentence.text().startswith("Line 3, column ")
@@ -73,7 +73,7 @@ def test_a_fault_is_said_where_it_is_and_put_right_by_a_press(window, panel) -> 
     assert form.edit.wrong_line == 3
 
 
-def test_typing_goes_on_where_the_line_began(panel) -> None:
+def test_auto_indent_keeps_the_indentation_of_the_line(panel) -> None:
     panel.list.choose("b")
     edit = panel.form.edit.edit
     edit.selectAll()
@@ -88,7 +88,7 @@ def test_typing_goes_on_where_the_line_began(panel) -> None:
     assert edit.toPlainText() == '{\n  "x": 1,\n  "y": 2\n}'
 
 
-def test_sending_arms_this_topic_alone_and_the_switch_ends_it(window, panel) -> None:
+def test_sending_arms_only_this_topic_and_the_switch_disarms_it(window, panel) -> None:
     session, acting = window.session, acting_of(window)
     heard = session.source.listen("/cmd_vel", "json")
     panel.list.choose("b")
@@ -115,7 +115,7 @@ def test_sending_arms_this_topic_alone_and_the_switch_ends_it(window, panel) -> 
     assert panel.strip.words.text() == "Sending is off"
 
 
-def test_stop_another_source_and_closing_disarm(window, panel) -> None:
+def test_stop_source_change_and_closing_disarm(window, panel) -> None:
     acting = acting_of(window)
     for end in (window.session.runs.stop, panel.shut):
         assert acting.arm() == ""
@@ -128,7 +128,7 @@ def test_stop_another_source_and_closing_disarm(window, panel) -> None:
     assert not acting.arming.is_on
 
 
-def test_time_ends_it(window, panel) -> None:
+def test_arming_expires_after_its_time_limit(window, panel) -> None:
     acting = acting_of(window)
     acting.arm()
     acting.allow(Target("topic", "/cmd_vel"))
@@ -138,7 +138,7 @@ def test_time_ends_it(window, panel) -> None:
     assert not panel.strip.switch.isChecked()
 
 
-def test_a_robots_topic_is_asked_for_again(window, panel) -> None:
+def test_robot_command_topic_asks_for_confirmation_again(window, panel) -> None:
     session, acting = window.session, acting_of(window)
     topic = session.fleet.connected[0].robot.topics.command
     heard = session.source.listen(topic, "json")
@@ -166,7 +166,7 @@ def test_a_robots_topic_is_asked_for_again(window, panel) -> None:
     assert acting.question is None
 
 
-def test_a_real_robot_may_not_be_moved_before_a_person_let_it(window, panel) -> None:
+def test_real_robot_is_not_moved_without_permission(window, panel) -> None:
     session, acting = window.session, acting_of(window)
     link = session.fleet.connected[0]
     link.robot = replace(link.robot, virtual=False)
@@ -182,7 +182,7 @@ def test_a_real_robot_may_not_be_moved_before_a_person_let_it(window, panel) -> 
     assert heard.listen(timeout_s=20.0) == (True, {"x": 0})
 
 
-def test_the_last_message_is_the_template(window, panel) -> None:
+def test_last_message_is_the_template(window, panel) -> None:
     panel.begin("/blackboard")
     assert panel.message is not None
     assert (panel.message.topic, panel.message.msg_type) == ("/blackboard", "json")
@@ -198,7 +198,7 @@ def test_the_last_message_is_the_template(window, panel) -> None:
     assert panel.message == kept, "one that is kept is shown again"
 
 
-def test_without_a_publisher_its_type_is_the_template(window, panel) -> None:
+def test_without_a_publisher_the_message_type_is_the_template(window, panel) -> None:
     panel.list.choose("b")
     panel.form.topic.setText("/nowhere")
     panel.form.kind.clear()
@@ -209,7 +209,7 @@ def test_without_a_publisher_its_type_is_the_template(window, panel) -> None:
     assert panel.message.payload() == {"x": 0.0, "y": 0.0, "z": 0.0}
 
 
-def test_names_of_topics_are_offered_and_their_type_taken(panel) -> None:
+def test_topic_names_are_suggested_and_their_type_is_adopted(panel) -> None:
     completer = panel.form.topic.completer()
     completer.setCompletionPrefix("black")
     assert completer.currentCompletion() == "/blackboard"
@@ -218,7 +218,7 @@ def test_names_of_topics_are_offered_and_their_type_taken(panel) -> None:
     assert panel.form.sentence.text().startswith("Messages of type image can't be edited by hand.")
 
 
-def test_copying_deleting_and_undo(window, panel) -> None:
+def test_messages_are_copied_deleted_and_restored_by_undo(window, panel) -> None:
     panel.list.choose("b")
     QTest.keyClick(panel.list, Qt.Key.Key_D, Qt.KeyboardModifier.ControlModifier)
     names = [each.name for each in acting_of(window).shelf.messages]
@@ -234,7 +234,7 @@ def test_copying_deleting_and_undo(window, panel) -> None:
     assert panel.message.name == "Stand still 2"
 
 
-def test_the_filter_and_an_empty_shelf(window, panel) -> None:
+def test_list_is_filtered_and_empty_list_offers_a_new_message(window, panel) -> None:
     panel.filter.setText("cmd")
     assert panel.list.model().rowCount() == 1
     panel.filter.clear()
@@ -246,7 +246,7 @@ def test_the_filter_and_an_empty_shelf(window, panel) -> None:
     assert panel.form.sentence.text().startswith("Choose a topic first.")
 
 
-def test_every_topic_has_it_in_its_menu(qtbot, window) -> None:
+def test_publish_is_in_the_menu_of_every_topic(qtbot, window) -> None:
     table = window.make(topics.PANEL)
     qtbot.addWidget(table)
     for widget in table.header_widgets():
@@ -257,7 +257,7 @@ def test_every_topic_has_it_in_its_menu(qtbot, window) -> None:
     assert "Publish to this topic" not in [each.words for each in table.row_actions("/robot/camera")]
 
 
-def test_in_a_recording_nothing_can_be_armed(window, panel, monkeypatch) -> None:
+def test_nothing_can_be_armed_while_a_recording_is_shown(window, panel, monkeypatch) -> None:
     monkeypatch.setattr(type(window.session), "is_replaying", True)
     assert acting_of(window).send(STILL) == "A recording is open. Return to live to send."
     ticks(window, panel, 7)
@@ -265,7 +265,7 @@ def test_in_a_recording_nothing_can_be_armed(window, panel, monkeypatch) -> None
     assert not panel.form.send.isEnabled()
 
 
-def test_everything_is_said_and_fits_also_where_it_is_narrow(panel, qtbot) -> None:
+def test_controls_have_accessible_names_and_fit_a_narrow_panel(panel, qtbot) -> None:
     assert unsaid(panel) == []
     panel.resize(420, 640)
     qtbot.waitUntil(lambda: panel.list.width() > 300)

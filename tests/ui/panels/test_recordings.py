@@ -80,7 +80,7 @@ def choose(panel: RecordingsPanel, folder: Path, name: str) -> RecordingTable:
     return table
 
 
-def test_each_recording_with_its_words_and_badges(qtbot, panel, window, folder):
+def test_each_recording_is_listed_with_its_facts_and_badges(qtbot, panel, window, folder):
     assert panel.empty.isVisible() or panel._has_looked, "until the folder was looked at, it says so"
     seen(qtbot, panel, "arm", "camera", "cut")
     facts = {each.path.stem: each for each in panel._look.files}
@@ -97,7 +97,7 @@ def test_each_recording_with_its_words_and_badges(qtbot, panel, window, folder):
     assert not list(unsaid(panel))
 
 
-def test_pictures_come_from_another_thread(qtbot, panel, folder):
+def test_thumbnails_are_decoded_in_another_thread(qtbot, panel, folder):
     seen(qtbot, panel, "arm", "camera", "cut")
     (facts,) = (each for each in panel._look.files if each.path.stem == "camera")
 
@@ -111,7 +111,7 @@ def test_pictures_come_from_another_thread(qtbot, panel, folder):
     assert (image.width(), image.height()) == (128, 96)
 
 
-def test_a_click_chooses_and_enter_opens(qtbot, panel, window, folder):
+def test_click_selects_and_enter_opens(qtbot, panel, window, folder):
     seen(qtbot, panel, "arm", "camera", "cut")
     table = choose(panel, folder, "arm")
     rect = table.visualRect(table.currentIndex())
@@ -121,7 +121,7 @@ def test_a_click_chooses_and_enter_opens(qtbot, panel, window, folder):
     assert window.commands == [f"recording.open:{folder / 'arm.mcap'}"]
 
 
-def test_f2_renames_in_the_row_and_nothing_is_written_over(qtbot, panel, window, folder):
+def test_f2_renames_in_place_and_never_overwrites(qtbot, panel, window, folder):
     (folder / "arm.mcap.bookmarks.json").write_text("[]")
     seen(qtbot, panel, "arm", "camera", "cut")
     table = choose(panel, folder, "arm")
@@ -144,7 +144,7 @@ def test_f2_renames_in_the_row_and_nothing_is_written_over(qtbot, panel, window,
     assert table.field is None
 
 
-def test_delete_moves_to_the_bin_and_undo_brings_it_back(qtbot, panel, window, folder, tmp_path, monkeypatch):
+def test_delete_moves_to_the_trash_and_undo_restores(qtbot, panel, window, folder, tmp_path, monkeypatch):
     place = tmp_path / "bin"
     place.mkdir()
 
@@ -167,7 +167,7 @@ def test_delete_moves_to_the_bin_and_undo_brings_it_back(qtbot, panel, window, f
     seen(qtbot, panel, "arm", "camera", "cut")
 
 
-def test_what_is_being_recorded_tells_its_figures_and_can_not_be_renamed(qtbot, panel, window, folder):
+def test_active_recording_shows_its_figures_and_cannot_be_renamed(qtbot, panel, window, folder):
     client = window.session.recordings.client
     client.state = RecorderState(
         "recording", folder / "arm.mcap", message_count=77, size_bytes=10**9, duration_s=61.0, lost=3
@@ -190,7 +190,7 @@ def test_what_is_being_recorded_tells_its_figures_and_can_not_be_renamed(qtbot, 
     client.state = RecorderState()
 
 
-def test_an_export_goes_on_beside_and_says_what_it_made(qtbot, panel, window, folder):
+def test_export_runs_in_the_background_and_reports_its_result(qtbot, panel, window, folder):
     seen(qtbot, panel, "arm", "camera", "cut")
     choose(panel, folder, "arm")
     panel.details.export.click()
@@ -206,9 +206,7 @@ def test_an_export_goes_on_beside_and_says_what_it_made(qtbot, panel, window, fo
     assert panel.details.export.text() == "Export"
 
 
-def test_a_part_of_the_time_and_some_topics_are_exported_by_mouse_and_keys(
-    qtbot, panel, window, folder, tmp_path
-):
+def test_time_range_and_topics_to_export_are_chosen_by_mouse_and_keys(qtbot, panel, window, folder, tmp_path):
     messages = [json_message(seq, f"/{'ab'[seq % 2]}") for seq in range(1000)]  # 10 s
     record(folder / "long.mcap", [[*messages[:500], picture(1)], messages[500:]])
     seen(qtbot, panel, "arm", "camera", "cut", "long")
@@ -296,7 +294,7 @@ def test_a_part_of_the_time_and_some_topics_are_exported_by_mouse_and_keys(
     assert not list(unsaid(panel))
 
 
-def test_the_filter_finds_names_notes_and_topics(qtbot, panel):
+def test_filter_finds_names_notes_and_topics(qtbot, panel):
     seen(qtbot, panel, "arm", "camera", "cut")
     panel.filter.setText("FIRST")
     assert "camera" not in names(panel)
@@ -306,7 +304,7 @@ def test_the_filter_finds_names_notes_and_topics(qtbot, panel):
     assert panel.empty.isVisible()
 
 
-def test_an_empty_folder_and_one_that_is_away_say_what_to_do(qtbot, panel, window, folder, tmp_path):
+def test_empty_folder_and_missing_folder_explain_what_to_do(qtbot, panel, window, folder, tmp_path):
     seen(qtbot, panel, "arm", "camera", "cut")
     window.session.recordings.set_folder(tmp_path / "stick")
 
@@ -321,7 +319,7 @@ def test_an_empty_folder_and_one_that_is_away_say_what_to_do(qtbot, panel, windo
     assert window.asked_why == [(panel, "")]
 
 
-def test_what_an_alarm_kept_is_opened_from_its_history(qtbot, window, folder):
+def test_recording_saved_by_an_alarm_is_opened_from_its_history(qtbot, window, folder):
     panel = window.make(alarms.PANEL, (752, 600))
     qtbot.addWidget(panel)
     for widget in panel.header_widgets():
@@ -343,7 +341,7 @@ def test_what_an_alarm_kept_is_opened_from_its_history(qtbot, window, folder):
     panel.shut()
 
 
-def test_a_topic_is_recorded_from_its_menu(qtbot, folder):
+def test_topic_is_recorded_from_its_menu(qtbot, folder):
     window = Window(Session.full())
     panel = window.make(topics.PANEL)
     qtbot.addWidget(panel)

@@ -46,7 +46,7 @@ def differing(first: QImage, second: QImage) -> int:
     ],
     ids=str,
 )  # fmt: skip
-def test_each_part_of_the_state_is_seen(qapp, change) -> None:
+def test_each_part_of_the_state_is_drawn(qapp, change) -> None:
     plain = RobotState()
     assert differing(painted(plain), painted(replace(plain, **change))) > 0
 
@@ -61,23 +61,23 @@ def test_each_emotion_has_its_own_face(qapp) -> None:
     assert painted(RobotState(emotion="a word nobody knows")) == painted(RobotState())
 
 
-def test_the_same_state_is_the_same_picture(qapp) -> None:
+def test_equal_states_give_equal_drawings(qapp) -> None:
     assert painted(PREVIEW) == painted(PREVIEW)
 
 
 @pytest.mark.parametrize("size", [(382, 286), (900, 200), (200, 700), (40, 30)])
-def test_it_fills_any_area(qapp, size) -> None:
+def test_drawing_fills_any_area(qapp, size) -> None:
     image = painted(PREVIEW, QRectF(0, 0, *size))
     corners = [(0, 0), (size[0] - 1, 0), (0, size[1] - 1), (size[0] - 1, size[1] - 1)]
     assert all(image.pixelColor(x, y) != QColor("magenta") for x, y in corners)
 
 
-def test_it_is_dimmed_in_a_dark_theme(qapp) -> None:
+def test_drawing_is_dimmed_in_the_dark_theme(qapp) -> None:
     light, dark = painted(PREVIEW), painted(PREVIEW, dark=True)
     assert dark.pixelColor(5, 5).lightness() < light.pixelColor(5, 5).lightness()
 
 
-def test_the_robot_turns_to_its_left_which_is_the_persons_right(qapp) -> None:
+def test_robot_turns_to_its_left_which_is_right_for_the_viewer(qapp) -> None:
     """The eyes' colour wanders with the heading, and is hidden from behind."""
 
     def eyes(theta_deg: float) -> list[int]:
@@ -96,7 +96,7 @@ def test_the_robot_turns_to_its_left_which_is_the_persons_right(qapp) -> None:
 
 @pytest.mark.parametrize("part", ["head", "left_hand", "right_hand", "ball"])
 @pytest.mark.parametrize("size", [(382, 286), (700, 300)])
-def test_parts_are_found_where_they_are_drawn(qapp, part, size) -> None:
+def test_hit_test_finds_parts_where_they_are_drawn(qapp, part, size) -> None:
     area, pen = QRectF(0, 0, *size), RobotDrawing()
     state = replace(PREVIEW, arm_left_deg=100.0)
     place = pen.place_of(part, area, state)
@@ -107,14 +107,14 @@ def test_parts_are_found_where_they_are_drawn(qapp, part, size) -> None:
 
 
 @pytest.mark.parametrize("place", [(0.0, 0.0), (-2.0, 1.5), (2.4, -2.0), (1.2, 0.3)])
-def test_the_floor_is_found_again(place) -> None:
+def test_floor_position_is_mapped_back_from_the_screen(place) -> None:
     stage = Stage(AREA, RoomBounds())
     spot = stage.spot(*place)
     x, y = stage.floor(stage.origin + QPointF(spot.u, spot.v) * stage.scale)
     assert (x, y) == (pytest.approx(place[0]), pytest.approx(place[1]))
 
 
-def test_what_is_nearer_is_lower_and_larger() -> None:
+def test_nearer_objects_are_lower_and_larger() -> None:
     stage = Stage(AREA, RoomBounds())
     far, near = stage.spot(-2, 0), stage.spot(2, 0)
     assert near.v > far.v
@@ -122,7 +122,7 @@ def test_what_is_nearer_is_lower_and_larger() -> None:
     assert stage.spot(0, 2).u > stage.spot(0, -2).u
 
 
-def test_a_message_becomes_a_state_and_damaged_parts_keep_their_defaults() -> None:
+def test_message_is_parsed_into_a_state_and_invalid_fields_keep_their_defaults() -> None:
     state = RobotState.parse(drawing(x=1.5, touched=["head"], speech="  "))
     assert (state.x, state.touched, state.speech) == (1.5, ("head",), None)
     assert state.objects[0].kind == "ball"
@@ -140,14 +140,14 @@ LONG = "Once upon a time there was a small robot. " * 11 + "end"
 
 @pytest.mark.parametrize("width", [60.0, 140.0, 300.0])
 @pytest.mark.parametrize("words", ["Hello", LONG, "x" * 300, "a " * 200, f"{'y' * 80} and {'z' * 3}"])
-def test_all_words_of_a_speech_are_in_its_bubble(qapp, words, width) -> None:
+def test_wrapped_speech_keeps_all_words_within_the_bubble(qapp, words, width) -> None:
     metrics = QFontMetricsF(QFont())
     lines = wrapped(words, metrics, width)
     assert "".join(lines).replace(" ", "") == words.replace(" ", "")
     assert all(metrics.horizontalAdvance(line) <= width for line in lines)
 
 
-def test_a_long_speech_scrolls_with_what_is_spoken() -> None:
+def test_long_speech_scrolls_with_the_spoken_line() -> None:
     lines = [f"line {number:02}" for number in range(20)]
     seen: dict[str, None] = {}
     for step in range(101):
@@ -164,7 +164,7 @@ def test_a_long_speech_scrolls_with_what_is_spoken() -> None:
 
 @pytest.mark.parametrize("size", [(382, 286), (900, 300), (200, 150)])
 @pytest.mark.parametrize("place", [(0.0, 0.0), (2.5, 2.4), (2.5, -2.4), (-2.5, 0.0)])
-def test_a_long_bubble_stays_inside_and_moves_on(qapp, size, place) -> None:
+def test_long_bubble_stays_inside_the_drawing_and_scrolls(qapp, size, place) -> None:
     area = QRectF(0, 0, *size)
     told = RobotState(x=place[0], y=place[1], speech=LONG)
     begun, ended = (painted(replace(told, spoken=spoken), area) for spoken in (0.0, 1.0))
@@ -175,7 +175,7 @@ def test_a_long_bubble_stays_inside_and_moves_on(qapp, size, place) -> None:
 
 
 @pytest.mark.parametrize("apart", [0.0, 20.0, 60.0, 150.0])
-def test_bubbles_of_robots_that_stand_close_do_not_cover_each_other(qapp, apart) -> None:
+def test_bubbles_of_adjacent_robots_do_not_overlap(qapp, apart) -> None:
     image = QImage(382, 286, QImage.Format.Format_RGB32)
     painter = QPainter(image)
     first = paint_bubble(

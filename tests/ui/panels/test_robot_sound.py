@@ -27,7 +27,7 @@ def panel(qtbot, window) -> RobotPanel:
     return made
 
 
-def test_the_button_is_kept(panel, window) -> None:
+def test_mute_setting_is_saved(panel, window) -> None:
     assert panel.sound.accessibleName() == "Mute the robots"
     press(panel.sound)
     heard = window.session.settings.get(SOUND, True)
@@ -36,7 +36,7 @@ def test_the_button_is_kept(panel, window) -> None:
     assert window.session.settings.get(SOUND, False)
 
 
-def test_the_button_says_why_robots_are_silent(panel, window) -> None:
+def test_mute_button_shows_why_robots_are_silent(panel, window) -> None:
     speaker = window.session.voices.speaker = FakeSpeaker()
     panel.refresh()
     assert "no voice" not in panel.sound.toolTip()
@@ -48,14 +48,14 @@ def test_the_button_says_why_robots_are_silent(panel, window) -> None:
     assert "no voice" not in panel.sound.toolTip()
 
 
-def test_a_sound_stands_in_a_bubble_beside_what_it_says() -> None:
+def test_sound_is_shown_in_a_bubble_beside_its_name() -> None:
     played = {"title": "bell", "number": 1, "notes": [[880, 0.3]], "played": 0.1}
     assert RobotState.parse({"sound": played}).caption == "♪\N{NO-BREAK SPACE}bell"
     assert RobotState.parse({"speech": "Hi", "sound": played}).caption == "Hi ♪\N{NO-BREAK SPACE}bell"
     assert RobotState.parse({"speech": "Hi", "sound": 3}).caption == "Hi"
 
 
-def test_the_bubble_of_a_sound_is_painted(panel, window) -> None:
+def test_sound_bubble_is_painted(panel, window) -> None:
     body = Body()
     link = window.session.fleet.links[0]
     link.drawing = drawable(body)
@@ -68,7 +68,7 @@ def test_the_bubble_of_a_sound_is_painted(panel, window) -> None:
     assert panel.view.accessibleDescription() == "♪\N{NO-BREAK SPACE}bell"
 
 
-def test_who_is_heard_after_the_bubble_has_gone_is_named_below(panel, window) -> None:
+def test_speaker_is_named_below_after_its_bubble_disappeared(panel, window) -> None:
     panel.refresh()
     before = panel.view.grab().toImage()
     window.session.voices._current = Utterance("Ginger", "And I say", "en", 0.5)

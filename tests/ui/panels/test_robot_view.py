@@ -38,7 +38,7 @@ def point(panel: RobotPanel, part: str):
     return place.toPoint()
 
 
-def test_it_is_drawn_from_its_state_with_its_name_and_its_chip(panel, window) -> None:
+def test_robot_is_drawn_from_its_state_with_name_and_chip(panel, window) -> None:
     assert (panel.title(), panel.chip.text, panel.chip.status) == ("Pepper", "virtual, ready", "ok")
     before = panel.view.grab().toImage()
     link = window.session.fleet.links[0]
@@ -50,7 +50,7 @@ def test_it_is_drawn_from_its_state_with_its_name_and_its_chip(panel, window) ->
     assert window.session.looked_at == ["Pepper"]
 
 
-def test_the_same_state_is_not_painted_again(panel, window, monkeypatch) -> None:
+def test_unchanged_state_is_not_repainted(panel, window, monkeypatch) -> None:
     asked: list[int] = []
     monkeypatch.setattr(panel.view, "update", lambda: asked.append(1))
     link = window.session.fleet.links[0]
@@ -63,7 +63,7 @@ def test_the_same_state_is_not_painted_again(panel, window, monkeypatch) -> None
 
 
 @pytest.mark.parametrize("how", ["away", "mute", "old"])
-def test_one_that_fell_silent_is_grey_and_says_nothing_any_more(panel, window, monkeypatch, how) -> None:
+def test_silent_robot_is_grey_and_its_speech_bubble_disappears(panel, window, monkeypatch, how) -> None:
     link = window.session.fleet.links[0]
     link.drawing = drawing(speech="Hello!")
     panel.refresh()
@@ -91,20 +91,20 @@ def test_one_that_fell_silent_is_grey_and_says_nothing_any_more(panel, window, m
 
 
 @pytest.mark.parametrize("part", ["head", "left_hand", "right_hand"])
-def test_pressing_a_part_touches_it_and_letting_go_ends_it(panel, window, part) -> None:
+def test_pressing_a_part_touches_it_and_releasing_ends_the_touch(panel, window, part) -> None:
     QTest.mousePress(panel.view, Qt.MouseButton.LeftButton, pos=point(panel, part))
     assert window.session.changes("Pepper") == [{"touch": part, "down": True}]
     QTest.mouseRelease(panel.view, Qt.MouseButton.LeftButton, pos=point(panel, part))
     assert window.session.changes("Pepper") == [{"touch": part, "down": False}]
 
 
-def test_the_keyboard_can_touch_it_too(panel, window) -> None:
+def test_robot_is_touched_by_keyboard_too(panel, window) -> None:
     QTest.keyPress(panel.view, Qt.Key.Key_H)
     QTest.keyRelease(panel.view, Qt.Key.Key_H)
     assert [change["down"] for change in window.session.changes("Pepper")] == [True, False]
 
 
-def test_space_touches_the_head_as_long_as_it_is_held(panel, window) -> None:
+def test_space_touches_the_head_while_it_is_held(panel, window) -> None:
     QTest.keyPress(panel.view, Qt.Key.Key_Space)
     assert window.session.changes("Pepper") == [{"touch": "head", "down": True}]
     QTest.keyRelease(panel.view, Qt.Key.Key_Space)
@@ -116,7 +116,7 @@ def test_space_touches_the_head_as_long_as_it_is_held(panel, window) -> None:
     assert window.session.changes("Pepper") == [], "it is let go once"
 
 
-def test_the_ball_is_dragged_over_the_floor(panel, window) -> None:
+def test_ball_is_dragged_over_the_floor(panel, window) -> None:
     start = point(panel, "ball")
     QTest.mousePress(panel.view, Qt.MouseButton.LeftButton, pos=start)
     end = start + (point(panel, "head") - start) * 0.2
@@ -130,12 +130,12 @@ def test_the_ball_is_dragged_over_the_floor(panel, window) -> None:
     assert -3 <= moves[-1]["x"] <= 3
 
 
-def test_a_press_beside_everything_does_nothing(panel, window) -> None:
+def test_press_outside_all_objects_does_nothing(panel, window) -> None:
     QTest.mouseClick(panel.view, Qt.MouseButton.LeftButton, pos=panel.view.rect().topLeft())
     assert window.session.changes("Pepper") == []
 
 
-def test_reset_puts_everything_back(panel, window) -> None:
+def test_reset_restores_the_initial_positions(panel, window) -> None:
     panel.reset.show()
     press(panel.reset)
     assert window.session.changes("Pepper") == [{"reset": True}]
@@ -152,7 +152,7 @@ def test_without_a_robot_the_virtual_one_is_offered(qtbot, qapp) -> None:
     assert panel.title() == "Ada"
 
 
-def test_a_real_robot_has_no_drawing_but_a_way_to_its_actions(qtbot, qapp) -> None:
+def test_real_robot_has_a_link_to_its_actions_instead_of_a_drawing(qtbot, qapp) -> None:
     window = Window(Session())
     window.session.join(pepper("Turtle"), virtual=False)
     panel = window.make(PANEL)
@@ -174,7 +174,7 @@ def test_a_real_robot_has_no_drawing_but_a_way_to_its_actions(qtbot, qapp) -> No
         (lambda sensor: False, "This robot reports no state, but you can try its actions."),
     ],
 )
-def test_a_robot_that_is_not_drawn_names_only_what_it_has(qtbot, kept, words) -> None:
+def test_robot_without_a_drawing_lists_only_its_capabilities(qtbot, kept, words) -> None:
     window = Window(Session())
     whole = pepper("Table")
     robot = replace(whole, virtual=False, sensors=tuple(sensor for sensor in whole.sensors if kept(sensor)))
@@ -185,7 +185,7 @@ def test_a_robot_that_is_not_drawn_names_only_what_it_has(qtbot, kept, words) ->
 
 
 @pytest.mark.parametrize("is_tried", [False, True])
-def test_run_begins_at_the_start_position_and_a_tried_block_does_not(qapp, is_tried: bool) -> None:
+def test_run_resets_to_the_start_position_and_a_tried_block_does_not(qapp, is_tried: bool) -> None:
     session = Session.full()
     turn = block("robot_virtual_pepper_do_turn", "t", ROBOT="Pepper", DIRECTION="left", ANGLE=number(90))
     session.document.edited(workspace(started(turn)))

@@ -32,7 +32,7 @@ def panel(qtbot, window) -> RobotsPanel:
     return made
 
 
-def test_every_action_but_the_stop_is_a_card(panel) -> None:
+def test_every_action_except_stop_is_a_card(panel) -> None:
     assert list(panel.cards) == [action.name for action in ACTIONS if action.name != "stop"]
     assert (panel.name.text(), panel.chip.text, panel.about.text()) == (
         "Pepper",
@@ -42,13 +42,13 @@ def test_every_action_but_the_stop_is_a_card(panel) -> None:
     assert panel.cards["walk"].risk.text == "moves the robot"
 
 
-def test_trying_sends_what_the_form_says(panel, window) -> None:
+def test_try_sends_the_input_of_the_form(panel, window) -> None:
     panel.cards["turn"].form.set_input({"angle": -45.0})
     press(panel.cards["turn"].try_button)
     assert window.session.asked("Pepper") == [("invoke", "turn", {"angle": -45.0, "speed": 40.0})]
 
 
-def test_a_refused_input_stands_below_its_row(panel, window) -> None:
+def test_rejected_input_is_reported_below_its_row(panel, window) -> None:
     card = panel.cards["say"]
     field = card.findChild(LongText)
     assert field is not None
@@ -68,7 +68,7 @@ def test_a_refused_input_stands_below_its_row(panel, window) -> None:
         ("failed", None, "failed", "error", "The robot gave no reason."),
     ],
 )
-def test_how_it_ended_is_said(panel, window, state, error, chip, status, sentence) -> None:
+def test_result_of_an_action_is_shown(panel, window, state, error, chip, status, sentence) -> None:
     link = window.session.fleet.links[0]
     link.invocations["turn"] = Invocation("1", "turn", state, error=error, elapsed_s=1.4)
     panel.refresh()
@@ -77,7 +77,7 @@ def test_how_it_ended_is_said(panel, window, state, error, chip, status, sentenc
     assert card.try_button.text() == "Try"
 
 
-def test_while_it_runs_it_shows_its_progress_and_can_be_cancelled(panel, window) -> None:
+def test_running_action_shows_progress_and_can_be_cancelled(panel, window) -> None:
     link = window.session.fleet.links[0]
     made = link.invocations["walk"] = Invocation("1", "walk", "running", {"progress": 0.4}, elapsed_s=0.6)
     panel.refresh()
@@ -93,13 +93,13 @@ def test_while_it_runs_it_shows_its_progress_and_can_be_cancelled(panel, window)
     assert card.words.text() == ""
 
 
-def test_what_cannot_be_cancelled_waits_for_its_end(panel, window) -> None:
+def test_action_that_cannot_be_cancelled_disables_its_button_while_running(panel, window) -> None:
     window.session.fleet.links[0].invocations["light"] = Invocation("1", "light", "running")
     panel.refresh()
     assert not panel.cards["light"].try_button.isEnabled()
 
 
-def test_feedback_is_said_in_the_words_of_the_description() -> None:
+def test_feedback_is_labelled_by_the_robot_description() -> None:
     walk = next(action for action in ACTIONS if action.name == "walk")
     fields = DataField("to_go", "to go", "number", "m"), DataField("word", "word", "text")
     walk = replace(walk, feedback=fields)
@@ -111,7 +111,7 @@ def test_feedback_is_said_in_the_words_of_the_description() -> None:
     assert progress_of(walk, {"distance": 0.5}, {}) is None
 
 
-def test_one_try_is_filled_the_one_with_the_focus(qtbot, panel) -> None:
+def test_only_the_try_button_of_the_focused_card_is_filled(qtbot, panel) -> None:
     kinds = {name: card.try_button.kind for name, card in panel.cards.items()}
     assert [name for name, kind in kinds.items() if kind == "primary"] == ["say"]
     panel.activateWindow()
@@ -120,14 +120,14 @@ def test_one_try_is_filled_the_one_with_the_focus(qtbot, panel) -> None:
     assert panel.cards["say"].try_button.kind == "plain"
 
 
-def test_finding_an_action(panel) -> None:
+def test_actions_are_searched(panel) -> None:
     QTest.keyClicks(panel.finder, "lights")  # the category of two
     assert [name for name, card in panel.cards.items() if card.isVisibleTo(panel)] == ["light", "emotion"]
     panel.finder.setText("fly")
     assert panel.none.isVisible()
 
 
-def test_later_cards_are_folded_and_say_their_values(panel) -> None:
+def test_later_cards_are_collapsed_and_summarise_their_values(panel) -> None:
     card = panel.cards["emotion"]
     assert not card.form.isVisibleTo(card)
     assert card.summary.text() == "happy, for 2 s"
@@ -135,13 +135,13 @@ def test_later_cards_are_folded_and_say_their_values(panel) -> None:
     assert card.form.isVisibleTo(card)
 
 
-def test_stop_stops_the_chosen_robot(panel, window) -> None:
+def test_stop_stops_the_selected_robot(panel, window) -> None:
     assert panel.stop.text() == "Stop Pepper"
     press(panel.stop)
     assert window.session.fleet.stopping == ("Pepper",)
 
 
-def test_another_robot_can_be_chosen_and_only_it_is_looked_at(panel, window) -> None:
+def test_another_robot_can_be_selected_and_only_that_one_is_watched(panel, window) -> None:
     link = window.session.join(pepper("Turtle"), virtual=False)
     link.invocations["walk"] = Invocation("1", "walk")
     panel.refresh()
@@ -154,7 +154,7 @@ def test_another_robot_can_be_chosen_and_only_it_is_looked_at(panel, window) -> 
     assert window.session.looked_at == []
 
 
-def test_forms_keep_what_was_typed_while_other_robots_come(panel, window) -> None:
+def test_forms_keep_typed_input_when_other_robots_connect(panel, window) -> None:
     panel.cards["say"].form.set_input({"text": "half a sentence"})
     window.session.join(pepper("Turtle"))
     panel.refresh()
@@ -175,7 +175,7 @@ def remember(window, name: str, seen_s: float) -> None:
     window.session.fleet.known._settings.set(KEY, [*told, {"name": name, "seen_s": seen_s}])
 
 
-def test_a_robot_of_another_start_is_away_and_can_be_forgotten(qtbot, window) -> None:
+def test_robot_of_an_earlier_session_is_listed_as_disconnected_and_can_be_forgotten(qtbot, window) -> None:
     remember(window, "NAO", time.time() - 86_400 * 400)
     panel = window.make(PANEL, (1032, 800))
     qtbot.addWidget(panel)
@@ -189,7 +189,7 @@ def test_a_robot_of_another_start_is_away_and_can_be_forgotten(qtbot, window) ->
     assert list(panel.items) == ["Pepper"]
 
 
-def test_without_any_robot_those_that_are_away_stand_beside_the_words(qtbot) -> None:
+def test_without_connected_robots_known_ones_are_listed_in_the_empty_state(qtbot) -> None:
     window = Window(Session())
     remember(window, "NAO", 0.0)
     panel = window.make(PANEL, (1032, 800))
@@ -198,7 +198,7 @@ def test_without_any_robot_those_that_are_away_stand_beside_the_words(qtbot) -> 
     assert panel.list.away["NAO"].isVisible()
 
 
-def test_a_robot_that_goes_says_when_it_was_seen_and_goes_from_the_list_when_forgotten(panel, window) -> None:
+def test_disconnected_robot_shows_when_it_was_seen_and_is_removed_when_forgotten(panel, window) -> None:
     fleet = window.session.fleet
     link = window.session.join(pepper("Rover"), virtual=False)
     fleet.known.saw([link.robot])
@@ -212,7 +212,7 @@ def test_a_robot_that_goes_says_when_it_was_seen_and_goes_from_the_list_when_for
     assert panel.name.text() == "Pepper"
 
 
-def test_a_robot_that_is_here_has_no_menu(panel) -> None:
+def test_connected_robot_has_no_menu(panel) -> None:
     assert panel.list.menu_of(panel.items["Pepper"]) is None
 
 
@@ -224,6 +224,6 @@ def test_a_robot_that_is_here_has_no_menu(panel) -> None:
         ((2026, 12, 1, 9, 0), "seen 20 November, 16:20"),
     ],
 )
-def test_when_it_was_seen_is_said_in_plain_words(now, words) -> None:
+def test_last_seen_time_is_formatted_in_plain_words(now, words) -> None:
     seen = dt.datetime(2026, 11, 20, 16, 20, tzinfo=dt.timezone.utc)
     assert seen_words(seen.timestamp(), dt.datetime(*now, tzinfo=dt.timezone.utc)) == words

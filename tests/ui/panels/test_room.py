@@ -72,7 +72,7 @@ def thing(window: Window, name: str) -> tuple[float, float]:
     return found.x, found.y
 
 
-def test_both_robots_are_in_one_picture(panel, window) -> None:
+def test_both_robots_are_in_one_drawing(panel, window) -> None:
     both = panel.view.grab().toImage()
     assert panel.view.place_of("Turtle/body") is not None
     window.session.fleet.links[1].drawing = of_turtle(x=0.2, y=1.5)
@@ -84,7 +84,7 @@ def test_both_robots_are_in_one_picture(panel, window) -> None:
 
 
 @pytest.mark.parametrize("name", ["ball", "Aiko", "marker 7", "table", "shelf"])
-def test_each_thing_is_dragged_over_the_floor(panel, window, name) -> None:
+def test_each_object_is_dragged_over_the_floor(panel, window, name) -> None:
     before = thing(window, name)
     drag(panel, name, QPoint(-40 if before[1] > 0 else 40, 10))
     after = thing(window, name)
@@ -94,7 +94,7 @@ def test_each_thing_is_dragged_over_the_floor(panel, window, name) -> None:
     assert window.session.changes("Pepper") == []  # it is everybody's room
 
 
-def test_a_thing_does_not_jump_under_the_mouse_and_stops_at_the_walls(panel, window) -> None:
+def test_dragged_object_keeps_its_offset_to_the_mouse_and_stops_at_the_walls(panel, window) -> None:
     before = thing(window, "table")
     drag(panel, "table", QPoint(5, 0))
     after = thing(window, "table")
@@ -105,7 +105,7 @@ def test_a_thing_does_not_jump_under_the_mouse_and_stops_at_the_walls(panel, win
     assert (table.x, table.y) == (3.0 - table.width / 2, 2.5 - table.depth / 2)
 
 
-def test_a_robot_is_taken_up_carried_and_put_down(panel, window) -> None:
+def test_robot_is_picked_up_moved_and_put_down(panel, window) -> None:
     drag(panel, "Turtle/body", QPoint(-50, 0))
     changes = window.session.changes("Turtle")
     assert changes[0] == {"hold": True}
@@ -117,7 +117,7 @@ def test_a_robot_is_taken_up_carried_and_put_down(panel, window) -> None:
     assert window.session.changes("Pepper")[0] == {"hold": True}
 
 
-def test_a_press_without_a_move_moves_nothing(panel, window) -> None:
+def test_press_without_a_move_moves_nothing(panel, window) -> None:
     QTest.mouseClick(panel.view, LEFT, pos=point(panel, "body"))
     QTest.mouseClick(panel.view, LEFT, pos=point(panel, "ball"))
     assert window.session.changes("Pepper") == []
@@ -127,7 +127,7 @@ def test_a_press_without_a_move_moves_nothing(panel, window) -> None:
 @pytest.mark.parametrize(
     ("at", "side"), [(0, "front"), (35, "front"), (90, "right"), (-90, "left"), (180, "back")]
 )
-def test_a_tap_on_the_small_robot_presses_its_bumper_on_that_side(panel, window, at, side) -> None:
+def test_click_on_the_small_robot_presses_the_bumper_on_that_side(panel, window, at, side) -> None:
     window.session.fleet.links[1].drawing = of_turtle(theta_deg=at)
     panel.refresh()
     toes = point(panel, "Turtle/body") + QPoint(0, round(panel.view.height() / 286 * 31 * 1.1))
@@ -135,7 +135,7 @@ def test_a_tap_on_the_small_robot_presses_its_bumper_on_that_side(panel, window,
     assert window.session.changes("Turtle") == [{"happen": "bump", "side": side}]
 
 
-def test_two_quick_taps_and_the_keyboard_press_the_bumper_and_a_drag_does_not(panel, window) -> None:
+def test_double_click_and_keyboard_press_the_bumper_and_a_drag_does_not(panel, window) -> None:
     place = point(panel, "Turtle/body")
     QTest.mouseClick(panel.view, LEFT, pos=place)
     QTest.mouseDClick(panel.view, LEFT, pos=place)
@@ -151,7 +151,7 @@ def test_two_quick_taps_and_the_keyboard_press_the_bumper_and_a_drag_does_not(pa
     assert front not in changes
 
 
-def test_what_can_be_moved_is_outlined_under_the_mouse(panel) -> None:
+def test_movable_object_under_the_mouse_is_outlined(panel) -> None:
     plain = panel.view.grab().toImage()
     QTest.mouseMove(panel.view, point(panel, "ball"))
     assert panel.view.cursor().shape() == Qt.CursorShape.OpenHandCursor
@@ -162,7 +162,7 @@ def test_what_can_be_moved_is_outlined_under_the_mouse(panel) -> None:
     assert panel.view.cursor().shape() == Qt.CursorShape.ArrowCursor
 
 
-def test_the_keyboard_moves_and_removes_what_tab_has_chosen(panel, window) -> None:
+def test_object_selected_with_tab_is_moved_and_removed_by_keyboard(panel, window) -> None:
     panel.view.setFocus()
     seen = []
     for _turn in range(7):
@@ -181,7 +181,7 @@ def test_the_keyboard_moves_and_removes_what_tab_has_chosen(panel, window) -> No
     assert window.session.changes("Turtle") == []
 
 
-def test_tab_leaves_the_room_after_the_last_thing(panel, window) -> None:
+def test_tab_leaves_the_room_after_the_last_object(panel, window) -> None:
     panel.view.setFocus()
     for _turn in range(8):
         QTest.keyClick(panel.view, Qt.Key.Key_Tab)
@@ -199,7 +199,7 @@ def choose(panel: RobotPanel, words: str) -> None:
     QTest.mouseClick(opened, LEFT, pos=opened.actionGeometry(action).center())
 
 
-def test_things_are_added_removed_and_put_back(panel, window) -> None:
+def test_objects_are_added_removed_and_restored(panel, window) -> None:
     press(panel.add)
     choose(panel, "Add a ball")
     panel.refresh()
@@ -220,7 +220,7 @@ def test_things_are_added_removed_and_put_back(panel, window) -> None:
     assert window.session.changes("Pepper") == window.session.changes("Turtle") == [{"reset": True}]
 
 
-def test_a_kind_of_which_there_are_enough_says_so(panel, window) -> None:
+def test_adding_beyond_the_limit_of_a_kind_is_rejected_with_a_toast(panel, window) -> None:
     for _turn in range(9):
         press(panel.add)
         choose(panel, "Add a ball")
@@ -245,7 +245,7 @@ def large(qtbot, panel) -> LargeRoom:
     return found
 
 
-def test_a_double_click_makes_the_room_large_and_another_one_small(panel, large) -> None:
+def test_double_click_enlarges_the_room_and_another_one_restores_it(panel, large) -> None:
     assert panel.view.width() == 900
     assert large.isAncestorOf(panel.view)
     large.parentWidget().resize(1000, 720)
@@ -255,7 +255,7 @@ def test_a_double_click_makes_the_room_large_and_another_one_small(panel, large)
     assert panel.pages.currentWidget() is panel.stage
 
 
-def test_esc_leaves_the_large_room_also_from_the_drawing(qtbot, panel, large) -> None:
+def test_esc_closes_the_large_room_also_with_focus_in_the_drawing(qtbot, panel, large) -> None:
     panel.view.setFocus()
     QTest.keyClick(panel.view, Qt.Key.Key_Escape)
     assert panel.isAncestorOf(panel.view)
@@ -263,7 +263,7 @@ def test_esc_leaves_the_large_room_also_from_the_drawing(qtbot, panel, large) ->
     assert panel.view.isVisible()
 
 
-def test_it_fills_the_screen_and_leaves_it_with_esc(panel, large) -> None:
+def test_room_fills_the_screen_and_esc_leaves_full_screen(panel, large) -> None:
     window = large.window()
     press(large.screen_button)
     assert window.windowState() & Qt.WindowState.WindowFullScreen
@@ -272,7 +272,7 @@ def test_it_fills_the_screen_and_leaves_it_with_esc(panel, large) -> None:
     assert panel.isAncestorOf(panel.view)
 
 
-def test_the_large_room_is_furnished_and_put_back_by_its_own_buttons(panel, large, window) -> None:
+def test_large_room_is_furnished_and_reset_by_its_own_buttons(panel, large, window) -> None:
     buttons = {each.accessibleName(): each for each in large.findChildren(IconButton)}
     press(buttons["Add something to the room"])
     choose(panel, "Add a ball")
@@ -281,7 +281,7 @@ def test_the_large_room_is_furnished_and_put_back_by_its_own_buttons(panel, larg
     assert window.session.room.room.thing("ball 2") is None
 
 
-def test_the_large_room_goes_on_showing_what_is_new(panel, large, window) -> None:
+def test_large_room_keeps_updating(panel, large, window) -> None:
     before = panel.view.grab().toImage()
     window.session.fleet.links[1].drawing = of_turtle(x=0.2, y=1.5)
     panel.refresh()

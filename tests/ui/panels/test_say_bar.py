@@ -47,7 +47,7 @@ def choose(panel: RobotPanel, words: str) -> None:
     QTest.mouseClick(opened, Qt.MouseButton.LeftButton, pos=place)
 
 
-def test_what_is_typed_is_heard_with_return(panel, window) -> None:
+def test_typed_words_are_said_to_the_robot_with_return(panel, window) -> None:
     assert panel.say.field.placeholderText() == "Say something to Pepper"
     QTest.keyClicks(panel.say.field, " good morning ")
     assert window.session.changes("Pepper") == []
@@ -60,7 +60,7 @@ def test_what_is_typed_is_heard_with_return(panel, window) -> None:
     assert panel.say.field.text() == "good morning"
 
 
-def test_the_room_says_what_the_robot_has_heard(panel, window) -> None:
+def test_room_shows_what_the_robot_heard(panel, window) -> None:
     link = window.session.fleet.links[0]
     link.drawing = {**drawing(), "speech": "", "heard": "good morning"}
     panel.refresh()
@@ -70,7 +70,7 @@ def test_the_room_says_what_the_robot_has_heard(panel, window) -> None:
     assert panel.view.heard == ""
 
 
-def test_the_words_that_the_behaviour_waits_for_are_offered(panel, window) -> None:
+def test_words_that_the_behaviour_waits_for_are_suggested(panel, window) -> None:
     hat = {"type": "robot_pepper_when_heard", "fields": {"ROBOT": "Pepper", "WORD": "quiz"}}
     window.session.document.workspace = {"blocks": {"blocks": [hat]}}
     press(panel.say.words)
@@ -81,7 +81,7 @@ def test_the_words_that_the_behaviour_waits_for_are_offered(panel, window) -> No
     assert [action.text() for action in menu(panel).actions()] == ["quiz", "hello"]
 
 
-def test_anything_else_can_be_let_happen(panel, window) -> None:
+def test_other_events_are_simulated_from_a_menu(panel, window) -> None:
     press(panel.say.events)
     entries = [action.text() for action in menu(panel).actions()]
     assert {"Sees a face", "Bumps with its front", "Left hand is touched"} <= set(entries)
@@ -90,7 +90,7 @@ def test_anything_else_can_be_let_happen(panel, window) -> None:
     assert window.session.changes("Pepper") == [{"happen": "bumped", "side": "front"}]
 
 
-def test_nothing_can_be_said_to_a_real_robot(qtbot) -> None:
+def test_say_bar_is_unavailable_for_a_real_robot(qtbot) -> None:
     window = Window(Session())
     window.session.join(pepper("Table"), virtual=False)
     panel = window.make(PANEL, (384, 320))

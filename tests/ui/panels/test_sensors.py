@@ -38,13 +38,13 @@ POSE = Sensor("pose", "position", "object", "/p", fields=(
         (Sensor("l", "list", "list", "/l"), ["x", "y"], ReadingWords("2", "x, y")),
     ],
 )  # fmt: skip
-def test_a_sensor_in_words(sensor: Sensor, value: object, reading: ReadingWords) -> None:
+def test_sensor_value_is_formatted_in_words(sensor: Sensor, value: object, reading: ReadingWords) -> None:
     found = reading_of(sensor, value)
     assert (found.value, found.beside) == (reading.value, reading.beside)
     assert found.share == (pytest.approx(reading.share) if reading.share is not None else None)
 
 
-def test_numbers_have_as_many_decimals_as_matter() -> None:
+def test_numbers_have_significant_decimals() -> None:
     assert [number_words(value, "m") for value in (1.0, -0.3, 12.34, 123.4)] == [
         "1 m",
         "\u22120.30 m",
@@ -59,7 +59,7 @@ def window(qapp) -> Window:
     return Window(Session.full())
 
 
-def test_one_row_for_each_sensor_but_pictures(qtbot, window) -> None:
+def test_every_sensor_except_images_has_one_row(qtbot, window) -> None:
     panel = window.make(PANEL, (384, 300))
     qtbot.addWidget(panel)
     assert isinstance(panel, SensorsPanel)
@@ -73,7 +73,7 @@ def test_one_row_for_each_sensor_but_pictures(qtbot, window) -> None:
     assert window.session.looked_at == []
 
 
-def test_what_people_look_for_comes_first_and_no_row_is_cut(qtbot, window) -> None:
+def test_common_sensors_come_first_and_no_row_is_clipped(qtbot, window) -> None:
     panel = window.make(PANEL, (384, 130))
     qtbot.addWidget(panel)
     assert isinstance(panel, SensorsPanel)
@@ -87,7 +87,7 @@ def test_what_people_look_for_comes_first_and_no_row_is_cut(qtbot, window) -> No
     qtbot.waitUntil(lambda: panel.rows[-1].visibleRegion().boundingRect().height() == 28)
 
 
-def test_values_follow_and_the_last_yes_is_remembered(qtbot, window, monkeypatch) -> None:
+def test_values_are_updated_and_the_last_true_is_remembered(qtbot, window, monkeypatch) -> None:
     panel = window.make(PANEL)
     qtbot.addWidget(panel)
     assert isinstance(panel, SensorsPanel)
@@ -105,7 +105,7 @@ def test_values_follow_and_the_last_yes_is_remembered(qtbot, window, monkeypatch
     assert touch.accessibleDescription() == "no 14 s ago"
 
 
-def test_a_robot_that_went_away_feels_nothing(qtbot, window) -> None:
+def test_disconnected_robot_shows_no_sensor_values(qtbot, window) -> None:
     panel = window.make(PANEL, (384, 300))
     qtbot.addWidget(panel)
     assert isinstance(panel, SensorsPanel)
@@ -114,7 +114,7 @@ def test_a_robot_that_went_away_feels_nothing(qtbot, window) -> None:
     assert {row.reading for row in panel.rows} == {ReadingWords()}
 
 
-def test_the_rows_are_painted_otherwise_when_values_differ(qtbot, window) -> None:
+def test_rows_with_different_values_are_painted_differently(qtbot, window) -> None:
     panel = window.make(PANEL, (384, 300))
     qtbot.addWidget(panel)
     before = panel.grab().toImage()
@@ -123,7 +123,7 @@ def test_the_rows_are_painted_otherwise_when_values_differ(qtbot, window) -> Non
     assert panel.grab().toImage() != before
 
 
-def test_with_no_robot_it_says_so_and_another_description_makes_other_rows(qtbot, qapp) -> None:
+def test_panel_without_a_robot_shows_an_empty_state_and_rows_follow_the_description(qtbot, qapp) -> None:
     window = Window(Session())
     panel = window.make(PANEL)
     qtbot.addWidget(panel)

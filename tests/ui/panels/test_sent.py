@@ -45,7 +45,7 @@ def sign(panel: SentPanel, row: int) -> str:
     return panel.table.cell_at(row, 1).said
 
 
-def test_what_is_sent_is_listed_copied_and_sent_again_while_it_is_armed(qtbot, window) -> None:
+def test_sent_messages_are_listed_copied_and_resent_while_armed(qtbot, window) -> None:
     session, panel = window.session, made(qtbot, window)
     acting = session.acting
     press(button(panel, "Publish a message"))
@@ -115,7 +115,7 @@ def put_all(session: Session) -> None:
     session.acting.arm()
 
 
-def test_calls_and_what_a_recording_sends_have_their_own_menus(qtbot, window) -> None:
+def test_calls_and_messages_sent_from_a_recording_have_their_own_menus(qtbot, window) -> None:
     panel, acting = made(qtbot, window), window.session.acting
     put_all(window.session)
     acting.allow(Target("service", "remember_face"))
@@ -141,7 +141,7 @@ def test_calls_and_what_a_recording_sends_have_their_own_menus(qtbot, window) ->
 
 
 @pytest.mark.parametrize("size", [(640, 320), (300, 200)], ids=["roomy", "narrow"])
-def test_words_are_translated_and_fit(qtbot, pseudo, window, size) -> None:
+def test_texts_are_translated_and_fit(qtbot, pseudo, window, size) -> None:
     panel = made(qtbot, window, size)
     assert untranslated_in(panel) == []
     put_all(window.session)

@@ -68,7 +68,7 @@ def answered(window: Window, panel: ServicesPanel, qtbot) -> None:
     qtbot.waitUntil(is_over, timeout=30_000)
 
 
-def test_services_with_who_offers_them_but_no_parameters(panel) -> None:
+def test_services_are_listed_with_their_nodes_and_without_parameter_services(panel) -> None:
     names = [panel.list.cell_at(row, 0).said for row in range(panel.list.model().rowCount())]
     assert names == [
         "forget_face, camera_driver",
@@ -80,7 +80,7 @@ def test_services_with_who_offers_them_but_no_parameters(panel) -> None:
     assert panel.list.model().rowCount() == 1
 
 
-def test_the_form_is_made_of_the_last_request_and_changes_the_json(panel) -> None:
+def test_form_is_built_from_the_last_request_and_edits_its_json(panel) -> None:
     fields = panel.form.fields
     assert list(fields) == ["name", "pictures", "quality", "replace", "box"]
     assert isinstance(fields["replace"], Switch)
@@ -102,7 +102,7 @@ def test_the_form_is_made_of_the_last_request_and_changes_the_json(panel) -> Non
     assert list(panel.form.fields) == ["name"]
 
 
-def test_what_no_field_takes_is_said_and_not_called(panel) -> None:
+def test_invalid_field_is_reported_and_disables_the_call(panel) -> None:
     field = panel.form.fields["pictures"]
     assert isinstance(field, QLineEdit)
     field.selectAll()
@@ -123,7 +123,7 @@ def test_what_no_field_takes_is_said_and_not_called(panel) -> None:
     assert panel.way.value == "json", "a list has no fields"
 
 
-def test_a_call_with_its_answer_time_and_history(window, panel, qtbot) -> None:
+def test_call_shows_reply_duration_and_history(window, panel, qtbot) -> None:
     session = window.session
     asked: list[object] = []
 
@@ -154,7 +154,7 @@ def test_a_call_with_its_answer_time_and_history(window, panel, qtbot) -> None:
     assert panel.calls_model.rowCount() == 0
 
 
-def test_a_refusal_a_timeout_and_giving_up(window, panel, qtbot) -> None:
+def test_rejected_timed_out_and_cancelled_calls_are_reported(window, panel, qtbot) -> None:
     session, go_on, mode = window.session, threading.Event(), ["refuse"]
 
     def serve(_request: object) -> object:
@@ -184,7 +184,7 @@ def test_a_refusal_a_timeout_and_giving_up(window, panel, qtbot) -> None:
     go_on.set()
 
 
-def test_closing_disarms_and_without_services_it_says_what_to_do(window, panel) -> None:
+def test_closing_disarms_and_empty_panel_explains_what_to_do(window, panel) -> None:
     window.session.acting.arm()
     panel.shut()
     assert not window.session.acting.arming.is_on
@@ -193,7 +193,7 @@ def test_closing_disarms_and_without_services_it_says_what_to_do(window, panel) 
     assert panel.pages.currentIndex() == 0
 
 
-def test_a_service_in_the_menu_of_commands_is_chosen(window, panel) -> None:
+def test_service_from_a_menu_command_is_selected(window, panel) -> None:
     panel.begin("set_language")
     assert panel.service == "set_language"
     assert panel.form.nothing.isVisible()
@@ -203,7 +203,7 @@ def test_a_service_in_the_menu_of_commands_is_chosen(window, panel) -> None:
     assert window.commands == ["service.call:set_language"]
 
 
-def test_answers_of_any_form_have_rows_and_not_too_many() -> None:
+def test_replies_of_any_shape_are_shown_in_a_bounded_number_of_rows() -> None:
     assert [row.words for row in answer_rows(None)] == ["null"]
     assert all(len(row.words) < 2 * TEXT_LETTERS for row in answer_rows("x" * 1000))
     assert len(answer_rows(list(range(10_000)))) == MOST_ROWS + 1
@@ -213,13 +213,13 @@ def test_answers_of_any_form_have_rows_and_not_too_many() -> None:
     assert len(answer_rows(deep)) < 20
 
 
-def test_everything_is_said_and_fits_also_where_it_is_narrow(panel, qtbot) -> None:
+def test_controls_have_accessible_names_and_fit_a_narrow_panel(panel, qtbot) -> None:
     assert unsaid(panel) == []
     panel.resize(400, 640)
     qtbot.waitUntil(lambda: panel.list.width() > 300)
 
 
-def test_nothing_of_an_answer_is_cut_off_at_the_width_of_the_developer_layout(window, panel, qtbot) -> None:
+def test_reply_is_not_clipped_at_the_width_of_the_developer_layout(window, panel, qtbot) -> None:
     panel.resize(328, 700)
     window.session.source.node.new_server("remember_face", lambda _request: {"ok": True}, threads=1)
     press(panel.call_button)

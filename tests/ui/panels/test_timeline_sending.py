@@ -47,7 +47,7 @@ def chosen(panel: TimelinePanel) -> list[str]:
     return [table.cell_at(row, 3).text for row in range(panel.chooser.model.rowCount())]
 
 
-def test_topics_are_chosen_named_armed_asked_for_sent_and_counted(qtbot, qapp, path):
+def test_recorded_topics_are_selected_renamed_armed_confirmed_sent_and_counted(qtbot, qapp, path):
     session = Session()
     window = Window(session)
     panel = window.make(PANEL, (1000, 340))

@@ -50,7 +50,7 @@ def row(panel: TopicsPanel, name: str, columns: tuple[str, ...] = FIGURES) -> li
     return [panel.model.data(panel.model.index(place, place_of(panel, column))) for column in columns]  # type: ignore[misc]
 
 
-def test_every_topic_with_its_figures(panel) -> None:
+def test_every_topic_is_listed_with_its_figures(panel) -> None:
     assert panel.model.rowCount() == 13
     assert row(panel, "/robot/depth") == ["/robot/depth", "image", "1", "60.0", "5.1 MB/s", "21 ms", "0.4 %"]
     assert row(panel, "/speech/words")[:5] == ["/speech/words", "string", "2", "0.2", "14 B/s"]
@@ -58,18 +58,18 @@ def test_every_topic_with_its_figures(panel) -> None:
     assert panel.count.text() == "13 topics, 7 nodes"
 
 
-def test_nothing_is_subscribed(panel, window) -> None:
+def test_topics_panel_subscribes_to_nothing(panel, window) -> None:
     ticks(window, panel, 10)
     assert window.session.watched == []
 
 
-def test_what_is_not_known_is_blank(panel, window) -> None:
+def test_unknown_figures_are_blank(panel, window) -> None:
     window.session.put(Topic("/x", rate_hz=None, lost=None))
     panel.refresh()
     assert row(panel, "/x") == ["/x", "json", "1", "", "", "", ""]
 
 
-def test_new_ones_are_bold_until_somebody_looks(panel, window) -> None:
+def test_new_topics_are_bold_until_selected(panel, window) -> None:
     index = panel.model.index_of("/speech/words")
     cell = panel.model.data(index, CELL_ROLE)
     assert (cell.bold, cell.chip) == (True, "new")
@@ -80,7 +80,7 @@ def test_new_ones_are_bold_until_somebody_looks(panel, window) -> None:
     assert window.opened == ["/speech/words"]
 
 
-def test_what_studio_itself_brought_is_no_news(panel, window) -> None:
+def test_topics_of_robots_started_by_studio_are_not_marked_as_new(panel, window) -> None:
     window.session.launcher.restart_virtual_robot("Pepper")
     topics = [
         Topic("/Pepper/pose", new=True, publisher_nodes=("Pepper",)),
@@ -96,14 +96,14 @@ def test_what_studio_itself_brought_is_no_news(panel, window) -> None:
     assert [cell.chip for cell in cells] == [None, None, None, "new", "new"]
 
 
-def test_a_type_says_its_last_word_and_has_an_icon_without_a_publisher() -> None:
+def test_type_is_shortened_to_its_last_part_and_has_an_icon_without_a_publisher() -> None:
     cell = type_cell(Topic("/a", "robot/answer", "json"))
     assert (cell.text, cell.icon) == ("answer", "braces")
     assert type_cell(Topic("/a", "json", "")).icon == "braces"
     assert type_cell(Topic("/a", "own/kind", "")).icon == "box"
 
 
-def test_vanished_ones_are_struck_through_and_say_since_when() -> None:
+def test_vanished_topics_are_struck_through_and_show_since_when() -> None:
     gone = Topic("/x", gone_s=4.7, new=True)
     assert name_cell(gone).struck
     assert name_cell(gone).chip is None
@@ -112,7 +112,7 @@ def test_vanished_ones_are_struck_through_and_say_since_when() -> None:
     assert loss_cell(Topic("/y", lost=3, loss_ratio=None)).text == "3"
 
 
-def test_the_filter_is_reached_by_the_slash_and_finds_names_types_and_nodes(qtbot, panel, window) -> None:
+def test_slash_focuses_the_filter_which_finds_names_types_and_nodes(qtbot, panel, window) -> None:
     panel.filter.show()
     QTest.keyClicks(panel.table, "/")
     panel.filter.setText("IMAGE depth")
@@ -126,7 +126,7 @@ def test_the_filter_is_reached_by_the_slash_and_finds_names_types_and_nodes(qtbo
     assert panel.model.rowCount() == 13
 
 
-def test_sorting_keeps_the_chosen_topic_and_figures_that_move_are_sorted_once_a_second(panel, window) -> None:
+def test_sorting_keeps_the_selection_and_changing_figures_are_sorted_once_per_second(panel, window) -> None:
     panel.show_topic("/odom")
     panel.table.horizontalHeader().sectionClicked.emit(place_of(panel, "rate"))  #: the largest first
     assert panel.model.data(panel.model.index(0, 0)) == "/robot/depth"
@@ -140,7 +140,7 @@ def test_sorting_keeps_the_chosen_topic_and_figures_that_move_are_sorted_once_a_
     assert panel.model.data(panel.model.index(0, 0)) == "/touch"
 
 
-def test_ten_thousand_topics_cost_one_signal_over_the_visible_rows_each_sixth_tick(qtbot, qapp) -> None:
+def test_ten_thousand_topics_emit_one_signal_for_visible_rows_every_sixth_tick(qtbot, qapp) -> None:
     window = Window(Session())
     for number in range(10_000):
         window.session.put(Topic(f"/t{number:05}", rate_hz=10.0, age_s=0.1))
@@ -158,7 +158,7 @@ def test_ten_thousand_topics_cost_one_signal_over_the_visible_rows_each_sixth_ti
     assert last - first < 30
 
 
-def test_enter_opens_and_the_arrows_move(panel, window) -> None:
+def test_enter_opens_a_topic_and_arrow_keys_move(panel, window) -> None:
     panel.table.setFocus(Qt.FocusReason.TabFocusReason)
     panel.table.choose("/joint_states")
     QTest.keyClick(panel.table, Qt.Key.Key_Down)
@@ -174,7 +174,7 @@ def test_enter_opens_and_the_arrows_move(panel, window) -> None:
         ("searching", "Searching for a master", None, 0, []),
     ],
 )
-def test_with_nothing_it_says_what_to_do_next(qtbot, qapp, kind, words, pressed, masters, commands) -> None:
+def test_empty_panel_explains_what_to_do_next(qtbot, qapp, kind, words, pressed, masters, commands) -> None:
     window = Window(Session())
     window.session.master = MasterState(kind, window.session.master.address)
     panel = window.make(PANEL)
@@ -188,7 +188,7 @@ def test_with_nothing_it_says_what_to_do_next(qtbot, qapp, kind, words, pressed,
     assert window.commands == commands
 
 
-def test_the_order_comes_back_with_the_layout(qtbot, panel, window) -> None:
+def test_sort_order_is_restored_with_the_layout(qtbot, panel, window) -> None:
     panel.table.horizontalHeader().sectionClicked.emit(place_of(panel, "age"))
     again = window.make(PANEL)
     qtbot.addWidget(again)
@@ -199,7 +199,7 @@ def test_the_order_comes_back_with_the_layout(qtbot, panel, window) -> None:
     assert again.table.order.column is again.table.columns[0]
 
 
-def test_the_curve_of_the_last_rates_stands_before_the_rate(panel, window) -> None:
+def test_sparkline_of_recent_rates_is_shown_before_the_rate(panel, window) -> None:
     topic = window.session.topics["/odom"]
     topic.rates.clear()
     topic.rates.extend([49.0, 50.0, 51.0])
@@ -212,7 +212,7 @@ def test_the_curve_of_the_last_rates_stands_before_the_rate(panel, window) -> No
     assert curve_cell(Topic("/silent")).curve == ()
 
 
-def test_columns_are_chosen_in_a_menu_and_come_back_with_the_layout(qtbot, panel, window) -> None:
+def test_columns_are_chosen_in_a_menu_and_restored_with_the_layout(qtbot, panel, window) -> None:
     assert panel.table.isColumnHidden(place_of(panel, "subscribers"))
     columns, _others = panel.more_actions()
     menu = columns.menu()
@@ -237,12 +237,12 @@ def test_columns_are_chosen_in_a_menu_and_come_back_with_the_layout(qtbot, panel
     assert again.save_state()["columns"] == {}
 
 
-def test_who_publishes_can_be_a_column() -> None:
+def test_publishers_are_an_optional_column() -> None:
     topic = Topic("/x", publisher_nodes=("camera", "lidar"), subscribers=2)
     assert nodes_cell(topic).text == "camera, lidar"
 
 
-def test_what_did_not_reach_the_panels_is_said_with_its_numbers(panel, window) -> None:
+def test_tooltips_report_how_many_messages_were_not_shown(panel, window) -> None:
     rate, loss = (panel.table.columns[place_of(panel, name)] for name in ("rate", "loss"))
     topic = window.session.topics["/odom"]
     assert rate.tip(topic) == "Messages per second, as reported by the publishers"
@@ -251,7 +251,7 @@ def test_what_did_not_reach_the_panels_is_said_with_its_numbers(panel, window) -
     assert loss.tip(topic) == "0 messages lost. 230 of 5\u2009000 messages shown"
 
 
-def test_an_empty_panel_leads_to_the_connection_doctor(qtbot, panel, window) -> None:
+def test_empty_panel_links_to_the_connection_doctor(qtbot, panel, window) -> None:
     assert panel.doctor.isHidden()
     panel.filter.setText("nothing like this")
     assert panel.doctor.isHidden()  # the filter is the reason
@@ -264,7 +264,7 @@ def test_an_empty_panel_leads_to_the_connection_doctor(qtbot, panel, window) -> 
     assert empty.asked_why == [(bare, "")]
 
 
-def test_a_topic_that_is_typed_and_not_there_leads_there_too(panel, window) -> None:
+def test_filter_for_a_missing_topic_links_to_the_connection_doctor_too(panel, window) -> None:
     panel.filter.setText("no topic")
     assert [each.accessibleName() for each in panel.empty.findChildren(Button)] == ["Clear the filter"]
     panel.filter.setText("/robot/deph")
@@ -276,7 +276,7 @@ def test_a_topic_that_is_typed_and_not_there_leads_there_too(panel, window) -> N
     assert (panel.filter.text(), list(panel.hindrances())) == ("", [])
 
 
-def test_a_topic_that_was_asked_for_is_chosen_as_soon_as_it_is_listed(panel, window) -> None:
+def test_requested_topic_is_selected_as_soon_as_it_is_listed(panel, window) -> None:
     panel.show_topic("/odom")
     assert panel.table.currentIndex() == panel.model.index_of("/odom")
     panel.show_topic("/later")
@@ -287,14 +287,14 @@ def test_a_topic_that_was_asked_for_is_chosen_as_soon_as_it_is_listed(panel, win
     assert window.opened == []
 
 
-def test_a_name_of_twenty_letters_fits_at_the_usual_width(qtbot, panel) -> None:
+def test_topic_name_of_twenty_letters_fits_the_default_width(qtbot, panel) -> None:
     panel.resize(640, 400)
     qtbot.wait(10)
     room = panel.table.columnWidth(place_of(panel, "topic"))
     assert room >= panel.theme.font("mono").pixelSize() * 0.6 * len("/Pepper/head_touched")
 
 
-def test_a_right_click_on_a_topic_does_whatever_can_be_done_with_it(panel, window) -> None:
+def test_context_menu_of_a_topic_offers_all_its_commands(panel, window) -> None:
     menu = panel.menu_of("/blackboard")
     assert menu is not None
     for action in menu.actions():
@@ -318,7 +318,7 @@ def as_tree(panel: TopicsPanel, window: Window) -> None:
     ticks(window, panel)
 
 
-def test_as_a_tree_topics_stand_in_folders_with_the_sums_of_their_rates(panel, window) -> None:
+def test_tree_view_groups_topics_in_folders_with_summed_rates(panel, window) -> None:
     session = window.session
     session.put(Topic("/arm/left/speed", rate_hz=40.0, bandwidth_Bps=400.0, age_s=0.5, lost=0))
     session.put(Topic("/arm/right/speed", rate_hz=2.5, bandwidth_Bps=100.0, age_s=0.1, lost=3))
@@ -337,7 +337,7 @@ def test_as_a_tree_topics_stand_in_folders_with_the_sums_of_their_rates(panel, w
     assert shown(panel) == ["/arm/left/speed", "/arm/right/speed"]
 
 
-def test_the_keyboard_opens_and_closes_folders_and_goes_up(panel, window) -> None:
+def test_folders_are_expanded_and_collapsed_by_keyboard_and_left_goes_to_the_parent(panel, window) -> None:
     as_tree(panel, window)
     whole = panel.model.rowCount()
     panel.table.setFocus(Qt.FocusReason.TabFocusReason)
@@ -357,7 +357,7 @@ def test_the_keyboard_opens_and_closes_folders_and_goes_up(panel, window) -> Non
     assert window.opened == ["/robot/depth"]
 
 
-def test_what_a_filter_finds_is_in_no_closed_folder_and_types_and_patterns_are_found(panel, window) -> None:
+def test_filter_expands_folders_and_matches_types_and_patterns(panel, window) -> None:
     as_tree(panel, window)
     panel.table.opened.emit("/robot/*")
     assert "depth" not in shown(panel)
@@ -369,14 +369,14 @@ def test_what_a_filter_finds_is_in_no_closed_folder_and_types_and_patterns_are_f
     assert "depth" not in shown(panel)
 
 
-def test_a_closed_folder_says_that_something_in_it_is_new(panel, window) -> None:
+def test_collapsed_folder_is_marked_when_it_contains_new_topics(panel, window) -> None:
     as_tree(panel, window)
     assert panel.model.data(panel.model.index_of("/speech/*"), CELL_ROLE).chip is None
     panel.table.opened.emit("/speech/*")
     assert panel.model.data(panel.model.index_of("/speech/*"), CELL_ROLE).chip == "new"
 
 
-def test_the_tree_and_its_closed_folders_come_back_with_the_layout(qtbot, panel, window) -> None:
+def test_tree_view_and_collapsed_folders_are_restored_with_the_layout(qtbot, panel, window) -> None:
     as_tree(panel, window)
     panel.table.opened.emit("/robot/*")
     again = window.make(PANEL)
@@ -388,7 +388,7 @@ def test_the_tree_and_its_closed_folders_come_back_with_the_layout(qtbot, panel,
     assert not again.as_tree.isChecked()
 
 
-def test_the_menu_of_a_folder_opens_and_closes_all_and_copies_its_pattern(panel, window) -> None:
+def test_folder_menu_expands_and_collapses_all_and_copies_its_pattern(panel, window) -> None:
     as_tree(panel, window)
     whole = shown(panel)
     by_words = {action.text(): action for action in panel.menu_of("/robot/*").actions()}

@@ -28,24 +28,24 @@ def count(picture: np.ndarray, colour: str, within: int = 12) -> int:
     return int((away.max(axis=2) <= within).sum())
 
 
-def test_it_looks_different_from_every_side(qapp) -> None:
+def test_drawing_differs_for_every_heading(qapp) -> None:
     pictures = [drawn(theta_deg=angle) for angle in range(0, 360, 45)]
     for number, one in enumerate(pictures):
         for other in pictures[:number]:
             assert (one != other).any(axis=2).sum() > 100
 
 
-def test_its_light_has_the_colour_that_it_was_given(qapp) -> None:
+def test_light_has_the_colour_of_the_state(qapp) -> None:
     assert count(drawn(theta_deg=90, eyes="#ff00ff"), "#ff00ff") > 30
     assert count(drawn(theta_deg=90, eyes="#00ff00"), "#ff00ff") == 0
 
 
 @pytest.mark.parametrize("side", ["left", "right", "front"])
-def test_what_it_bumps_into_is_amber(qapp, side) -> None:
+def test_obstacle_hit_by_the_bumper_is_amber(qapp, side) -> None:
     assert count(drawn(theta_deg=0, bumped=side), "#FFB300") > count(drawn(theta_deg=0), "#FFB300") + 20
 
 
-def test_its_body_and_the_ball_can_be_found_and_it_has_no_hands(qapp) -> None:
+def test_body_and_ball_are_hit_testable_and_there_are_no_hands(qapp) -> None:
     ball = {"kind": "ball", "name": "ball", "x": 1.5, "y": -1.0}
     state = RobotState.parse({"figure": "turtle", "objects": [ball]})
     drawing = RobotDrawing()

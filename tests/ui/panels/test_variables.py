@@ -56,12 +56,12 @@ def tells(window: Window, panel: VariablesPanel, **values: object) -> None:
     ticks(window, panel, 1)
 
 
-def test_every_variable_of_the_behaviour_is_there_before_it_runs(panel, window) -> None:
+def test_every_variable_of_the_behaviour_is_listed_before_it_runs(panel, window) -> None:
     assert shown(panel) == [("score", ""), ("names", ""), ("later", "")]
     assert panel.when.text() == ""
 
 
-def test_values_come_while_it_runs_are_marked_and_stay_after_the_end(panel, window) -> None:
+def test_values_are_updated_and_marked_during_a_run_and_kept_after_it(panel, window) -> None:
     now = [100.0]
     panel.clock = lambda: now[0]
     window.session.runs.run()
@@ -83,7 +83,7 @@ def test_values_come_while_it_runs_are_marked_and_stay_after_the_end(panel, wind
     assert panel.model.cell_at(0, 1).role == "textSecondary"
 
 
-def test_a_list_opens_by_a_click_and_by_keys(panel, window) -> None:
+def test_list_is_expanded_by_click_and_keyboard(panel, window) -> None:
     window.session.runs.run()
     tells(window, panel, names=["Ada", "Grace"])
     index = panel.model.index_of("names 0")
@@ -97,7 +97,7 @@ def test_a_list_opens_by_a_click_and_by_keys(panel, window) -> None:
     assert len(shown(panel)) == 5
 
 
-def test_keys_and_the_menu_ask_for_commands(panel, window) -> None:
+def test_keys_and_menu_trigger_variable_commands(panel, window) -> None:
     panel.table.choose("score 0")
     QTest.keyClick(panel.table, Qt.Key.Key_F2)
     QTest.keyClick(panel.table, Qt.Key.Key_Delete)
@@ -116,7 +116,7 @@ def test_keys_and_the_menu_ask_for_commands(panel, window) -> None:
     assert window.commands[-3:] == ["variable.rename:score", "variable.delete:score", "variable.watch:score"]
 
 
-def test_without_a_variable_it_says_what_one_is_and_makes_one(panel, window) -> None:
+def test_panel_without_variables_explains_them_and_creates_one(panel, window) -> None:
     window.session.document.edited(workspace(started()))
     ticks(window, panel, 1)
     assert panel.pages.currentWidget() is panel.empty
@@ -124,7 +124,7 @@ def test_without_a_variable_it_says_what_one_is_and_makes_one(panel, window) -> 
     assert window.commands[-1] == "variable.new"
 
 
-def test_another_behaviour_shows_nothing_of_the_run(panel, window) -> None:
+def test_another_behaviour_shows_no_values_of_the_run(panel, window) -> None:
     window.session.runs.run()
     tells(window, panel, score=3)
     window.session.documents.new()
@@ -137,12 +137,12 @@ def test_another_behaviour_shows_nothing_of_the_run(panel, window) -> None:
     ("value", "words"),
     [([], "empty"), (["x"], "1 item: x"), (None, "unknown"), ("", ""), (True, "yes"), ("a\nb", "a b")],
 )
-def test_a_value_in_the_words_of_a_row(value: object, words: str) -> None:
+def test_variable_value_is_formatted_in_one_row(value: object, words: str) -> None:
     (row,) = rows_of([Variable("v", "v", "v")], {"v": brief("v", value)}, (), Order())
     assert value_cell(row).text == words
 
 
-def test_names_are_sorted_without_regard_to_case(panel) -> None:
+def test_names_are_sorted_case_insensitively(panel) -> None:
     variables = [Variable(each, each, each) for each in ("b", "A", "c")]
     order = Order(panel.table.columns[0])
     assert [row.variable.name for row in rows_of(variables, {}, (), order)] == ["A", "b", "c"]

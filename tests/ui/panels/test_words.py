@@ -178,7 +178,7 @@ def shown(qtbot, theme: Theme) -> Show:
 
 @pytest.mark.parametrize("name", sorted(SIZES))
 @pytest.mark.parametrize("session", [Session, Session.full], ids=["empty", "full"])
-def test_a_panel_says_every_word_in_the_chosen_language(pseudo, shown, name, session) -> None:
+def test_all_texts_of_a_panel_are_translated(pseudo, shown, name, session) -> None:
     there = session()
     with shown(name, there) as (_dock, panel):
         data = {each for each in (*data_of(there), "#33aaff", CHOSEN, *PLOTTED) if each}
@@ -187,7 +187,7 @@ def test_a_panel_says_every_word_in_the_chosen_language(pseudo, shown, name, ses
 
 
 @pytest.mark.parametrize("session", [Session, Session.full], ids=["empty", "full"])
-def test_a_panel_has_room_for_longer_words(pseudo, shown, session) -> None:
+def test_panel_has_room_for_longer_translations(pseudo, shown, session) -> None:
     faults = []
     for name in SIZES:
         with shown(name, session()) as (dock, _panel):
@@ -196,7 +196,7 @@ def test_a_panel_has_room_for_longer_words(pseudo, shown, session) -> None:
 
 
 @pytest.mark.parametrize("name", ["nodes", "topics"])
-def test_the_head_of_a_table_takes_the_room_that_is_left(pseudo, shown, name) -> None:
+def test_table_columns_are_wide_enough_for_their_headers(pseudo, shown, name) -> None:
     with shown(name, Session.full()) as (dock, panel):
         dock.resize(1400, 500)
         panel.refresh()
@@ -208,7 +208,7 @@ def test_the_head_of_a_table_takes_the_room_that_is_left(pseudo, shown, name) ->
 
 @pytest.mark.parametrize("language", words.languages(words.LOCALE))
 @pytest.mark.parametrize("columns", [topics.COLUMNS, nodes.COLUMNS], ids=["topics", "nodes"])
-def test_the_heads_of_the_narrowest_tables_are_whole_in_every_language(theme, language, columns) -> None:
+def test_headers_of_the_narrowest_tables_are_not_clipped_in_any_language(theme, language, columns) -> None:
     """Else a translator finds a shorter word: the table gives a column no more room where it is narrow."""
     catalog = words.read(words.po_file(words.LOCALE, language), language)
     metrics = QFontMetricsF(head_font(theme))
@@ -246,6 +246,6 @@ def _constants(given: ast.expr) -> Iterator[str]:
 
 
 @pytest.mark.parametrize("folder", ["panels", "pictures", "shell", "startup", "text", "widgets"])
-def test_no_words_are_shown_that_nobody_can_translate(folder) -> None:
+def test_every_shown_text_is_translatable(folder) -> None:
     found = [each for each in bare_words(folder) if not any(known in each for known in NO_WORDS)]
     assert "\n".join(found) == ""

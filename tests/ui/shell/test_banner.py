@@ -80,7 +80,7 @@ def places(window: MainWindow) -> dict[QWidget, QRect]:
 
 @pytest.mark.parametrize("layout", ["start", "behaviour", "developer"])
 @pytest.mark.parametrize("size", [(1280, 800), (1600, 1000), SMALL])
-def test_a_banner_covers_nothing_that_can_be_pressed_and_moves_nothing(
+def test_banner_covers_no_control_and_moves_no_layout(
     window: MainWindow, mouse: Mouse, layout: str, size: tuple[int, int]
 ) -> None:
     window.resize(*size)
@@ -102,13 +102,13 @@ def test_a_banner_covers_nothing_that_can_be_pressed_and_moves_nothing(
     assert places(window) == before, "no strip is left"
 
 
-def test_on_the_start_page_it_covers_no_words(window: MainWindow, mouse: Mouse) -> None:
+def test_banner_covers_no_text_on_the_start_page(window: MainWindow, mouse: Mouse) -> None:
     show(window, "start")
     say(window)
     assert place(window, window.banner).bottom() <= place(window, window.start._question).top()
 
 
-def test_words_beside_it_are_shortened_but_not_those_that_ask_somebody_to_act(
+def test_adjacent_text_is_shortened_except_text_that_requires_action(
     window: MainWindow, mouse: Mouse
 ) -> None:
     show(window, "behaviour")
@@ -125,7 +125,7 @@ def test_words_beside_it_are_shortened_but_not_those_that_ask_somebody_to_act(
     assert bar.banner_area().x() >= bar.sentence.x() + bar.sentence.full_width()
 
 
-def test_a_press_just_when_it_came_is_not_taken(window: MainWindow, mouse: Mouse) -> None:
+def test_press_right_after_the_banner_appeared_is_ignored(window: MainWindow, mouse: Mouse) -> None:
     mouse.at = window.middle.mapToGlobal(window.tool_bar.banner_area().center())
     say(window)
     assert not window.banner.isAncestorOf(mouse.under_it())  # type: ignore[arg-type]
@@ -134,7 +134,7 @@ def test_a_press_just_when_it_came_is_not_taken(window: MainWindow, mouse: Mouse
     assert window.banner.isAncestorOf(mouse.under_it())  # type: ignore[arg-type]
 
 
-def test_its_button_does_not_become_another_one_under_the_mouse(window: MainWindow, mouse: Mouse) -> None:
+def test_banner_button_is_not_replaced_under_the_mouse(window: MainWindow, mouse: Mouse) -> None:
     say(window, "mild", "warn")
     mouse.over(window.banner.banner)
     at = QPointF(20, 20)
@@ -147,14 +147,14 @@ def test_its_button_does_not_become_another_one_under_the_mouse(window: MainWind
     assert window.banner.identity == "worse"
 
 
-def test_it_goes_with_the_bar_when_the_layout_changes(window: MainWindow, mouse: Mouse) -> None:
+def test_banner_moves_to_the_bar_of_the_new_layout(window: MainWindow, mouse: Mouse) -> None:
     say(window)
     assert window.tool_bar.geometry().contains(window.banner.geometry())
     show(window, "behaviour")
     assert window.run_bar.geometry().contains(window.banner.geometry())
 
 
-def test_the_button_in_a_narrow_banner_keeps_its_name(window: MainWindow, mouse: Mouse) -> None:
+def test_button_in_a_narrow_banner_keeps_its_name(window: MainWindow, mouse: Mouse) -> None:
     step = {"button": "Open the connection doctor", "action": "help.doctor"}
     window.session.alerts.put("one", "warn", "It is one.", **step)
     settle(window)
@@ -163,7 +163,7 @@ def test_the_button_in_a_narrow_banner_keeps_its_name(window: MainWindow, mouse:
     assert "Open the connection doctor" in (button.text(), button.toolTip())
 
 
-def test_a_banner_that_stands_there_is_not_painted_again(window: MainWindow, mouse: Mouse) -> None:
+def test_unchanged_banner_is_not_repainted(window: MainWindow, mouse: Mouse) -> None:
     say(window)
     mouse.now += FRESH_S
     settle(window)
@@ -183,7 +183,7 @@ def test_a_banner_that_stands_there_is_not_painted_again(window: MainWindow, mou
     assert not {QEvent.Type.Paint, QEvent.Type.ZOrderChange, QEvent.Type.Resize} & set(changed)
 
 
-def test_an_alert_for_developers_is_told_in_their_layout_only(window: MainWindow, mouse: Mouse) -> None:
+def test_alert_for_developers_is_shown_in_their_layout_only(window: MainWindow, mouse: Mouse) -> None:
     window.session.alerts.put("ports", "warn", "Port 7000 is taken.", for_developers=True)
     settle(window)
     assert window.banner.identity == "ports"
@@ -195,7 +195,7 @@ def test_an_alert_for_developers_is_told_in_their_layout_only(window: MainWindow
     assert window.banner.identity == "ports"
 
 
-def test_the_count_of_alerts_opens_them_by_mouse_and_by_keyboard(window: MainWindow, mouse: Mouse) -> None:
+def test_alert_count_opens_the_alerts_by_mouse_and_keyboard(window: MainWindow, mouse: Mouse) -> None:
     show(window, "behaviour")
     say(window)
     (item,) = [each for each in window.status.items() if each.text == "1 alert"]
@@ -208,7 +208,7 @@ def test_the_count_of_alerts_opens_them_by_mouse_and_by_keyboard(window: MainWin
     assert window.showing == "behaviour"
 
 
-def test_shift_tab_leads_from_the_banner_through_the_whole_window(
+def test_shift_tab_moves_from_the_banner_through_the_whole_window(
     qtbot, window: MainWindow, mouse: Mouse
 ) -> None:
     window.activateWindow()

@@ -101,7 +101,7 @@ def found() -> list[tuple[Path, str, int]]:
     return [(path, words, line) for path in modules() for words, line in named(path)]
 
 
-def test_everybody_who_names_a_command_is_found() -> None:
+def test_every_reference_to_a_command_is_found() -> None:
     words = {words for _, words, _ in found()}
     assert {
         "network.others",  # an alert of the core
@@ -119,23 +119,23 @@ def test_everybody_who_names_a_command_is_found() -> None:
     assert len(words) > 30
 
 
-def test_whoever_names_a_command_names_one_that_is_there() -> None:
+def test_every_referenced_command_exists() -> None:
     unknown = [f"{path}:{line}: {words!r}" for path, words, line in found() if not is_known(words)]
     assert not unknown, "these name no command"
 
 
-def test_lists_of_commands_name_commands() -> None:
+def test_lists_of_command_ids_contain_only_existing_commands() -> None:
     assert {*STEP_ICONS, *ROLES, *PACES, *ARRANGING, STOP} <= IDS
 
 
-def test_the_menu_of_a_tab_names_commands_about_a_tab() -> None:
+def test_tab_menu_lists_only_tab_commands() -> None:
     source = (Path(app.__file__).parent / "ui" / "panels" / "behaviour" / "tabs.py").read_text("utf-8")
     listed = set(re.findall(r'"(tab\.[a-z_]+)"', source))
     assert len(listed) == 6
     assert listed <= ABOUT
 
 
-def test_the_alerts_of_the_tests_name_commands_too() -> None:
+def test_alerts_in_test_data_reference_existing_commands() -> None:
     sources = (Path(full_session.__file__), Path(sample_data.__file__))
     alerts = [words for source in sources for words, _ in named(source) if "." in words or ":" in words]
     assert alerts
@@ -143,34 +143,34 @@ def test_the_alerts_of_the_tests_name_commands_too() -> None:
 
 
 @pytest.mark.parametrize("name", ["nonsense", "nonsense:x", "panel.nonsense", "run.run:x", ""])
-def test_a_command_that_is_not_there_is_an_error_at_once(commands: Commands, name: str) -> None:
+def test_unknown_command_raises_immediately(commands: Commands, name: str) -> None:
     with pytest.raises(UnknownCommandError, match="no command"):
         commands.run(name)
     with pytest.raises(UnknownCommandError):
         commands.actions[name]
 
 
-def test_a_panel_that_names_none_is_an_error_at_once(window: MainWindow) -> None:
+def test_unknown_command_id_from_a_panel_raises_immediately(window: MainWindow) -> None:
     with pytest.raises(UnknownCommandError, match=r"help\.nobody"):
         window.context.run("help.nobody")
     with pytest.raises(UnknownCommandError):
         window.commands.shortcuts.of("help.nobody")
 
 
-def test_arguments_are_typed() -> None:
+def test_command_arguments_are_typed() -> None:
     assert TabPlace.parse("a:b:2") == TabPlace("a:b", 2)
     assert RobotSwap.parse("NAO:Pepper:2") == RobotSwap("NAO", "Pepper:2")
     with pytest.raises(ValueError, match="invalid literal"):
         TabPlace.parse("key:first")
 
 
-def test_no_command_is_twice_in_the_table_and_each_menu_is_one_of_the_bar() -> None:
+def test_command_ids_are_unique_and_each_menu_is_in_the_menu_bar() -> None:
     assert len(IDS) == len(COMMANDS)
     assert len(ABOUT) == len(ARGUMENT_COMMANDS)
     assert {command.menu for command in COMMANDS} <= {*MENUS, ""}
 
 
-def test_the_longest_menu_fits_a_low_screen(window: MainWindow, commands: Commands) -> None:
+def test_longest_menu_fits_a_low_screen(window: MainWindow, commands: Commands) -> None:
     for menu in window.bar.menus.findChildren(QMenu):
         rows = [each for each in menu.actions() if each.isVisible() and not each.isSeparator()]
         assert len(rows) <= 18, f"{menu.title()} has {len(rows)} entries"

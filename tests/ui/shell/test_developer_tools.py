@@ -35,7 +35,7 @@ def click(button) -> None:
     QTest.mouseClick(button, Qt.MouseButton.LeftButton)
 
 
-def test_freeze_holds_all_that_is_live_and_lets_it_go_on(tools, window, commands) -> None:
+def test_freeze_pauses_and_resumes_all_live_panels(tools, window, commands) -> None:
     one, other = live(window, "inspector"), live(window, "image")
     one.setChecked(True)
     tools.refresh()
@@ -47,7 +47,7 @@ def test_freeze_holds_all_that_is_live_and_lets_it_go_on(tools, window, commands
     assert (one.isChecked(), other.isChecked(), tools.freeze.isChecked()) == (False, False, False)
 
 
-def test_where_nothing_is_live_nothing_freezes(tools, window) -> None:
+def test_freeze_is_disabled_without_live_panels(tools, window) -> None:
     live(window, "inspector").hide()
     tools.refresh()
     assert not tools.freeze.isEnabled()
@@ -66,7 +66,7 @@ def dropped(monkeypatch: pytest.MonkeyPatch) -> list[tuple[QMenu, QWidget]]:
     return seen
 
 
-def test_the_layout_says_its_name_and_offers_the_others(tools, window, dropped) -> None:
+def test_layout_button_shows_the_name_and_offers_the_others(tools, window, dropped) -> None:
     window.saved_layouts.keep_as(window.bench, "developer", "Two cameras")
     tools.refresh()
     assert tools.layout.text() == "Two cameras"
@@ -83,7 +83,9 @@ def test_the_layout_says_its_name_and_offers_the_others(tools, window, dropped) 
     assert tools.layout.text() == "Developer"
 
 
-def test_what_cant_be_done_with_a_layout_is_grey_only_in_its_menu(tools, commands, dropped) -> None:
+def test_unavailable_layout_commands_are_disabled_only_while_the_menu_is_open(
+    tools, commands, dropped
+) -> None:
     click(tools.layout)
     ((menu, _below),) = dropped
     assert not commands.actions["layout.delete"].isEnabled()
@@ -101,7 +103,7 @@ def test_panels_are_opened_and_closed(tools, window, dropped) -> None:
     assert "console" not in window.bench.open_names()
 
 
-def test_large_text_in_a_narrow_window_leaves_the_menus_to_the_view_menu(tools, window) -> None:
+def test_layout_and_panel_menus_are_hidden_with_large_text_in_a_narrow_window(tools, window) -> None:
     window.resize(1100, 700)
     assert tools.layout.isVisible()
     window.theme.set_text_percent(200)

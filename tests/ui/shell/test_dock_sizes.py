@@ -23,7 +23,7 @@ pytest_plugins = ["tests.ui.shell_fixtures"]
         ([120, 384], 300, [False, True], [120, 229]),
     ],
 )
-def test_what_is_kept_and_what_grows(
+def test_extra_space_goes_to_panels_without_fixed_size(
     wanted: list[int], room: int, keep: list[bool], sizes: list[int]
 ) -> None:
     assert shares(wanted, room, keep=keep) == sizes
@@ -35,7 +35,9 @@ def widths(window: MainWindow, *names: str) -> list[int]:
     return [bench.docks[name].width() for name in names]
 
 
-def test_side_columns_keep_their_width_in_every_window(qtbot, window: MainWindow, commands: Commands) -> None:
+def test_side_columns_keep_their_width_at_every_window_size(
+    qtbot, window: MainWindow, commands: Commands
+) -> None:
     window.show()
     commands.run("layout.behaviour")
     for size in ((1440, 900), (1920, 1080), (1100, 700), (1440, 900)):
@@ -56,7 +58,7 @@ def test_side_columns_keep_their_width_in_every_window(qtbot, window: MainWindow
         )
 
 
-def test_a_line_that_a_person_moved_stays_there(qtbot, window: MainWindow, commands: Commands) -> None:
+def test_splitter_moved_by_the_user_keeps_its_position(qtbot, window: MainWindow, commands: Commands) -> None:
     window.show()
     commands.run("layout.behaviour")
     bench = window.bench

@@ -24,7 +24,9 @@ def field(qtbot, window: MainWindow, commands: Commands) -> QLineEdit:
     return made
 
 
-def test_a_field_is_edited(window: MainWindow, commands: Commands, field: QLineEdit) -> None:
+def test_edit_commands_apply_to_the_focused_text_field(
+    window: MainWindow, commands: Commands, field: QLineEdit
+) -> None:
     commands.run("edit.selectAll")
     assert field.selectedText() == "hello"
     commands.run("edit.copy")
@@ -35,7 +37,7 @@ def test_a_field_is_edited(window: MainWindow, commands: Commands, field: QLineE
     assert field.text() == "hello"
 
 
-def test_a_field_stays_meant_while_the_menu_bar_has_the_keyboard(
+def test_text_field_stays_the_target_while_the_menu_bar_has_focus(
     window: MainWindow, commands: Commands, field: QLineEdit
 ) -> None:
     window.bar.menus.setFocus()
@@ -44,7 +46,7 @@ def test_a_field_stays_meant_while_the_menu_bar_has_the_keyboard(
     assert field.selectedText() == "hello"
 
 
-def test_what_can_t_be_done_is_grey(commands: Commands, field: QLineEdit) -> None:
+def test_unavailable_edit_commands_are_disabled_with_a_reason(commands: Commands, field: QLineEdit) -> None:
     field.setReadOnly(True)
     assert commands.actions.why_not("edit.paste") == "This text can't be changed"
     assert commands.actions.why_not("edit.copy") == ""
@@ -53,7 +55,7 @@ def test_what_can_t_be_done_is_grey(commands: Commands, field: QLineEdit) -> Non
     assert commands.actions.why_not("edit.copy") == "Only for blocks and text fields"
 
 
-def test_the_keys_stay_with_who_has_the_keyboard(commands: Commands) -> None:
+def test_edit_shortcuts_are_left_to_the_focused_widget(commands: Commands) -> None:
     for what in ("cut", "copy", "paste", "selectAll"):
         action = commands.actions[f"edit.{what}"]
         assert action.shortcuts() == []

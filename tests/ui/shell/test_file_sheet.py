@@ -57,7 +57,7 @@ def typed(sheet: FileSheet, name: str) -> None:
     QTest.keyClicks(sheet.name, name)
 
 
-def test_folders_come_first_and_only_behaviours_are_listed(sheet: FileSheet, folder: Path) -> None:
+def test_folders_are_listed_first_and_only_behaviour_files_after_them(sheet: FileSheet, folder: Path) -> None:
     sheet.ask_open(folder, print)
     assert rows(sheet) == ["class 3", "a quiz", "Greeting"]
     assert [entry.path.name for entry in entries_of(folder) if entry.is_folder] == ["class 3"]
@@ -66,7 +66,9 @@ def test_folders_come_first_and_only_behaviours_are_listed(sheet: FileSheet, fol
     assert rows(sheet) == ["class 3", "Greeting", "a quiz"], "folders first, the other way round too"
 
 
-def test_saving_adds_the_ending_that_is_shown(sheet: FileSheet, folder: Path, taken: list[Path]) -> None:
+def test_saving_appends_the_displayed_file_extension(
+    sheet: FileSheet, folder: Path, taken: list[Path]
+) -> None:
     sheet.ask_save(folder / "New behaviour.nepb", taken.append)
     assert sheet.name.text() == "New behaviour"
     assert sheet.ending.text() == ".nepb"
@@ -78,7 +80,7 @@ def test_saving_adds_the_ending_that_is_shown(sheet: FileSheet, folder: Path, ta
     assert not sheet.isVisible()
 
 
-def test_an_ending_or_a_whole_path_may_be_typed(sheet: FileSheet, folder: Path, taken: list[Path]) -> None:
+def test_file_extension_or_full_path_can_be_typed(sheet: FileSheet, folder: Path, taken: list[Path]) -> None:
     sheet.ask_save(folder / "New.nepb", taken.append)
     typed(sheet, "Dance.nepb")
     assert sheet.target == folder / "Dance.nepb"
@@ -89,7 +91,7 @@ def test_an_ending_or_a_whole_path_may_be_typed(sheet: FileSheet, folder: Path, 
     assert not sheet.done.isEnabled()
 
 
-def test_a_name_that_is_taken_is_replaced_or_both_are_kept(
+def test_existing_file_is_replaced_or_both_are_kept(
     sheet: FileSheet, folder: Path, taken: list[Path]
 ) -> None:
     sheet.ask_save(folder / "Greeting.nepb", taken.append)
@@ -106,7 +108,7 @@ def test_a_name_that_is_taken_is_replaced_or_both_are_kept(
     assert sheet.done.text() == "Save"
 
 
-def test_numbers_that_are_taken_are_passed_over(folder: Path) -> None:
+def test_suggested_name_skips_numbers_in_use(folder: Path) -> None:
     (folder / "Greeting 2.nepb").write_text("", "utf-8")
     assert free_name(folder, "Greeting") == "Greeting 3"
     assert free_name(folder, "Dance") == "Dance"
@@ -125,11 +127,11 @@ def test_numbers_that_are_taken_are_passed_over(folder: Path) -> None:
         ("", ""),
     ],
 )
-def test_names_are_refused_in_words(name: str, wrong: str) -> None:
+def test_invalid_names_are_rejected_with_a_reason(name: str, wrong: str) -> None:
     assert name_refusal(name) == wrong
 
 
-def test_a_refused_name_can_not_be_saved(sheet: FileSheet, folder: Path, taken: list[Path]) -> None:
+def test_file_with_an_invalid_name_cannot_be_saved(sheet: FileSheet, folder: Path, taken: list[Path]) -> None:
     sheet.ask_save(folder / "x.nepb", taken.append)
     typed(sheet, "what?")
     assert sheet.said.text() == "A name can't have “?” in it."
@@ -139,7 +141,7 @@ def test_a_refused_name_can_not_be_saved(sheet: FileSheet, folder: Path, taken: 
     assert sheet.isVisible()
 
 
-def test_a_folder_is_opened_made_and_left_again(sheet: FileSheet, folder: Path, taken: list[Path]) -> None:
+def test_folder_is_opened_created_and_left(sheet: FileSheet, folder: Path, taken: list[Path]) -> None:
     sheet.ask_save(folder / "Dance.nepb", taken.append)
     QTest.mouseClick(sheet.new_folder, LEFT)
     QTest.keyClicks(sheet.folder_name, "Class 4")
@@ -158,7 +160,7 @@ def test_a_folder_is_opened_made_and_left_again(sheet: FileSheet, folder: Path, 
     assert taken == []
 
 
-def test_the_keyboard_opens_a_file_in_a_folder(sheet: FileSheet, folder: Path, taken: list[Path]) -> None:
+def test_file_in_a_folder_is_opened_by_keyboard(sheet: FileSheet, folder: Path, taken: list[Path]) -> None:
     (folder / "class 3" / "Dance.nepb").write_text("{}", "utf-8")
     sheet.ask_open(folder, taken.append)
     assert sheet.list.hasFocus()
@@ -173,7 +175,7 @@ def test_the_keyboard_opens_a_file_in_a_folder(sheet: FileSheet, folder: Path, t
     assert taken == [folder / "class 3" / "Dance.nepb"]
 
 
-def test_return_on_a_file_takes_its_name_and_replaces_nothing(
+def test_return_on_a_file_takes_its_name_without_replacing_it(
     sheet: FileSheet, folder: Path, taken: list[Path]
 ) -> None:
     sheet.ask_save(folder / "Dance.nepb", taken.append)
@@ -184,14 +186,14 @@ def test_return_on_a_file_takes_its_name_and_replaces_nothing(
     assert sheet.name.hasFocus()
 
 
-def test_a_folder_that_is_gone_says_so_and_the_one_before_stays(sheet: FileSheet, folder: Path) -> None:
+def test_missing_folder_is_reported_and_the_previous_one_stays_open(sheet: FileSheet, folder: Path) -> None:
     sheet.ask_open(folder, print)
     sheet.go_to(folder / "gone")
     assert sheet.folder == folder
     assert sheet.said.text() == "Can't open “gone”: no such file or directory."
 
 
-def test_places_are_folders_that_are_there_each_once(folder: Path, tmp_path: Path) -> None:
+def test_places_are_existing_folders_without_duplicates(folder: Path, tmp_path: Path) -> None:
     found = known_places(
         tmp_path, [folder / "Greeting.nepb", folder / "b.nepb", tmp_path / "x" / "gone.nepb"]
     )
@@ -201,7 +203,7 @@ def test_places_are_folders_that_are_there_each_once(folder: Path, tmp_path: Pat
     assert len({place.folder for place in found}) == len(found)
 
 
-def test_stop_works_and_the_sheet_stays(
+def test_stop_works_and_the_sheet_stays_open(
     qtbot: QtBot, window: MainWindow, commands: Commands, sheet: FileSheet, folder: Path
 ) -> None:
     stops: list[str] = []
@@ -222,7 +224,7 @@ def test_stop_works_and_the_sheet_stays(
 
 
 @pytest.mark.parametrize("percent", [100, 150, 200])
-def test_columns_are_read_at_every_size_of_text(
+def test_columns_are_readable_at_every_text_size(
     qtbot: QtBot, sheet: FileSheet, theme: Theme, folder: Path, percent: int
 ) -> None:
     theme.set_text_percent(percent)
@@ -239,7 +241,7 @@ def test_columns_are_read_at_every_size_of_text(
     QApplication.processEvents()
 
 
-def test_the_window_asks_with_it(qtbot: QtBot, theme: Theme, session: Session, folder: Path) -> None:
+def test_window_opens_its_own_file_sheet(qtbot: QtBot, theme: Theme, session: Session, folder: Path) -> None:
     session.settings.add_recent(folder / "Greeting.nepb", "Greeting")
     window = MainWindow(session, theme, PANELS, [])
     qtbot.addWidget(window)
@@ -253,7 +255,7 @@ def test_the_window_asks_with_it(qtbot: QtBot, theme: Theme, session: Session, f
     window.close()
 
 
-def test_a_picture_is_chosen_among_pictures(sheet: FileSheet, folder: Path, taken: list[Path]) -> None:
+def test_image_chooser_lists_only_images(sheet: FileSheet, folder: Path, taken: list[Path]) -> None:
     for name in ("cat.PNG", "dog.jpg", "song.mp3"):
         (folder / name).write_bytes(b"")
     sheet.ask_picture(folder, taken.append)
@@ -265,7 +267,7 @@ def test_a_picture_is_chosen_among_pictures(sheet: FileSheet, folder: Path, take
     assert rows(sheet) == ["class 3", "a quiz", "Greeting"], "the next question is for behaviours again"
 
 
-def test_a_folder_is_chosen_or_made(sheet: FileSheet, folder: Path, taken: list[Path]) -> None:
+def test_folder_is_chosen_or_created(sheet: FileSheet, folder: Path, taken: list[Path]) -> None:
     sheet.ask_folder(folder, taken.append)
     assert rows(sheet) == ["class 3"]
     assert sheet.said.text() == "Images will be saved in “work”.", "no row is chosen by itself"
@@ -282,7 +284,7 @@ def test_a_folder_is_chosen_or_made(sheet: FileSheet, folder: Path, taken: list[
     assert taken == [folder / "class 3", folder / "album"]
 
 
-def test_the_settings_stay_open_below_the_sheet_and_get_the_keys_back(
+def test_settings_stay_open_below_the_sheet_and_regain_focus(
     sheet: FileSheet, window: MainWindow, commands: Commands, folder: Path, taken: list[Path]
 ) -> None:
     commands.run("settings.open")
@@ -300,7 +302,7 @@ def test_the_settings_stay_open_below_the_sheet_and_get_the_keys_back(
     assert taken == []
 
 
-def test_something_else_is_saved_as_one_of_several_kinds(sheet: FileSheet, folder: Path) -> None:
+def test_save_as_offers_several_file_types(sheet: FileSheet, folder: Path) -> None:
     kinds = FileKind("Picture", ".png"), FileKind("Sharp picture", ".svg")
     taken: list[tuple[str, str]] = []
     (folder / "Tea 1.svg").write_text("<svg/>")

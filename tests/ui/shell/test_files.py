@@ -35,7 +35,7 @@ class _NoJournal:
     def discard(self) -> None: ...
 
 
-def test_saving_a_new_behaviour_asks_where(
+def test_saving_a_new_behaviour_opens_the_file_dialog(
     commands: Commands, document: Document, answers: Answers, tmp_path
 ) -> None:
     document.edited(BLOCKS)
@@ -48,7 +48,7 @@ def test_saving_a_new_behaviour_asks_where(
     assert len(answers.asked) == 1
 
 
-def test_the_editors_newest_edit_is_saved(
+def test_latest_edit_of_the_editor_is_saved(
     commands: Commands, window: MainWindow, document, answers, tmp_path
 ) -> None:
     answers.path = tmp_path / "a.nepb"
@@ -65,7 +65,7 @@ def names(window: MainWindow) -> list[str]:
     return [document.name for document in window.session.documents]
 
 
-def test_another_file_opens_beside_work_that_is_not_saved(commands, window, tmp_path: Path) -> None:
+def test_another_file_opens_in_a_new_tab_beside_unsaved_work(commands, window, tmp_path: Path) -> None:
     path = saved(tmp_path / "Other.nepb")
     window.session.document.edited(BLOCKS)
     commands.files.open(path)
@@ -75,7 +75,9 @@ def test_another_file_opens_beside_work_that_is_not_saved(commands, window, tmp_
     assert window.showing == "behaviour"
 
 
-def test_work_without_a_file_is_kept_when_its_tab_is_closed(commands, window, home: Path) -> None:
+def test_unsaved_behaviour_without_a_file_is_kept_when_its_tab_is_closed(
+    commands, window, home: Path
+) -> None:
     window.session.document.edited(BLOCKS)
     commands.run("tab.close")
     kept = list((home / "kept").glob("New behaviour*.nepb"))
@@ -86,7 +88,7 @@ def test_work_without_a_file_is_kept_when_its_tab_is_closed(commands, window, ho
     assert window.session.document.blank
 
 
-def test_a_changed_file_is_saved_when_its_tab_is_closed_and_opens_again(commands, window, tmp_path) -> None:
+def test_changed_file_is_saved_when_its_tab_is_closed_and_can_be_reopened(commands, window, tmp_path) -> None:
     path = saved(tmp_path / "Mine.nepb")
     commands.files.open(path)
     window.session.document.edited(changed("z"))
@@ -104,7 +106,7 @@ def press_toast(window: MainWindow) -> None:
     window.toast.button.click()
 
 
-def test_saving_at_the_close_of_a_tab_can_be_taken_back(commands, window, tmp_path: Path) -> None:
+def test_saving_on_tab_close_can_be_undone(commands, window, tmp_path: Path) -> None:
     path = saved(tmp_path / "Mine.nepb")
     before = path.read_bytes()
     commands.files.open(path)
@@ -119,7 +121,7 @@ def test_saving_at_the_close_of_a_tab_can_be_taken_back(commands, window, tmp_pa
     assert window.session.document.workspace == changed("z")
 
 
-def test_what_a_file_said_before_it_was_written_over_stays_findable(
+def test_previous_content_of_an_overwritten_file_is_kept_as_a_copy(
     commands, window, home: Path, tmp_path
 ) -> None:
     path = saved(tmp_path / "Mine.nepb")
@@ -131,7 +133,7 @@ def test_what_a_file_said_before_it_was_written_over_stays_findable(
     assert [copy.read_bytes() for copy in copies] == [before]
 
 
-def test_several_tabs_are_closed_and_taken_back_together(commands, window, tmp_path: Path) -> None:
+def test_several_tabs_are_closed_and_restored_together(commands, window, tmp_path: Path) -> None:
     paths = [saved(tmp_path / f"{name}.nepb") for name in "ABC"]
     before = [path.read_bytes() for path in paths]
     for path in paths:
@@ -146,7 +148,7 @@ def test_several_tabs_are_closed_and_taken_back_together(commands, window, tmp_p
     )
 
 
-def test_a_tab_opened_again_before_undo_is_unsaved_work(commands, window, tmp_path: Path) -> None:
+def test_tab_reopened_before_undo_is_unsaved_work(commands, window, tmp_path: Path) -> None:
     path = saved(tmp_path / "Mine.nepb")
     before = path.read_bytes()
     commands.files.open(path)
@@ -159,7 +161,7 @@ def test_a_tab_opened_again_before_undo_is_unsaved_work(commands, window, tmp_pa
     assert window.session.document.workspace == changed("z")
 
 
-def test_undo_does_not_write_over_what_somebody_else_wrote(commands, window, tmp_path: Path) -> None:
+def test_undo_does_not_overwrite_changes_of_another_program(commands, window, tmp_path: Path) -> None:
     path = saved(tmp_path / "Mine.nepb")
     before = path.read_bytes()
     commands.files.open(path)
@@ -173,7 +175,9 @@ def test_undo_does_not_write_over_what_somebody_else_wrote(commands, window, tmp
     assert window.session.document.workspace == BLOCKS
 
 
-def test_a_tab_stays_when_what_it_writes_over_can_not_be_kept(commands, window, home: Path, tmp_path) -> None:
+def test_tab_stays_open_when_the_overwritten_content_cannot_be_backed_up(
+    commands, window, home: Path, tmp_path
+) -> None:
     path = saved(tmp_path / "Mine.nepb")
     before = path.read_bytes()
     commands.files.open(path)
@@ -185,7 +189,7 @@ def test_a_tab_stays_when_what_it_writes_over_can_not_be_kept(commands, window, 
     assert window.session.alerts.active[0].title.startswith("Mine.nepb was not saved")
 
 
-def test_saving_over_what_another_program_wrote_keeps_that(commands, window, home: Path, tmp_path) -> None:
+def test_saving_over_changes_of_another_program_backs_them_up(commands, window, home: Path, tmp_path) -> None:
     path = saved(tmp_path / "Mine.nepb")
     commands.files.open(path)
     window.session.document.edited(changed("z"))
@@ -203,7 +207,7 @@ def test_saving_over_what_another_program_wrote_keeps_that(commands, window, hom
     assert (document.name, document.path) == ("Mine, before", None)
 
 
-def test_saving_twice_is_no_change_by_others(commands, window, home: Path, tmp_path) -> None:
+def test_saving_twice_is_not_detected_as_an_external_change(commands, window, home: Path, tmp_path) -> None:
     path = saved(tmp_path / "Mine.nepb")
     said = [path.read_bytes()]
     commands.files.open(path)
@@ -216,7 +220,9 @@ def test_saving_twice_is_no_change_by_others(commands, window, home: Path, tmp_p
     assert sorted(copy.read_bytes() for copy in (home / "earlier").iterdir()) == sorted(said[:-1])
 
 
-def test_saving_goes_on_when_earlier_versions_can_not_be_kept(commands, window, home: Path, tmp_path) -> None:
+def test_saving_succeeds_when_the_earlier_versions_cannot_be_kept(
+    commands, window, home: Path, tmp_path
+) -> None:
     path = saved(tmp_path / "Mine.nepb")
     commands.files.open(path)
     window.session.document.edited(changed("z"))
@@ -227,9 +233,7 @@ def test_saving_goes_on_when_earlier_versions_can_not_be_kept(commands, window, 
     assert any("can't be kept" in record.text for record in window.session.console.records)
 
 
-def test_saving_as_keeps_the_file_that_it_writes_over(
-    commands, window, answers, home: Path, tmp_path
-) -> None:
+def test_save_as_backs_up_the_file_it_overwrites(commands, window, answers, home: Path, tmp_path) -> None:
     answers.path = saved(tmp_path / "Theirs.nepb")
     before = answers.path.read_bytes()
     window.session.document.edited(changed("z"))
@@ -242,7 +246,7 @@ def test_saving_as_keeps_the_file_that_it_writes_over(
     assert window.session.document.workspace == BLOCKS
 
 
-def test_nothing_is_written_over_that_can_not_be_kept(
+def test_file_that_cannot_be_backed_up_is_not_overwritten(
     commands, window, answers, home: Path, tmp_path
 ) -> None:
     answers.path = saved(tmp_path / "Theirs.nepb")
@@ -256,7 +260,7 @@ def test_nothing_is_written_over_that_can_not_be_kept(
     assert window.session.alerts.active[0].button == "Save somewhere else"
 
 
-def test_saving_as_where_nothing_was_keeps_nothing(commands, window, answers, home: Path, tmp_path) -> None:
+def test_save_as_to_a_new_file_creates_no_backup(commands, window, answers, home: Path, tmp_path) -> None:
     answers.path = tmp_path / "New.nepb"
     window.session.document.edited(changed("z"))
     commands.run("file.save_as")
@@ -264,7 +268,7 @@ def test_saving_as_where_nothing_was_keeps_nothing(commands, window, answers, ho
     assert not (home / "earlier").exists()
 
 
-def test_a_tab_that_can_not_be_saved_stays(commands, window, tmp_path: Path) -> None:
+def test_tab_that_cannot_be_saved_stays_open(commands, window, tmp_path: Path) -> None:
     folder = tmp_path / "gone"
     folder.mkdir()
     commands.files.open(saved(folder / "Mine.nepb"))
@@ -279,7 +283,7 @@ def test_a_tab_that_can_not_be_saved_stays(commands, window, tmp_path: Path) -> 
     assert alert.button == "Save somewhere else"
 
 
-def test_closing_the_tab_of_a_program_stops_it(commands, window, monkeypatch) -> None:
+def test_closing_the_tab_of_a_running_program_stops_it(commands, window, monkeypatch) -> None:
     runs, stopped = window.session.runs, []
     window.session.document.edited(BLOCKS)
     runs.document, runs._run = window.session.document, RunState("running")
@@ -288,7 +292,7 @@ def test_closing_the_tab_of_a_program_stops_it(commands, window, monkeypatch) ->
     assert stopped == [True]
 
 
-def test_tabs_are_reached_moved_and_closed_by_name(commands, window, tmp_path: Path) -> None:
+def test_tabs_are_selected_moved_and_closed_by_name(commands, window, tmp_path: Path) -> None:
     for name in "ABC":
         commands.files.open(saved(tmp_path / f"{name}.nepb"))
     commands.run("tab.next")
@@ -304,13 +308,13 @@ def test_tabs_are_reached_moved_and_closed_by_name(commands, window, tmp_path: P
     assert names(window) == ["C"]
 
 
-def test_an_untouched_behaviour_leaves_no_file(commands: Commands, home: Path) -> None:
+def test_unedited_new_behaviour_leaves_no_file(commands: Commands, home: Path) -> None:
     commands.run("file.new")
     commands.run("tab.close")
     assert not (home / "kept").exists()
 
 
-def test_saving_as_names_the_tab_and_keeps_the_old_file(
+def test_save_as_renames_the_tab_and_keeps_the_old_file(
     commands, window, document, answers, tmp_path
 ) -> None:
     old = saved(tmp_path / "Old.nepb")
@@ -326,7 +330,7 @@ def test_saving_as_names_the_tab_and_keeps_the_old_file(
     assert answers.asked[-1] == f"save {tmp_path / 'Old.nepb'}"
 
 
-def test_files_from_outside_open_and_strange_ones_are_told_once(commands, window, tmp_path: Path) -> None:
+def test_external_files_open_and_unsupported_ones_raise_one_alert(commands, window, tmp_path: Path) -> None:
     picture = tmp_path / "photo.png"
     picture.write_bytes(b"x")
     paths = [saved(tmp_path / "A.nepb"), picture, saved(tmp_path / "B.nepb"), tmp_path]
@@ -337,7 +341,7 @@ def test_files_from_outside_open_and_strange_ones_are_told_once(commands, window
     assert alert.detail == "Behaviours are files ending in .nepb."
 
 
-def test_a_file_that_is_no_behaviour_becomes_an_alert(commands, window, document, tmp_path: Path) -> None:
+def test_file_that_is_no_behaviour_raises_an_alert(commands, window, document, tmp_path: Path) -> None:
     path = tmp_path / "bad.nepb"
     path.write_text("not json", "utf-8")
     document.edited(BLOCKS)
@@ -349,9 +353,7 @@ def test_a_file_that_is_no_behaviour_becomes_an_alert(commands, window, document
     assert document.workspace == BLOCKS
 
 
-def test_a_place_that_can_not_be_written_becomes_an_alert(
-    commands: Commands, window, document, answers, tmp_path
-) -> None:
+def test_unwritable_folder_raises_an_alert(commands: Commands, window, document, answers, tmp_path) -> None:
     document.edited(BLOCKS)
     (tmp_path / "file").write_text("in the way", "utf-8")
     answers.path = tmp_path / "file" / "x.nepb"
@@ -363,7 +365,7 @@ def test_a_place_that_can_not_be_written_becomes_an_alert(
     assert list(window.session.alerts.active) == []
 
 
-def test_mending_changes_the_blocks_and_tells_the_editor(commands: Commands, document: Document) -> None:
+def test_fix_changes_the_blocks_and_updates_the_editor(commands: Commands, document: Document) -> None:
     wait = {"type": "control_wait_until", "id": "w"}
     document.edited({"blocks": {"languageVersion": 0, "blocks": [wait]}})
     before = document.mends
@@ -373,7 +375,7 @@ def test_mending_changes_the_blocks_and_tells_the_editor(commands: Commands, doc
     assert document.dirty
 
 
-def test_kept_files_never_replace_each_other(tmp_path: Path) -> None:
+def test_backup_files_never_replace_each_other(tmp_path: Path) -> None:
     first = free_path(tmp_path, "a/b: c", 0)
     first.touch()
     second = free_path(tmp_path, "a/b: c", 0)

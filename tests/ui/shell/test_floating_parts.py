@@ -42,7 +42,7 @@ def place(qtbot) -> QWidget:
     return made
 
 
-def test_a_toast_goes_to_the_corner_and_follows_the_window(place: QWidget, theme: Theme) -> None:
+def test_toast_is_placed_in_the_corner_and_follows_window_resizes(place: QWidget, theme: Theme) -> None:
     toast = Toast(theme, place)
     toast.show_toast("Copied robots.Pepper.pose.y")
     assert toast.isVisible()
@@ -52,7 +52,7 @@ def test_a_toast_goes_to_the_corner_and_follows_the_window(place: QWidget, theme
     assert place.width() - toast.geometry().right() == right
 
 
-def test_a_toast_undoes_what_it_says(place: QWidget, theme: Theme) -> None:
+def test_toast_undoes_the_reported_action(place: QWidget, theme: Theme) -> None:
     done: list[str] = []
     toast = Toast(theme, place)
     toast.show_toast("Deleted 4 blocks", "Undo", lambda: done.append("undone"))
@@ -61,7 +61,7 @@ def test_a_toast_undoes_what_it_says(place: QWidget, theme: Theme) -> None:
     assert not toast.isVisible()
 
 
-def test_a_toast_stays_while_it_has_the_focus(qtbot, place: QWidget, theme: Theme) -> None:
+def test_toast_stays_while_it_has_focus(qtbot, place: QWidget, theme: Theme) -> None:
     toast = Toast(theme, place)
     toast.show_toast("Deleted 4 blocks", "Undo", lambda: None)
     toast.button.setFocus()
@@ -74,7 +74,7 @@ def test_a_toast_stays_while_it_has_the_focus(qtbot, place: QWidget, theme: Them
     assert not toast.isVisible()
 
 
-def test_an_offer_waits_for_its_answer_and_alerts_wait_behind_it(place: QWidget, theme: Theme) -> None:
+def test_offer_waits_for_its_answer_and_alerts_queue_behind_it(place: QWidget, theme: Theme) -> None:
     banner = AlertBanner(theme)
     place.layout().addWidget(banner)
     done: list[str] = []
@@ -93,7 +93,7 @@ def test_an_offer_waits_for_its_answer_and_alerts_wait_behind_it(place: QWidget,
     assert not banner.banner.second.isVisible()
 
 
-def test_a_closed_offer_and_a_closed_alert_make_room_for_the_next(place: QWidget, theme: Theme) -> None:
+def test_closing_an_offer_or_alert_shows_the_next_one(place: QWidget, theme: Theme) -> None:
     banner = AlertBanner(theme)
     place.layout().addWidget(banner)
     dismissed: list[str] = []
@@ -108,7 +108,7 @@ def test_a_closed_offer_and_a_closed_alert_make_room_for_the_next(place: QWidget
     assert dismissed == ["a", "b"]
 
 
-def test_words_of_an_alert_are_no_markup(place: QWidget, theme: Theme) -> None:
+def test_alert_text_is_not_interpreted_as_markup(place: QWidget, theme: Theme) -> None:
     banner = AlertBanner(theme)
     place.layout().addWidget(banner)
     banner.show_alerts([Said("a", title="<b>/faces</b> & co.")])
@@ -117,9 +117,7 @@ def test_words_of_an_alert_are_no_markup(place: QWidget, theme: Theme) -> None:
     assert "&lt;b&gt;" in banner.banner.words.toolTip()
 
 
-def test_long_words_have_a_smaller_font_and_then_as_many_lines_as_there_is_room_for(
-    place: QWidget, theme: Theme
-) -> None:
+def test_long_text_uses_a_smaller_font_and_wraps_to_the_available_lines(place: QWidget, theme: Theme) -> None:
     banner = AlertBanner(theme)
     place.layout().addWidget(banner)
     banner.show_alerts([Said("a", detail="It means a lot. " * 30)])
@@ -132,7 +130,7 @@ def test_long_words_have_a_smaller_font_and_then_as_many_lines_as_there_is_room_
     assert words.lines("bodyLarge")[1]
 
 
-def test_the_ring_is_two_pixels_outside_and_follows(qtbot, place: QWidget, theme: Theme) -> None:
+def test_focus_ring_surrounds_the_widget_and_follows_it(qtbot, place: QWidget, theme: Theme) -> None:
     ring = FocusRing(theme, place)
     first, second = Button(theme, "One"), Button(theme, "Two")
     place.layout().addWidget(first)
@@ -152,7 +150,7 @@ def test_the_ring_is_two_pixels_outside_and_follows(qtbot, place: QWidget, theme
     assert not ring.isVisible()
 
 
-def test_the_mouse_makes_no_ring(qtbot, place: QWidget, theme: Theme) -> None:
+def test_mouse_click_shows_no_focus_ring(qtbot, place: QWidget, theme: Theme) -> None:
     ring = FocusRing(theme, place)
     field, other = QLineEdit(), QLineEdit()
     place.layout().addWidget(other)
@@ -167,9 +165,7 @@ def test_the_mouse_makes_no_ring(qtbot, place: QWidget, theme: Theme) -> None:
 
 
 @pytest.mark.parametrize("key", ["Tab", "Backtab", "Right", "Down", "F6", "Home"])
-def test_the_first_key_that_moves_the_focus_shows_the_ring(
-    qtbot, place: QWidget, theme: Theme, key: str
-) -> None:
+def test_first_key_that_moves_the_focus_shows_the_ring(qtbot, place: QWidget, theme: Theme, key: str) -> None:
     ring = FocusRing(theme, place)
     buttons = [Button(theme, word) for word in ("One", "Two")]
     for button in buttons:
@@ -189,7 +185,7 @@ def test_the_first_key_that_moves_the_focus_shows_the_ring(
     assert not ring.isVisible()
 
 
-def test_after_the_mouse_a_hidden_widget_hands_on_no_ring(qtbot, place: QWidget, theme: Theme) -> None:
+def test_hiding_a_clicked_widget_shows_no_ring_on_the_next_one(qtbot, place: QWidget, theme: Theme) -> None:
     ring = FocusRing(theme, place)
     first, second = Button(theme, "One"), Button(theme, "Two")
     place.layout().addWidget(first)
@@ -206,7 +202,7 @@ def test_after_the_mouse_a_hidden_widget_hands_on_no_ring(qtbot, place: QWidget,
     assert ring.target is first
 
 
-def test_the_first_press_in_a_window_counts_as_well(qtbot, theme: Theme) -> None:
+def test_first_mouse_press_in_a_window_is_detected_too(qtbot, theme: Theme) -> None:
     window = QWidget()
     qtbot.addWidget(window)
     column = QVBoxLayout(window)
@@ -223,7 +219,7 @@ def test_the_first_press_in_a_window_counts_as_well(qtbot, theme: Theme) -> None
     assert ring.target is None
 
 
-def test_the_ring_ends_where_a_scrolled_place_ends(qtbot, place: QWidget, theme: Theme) -> None:
+def test_ring_is_clipped_at_the_edge_of_a_scroll_area(qtbot, place: QWidget, theme: Theme) -> None:
     ring = FocusRing(theme, place)
     inside = QWidget()
     inside.setFixedSize(300, 2000)
@@ -243,7 +239,7 @@ def test_the_ring_ends_where_a_scrolled_place_ends(qtbot, place: QWidget, theme:
     assert not ring.isVisible()
 
 
-def test_a_ring_outlives_its_widget(qtbot, place: QWidget, theme: Theme) -> None:
+def test_ring_survives_deletion_of_its_widget(qtbot, place: QWidget, theme: Theme) -> None:
     ring = FocusRing(theme, place)
     button = Button(theme, "Brief")
     place.layout().addWidget(button)
@@ -259,13 +255,11 @@ def test_a_ring_outlives_its_widget(qtbot, place: QWidget, theme: Theme) -> None
 @pytest.mark.parametrize(
     ("keys", "said"), [("Ctrl+Shift+S", "Ctrl+Shift+S"), ("Ctrl++", "Ctrl++"), ("F12", "F12")]
 )
-def test_keys_are_said_as_on_the_keyboard(keys: str, said: str) -> None:
+def test_keys_are_named_as_on_the_keyboard(keys: str, said: str) -> None:
     assert spoken_key(keys) == said
 
 
-def test_a_sheet_closes_with_esc_and_when_the_person_goes_elsewhere(
-    qtbot, place: QWidget, theme: Theme
-) -> None:
+def test_sheet_closes_with_esc_and_when_focus_moves_elsewhere(qtbot, place: QWidget, theme: Theme) -> None:
     field = QLineEdit()
     place.layout().addWidget(field)
     for leave in (lambda: QTest.keyClick(QApplication.focusWidget(), Qt.Key.Key_Escape), field.setFocus):

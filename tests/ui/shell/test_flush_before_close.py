@@ -26,13 +26,13 @@ class Late:
         self.done.append(done)
 
 
-def test_without_an_editor_it_closes_at_once(qapp) -> None:
+def test_window_closes_at_once_without_an_editor(qapp) -> None:
     closed: list[bool] = []
     assert FlushBeforeClose(QObject(), lambda: None, lambda: closed.append(True)).ready()
     assert closed == []
 
 
-def test_a_late_editor_is_waited_for_and_asked_once(qtbot, qapp, monkeypatch) -> None:
+def test_slow_editor_is_waited_for_and_flushed_once(qtbot, qapp, monkeypatch) -> None:
     monkeypatch.setattr(documents, "LONGEST_FLUSH_MS", 2000)
     editor, closed, parent = Late(), [], QObject()
     waits = FlushBeforeClose(parent, lambda: editor, lambda: closed.append(waits.ready()))
@@ -45,7 +45,7 @@ def test_a_late_editor_is_waited_for_and_asked_once(qtbot, qapp, monkeypatch) ->
     assert closed == [True]
 
 
-def test_an_editor_that_hangs_is_left(qtbot, qapp) -> None:
+def test_hanging_editor_does_not_block_closing(qtbot, qapp) -> None:
     editor, closed, parent = Late(), [], QObject()
     waits = FlushBeforeClose(parent, lambda: editor, lambda: closed.append(True))
     assert not waits.ready()
@@ -53,7 +53,7 @@ def test_an_editor_that_hangs_is_left(qtbot, qapp) -> None:
     assert waits.ready()
 
 
-def test_the_window_takes_the_newest_edit_with_it(qtbot, window: MainWindow, commands, monkeypatch) -> None:
+def test_closing_the_window_saves_the_latest_edit(qtbot, window: MainWindow, commands, monkeypatch) -> None:
     bench = window.show_layout("behaviour")
     editor, shut = Late(), []
     monkeypatch.setattr(bench.docks["behaviour"].panel, "flush", editor.flush)
@@ -67,7 +67,7 @@ def test_the_window_takes_the_newest_edit_with_it(qtbot, window: MainWindow, com
     assert not window.isVisible()
 
 
-def test_work_that_cant_be_kept_is_not_lost_without_a_word(
+def test_work_that_cannot_be_saved_is_reported_before_closing(
     qtbot, window: MainWindow, commands, home: Path
 ) -> None:
     """As on a full disk: the window stays open once, and says why."""
@@ -93,7 +93,7 @@ def test_work_that_cant_be_kept_is_not_lost_without_a_word(
     assert left["workspace"] == BLOCKS
 
 
-def test_who_was_told_and_closes_again_gives_the_work_up(window: MainWindow, commands, home: Path) -> None:
+def test_closing_again_after_the_warning_discards_the_work(window: MainWindow, commands, home: Path) -> None:
     (home / "journal").parent.mkdir(parents=True, exist_ok=True)
     (home / "journal").write_text("no folder")
     window.show()

@@ -32,7 +32,7 @@ def window(qtbot) -> QWidget:
     return window
 
 
-def test_what_was_asked_for_outlives_what_was_asked(window: QWidget) -> None:
+def test_focus_chain_widgets_survive_deletion_of_the_queried_widget(window: QWidget) -> None:
     first, second = window.findChildren(QLineEdit)
     area = window.findChildren(QScrollArea)[0]
     header = area.viewport()  # made by Qt, not by Python: what PySide would call deleted
@@ -48,7 +48,7 @@ def test_what_was_asked_for_outlives_what_was_asked(window: QWidget) -> None:
     assert area.parentWidget() is window
 
 
-def test_a_proxy_stays_where_it_is(window: QWidget) -> None:
+def test_focus_proxy_keeps_its_parent_when_queried(window: QWidget) -> None:
     first, second = window.findChildren(QLineEdit)
     assert proxy_of(first) is None
     first.setFocusProxy(second)
@@ -56,7 +56,7 @@ def test_a_proxy_stays_where_it_is(window: QWidget) -> None:
     assert second.parentWidget() is window
 
 
-def test_a_window_is_nobodys_child_after_it_was_asked_for(window: QWidget) -> None:
+def test_window_has_no_parent_after_a_focus_chain_query(window: QWidget) -> None:
     last = window.findChildren(QLineEdit)[-1]
     assert any(following(each) is window for each in window.findChildren(QWidget))
     delete(last)
@@ -65,7 +65,7 @@ def test_a_window_is_nobodys_child_after_it_was_asked_for(window: QWidget) -> No
     assert window.isWindow()
 
 
-def test_nobody_else_asks_for_the_focus_chain() -> None:
+def test_only_the_keyboard_module_queries_the_qt_focus_chain() -> None:
     root = Path(app.ui.__file__).parent
     asking = {path.name for path in root.rglob("*.py") if ASKS.search(path.read_text("utf-8"))}
     assert asking == {"keyboard.py"}

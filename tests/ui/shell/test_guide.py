@@ -34,7 +34,7 @@ def text(language: str, page: str) -> str:
     return (FOLDER / language / page).read_text("utf-8")
 
 
-def test_there_is_a_page_for_each_of_what_people_ask() -> None:
+def test_guide_has_a_page_for_each_common_question() -> None:
     assert [page.title for page in read_pages(FOLDER, "en", lambda _command: "F1")] == TITLES
     assert "es" in LANGUAGES
     assert {code for code, _name in i18n.offered()} <= set(LANGUAGES), "each language that is offered"
@@ -42,7 +42,7 @@ def test_there_is_a_page_for_each_of_what_people_ask() -> None:
 
 @pytest.mark.parametrize("language", LANGUAGES)
 @pytest.mark.parametrize("page", PAGES)
-def test_each_language_has_each_page_with_the_same_keys_and_parts(language: str, page: str) -> None:
+def test_every_language_has_every_page_with_the_same_keys_and_sections(language: str, page: str) -> None:
     english, other = text("en", page), text(language, page)
     named = re.findall(r"\{key:([^}]*)\}", other)
     assert set(named) <= {command.id for command in COMMANDS}
@@ -51,7 +51,7 @@ def test_each_language_has_each_page_with_the_same_keys_and_parts(language: str,
         assert len(re.findall(part, other)) == len(re.findall(part, english)), part
 
 
-def test_what_english_pages_call_commands_is_what_they_are_called() -> None:
+def test_english_pages_use_the_names_of_the_menu_commands() -> None:
     called = {words for command in COMMANDS for words in (command.text, command.text.format(number=""))}
     called |= {command.under for command in COMMANDS}
     for page in PAGES:
@@ -61,7 +61,7 @@ def test_what_english_pages_call_commands_is_what_they_are_called() -> None:
 
 @pytest.mark.parametrize("language", [each for each in LANGUAGES if each != "en"])
 @pytest.mark.parametrize("page", PAGES)
-def test_other_languages_call_commands_what_they_are_called_there(
+def test_translated_pages_use_the_translated_command_names(
     monkeypatch: pytest.MonkeyPatch, language: str, page: str
 ) -> None:
     monkeypatch.setattr("nep.i18n._current", None)
@@ -88,7 +88,7 @@ def named_pictures(page: str) -> list[tuple[str, str, str]]:
 
 
 @pytest.mark.parametrize("page", PAGES)
-def test_each_picture_is_there_in_each_language_and_in_both_themes(page: str) -> None:
+def test_every_image_exists_in_every_language_and_theme(page: str) -> None:
     for language, name, words in named_pictures(page):
         assert len(words) > MOST_LETTERS_OF_A_NAME, f"{name}: say what can be seen"
         found = []
@@ -104,7 +104,7 @@ def test_each_picture_is_there_in_each_language_and_in_both_themes(page: str) ->
         assert light > dark, f"{name}: one of them is in the colours of the other"
 
 
-def test_pictures_differ_only_in_words_and_all_are_used_and_small() -> None:
+def test_languages_have_the_same_images_and_all_are_used_and_small() -> None:
     by_language = {
         language: {name for page in PAGES for of, name, _words in named_pictures(page) if of == language}
         for language in LANGUAGES
@@ -118,7 +118,7 @@ def test_pictures_differ_only_in_words_and_all_are_used_and_small() -> None:
     assert sum(path.stat().st_size for path in files) < ALL_PICTURES
 
 
-def test_a_page_shows_the_pictures_of_its_language_in_the_colours_of_now(
+def test_page_shows_images_of_its_language_and_the_current_theme(
     qtbot, guide: GuideSheet, theme: Theme
 ) -> None:
     def pictures() -> list[QTextImageFormat]:
@@ -150,7 +150,7 @@ def test_a_page_shows_the_pictures_of_its_language_in_the_colours_of_now(
     qtbot.waitUntil(lambda: all(look.width() <= 300 for look in pictures()))
 
 
-def test_a_picture_that_is_not_there_in_a_language_is_the_english_one(tmp_path: Path) -> None:
+def test_missing_translated_image_falls_back_to_english(tmp_path: Path) -> None:
     (tmp_path / "en" / "dark").mkdir(parents=True)
     (tmp_path / "en" / "1.md").write_text("# One\n![A room with a robot](room)\n", "utf-8")
     (tmp_path / "en" / "dark" / "room.png").write_bytes(b"")
@@ -162,7 +162,7 @@ def test_a_picture_that_is_not_there_in_a_language_is_the_english_one(tmp_path: 
     assert not page.has("png")
 
 
-def test_a_language_without_a_page_shows_the_english_one(tmp_path: Path) -> None:
+def test_missing_translated_page_falls_back_to_english(tmp_path: Path) -> None:
     for folder, name in (("en", "1-a.md"), ("en", "2-b.md"), ("fr", "2-b.md")):
         (tmp_path / folder).mkdir(exist_ok=True)
         (tmp_path / folder / name).write_text(f"# {folder} {name}\n", "utf-8")
@@ -170,14 +170,14 @@ def test_a_language_without_a_page_shows_the_english_one(tmp_path: Path) -> None
     assert [page.title for page in pages] == ["en 1-a.md", "fr 2-b.md"]
 
 
-def test_keys_are_those_of_the_moment(tmp_path: Path) -> None:
+def test_pages_show_the_current_shortcuts(tmp_path: Path) -> None:
     (tmp_path / "en").mkdir()
     (tmp_path / "en" / "1.md").write_text("# Keys\nRun: {key:run.run}, {key:none}\n", "utf-8")
     (page,) = read_pages(tmp_path, "en", lambda command: {"run.run": "Ctrl+F5"}.get(command, ""))
     assert page.text == "# Keys\nRun: **Ctrl+F5**, **-**\n"
 
 
-def test_words_are_found_in_any_order_without_marks() -> None:
+def test_search_matches_words_in_any_order_and_ignores_accents() -> None:
     page = GuidePage("Stop", "# Stop\n**Stop** tells *every* robot")
     assert page.has("robot stop")
     assert page.has("STOP TELLS")
@@ -195,7 +195,7 @@ def guide(qtbot, window: MainWindow, commands: Commands) -> GuideSheet:
     return found
 
 
-def test_the_list_leads_to_pages_and_the_search_to_those_with_the_words(qtbot, guide: GuideSheet) -> None:
+def test_list_opens_pages_and_search_lists_pages_with_matches(qtbot, guide: GuideSheet) -> None:
     assert [guide.list.item(row).text() for row in range(guide.list.count())] == TITLES
     qtbot.waitUntil(guide.list.hasFocus)
     QTest.keyClick(guide.list, Qt.Key.Key_Down)
@@ -212,14 +212,14 @@ def test_the_list_leads_to_pages_and_the_search_to_those_with_the_words(qtbot, g
     assert not guide.isVisible()
 
 
-def test_it_opens_where_it_was_left(window: MainWindow, commands: Commands, guide: GuideSheet) -> None:
+def test_guide_reopens_at_the_last_page(window: MainWindow, commands: Commands, guide: GuideSheet) -> None:
     guide.list.setCurrentRow(4)
     guide.shut()
     commands.run("help.guide")
     assert guide.page.toPlainText().startswith("When something is wrong")
 
 
-def test_nothing_in_a_page_is_italic_and_keys_are_words(guide: GuideSheet) -> None:
+def test_pages_have_no_italics_and_no_unresolved_shortcut_placeholders(guide: GuideSheet) -> None:
     for row in range(guide.list.count()):
         guide.list.setCurrentRow(row)
         block = guide.page.document().begin()
@@ -229,7 +229,7 @@ def test_nothing_in_a_page_is_italic_and_keys_are_words(guide: GuideSheet) -> No
         assert "{key" not in guide.page.toPlainText()
 
 
-def test_about_says_what_it_runs_on_and_copies_it(qtbot, window: MainWindow, commands: Commands) -> None:
+def test_about_lists_versions_and_copies_them(qtbot, window: MainWindow, commands: Commands) -> None:
     window.show()
     commands.run("help.about")
     (sheet,) = [each for each in window.findChildren(AboutSheet) if each.isVisible()]

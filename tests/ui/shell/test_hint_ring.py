@@ -33,7 +33,7 @@ def ring(place: QWidget, theme: Theme) -> HintRing:
     return HintRing(theme, place)
 
 
-def test_it_surrounds_the_button_and_follows_it(qtbot: QtBot, place: QWidget, ring: HintRing) -> None:
+def test_ring_surrounds_the_button_and_follows_it(qtbot: QtBot, place: QWidget, ring: HintRing) -> None:
     assert ring.point_at("run.run")
     (button,) = place.findChildren(Button)
     assert ring.geometry().contains(QRect(button.pos(), button.size()))
@@ -41,7 +41,7 @@ def test_it_surrounds_the_button_and_follows_it(qtbot: QtBot, place: QWidget, ri
     qtbot.waitUntil(lambda: ring.geometry().contains(QRect(QPoint(200, 120), button.size())))
 
 
-def test_the_press_goes_through_and_ends_it(place: QWidget, ring: HintRing) -> None:
+def test_click_passes_through_the_ring_and_hides_it(place: QWidget, ring: HintRing) -> None:
     ring.point_at("run.run")
     (button,) = place.findChildren(Button)
     pressed: list[bool] = []
@@ -53,7 +53,9 @@ def test_the_press_goes_through_and_ends_it(place: QWidget, ring: HintRing) -> N
     assert ring.target is None
 
 
-def test_escape_ends_it_and_so_does_a_button_that_goes(qtbot: QtBot, place: QWidget, ring: HintRing) -> None:
+def test_ring_is_hidden_by_escape_and_when_its_button_is_hidden(
+    qtbot: QtBot, place: QWidget, ring: HintRing
+) -> None:
     ring.point_at("run.run")
     QTest.keyClick(place.windowHandle(), Qt.Key.Key_Escape)
     assert ring.isHidden()
@@ -63,6 +65,6 @@ def test_escape_ends_it_and_so_does_a_button_that_goes(qtbot: QtBot, place: QWid
     qtbot.waitUntil(ring.isHidden)
 
 
-def test_nothing_is_ringed_where_no_such_button_is_seen(place: QWidget, ring: HintRing) -> None:
+def test_no_ring_is_shown_when_the_button_is_not_visible(place: QWidget, ring: HintRing) -> None:
     assert not ring.point_at("run.stop")
     assert ring.isHidden()

@@ -23,13 +23,13 @@ def changed(**values: object) -> bytes:
 
 
 @pytest.mark.parametrize("encoding", ["utf-8", "utf-8-sig", "utf-16"])
-def test_what_is_written_is_read(encoding: str):
+def test_written_layout_is_read_back(encoding: str):
     saved = layout_bytes("Mine", "developer", SAVED).decode().encode(encoding)
     found = read_layout(saved, "file", PANELS)
     assert (found.name, found.base, found.saved, found.unknown) == ("Mine", "developer", SAVED, ())
 
 
-def test_panels_that_are_not_there_are_named_once_and_left_out():
+def test_unknown_panels_are_reported_once_and_skipped():
     found = read_layout(layout_bytes("Mine", "developer", SAVED), "file", ("topics",))
     assert (found.saved["open"], found.unknown) == (["topics"], ("plot",))
     found = read_layout(layout_bytes("Mine", "developer", SAVED), "file", ("plot",))
@@ -45,7 +45,7 @@ def test_panels_that_are_not_there_are_named_once_and_left_out():
     [("  two\n words\u202e ", "two words"), ("x" * 50, "x" * 40), ("", "the file"), (7, "the file"),
      ("\x00", "the file")],
 )  # fmt: skip
-def test_a_name_is_one_line_that_fits(name, shown):
+def test_layout_name_is_reduced_to_one_short_line(name, shown):
     assert read_layout(changed(name=name), "the file", PANELS).name == shown
 
 
@@ -69,12 +69,12 @@ def test_a_name_is_one_line_that_fits(name, shown):
         (changed(arrangement={"open": [], "docks": 3}), "it is damaged"),
     ],
 )
-def test_what_is_no_layout_is_a_sentence(data, sentence):
+def test_invalid_layout_file_is_rejected_with_a_reason(data, sentence):
     with pytest.raises(LayoutFileError, match=f"^{sentence}$"):
         read_layout(data, "file", PANELS)
 
 
-def test_a_layout_goes_out_and_comes_back_and_can_be_undone(
+def test_layout_is_exported_imported_and_import_can_be_undone(
     window: MainWindow, commands: Commands, answers: Answers, tmp_path: Path
 ):
     window.show()

@@ -72,7 +72,7 @@ def rest_of(bench: Workbench) -> list[str]:
 
 
 @pytest.mark.parametrize("order", [*permutations(layout.name for layout in LAYOUTS)])
-def test_every_panel_opened_in_one_layout_outlives_the_other(
+def test_every_panel_opened_in_one_layout_survives_switching_to_the_other(
     layouts: Layouts, order: tuple[str, ...]
 ) -> None:
     first, second = order
@@ -96,7 +96,7 @@ def test_every_panel_opened_in_one_layout_outlives_the_other(
     assert not rest_of(layouts.benches[second])
 
 
-def test_the_robots_cards_outlive_the_tabs_that_led_to_them(layouts: Layouts) -> None:
+def test_robot_cards_survive_switching_tabs_and_layouts(layouts: Layouts) -> None:
     bench = layouts.switch("developer")
     dock = bench.open("robots")  # a tab beside Topics
     layouts.settle()

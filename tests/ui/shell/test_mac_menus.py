@@ -38,7 +38,7 @@ def all_entries(window: MainWindow) -> list[QAction]:
     return found
 
 
-def test_settings_quit_and_about_are_where_a_mac_has_them(window: MainWindow) -> None:
+def test_settings_quit_and_about_are_in_the_macos_application_menu(window: MainWindow) -> None:
     places = {action.objectName(): action.menuRole() for action in all_entries(window)}
     moved = {name: role for name, role in places.items() if role != Role.NoRole}
     assert moved == {
@@ -48,7 +48,7 @@ def test_settings_quit_and_about_are_where_a_mac_has_them(window: MainWindow) ->
     }
 
 
-def test_a_mac_guesses_nothing_by_words(window: MainWindow) -> None:
+def test_no_action_uses_the_text_heuristic_menu_role_on_macos(window: MainWindow) -> None:
     found = all_entries(window)
     assert len(found) > 40
     assert [action.text() for action in found if action.menuRole() == Role.TextHeuristicRole] == []
@@ -57,7 +57,7 @@ def test_a_mac_guesses_nothing_by_words(window: MainWindow) -> None:
 @pytest.mark.parametrize(
     "words", ["About us", "Quit", "Setup", "Preferences of Ana", "Configuración", "Exit"]
 )
-def test_a_name_that_sounds_like_a_command_stays_in_its_menu(qtbot, theme: Theme, words: str) -> None:
+def test_menu_entry_named_like_a_system_command_stays_in_its_menu(qtbot, theme: Theme, words: str) -> None:
     place = QWidget()
     qtbot.addWidget(place)
     menu = Menu(theme, place, words)
@@ -70,9 +70,7 @@ def test_a_name_that_sounds_like_a_command_stays_in_its_menu(qtbot, theme: Theme
 
 
 @pytest.mark.parametrize(("platform", "native"), [("darwin", True), ("linux", False), ("win32", False)])
-def test_the_menus_are_at_the_top_of_the_screen_of_a_mac_alone(
-    qtbot, theme: Theme, platform: str, native: bool
-) -> None:
+def test_native_menu_bar_is_used_on_macos_only(qtbot, theme: Theme, platform: str, native: bool) -> None:
     bar = AppBar(theme, LAYOUTS, platform)
     qtbot.addWidget(bar)
     assert bar.native == native

@@ -47,7 +47,7 @@ def show(qtbot, window: MainWindow) -> None:
     qtbot.waitUntil(window.isActiveWindow)
 
 
-def test_it_begins_with_the_start_page(qtbot, window: MainWindow, commands: Commands) -> None:
+def test_window_opens_with_the_start_page(qtbot, window: MainWindow, commands: Commands) -> None:
     show(qtbot, window)
     assert window.start.isVisible()
     assert not window.run_bar.isVisible()
@@ -58,7 +58,7 @@ def test_it_begins_with_the_start_page(qtbot, window: MainWindow, commands: Comm
     assert not window.bar.stop.filled
 
 
-def test_there_is_one_way_to_the_start_page_and_one_back(
+def test_home_button_opens_the_start_page_and_back_button_returns(
     qtbot, window: MainWindow, commands: Commands
 ) -> None:
     show(qtbot, window)
@@ -77,7 +77,7 @@ def test_there_is_one_way_to_the_start_page_and_one_back(
     assert window.showing == "developer"
 
 
-def test_open_work_on_the_start_page_leads_to_its_tab(qtbot, window: MainWindow, commands: Commands) -> None:
+def test_open_work_on_the_start_page_opens_its_tab(qtbot, window: MainWindow, commands: Commands) -> None:
     show(qtbot, window)
     documents = window.session.documents
     first = documents.current
@@ -136,7 +136,7 @@ def test_both_layouts_show_their_panels(qtbot, window: MainWindow, commands: Com
     assert window.bar.switch.value == "developer"
 
 
-def test_the_first_arrangement_is_the_pictures(qtbot, window: MainWindow, commands: Commands) -> None:
+def test_default_arrangement_matches_the_design(qtbot, window: MainWindow, commands: Commands) -> None:
     show(qtbot, window)
     commands.run("layout.behaviour")
     docks = window.benches["behaviour"].docks
@@ -154,7 +154,7 @@ def test_the_first_arrangement_is_the_pictures(qtbot, window: MainWindow, comman
     assert docks["console"].y() > docks["image"].y()
 
 
-def test_only_panels_that_can_be_seen_are_refreshed(qtbot, window: MainWindow, commands: Commands) -> None:
+def test_only_visible_panels_are_refreshed(qtbot, window: MainWindow, commands: Commands) -> None:
     show(qtbot, window)
     commands.run("layout.behaviour")
     commands.run("layout.developer")
@@ -173,7 +173,7 @@ def test_only_panels_that_can_be_seen_are_refreshed(qtbot, window: MainWindow, c
     assert panel(window, "developer", "alerts").refreshed == behind + 1
 
 
-def test_a_panel_that_fails_is_shown_as_failed_and_the_window_lives_on(
+def test_failed_panel_is_shown_as_failed_and_the_window_keeps_running(
     qtbot, window: MainWindow, commands: Commands
 ) -> None:
     show(qtbot, window)
@@ -196,7 +196,7 @@ def test_a_panel_that_fails_is_shown_as_failed_and_the_window_lives_on(
     assert topics.refreshed > 0
 
 
-def test_f12_stops_everywhere(qtbot, window: MainWindow, commands: Commands, monkeypatch) -> None:
+def test_f12_stops_from_everywhere(qtbot, window: MainWindow, commands: Commands, monkeypatch) -> None:
     stops: list[str] = []
     commands.actions["run.stop"].triggered.connect(lambda: stops.append("stop"))
     show(qtbot, window)
@@ -212,7 +212,7 @@ def test_f12_stops_everywhere(qtbot, window: MainWindow, commands: Commands, mon
     assert len(stops) == 4
 
 
-def test_esc_leaves_a_field_and_stops_nothing(qtbot, window: MainWindow, commands: Commands) -> None:
+def test_esc_leaves_a_text_field_and_stops_nothing(qtbot, window: MainWindow, commands: Commands) -> None:
     stops: list[str] = []
     commands.actions["run.stop"].triggered.connect(lambda: stops.append("stop"))
     show(qtbot, window)
@@ -225,7 +225,9 @@ def test_esc_leaves_a_field_and_stops_nothing(qtbot, window: MainWindow, command
 
 
 @pytest.mark.parametrize("held", [Qt.KeyboardModifier.NoModifier, Qt.KeyboardModifier.ShiftModifier])
-def test_tab_never_leads_behind_another_panel(qtbot, window: MainWindow, commands: Commands, held) -> None:
+def test_tab_never_focuses_a_panel_hidden_behind_another(
+    qtbot, window: MainWindow, commands: Commands, held
+) -> None:
     show(qtbot, window)
     commands.run("layout.developer")
     bench = window.benches["developer"]
@@ -243,7 +245,7 @@ def test_tab_never_leads_behind_another_panel(qtbot, window: MainWindow, command
     assert not any(dock.isAncestorOf(each) for dock in behind for each in seen)
 
 
-def test_shift_f10_opens_the_menu_of_what_has_the_keyboard(
+def test_shift_f10_opens_the_menu_of_the_focused_widget(
     qtbot, window: MainWindow, commands: Commands
 ) -> None:
     show(qtbot, window)
@@ -257,7 +259,7 @@ def test_shift_f10_opens_the_menu_of_what_has_the_keyboard(
     assert asked == [field.rect().center()]
 
 
-def test_f6_and_numbers_go_through_the_panels(qtbot, window: MainWindow, commands: Commands) -> None:
+def test_f6_and_number_shortcuts_move_between_panels(qtbot, window: MainWindow, commands: Commands) -> None:
     show(qtbot, window)
     commands.run("layout.developer")
     qtbot.waitUntil(window.benches["developer"].docks["console"].shown)
@@ -275,7 +277,7 @@ def test_f6_and_numbers_go_through_the_panels(qtbot, window: MainWindow, command
     assert found.title.name.property("role") == "text"
 
 
-def test_slash_goes_to_the_filter_of_the_panel(qtbot, window: MainWindow, commands: Commands) -> None:
+def test_slash_focuses_the_filter_of_the_panel(qtbot, window: MainWindow, commands: Commands) -> None:
     show(qtbot, window)
     commands.run("layout.developer")
     topics = panel(window, "developer", "topics")
@@ -286,7 +288,7 @@ def test_slash_goes_to_the_filter_of_the_panel(qtbot, window: MainWindow, comman
     assert topics.filter.text() == ""
 
 
-def test_panels_float_close_and_open_again(qtbot, window: MainWindow, commands: Commands) -> None:
+def test_panels_are_floated_closed_and_reopened(qtbot, window: MainWindow, commands: Commands) -> None:
     show(qtbot, window)
     bench = window.show_layout("developer")
     dock = bench.docks["inspector"]
@@ -301,7 +303,7 @@ def test_panels_float_close_and_open_again(qtbot, window: MainWindow, commands: 
     assert "inspector" in bench.open_names()
 
 
-def test_floating_panels_go_with_their_layout(qtbot, window: MainWindow, commands: Commands) -> None:
+def test_floating_panels_are_hidden_with_their_layout(qtbot, window: MainWindow, commands: Commands) -> None:
     show(qtbot, window)
     bench = window.show_layout("developer")
     bench.docks["inspector"].setFloating(True)
@@ -312,7 +314,7 @@ def test_floating_panels_go_with_their_layout(qtbot, window: MainWindow, command
     assert bench.docks["inspector"].isVisible()
 
 
-def test_panels_that_share_a_place_are_tabs_in_the_title(
+def test_panels_in_the_same_dock_area_are_tabs_in_the_title(
     qtbot, window: MainWindow, commands: Commands
 ) -> None:
     show(qtbot, window)
@@ -325,7 +327,7 @@ def test_panels_that_share_a_place_are_tabs_in_the_title(
     assert not bench.docks["console"].shown()
 
 
-def test_tabs_of_panels_and_a_panels_own_tabs_have_a_row_each(qtbot, window: MainWindow) -> None:
+def test_dock_tabs_and_the_tabs_of_a_panel_have_separate_rows(qtbot, window: MainWindow) -> None:
     """Nobody takes the tab of a panel for one of a file, however narrow the window is."""
 
     class Own(PlainPanel):
@@ -352,14 +354,14 @@ def test_tabs_of_panels_and_a_panels_own_tabs_have_a_row_each(qtbot, window: Mai
     assert title.sizeHint().height() == alone
 
 
-def test_a_panel_opens_beside_its_home(qtbot, window: MainWindow, commands: Commands) -> None:
+def test_panel_opens_as_a_tab_in_its_default_dock_area(qtbot, window: MainWindow, commands: Commands) -> None:
     show(qtbot, window)
     bench = window.show_layout("behaviour")
     commands.run("panel:console")
     assert bench.docks["console"] in bench.tabifiedDockWidgets(bench.docks["problems"])
 
 
-def test_a_narrow_window_makes_tabs_and_a_wide_one_ends_them(
+def test_narrow_window_tabifies_panels_and_wide_window_separates_them(
     qtbot, window: MainWindow, commands: Commands
 ) -> None:
     show(qtbot, window)
@@ -374,7 +376,7 @@ def test_a_narrow_window_makes_tabs_and_a_wide_one_ends_them(
     assert docks["sensors"].y() > docks["camera"].y()
 
 
-def test_what_was_closed_in_a_narrow_window_stays_closed_in_a_wide_one(
+def test_panel_closed_in_a_narrow_window_stays_closed_in_a_wide_one(
     qtbot, window: MainWindow, commands: Commands
 ) -> None:
     show(qtbot, window)
@@ -390,7 +392,7 @@ def test_what_was_closed_in_a_narrow_window_stays_closed_in_a_wide_one(
     assert "robots" in bench.open_names()
 
 
-def test_everything_comes_back_at_the_next_start(qtbot, theme: Theme, session: Session, home: Path) -> None:
+def test_window_state_is_restored_after_restart(qtbot, theme: Theme, session: Session, home: Path) -> None:
     first = MainWindow(session, theme, PANELS, [])
     qtbot.addWidget(first)
     commands = first.commands
@@ -419,7 +421,9 @@ def test_everything_comes_back_at_the_next_start(qtbot, theme: Theme, session: S
     second.close()
 
 
-def test_damaged_layouts_give_the_first_arrangement(qtbot, window: MainWindow, commands: Commands) -> None:
+def test_damaged_layouts_fall_back_to_the_default_arrangement(
+    qtbot, window: MainWindow, commands: Commands
+) -> None:
     window.session.settings.set(
         "layouts", {"developer": {"open": ["topics", 5], "docks": "%%%", "panels": 3}}
     )
@@ -427,7 +431,7 @@ def test_damaged_layouts_give_the_first_arrangement(qtbot, window: MainWindow, c
     assert "inspector" in window.show_layout("developer").open_names()
 
 
-def test_a_topic_opens_in_the_panel_that_fits(qtbot, window: MainWindow, commands: Commands) -> None:
+def test_topic_opens_in_the_matching_panel(qtbot, window: MainWindow, commands: Commands) -> None:
     show(qtbot, window)
     window.show_layout("behaviour")
     window.open_topic("/odom")
@@ -436,7 +440,7 @@ def test_a_topic_opens_in_the_panel_that_fits(qtbot, window: MainWindow, command
     assert panel(window, "developer", "image").topics == []
 
 
-def test_commands_are_done_by_name(qtbot, window: MainWindow, commands: Commands) -> None:
+def test_commands_run_by_name(qtbot, window: MainWindow, commands: Commands) -> None:
     show(qtbot, window)
     assert commands.run("inspect:/faces")
     assert panel(window, "developer", "inspector").topics == ["/faces"]
@@ -449,7 +453,7 @@ def test_commands_are_done_by_name(qtbot, window: MainWindow, commands: Commands
     assert not commands.run("tab:nobody")
 
 
-def test_an_alert_is_a_banner_until_it_is_cured(qtbot, window: MainWindow, commands: Commands) -> None:
+def test_alert_is_a_banner_until_it_is_resolved(qtbot, window: MainWindow, commands: Commands) -> None:
     show(qtbot, window)
     window.show_layout("developer")
     alerts = window.session.alerts
@@ -471,7 +475,7 @@ def test_an_alert_is_a_banner_until_it_is_cured(qtbot, window: MainWindow, comma
     assert alerts.dismissed("one")
 
 
-def test_what_a_dead_studio_left_is_offered_without_a_dialog(
+def test_recovery_of_work_after_a_crash_is_offered_without_a_dialog(
     qtbot, window: MainWindow, commands: Commands, home: Path
 ) -> None:
     for name in ("Story", "Tale", "Song"):
@@ -492,7 +496,7 @@ def test_what_a_dead_studio_left_is_offered_without_a_dialog(
     assert not window.banner.isVisible()
 
 
-def test_a_studio_that_closed_in_order_has_its_tabs_again_and_asks_nothing(
+def test_tabs_are_restored_without_asking_after_a_clean_exit(
     qtbot, theme: Theme, window: MainWindow, commands: Commands, home: Path
 ) -> None:
     window.session.tabs.come_back([])
@@ -513,7 +517,7 @@ def test_a_studio_that_closed_in_order_has_its_tabs_again_and_asks_nothing(
     again.close()
 
 
-def test_the_theme_changes_at_once(qtbot, window: MainWindow, commands: Commands) -> None:
+def test_theme_changes_at_once(qtbot, window: MainWindow, commands: Commands) -> None:
     show(qtbot, window)
     window.show_layout("behaviour")
     commands.run("theme.dark")
@@ -537,7 +541,7 @@ def test_large_text_clips_no_button_of_the_bars(
     assert window.run_bar.height() >= window.run_bar.sizeHint().height()
 
 
-def test_closing_is_orderly(qtbot, window: MainWindow, commands: Commands) -> None:
+def test_window_closes_cleanly(qtbot, window: MainWindow, commands: Commands) -> None:
     done: list[str] = []
     window.on_shut = lambda: done.append("shut")
     show(qtbot, window)
@@ -550,7 +554,7 @@ def test_closing_is_orderly(qtbot, window: MainWindow, commands: Commands) -> No
     assert not window.timer.isActive()
 
 
-def test_every_command_has_words_and_no_two_share_a_key() -> None:
+def test_every_command_has_a_text_and_no_two_share_a_shortcut() -> None:
     assert len({row.id for row in COMMANDS}) == len(COMMANDS)
     keys = [key for row in COMMANDS for key in row.keys]
     assert len(set(keys)) == len(keys)
@@ -559,14 +563,14 @@ def test_every_command_has_words_and_no_two_share_a_key() -> None:
     assert (stop.text, stop.keys_at_first()[0]) == ("Stop the program and all robots", "F12")
 
 
-def test_no_button_of_qts_own_looks_is_left(qtbot, window: MainWindow, commands: Commands) -> None:
+def test_no_plain_qt_buttons_are_used(qtbot, window: MainWindow, commands: Commands) -> None:
     show(qtbot, window)
     for layout in ("behaviour", "developer"):
         window.show_layout(layout)
     assert window.findChildren(QPushButton) == []
 
 
-def test_all_controls_have_names(qtbot, window: MainWindow, commands: Commands) -> None:
+def test_all_controls_have_accessible_names(qtbot, window: MainWindow, commands: Commands) -> None:
     show(qtbot, window)
     window.show_layout("behaviour")
     window.tick()
@@ -581,7 +585,9 @@ def test_all_controls_have_names(qtbot, window: MainWindow, commands: Commands) 
 
 
 @pytest.mark.parametrize("percent", [100, 150, 200])
-def test_titles_grow_with_the_text(qtbot, window: MainWindow, commands: Commands, percent: int) -> None:
+def test_panel_titles_grow_with_the_text_size(
+    qtbot, window: MainWindow, commands: Commands, percent: int
+) -> None:
     show(qtbot, window)
     bench = window.show_layout("behaviour")
     window.theme.set_text_percent(percent)
@@ -593,7 +599,7 @@ def test_titles_grow_with_the_text(qtbot, window: MainWindow, commands: Commands
 
 
 @pytest.mark.parametrize("percent", [100, 150, 200])
-def test_results_are_never_cut_at_the_smallest_window(
+def test_results_are_never_clipped_in_the_smallest_window(
     qtbot, window: MainWindow, commands, percent: int
 ) -> None:
     show(qtbot, window)
@@ -617,7 +623,7 @@ def test_results_are_never_cut_at_the_smallest_window(
     assert bar.run.width() >= bar.run.sizeHint().width()
 
 
-def test_a_fault_of_the_session_is_said_once_and_the_window_lives_on(
+def test_session_error_is_logged_once_and_the_window_keeps_running(
     qtbot, window: MainWindow, commands: Commands, monkeypatch, caplog: pytest.LogCaptureFixture
 ) -> None:
     show(qtbot, window)
@@ -636,7 +642,7 @@ def test_a_fault_of_the_session_is_said_once_and_the_window_lives_on(
     assert sum(once.filter(record) is not None for record in caplog.records) == 1
 
 
-def test_closing_while_a_program_runs_stops_the_robots_at_once(
+def test_closing_the_window_during_a_run_stops_the_robots_at_once(
     qtbot, window: MainWindow, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     done: list[str] = []
@@ -648,7 +654,7 @@ def test_closing_while_a_program_runs_stops_the_robots_at_once(
     assert done == ["stop", "close"]
 
 
-def test_an_idle_window_closes_without_a_stop(
+def test_idle_window_closes_without_sending_stop(
     qtbot, window: MainWindow, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     done: list[str] = []
@@ -658,7 +664,7 @@ def test_an_idle_window_closes_without_a_stop(
     assert done == []
 
 
-def test_a_panel_that_floats_or_closes_does_not_hand_the_keyboard_on(
+def test_floating_or_closing_a_panel_does_not_move_focus_to_another_panel(
     qtbot, window: MainWindow, commands: Commands
 ) -> None:
     show(qtbot, window)
@@ -677,7 +683,7 @@ def test_a_panel_that_floats_or_closes_does_not_hand_the_keyboard_on(
     assert focus is None or not any(d.isAncestorOf(focus) for d in bench.docks.values())
 
 
-def test_the_systems_dialogs_leave_the_window_free(qtbot, window: MainWindow, tmp_path: Path) -> None:
+def test_system_file_dialogs_are_not_modal(qtbot, window: MainWindow, tmp_path: Path) -> None:
     show(qtbot, window)
     asked: list[Path] = []
     SystemDialogs(window).save(str(tmp_path / "Dance.nepb"), asked.append)
@@ -692,7 +698,7 @@ def test_the_systems_dialogs_leave_the_window_free(qtbot, window: MainWindow, tm
     dialog.close()
 
 
-def test_the_next_start_shows_what_was_worked_on_last(window: MainWindow, commands: Commands) -> None:
+def test_last_used_layout_is_shown_after_restart(window: MainWindow, commands: Commands) -> None:
     assert layout_left(window) == "", "a first start"
     commands.run("layout.developer")
     assert layout_left(window) == "developer"
@@ -704,7 +710,7 @@ def test_the_next_start_shows_what_was_worked_on_last(window: MainWindow, comman
     assert layout_left(window) == "", "a person went to the start page"
 
 
-def test_a_layout_that_comes_shows_its_bars_and_then_itself(
+def test_loading_layout_shows_its_bars_first_and_then_its_panels(
     qtbot, window: MainWindow, commands: Commands
 ) -> None:
     show(qtbot, window)
@@ -721,7 +727,7 @@ def test_a_layout_that_comes_shows_its_bars_and_then_itself(
 
 
 @pytest.mark.parametrize("kind", ["good", "bad", "none"])
-def test_a_start_shows_the_file_that_was_asked_for(
+def test_start_with_a_file_argument_shows_that_file(
     window: MainWindow, commands: Commands, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, kind: str
 ) -> None:
     monkeypatch.setattr(window, "begin", lambda: None)
@@ -734,7 +740,7 @@ def test_a_start_shows_the_file_that_was_asked_for(
     assert len(list(window.session.alerts.active)) == (1 if kind == "bad" else 0)
 
 
-def test_a_start_shows_what_was_left(
+def test_start_shows_what_was_open_last(
     window: MainWindow, commands: Commands, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(window, "begin", lambda: None)
@@ -747,7 +753,7 @@ def test_a_start_shows_what_was_left(
     assert [step.__name__ for step in first_steps(window, Options(new_window=True))] == ["<lambda>"]
 
 
-def test_the_very_first_start_offers_the_first_steps_and_the_second_does_not(
+def test_very_first_start_offers_the_first_steps_and_the_second_does_not(
     window: MainWindow, commands: Commands, home: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(window, "begin", lambda: None)
@@ -762,7 +768,7 @@ def test_the_very_first_start_offers_the_first_steps_and_the_second_does_not(
 
 
 @pytest.mark.parametrize("instead", ["work of last time", "open work", "a file", "an earlier version"])
-def test_nothing_is_offered_where_something_else_is_at_hand(
+def test_first_steps_are_not_offered_when_there_is_other_work(
     window: MainWindow, commands: Commands, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, instead: str
 ) -> None:
     monkeypatch.setattr(window, "begin", lambda: None)
@@ -776,7 +782,7 @@ def test_nothing_is_offered_where_something_else_is_at_hand(
     assert not window.start.offers_first_steps
 
 
-def test_who_drives_the_window_alone_begins_the_demonstration_and_nobody_else_does(
+def test_demo_option_starts_the_demo_except_in_self_drive_mode(
     window: MainWindow, commands: Commands, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     begun: list[str] = []
@@ -790,7 +796,7 @@ def test_who_drives_the_window_alone_begins_the_demonstration_and_nobody_else_do
     assert begun == ["demo"]
 
 
-def test_panels_made_ahead_are_those_that_a_layout_shows(theme: Theme, session: Session) -> None:
+def test_only_panels_of_a_visible_layout_are_created_ahead(theme: Theme, session: Session) -> None:
     made: list[str] = []
     seen: dict[str, PlainPanel] = {}
 
@@ -817,7 +823,7 @@ def test_panels_made_ahead_are_those_that_a_layout_shows(theme: Theme, session: 
     window.close()
 
 
-def test_panels_that_were_made_ahead_and_never_seen_end_with_the_window(
+def test_panels_created_ahead_and_never_shown_are_closed_with_the_window(
     theme: Theme, session: Session
 ) -> None:
     panels: list[PlainPanel] = []

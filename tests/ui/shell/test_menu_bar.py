@@ -13,7 +13,7 @@ pytestmark = pytest.mark.qt_log_ignore("does not support grabbing the keyboard",
 pytest_plugins = ["tests.ui.shell_fixtures"]
 
 
-def test_alt_shows_the_letters(qtbot, window: MainWindow) -> None:
+def test_holding_alt_underlines_the_mnemonics(qtbot, window: MainWindow) -> None:
     window.show()
     bar = window.bar.menus
     qtbot.waitUntil(bar.isVisible)
@@ -25,7 +25,7 @@ def test_alt_shows_the_letters(qtbot, window: MainWindow) -> None:
             assert bar.grab().toImage() != before
 
 
-def test_a_chosen_menu_is_marked(qtbot, window: MainWindow) -> None:
+def test_active_menu_is_highlighted(qtbot, window: MainWindow) -> None:
     window.show()
     bar = window.bar.menus
     qtbot.waitUntil(bar.isVisible)

@@ -28,7 +28,7 @@ def shown(qtbot, theme: Theme, place: QWidget, *actions: QAction) -> Menu:
     return menu
 
 
-def test_the_corners_are_round_and_the_edges_straight() -> None:
+def test_menu_has_round_corners_and_straight_edges() -> None:
     region = round_region(QSize(200, 100), 8)
     for corner in (QPoint(0, 0), QPoint(199, 0), QPoint(1, 98), QPoint(199, 99)):
         assert not region.contains(corner)
@@ -36,7 +36,7 @@ def test_the_corners_are_round_and_the_edges_straight() -> None:
         assert region.contains(edge)
 
 
-def test_words_marks_and_keys_are_painted(qtbot, theme: Theme) -> None:
+def test_text_check_marks_and_shortcuts_are_painted(qtbot, theme: Theme) -> None:
     place = QWidget()
     plain, marked = QAction("&Copy", place), QAction("&Copy", place)
     marked.setCheckable(True)
@@ -60,7 +60,7 @@ def test_words_marks_and_keys_are_painted(qtbot, theme: Theme) -> None:
     menu.close()
 
 
-def test_a_letter_chooses_an_entry_whatever_its_words_are(qtbot, theme: Theme) -> None:
+def test_every_menu_entry_can_be_chosen_by_a_letter(qtbot, theme: Theme) -> None:
     place, done = QWidget(), []
     made = [QAction(words, place) for words in ("Cortar", "Copiar", "Última", "No")]
     for action in made:
@@ -73,7 +73,7 @@ def test_a_letter_chooses_an_entry_whatever_its_words_are(qtbot, theme: Theme) -
     assert done == ["Cortar", "Copiar", "Última"]  # what is off is not chosen
 
 
-def test_a_letter_opens_the_menu_in_a_menu(qtbot, theme: Theme) -> None:
+def test_letter_opens_a_submenu(qtbot, theme: Theme) -> None:
     place = QWidget()
     menu = Menu(theme, place)
     inner = Menu(theme, menu, "Look")
@@ -88,7 +88,7 @@ def test_a_letter_opens_the_menu_in_a_menu(qtbot, theme: Theme) -> None:
     menu.close()
 
 
-def test_the_letters_are_underlined_for_who_uses_keys(qtbot, theme: Theme) -> None:
+def test_mnemonics_are_underlined_during_keyboard_navigation(qtbot, theme: Theme) -> None:
     place = QWidget()
     menu = shown(qtbot, theme, place, QAction("Copy", place), QAction("Paste", place))
     before = menu.grab().toImage()
@@ -98,7 +98,7 @@ def test_the_letters_are_underlined_for_who_uses_keys(qtbot, theme: Theme) -> No
     menu.close()
 
 
-def test_a_field_offers_its_editing_in_our_menu(qtbot, theme: Theme) -> None:
+def test_text_field_uses_our_context_menu(qtbot, theme: Theme) -> None:
     field = QLineEdit("hello")
     EditMenu(theme, field)
     theme.apply()
@@ -115,7 +115,7 @@ def test_a_field_offers_its_editing_in_our_menu(qtbot, theme: Theme) -> None:
         menu.close()
 
 
-def test_the_list_of_a_choice_has_no_frame_of_the_system(qtbot, theme: Theme) -> None:
+def test_combo_box_popup_is_frameless(qtbot, theme: Theme) -> None:
     theme.apply()
     choice = ComboBox(theme, [(name, name) for name in ("one", "two", "three", "four", "five")])
     qtbot.addWidget(choice)

@@ -49,12 +49,12 @@ def window(qtbot, tmp_path) -> Window:
     return made
 
 
-def test_nothing_shows_while_nobody_asks(window) -> None:
+def test_no_question_is_shown_without_a_request(window) -> None:
     window.question.refresh()
     assert not window.question.isVisible()
 
 
-def test_it_says_what_moves_and_how_it_is_stopped(window) -> None:
+def test_question_names_what_moves_and_how_to_stop_it(window) -> None:
     window.ask("move", "turn")
     question = window.question
     assert question.isVisible()
@@ -67,7 +67,7 @@ def test_it_says_what_moves_and_how_it_is_stopped(window) -> None:
     assert question.accessibleName() == "Allow Rover to move?"
 
 
-def test_let_it_move_goes_on(window) -> None:
+def test_allowing_motion_continues_the_action(window) -> None:
     window.ask("move")
     QTest.mouseClick(window.question.let, Qt.MouseButton.LeftButton)
     assert window.done == ["moved"]
@@ -90,7 +90,7 @@ def test_not_now_moves_nothing(window, how) -> None:
     assert not window.permission.allowed(ROVER)
 
 
-def test_always_is_kept(window, tmp_path) -> None:
+def test_always_allow_is_saved(window, tmp_path) -> None:
     window.ask("move")
     QTest.mouseClick(
         window.question.always, Qt.MouseButton.LeftButton, pos=window.question.always.rect().center()
@@ -100,7 +100,7 @@ def test_always_is_kept(window, tmp_path) -> None:
     assert MotionPermission(Settings(tmp_path)).allowed(ROVER)
 
 
-def test_an_always_that_can_not_be_kept_is_told_and_it_moves_all_the_same(window, tmp_path) -> None:
+def test_always_allow_that_cannot_be_saved_is_reported_and_motion_is_allowed(window, tmp_path) -> None:
     (tmp_path / "settings.json").mkdir()
     window.ask("move")
     window.question.always.setChecked(True)
@@ -109,7 +109,7 @@ def test_an_always_that_can_not_be_kept_is_told_and_it_moves_all_the_same(window
     assert window.done == ["moved"]
 
 
-def test_a_stop_takes_the_question_away(window) -> None:
+def test_stop_closes_the_question(window) -> None:
     window.ask("move")
     window.permission.withdraw()
     window.question.refresh()
@@ -117,7 +117,7 @@ def test_a_stop_takes_the_question_away(window) -> None:
     assert window.done == []
 
 
-def test_it_stays_in_a_small_window_and_moves_with_it(window, qtbot) -> None:
+def test_question_stays_inside_a_small_window_and_follows_resizing(window, qtbot) -> None:
     window.ask("move")
     window.resize(420, 380)
     qtbot.waitUntil(lambda: window.question.width() <= 400)
@@ -125,7 +125,7 @@ def test_it_stays_in_a_small_window_and_moves_with_it(window, qtbot) -> None:
     assert inside.contains(window.question.geometry())
 
 
-def test_what_had_the_keyboard_may_be_gone_by_then(window) -> None:
+def test_answer_works_when_the_previously_focused_widget_was_deleted(window) -> None:
     window.ask("move")
     window.field.deleteLater()
     QCoreApplication.sendPostedEvents(window.field, QEvent.Type.DeferredDelete.value)
@@ -144,7 +144,7 @@ LONG = [
 @pytest.mark.parametrize("name", LONG, ids=lambda each: each[:10])
 @pytest.mark.parametrize("size", [(1440, 900), (640, 480)])
 @pytest.mark.parametrize("percent", [100, 150])
-def test_the_whole_name_is_to_be_read_however_long(qtbot, tmp_path, name, size, percent) -> None:
+def test_long_robot_name_is_shown_in_full(qtbot, tmp_path, name, size, percent) -> None:
     """Two robots may differ in their last letter only."""
     window = Window(tmp_path)
     qtbot.addWidget(window)
@@ -166,7 +166,7 @@ def test_the_whole_name_is_to_be_read_however_long(qtbot, tmp_path, name, size, 
     assert name in window.question.accessibleName()
 
 
-def test_its_words_have_their_room_at_the_first_show(qtbot, tmp_path) -> None:
+def test_question_has_its_final_size_when_first_shown(qtbot, tmp_path) -> None:
     window = Window(tmp_path)
     qtbot.addWidget(window)
     window.question._theme.apply()  # the words grow when the question is polished

@@ -43,7 +43,7 @@ def make(qtbot, tmp_path):
         reach.close()
 
 
-def test_it_warns_names_the_address_and_lets_them_connect(make):
+def test_sheet_warns_shows_the_address_and_allows_connections(make):
     sheet, reach, asked = make()
     sheet.open()
     assert sheet.heading.text() == "Let other computers connect?"
@@ -68,7 +68,7 @@ def test_not_now_changes_nothing(make):
     assert not sheet.isVisible()
 
 
-def test_it_is_taken_back_where_it_was_given(make):
+def test_access_is_revoked_in_the_same_sheet(make):
     sheet, reach, asked = make()
     reach.follow(GraphView(epoch=1, revision=1, listens=("192.168.1.20",)))
     assert access_words(reach) == ("wifi", "Other computers connect at 192.168.1.20", "warn")
@@ -80,7 +80,7 @@ def test_it_is_taken_back_where_it_was_given(make):
     assert asked == [()]
 
 
-def test_without_a_network_it_says_what_to_do_first(make):
+def test_without_a_network_the_sheet_explains_what_to_do_first(make):
     sheet, reach, _asked = make(here=())
     sheet.open()
     assert sheet.heading.text() == "This computer is not connected to a network"
@@ -88,7 +88,7 @@ def test_without_a_network_it_says_what_to_do_first(make):
     assert access_words(reach)[1] == "This computer only"
 
 
-def test_the_master_of_another_computer_decides_there(make):
+def test_access_to_a_remote_master_is_decided_on_its_computer(make):
     sheet, reach, _asked = make(address="192.168.1.9:7780")
     sheet.open()
     assert "192.168.1.9" in sheet.heading.text()

@@ -111,7 +111,7 @@ def opened(window: MainWindow, panel: str) -> Dock:
 
 
 @pytest.mark.parametrize("panel", PANELS)
-def test_more_and_every_menu_of_a_panel(qtbot, window: MainWindow, panel: str) -> None:
+def test_reopening_every_menu_of_a_panel_leaks_no_objects(qtbot, window: MainWindow, panel: str) -> None:
     window.show()
     dock = opened(window, panel)
     shown: list[QMenu] = []
@@ -144,7 +144,7 @@ def test_more_and_every_menu_of_a_panel(qtbot, window: MainWindow, panel: str) -
         ("console", "_show_menu"),
     ],
 )
-def test_the_menu_in_a_title(window: MainWindow, panel: str, opener: str) -> None:
+def test_reopening_the_title_menu_leaks_no_objects(window: MainWindow, panel: str, opener: str) -> None:
     window.show()
     dock = opened(window, panel)
     leaves_nothing(window, getattr(dock.panel, opener))
@@ -158,35 +158,35 @@ def test_the_menu_in_a_title(window: MainWindow, panel: str, opener: str) -> Non
         ("inspector", "_show_menu"),
     ],
 )
-def test_the_menu_under_the_mouse(window: MainWindow, panel: str, opener: str) -> None:
+def test_reopening_the_context_menu_leaks_no_objects(window: MainWindow, panel: str, opener: str) -> None:
     window.show()
     dock = opened(window, panel)
     leaves_nothing(window, lambda: getattr(dock.panel, opener)(QPoint(5, 5)))
 
 
 @pytest.mark.parametrize("panel", ["nodes", "topics"])
-def test_the_menu_of_a_row(window: MainWindow, panel: str) -> None:
+def test_reopening_the_row_menu_leaks_no_objects(window: MainWindow, panel: str) -> None:
     window.show()
     inside = opened(window, panel).panel
     assert isinstance(inside, TablePanel)
     leaves_nothing(window, lambda: inside._show_row_menu("/odom", QPoint(5, 5)))
 
 
-def test_the_menu_of_a_line_in_the_graph(window: MainWindow) -> None:
+def test_reopening_the_edge_menu_of_the_graph_leaks_no_objects(window: MainWindow) -> None:
     window.show()
     inside = opened(window, "graph").panel
     assert isinstance(inside, GraphPanel)
     leaves_nothing(window, lambda: inside._show_menu(GraphChoice("topic", "/blackboard"), QPoint(5, 5)))
 
 
-def test_the_columns_of_a_table(window: MainWindow) -> None:
+def test_reopening_the_column_menu_of_a_table_leaks_no_objects(window: MainWindow) -> None:
     window.show()
     dock = opened(window, "topics")
     table = dock.panel.table  # type: ignore[attr-defined]
     leaves_nothing(window, lambda: table._show_columns(QPoint(5, 5)))
 
 
-def test_the_menus_of_the_bar_and_what_they_list(window: MainWindow) -> None:
+def test_reopening_the_menus_and_submenus_of_the_menu_bar_leaks_no_objects(window: MainWindow) -> None:
     window.show()
     opened(window, "topics")
 
@@ -209,13 +209,13 @@ def test_the_menus_of_the_bar_and_what_they_list(window: MainWindow) -> None:
 
 
 @pytest.mark.parametrize("name", COMMANDS)
-def test_what_a_command_opens(window: MainWindow, name: str) -> None:
+def test_reopening_sheets_and_dialogs_of_commands_leaks_no_objects(window: MainWindow, name: str) -> None:
     window.show()
     opened(window, "behaviour")
     leaves_nothing(window, lambda: window.commands.run(name))
 
 
-def test_toasts_and_banners(window: MainWindow) -> None:
+def test_toasts_and_banners_leak_no_objects(window: MainWindow) -> None:
     window.show()
     opened(window, "topics")
 
@@ -232,7 +232,7 @@ def test_toasts_and_banners(window: MainWindow) -> None:
     leaves_nothing(window, say)
 
 
-def test_layouts_and_panels_that_come_and_go(qtbot, window: MainWindow) -> None:
+def test_opening_and_closing_layouts_and_panels_leaks_no_objects(qtbot, window: MainWindow) -> None:
     window.show()
 
     def go_round() -> None:

@@ -46,7 +46,7 @@ def states(sheet: OtherNetworksSheet) -> list[str]:
     return [row.state.text() for row in sheet.rows]
 
 
-def test_all_are_off_at_first_and_say_what_their_address_means(
+def test_all_networks_are_disabled_by_default_and_explain_their_address(
     sheet: OtherNetworksSheet, world: World
 ) -> None:
     assert [row.switch.text() for row in sheet.rows] == ["ROS 1", "ROS 2", "Zenoh"]
@@ -57,7 +57,7 @@ def test_all_are_off_at_first_and_say_what_their_address_means(
     assert world.made == []
 
 
-def test_a_switch_applies_at_once_and_says_how_the_network_is(
+def test_switch_applies_at_once_and_shows_the_connection_state(
     sheet: OtherNetworksSheet, world: World
 ) -> None:
     ros = sheet.rows[0]
@@ -73,7 +73,7 @@ def test_a_switch_applies_at_once_and_says_how_the_network_is(
     assert "another computer" in states(sheet)[0]
 
 
-def test_a_wrong_address_says_so_and_stays_as_it_was_typed(sheet: OtherNetworksSheet, world: World) -> None:
+def test_invalid_address_is_reported_and_kept_as_typed(sheet: OtherNetworksSheet, world: World) -> None:
     row = sheet.rows[1]
     row.address.setText("999")
     row.switch.click()
@@ -94,7 +94,7 @@ def test_a_wrong_address_says_so_and_stays_as_it_was_typed(sheet: OtherNetworksS
     assert ([fake.address for fake in world.made], row.address.text()) == (["9", "10"], "10")
 
 
-def test_what_was_typed_is_taken_over_when_it_closes(sheet: OtherNetworksSheet, world: World) -> None:
+def test_typed_address_is_applied_when_the_sheet_closes(sheet: OtherNetworksSheet, world: World) -> None:
     row = sheet.rows[2]
     row.switch.click()
     row.address.setText("local/lab")
@@ -105,7 +105,7 @@ def test_what_was_typed_is_taken_over_when_it_closes(sheet: OtherNetworksSheet, 
     sheet.shut()
 
 
-def test_what_can_not_be_kept_is_said(
+def test_setting_that_cannot_be_saved_is_reported(
     sheet: OtherNetworksSheet, world: World, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     def refuse(_key: str, _value: object) -> None:
@@ -118,7 +118,7 @@ def test_what_can_not_be_kept_is_said(
 
 
 @pytest.mark.parametrize("percent", [100, 200])
-def test_its_words_are_translated_and_fit(
+def test_texts_are_translated_and_fit(
     qtbot, pseudo, theme: Theme, sheet: OtherNetworksSheet, world: World, percent: int
 ) -> None:
     theme.set_text_percent(percent)

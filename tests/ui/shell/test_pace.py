@@ -21,14 +21,14 @@ class Runner:
     def stop(self) -> None: ...
 
 
-def test_the_run_bar_offers_the_speeds_of_the_menu(window: MainWindow, commands: Commands) -> None:
+def test_run_bar_offers_the_same_speeds_as_the_menu(window: MainWindow, commands: Commands) -> None:
     offered = [action.text() for action in window.run_bar._paces.actions()]
     assert offered == ["Full speed", "Slow motion: 0.5 s per block", "Very slow: 1.5 s per block"]
     assert commands.actions["run.full_speed"].isChecked()
     assert window.run_bar.pace.accessibleName() == "Speed"
 
 
-def test_a_speed_reaches_the_program_that_runs_and_the_next_one(
+def test_speed_applies_to_the_running_program_and_the_next_one(
     window: MainWindow, commands: Commands
 ) -> None:
     runs, runner = window.session.runs, Runner()
@@ -46,7 +46,7 @@ def test_a_speed_reaches_the_program_that_runs_and_the_next_one(
     runs._runner = None
 
 
-def test_start_position_of_virtual_robots_is_a_choice(window: MainWindow, commands: Commands) -> None:
+def test_start_position_of_virtual_robots_can_be_disabled(window: MainWindow, commands: Commands) -> None:
     fleet, action = window.session.fleet, commands.actions["run.from_start"]
     assert (fleet.begins_at_start, action.isChecked()) == (True, True)
     commands.run("run.from_start")

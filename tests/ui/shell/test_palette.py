@@ -39,11 +39,11 @@ def bold(query: str, words: str) -> str:
     return "|".join(words[begin:end] for begin, end in fits[1])
 
 
-def test_the_beginning_of_a_word_is_better_than_its_middle() -> None:
+def test_match_at_word_start_scores_higher_than_inside_a_word() -> None:
     assert found("Unsaved", "Save", "Auto save", query="save") == ["Save", "Auto save", "Unsaved"]
 
 
-def test_letters_that_fit_are_told() -> None:
+def test_matched_letters_are_reported() -> None:
     assert bold("reco", "Save last 60 s of the recording") == "reco"
     assert bold("rp", "Reset panels") == "R|p"
     assert bold("text larger", "Larger text") == "Larger|text"
@@ -51,16 +51,16 @@ def test_letters_that_fit_are_told() -> None:
 
 
 @pytest.mark.parametrize("query", ["xyz", "savex", "zz top", "keyboard mouse"])
-def test_what_does_not_fit_is_not_found(query: str) -> None:
+def test_non_matching_entries_are_not_found(query: str) -> None:
     assert found("Save", "Keyboard shortcuts", "Stop the program", query=query) == []
 
 
-def test_what_can_be_done_now_stands_above_what_can_not() -> None:
+def test_available_commands_rank_above_unavailable_ones() -> None:
     entries = [Entry("command:a", "Let go", reason="Nothing is held"), Entry("command:b", "Go up")]
     assert [each.entry.words for each in Finder(entries).find("go", 20)[0]] == ["Go up", "Let go"]
 
 
-def test_scattered_letters_do_not_fit() -> None:
+def test_scattered_letters_do_not_match() -> None:
     assert found("Show the inside of every panel that is open", query="hif") == []
     assert found("Close the behaviour", query="tour") == []  # it would close a tab on Enter
 
@@ -69,7 +69,7 @@ def test_scattered_letters_do_not_fit() -> None:
     ("query", "words"),
     [("rp", "Reset panels"), ("ob", "Open another behaviour"), ("vl", "Volver a poner los paneles")],
 )
-def test_the_initials_of_a_command_mean_it(query: str, words: str) -> None:
+def test_initials_match_a_command(query: str, words: str) -> None:
     topics = [Entry(f"topic:/{query}", f"/{query}"), Entry(f"topic:/a{query}", f"/a{query}")]
     other = Entry("command:x", f"Take the {query}x away")
     rows, _count = Finder([*topics, Entry("command:layout.reset", words)]).find(query, 20)
@@ -79,11 +79,11 @@ def test_the_initials_of_a_command_mean_it(query: str, words: str) -> None:
 
 
 @pytest.mark.parametrize("query", ["p", "pt b", "bp", "pbx", "tb"])
-def test_what_are_no_initials_stands_as_ever(query: str) -> None:
+def test_non_initials_are_not_treated_as_initials(query: str) -> None:
     assert not fuzzy.is_initials(query, "Reset panels")
 
 
-def test_of_very_many_whole_pieces_are_found_and_all_are_counted() -> None:
+def test_among_ten_thousand_entries_whole_words_are_found_and_all_matches_counted() -> None:
     many = [Entry(f"topic:/robot{n}/joint/{n % 97}", f"/robot{n}/joint/{n % 97}") for n in range(10_000)]
     finder = Finder([*many, Entry("command:x", "Joists and beams")])
     rows, count = finder.find("joint", 40)
@@ -97,7 +97,7 @@ def test_of_very_many_whole_pieces_are_found_and_all_are_counted() -> None:
     assert count == 10_001
 
 
-def test_of_ten_thousand_topics_few_are_looked_at_closely(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_fuzzy_comparison_is_limited_among_ten_thousand_topics(monkeypatch: pytest.MonkeyPatch) -> None:
     """What makes it quick (4 ms): the costly comparison is made for the most promising alone."""
     finder = Finder(
         [Entry(f"topic:/robot{n}/joint/{n % 97}", f"/robot{n}/joint/{n % 97}") for n in range(10_000)]
@@ -146,14 +146,16 @@ def headings(palette: Palette) -> list[str]:
     return [line.words for line in palette.rows.lines.lines if isinstance(line, Heading)]
 
 
-def test_it_is_640_wide_128_from_the_top_and_has_the_keyboard(palette: Palette, window: MainWindow) -> None:
+def test_palette_is_640_px_wide_128_px_from_the_top_and_focused(palette: Palette, window: MainWindow) -> None:
     assert (palette.width(), palette.y()) == (640, 128)
     assert abs(palette.geometry().center().x() - window.rect().center().x()) <= 1
     assert palette.field.hasFocus()
     assert palette.rows.entry is not None
 
 
-def test_it_opens_in_120_ms_and_at_once_with_less_motion(qtbot, palette: Palette, window: MainWindow) -> None:
+def test_palette_opens_in_120_ms_and_at_once_with_reduced_motion(
+    qtbot, palette: Palette, window: MainWindow
+) -> None:
     assert palette.graphicsEffect() is None
     palette.shut()
     window.theme.set_motion("off")
@@ -162,7 +164,7 @@ def test_it_opens_in_120_ms_and_at_once_with_less_motion(qtbot, palette: Palette
     qtbot.waitUntil(lambda: palette.graphicsEffect() is None)
 
 
-def test_stop_stays_bright_and_can_be_pressed(palette: Palette, window: MainWindow) -> None:
+def test_stop_stays_bright_and_clickable(palette: Palette, window: MainWindow) -> None:
     stop = window.tool_bar.stop
     middle = stop.mapTo(window, stop.rect().center())
     assert window.childAt(middle) is stop
@@ -176,7 +178,7 @@ def test_stop_stays_bright_and_can_be_pressed(palette: Palette, window: MainWind
 
 @pytest.mark.parametrize("percent", [200, 125, 100])
 @pytest.mark.parametrize("layout", ["behaviour", "developer"])
-def test_the_hole_over_stop_follows_it_when_the_size_of_text_changes(
+def test_overlay_cutout_follows_the_stop_button_when_the_text_size_changes(
     qtbot, palette: Palette, window: MainWindow, layout: str, percent: int
 ) -> None:
     """Whatever opens over the window: one that keeps its place is not laid out again by itself."""
@@ -200,7 +202,7 @@ def test_the_hole_over_stop_follows_it_when_the_size_of_text_changes(
     qtbot.waitUntil(follows)
 
 
-def test_f12_stops_while_it_is_open(palette: Palette, commands: Commands) -> None:
+def test_f12_stops_while_the_palette_is_open(palette: Palette, commands: Commands) -> None:
     stops: list[str] = []
     commands.actions["run.stop"].triggered.connect(lambda: stops.append("stop"))
     QTest.keyClick(palette.field, Qt.Key.Key_F12)
@@ -208,7 +210,7 @@ def test_f12_stops_while_it_is_open(palette: Palette, commands: Commands) -> Non
     assert palette.isVisible()
 
 
-def test_a_command_is_found_and_done(palette: Palette, window: MainWindow) -> None:
+def test_command_is_found_and_run(palette: Palette, window: MainWindow) -> None:
     QTest.keyClicks(palette.field, "dark")
     assert words(palette)[0] == "Dark"
     QTest.keyClick(palette.field, Qt.Key.Key_Return)
@@ -219,13 +221,13 @@ def test_a_command_is_found_and_done(palette: Palette, window: MainWindow) -> No
     assert words(palette)[0] == "Dark"
 
 
-def test_what_was_used_is_known_after_a_new_start(palette: Palette, window: MainWindow) -> None:
+def test_recently_used_commands_are_remembered_after_restart(palette: Palette, window: MainWindow) -> None:
     QTest.keyClicks(palette.field, "larger")
     QTest.keyClick(palette.field, Qt.Key.Key_Return)
     assert window.session.settings.get("palette_last", []) == ["command:text.larger"]
 
 
-def test_keys_choose(palette: Palette) -> None:
+def test_results_are_selected_by_keyboard(palette: Palette) -> None:
     order = words(palette)
 
     def chosen_after(key: Qt.Key) -> str:
@@ -243,7 +245,7 @@ def test_keys_choose(palette: Palette) -> None:
     assert chosen_after(Qt.Key.Key_Home) == order[0]
 
 
-def test_esc_and_ctrl_k_close_it_and_the_keyboard_goes_back(palette: Palette, window: MainWindow) -> None:
+def test_esc_and_ctrl_k_close_the_palette_and_restore_focus(palette: Palette, window: MainWindow) -> None:
     palette.shut()
     panel = window.benches["developer"].docks["topics"].panel
     assert isinstance(panel, PlainPanel)
@@ -257,12 +259,12 @@ def test_esc_and_ctrl_k_close_it_and_the_keyboard_goes_back(palette: Palette, wi
     assert not palette.isVisible()
 
 
-def test_a_click_beside_it_closes_it(palette: Palette) -> None:
+def test_click_outside_closes_the_palette(palette: Palette) -> None:
     QTest.mouseClick(palette._scrim, Qt.MouseButton.LeftButton, pos=QPoint(20, 400))
     assert not palette.isVisible()
 
 
-def test_tab_stays_inside(palette: Palette) -> None:
+def test_tab_stays_inside_the_palette(palette: Palette) -> None:
     for _ in range(3):
         QTest.keyClick(QApplication.focusWidget(), Qt.Key.Key_Tab)
         focus = QApplication.focusWidget()
@@ -312,7 +314,7 @@ def test_examples_are_found_and_open_as_new_behaviours(palette, window: MainWind
     assert window.session.document.path is None
 
 
-def test_what_cant_be_done_says_why_and_is_not_done(palette: Palette, window: MainWindow) -> None:
+def test_unavailable_command_shows_the_reason_and_is_not_run(palette: Palette, window: MainWindow) -> None:
     palette.field.setText("smaller text")
     entry = palette.rows.entry
     assert entry is not None
@@ -322,7 +324,7 @@ def test_what_cant_be_done_says_why_and_is_not_done(palette: Palette, window: Ma
     assert window.theme.text_percent == 100
 
 
-def test_nothing_found_is_said(palette: Palette) -> None:
+def test_empty_result_is_reported(palette: Palette) -> None:
     palette.field.setText("qqqq")
     assert palette.rows.entry is None
     assert palette.nothing.text() == "No results for “qqqq”."
@@ -331,7 +333,7 @@ def test_nothing_found_is_said(palette: Palette) -> None:
     assert palette.isVisible()
 
 
-def test_it_stays_small_with_very_many_topics(palette: Palette, window: MainWindow) -> None:
+def test_list_stays_short_with_very_many_topics(palette: Palette, window: MainWindow) -> None:
     palette.shut()
     for number in range(10_000):
         window.session.topics._topics[f"/t{number}"] = Topic(f"/t{number}", "json", "json")
@@ -344,7 +346,7 @@ def test_it_stays_small_with_very_many_topics(palette: Palette, window: MainWind
     assert palette.height() < 600
 
 
-def test_a_screen_reader_hears_words_key_and_reason(palette: Palette) -> None:
+def test_screen_reader_text_contains_command_shortcut_and_reason(palette: Palette) -> None:
     palette.field.setText("stop the program")
     index = palette.rows.currentIndex()
     spoken = index.data(Qt.ItemDataRole.AccessibleTextRole)
@@ -353,7 +355,7 @@ def test_a_screen_reader_hears_words_key_and_reason(palette: Palette) -> None:
     assert palette.accessibleName() == "Command palette"
 
 
-def test_the_field_in_the_app_bar_opens_it(palette: Palette, window: MainWindow) -> None:
+def test_search_field_in_the_app_bar_opens_the_palette(palette: Palette, window: MainWindow) -> None:
     palette.shut()
     assert window.bar.search.toolTip() == "Find a command or panel (Ctrl+K)"
     QTest.mouseClick(window.bar.search, Qt.MouseButton.LeftButton)

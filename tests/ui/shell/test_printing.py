@@ -64,7 +64,7 @@ def dialogs(kind: type) -> list[QWidget]:
     return [each for each in QApplication.topLevelWidgets() if isinstance(each, kind) and each.isVisible()]
 
 
-def test_without_a_printer_a_pdf_is_offered_in_a_sentence(qtbot, tmp_path: Path) -> None:
+def test_without_a_printer_a_pdf_is_offered(qtbot, tmp_path: Path) -> None:
     case = Case(qtbot, b"%PDF", [])
     case.answers.path = tmp_path / "Tea 1.2"
     case.printing.ask()
@@ -75,7 +75,7 @@ def test_without_a_printer_a_pdf_is_offered_in_a_sentence(qtbot, tmp_path: Path)
     assert case.editor.asked[0][0] == "Tea"
 
 
-def test_with_a_printer_its_dialog_comes_and_the_window_stays_free(qtbot) -> None:
+def test_print_dialog_is_not_modal(qtbot) -> None:
     case = Case(qtbot, b"%PDF", ["Office"])
     case.printing.ask()
     (dialog,) = dialogs(QPrintDialog)
@@ -84,7 +84,7 @@ def test_with_a_printer_its_dialog_comes_and_the_window_stays_free(qtbot) -> Non
     assert case.editor.asked == []
 
 
-def test_what_cannot_be_written_or_is_empty_is_said(qtbot, tmp_path: Path) -> None:
+def test_unwritable_target_and_empty_canvas_are_reported(qtbot, tmp_path: Path) -> None:
     (tmp_path / "file").write_text("")
     case = Case(qtbot, b"%PDF", [])
     case.printing.save(tmp_path / "file" / "a.pdf")
@@ -96,7 +96,7 @@ def test_what_cannot_be_written_or_is_empty_is_said(qtbot, tmp_path: Path) -> No
 
 
 @pytest.mark.parametrize(("first", "last", "count"), [(0, 0, 3), (2, 3, 2), (2, 9, 2)])
-def test_the_pages_that_were_asked_for_are_painted(qtbot, tmp_path: Path, first, last, count) -> None:
+def test_only_the_requested_pages_are_painted(qtbot, tmp_path: Path, first, last, count) -> None:
     printer = QPrinter(QPrinter.PrinterMode.HighResolution)
     printer.setOutputFormat(QPrinter.OutputFormat.PdfFormat)
     printer.setOutputFileName(str(tmp_path / "out.pdf"))
@@ -116,7 +116,7 @@ def test_the_pages_that_were_asked_for_are_painted(qtbot, tmp_path: Path, first,
 
 
 @pytest.mark.qt_log_ignore("QPainter::begin")
-def test_a_printer_that_takes_nothing_is_said(qtbot, tmp_path: Path) -> None:
+def test_printer_that_rejects_the_job_is_reported(qtbot, tmp_path: Path) -> None:
     printer = QPrinter(QPrinter.PrinterMode.ScreenResolution)
     printer.setOutputFormat(QPrinter.OutputFormat.PdfFormat)
     printer.setOutputFileName(str(tmp_path / "no folder" / "out.pdf"))

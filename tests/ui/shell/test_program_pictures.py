@@ -35,7 +35,7 @@ def made(editor: Editor, said: list[str], answers: Answers | None = None) -> Pro
     return ProgramPictures(cast("Shell", shell), cast("Session", session), answers or Answers())
 
 
-def test_the_ending_that_is_typed_says_as_what_it_is_saved(tmp_path: Path) -> None:
+def test_typed_file_extension_selects_the_image_format(tmp_path: Path) -> None:
     said: list[str] = []
     editor, answers = Editor(b"<svg/>"), Answers()
     answers.path = tmp_path / "Tea.SVG"
@@ -45,7 +45,7 @@ def test_the_ending_that_is_typed_says_as_what_it_is_saved(tmp_path: Path) -> No
     assert answers.path.read_bytes() == b"<svg/>"
 
 
-def test_a_picture_is_written_with_the_ending_of_its_kind(tmp_path: Path) -> None:
+def test_image_is_written_with_the_extension_of_its_format(tmp_path: Path) -> None:
     said: list[str] = []
     editor = Editor(b"<svg/>")
     made(editor, said).save(tmp_path / "Greeting 1.2", "svg", False)
@@ -54,7 +54,7 @@ def test_a_picture_is_written_with_the_ending_of_its_kind(tmp_path: Path) -> Non
     assert said == ["Saved Greeting 1.2.svg"]
 
 
-def test_a_place_where_nothing_can_be_written_is_said(tmp_path: Path) -> None:
+def test_unwritable_folder_is_reported(tmp_path: Path) -> None:
     said: list[str] = []
     (tmp_path / "file").write_text("")
     made(Editor(b"<svg/>"), said).save(tmp_path / "file" / "a.svg", "svg", True)
@@ -62,7 +62,7 @@ def test_a_place_where_nothing_can_be_written_is_said(tmp_path: Path) -> None:
     assert sentence.startswith("Can't save the image")
 
 
-def test_without_blocks_nothing_is_written(tmp_path: Path) -> None:
+def test_nothing_is_written_without_blocks(tmp_path: Path) -> None:
     said: list[str] = []
     made(Editor(b""), said).save(tmp_path / "a.png", "png", True)
     assert said == ["This page has no blocks"]
@@ -70,7 +70,7 @@ def test_without_blocks_nothing_is_written(tmp_path: Path) -> None:
 
 
 @pytest.mark.usefixtures("qapp")
-def test_a_picture_is_copied(qtbot: QtBot, tmp_path: Path) -> None:
+def test_image_is_copied_to_the_clipboard(qtbot: QtBot, tmp_path: Path) -> None:
     image = QImage(3, 2, QImage.Format.Format_RGB32)
     image.fill(QColor("#0a0b0c"))
     image.save(str(tmp_path / "a.png"))

@@ -39,7 +39,7 @@ def said(card: QuestionCard, monkeypatch: pytest.MonkeyPatch) -> list[tuple[int,
     return got
 
 
-def test_the_keyboard_goes_to_the_question_and_enter_answers(card, said, window) -> None:
+def test_question_gets_focus_and_enter_answers(card, said, window) -> None:
     before = window.bar.home
     before.setFocus()
     card.show_question(NAME, held=False)
@@ -53,14 +53,14 @@ def test_the_keyboard_goes_to_the_question_and_enter_answers(card, said, window)
     assert not card.isVisible()
 
 
-def test_escape_answers_nothing(card, said) -> None:
+def test_escape_does_not_answer(card, said) -> None:
     card.show_question(NAME, held=False)
     QTest.keyClicks(card.field, "Ada")
     QTest.keyClick(card.field, Qt.Key.Key_Escape)
     assert said == [(1, "")]
 
 
-def test_the_button_answers_and_the_next_question_begins_empty(card, said) -> None:
+def test_button_answers_and_the_next_question_starts_empty(card, said) -> None:
     card.show_question(NAME, held=False)
     QTest.keyClicks(card.field, "Ada")
     QTest.mouseClick(card.button, Qt.MouseButton.LeftButton)
@@ -69,7 +69,7 @@ def test_the_button_answers_and_the_next_question_begins_empty(card, said) -> No
     assert QApplication.focusWidget() is card.field
 
 
-def test_a_tick_takes_nothing_away_that_is_being_typed(card, said) -> None:
+def test_refresh_keeps_the_text_being_typed(card, said) -> None:
     card.show_question(NAME, held=False)
     QTest.keyClicks(card.field, "Ad")
     card.show_question(NAME, held=False)
@@ -77,7 +77,7 @@ def test_a_tick_takes_nothing_away_that_is_being_typed(card, said) -> None:
     assert card.field.text() == "Ada"
 
 
-def test_while_paused_it_is_held(card, said) -> None:
+def test_input_is_disabled_while_paused(card, said) -> None:
     card.show_question(NAME, held=False)
     QTest.keyClicks(card.field, "Ada")
     card.show_question(NAME, held=True)
@@ -91,7 +91,7 @@ def test_while_paused_it_is_held(card, said) -> None:
 
 @pytest.mark.parametrize("words", ["", "👍" * 3, "A very long question, " * 20])
 @pytest.mark.parametrize("size", [(1024, 600), (1440, 900)])
-def test_it_stays_inside_the_window_and_covers_no_stop(card, window, words, size) -> None:
+def test_card_stays_inside_the_window_and_does_not_cover_stop(card, window, words, size) -> None:
     window.resize(*size)
     card.show_question(AskedQuestion(1, 1, words), held=False)
     assert window.rect().contains(card.geometry())
@@ -112,7 +112,7 @@ class Answered:
         self.got.append((question, words))
 
 
-def test_only_the_question_that_is_asked_is_answered_and_once() -> None:
+def test_only_the_current_question_is_answered_and_only_once() -> None:
     asking, runner = Asking(), Answered(4)
     asking.apply(RunnerEvent("ask", 4, text="Nobody runs yet", question=9))
     assert asking.question is None
@@ -160,7 +160,7 @@ def test_choices_are_large_buttons_and_a_click_answers(card, said) -> None:
         ([Qt.Key.Key_Escape], ""),
     ],
 )
-def test_the_keyboard_chooses(card, said, keys, answer) -> None:
+def test_choices_are_selected_by_keyboard(card, said, keys, answer) -> None:
     card.show_question(PET, held=False)
     for key in keys:
         focus = QApplication.focusWidget()
@@ -169,14 +169,14 @@ def test_the_keyboard_chooses(card, said, keys, answer) -> None:
     assert said == [(3, answer)]
 
 
-def test_a_number_without_a_choice_does_nothing(card, said) -> None:
+def test_number_key_without_a_choice_does_nothing(card, said) -> None:
     card.show_question(PET, held=False)
     QTest.keyClick(card.choices.buttons[0], Qt.Key.Key_4)
     QTest.keyClick(card.choices.buttons[0], Qt.Key.Key_1, Qt.KeyboardModifier.ControlModifier)
     assert said == []
 
 
-def test_choices_are_held_while_paused_and_the_keys_go_nowhere_else(card, said) -> None:
+def test_choices_are_disabled_while_paused_and_keys_are_swallowed(card, said) -> None:
     card.show_question(PET, held=False)
     card.show_question(PET, held=True)
     assert QApplication.focusWidget() is card
@@ -191,7 +191,7 @@ def test_choices_are_held_while_paused_and_the_keys_go_nowhere_else(card, said) 
 
 
 @pytest.mark.parametrize("size", [(1024, 600), (1440, 900)])
-def test_long_choices_wrap_and_many_scroll_to_what_an_arrow_reaches(card, window, size, qtbot) -> None:
+def test_long_choices_wrap_and_many_choices_scroll_to_the_focused_one(card, window, size, qtbot) -> None:
     window.resize(*size)
     many = tuple(f"{number} " + "a choice of some length " * 8 for number in range(12))
     card.show_question(AskedQuestion(1, 4, "Which one? " * 20, many), held=False)
@@ -211,7 +211,7 @@ def test_long_choices_wrap_and_many_scroll_to_what_an_arrow_reaches(card, window
 
 
 @pytest.mark.parametrize("away_between", [True, False])
-def test_a_question_with_more_choices_than_the_last_has_room_for_all(card, qtbot, away_between: bool) -> None:
+def test_question_with_more_choices_than_the_previous_one_shows_all(card, qtbot, away_between: bool) -> None:
     card.show_question(AskedQuestion(1, 7, "Play?", ("yes", "no")), held=False)
     QTest.qWait(1)
     if away_between:
@@ -223,7 +223,7 @@ def test_a_question_with_more_choices_than_the_last_has_room_for_all(card, qtbot
     )
 
 
-def test_short_choices_stand_beside_each_other(card) -> None:
+def test_short_choices_are_placed_side_by_side(card) -> None:
     card.show_question(AskedQuestion(1, 5, "Play?", ("yes", "no")), held=False)
     yes, no = card.choices.buttons
     assert yes.y() == no.y()

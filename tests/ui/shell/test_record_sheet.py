@@ -77,7 +77,7 @@ def shown(window: MainWindow) -> str:
     return window.tools.record.text()
 
 
-def test_the_key_begins_and_ends_and_the_bars_tell(window, recorder):
+def test_shortcut_starts_and_stops_recording_and_the_bars_show_it(window, recorder):
     assert window.commands.shortcuts.first("recording.toggle") == "Ctrl+R"
     assert window.commands.shortcuts.first("recording.keep") == "F9"
     assert shown(window) == "Record"
@@ -102,7 +102,7 @@ def test_the_key_begins_and_ends_and_the_bars_tell(window, recorder):
     assert ": 0:42, 168 MB" in window.toast.accessibleName()
 
 
-def test_the_button_begins_and_opens_the_sheet_in_which_it_ends(window, recorder):
+def test_button_starts_recording_and_opens_the_sheet_that_stops_it(window, recorder):
     window.tools.record.click()
     sheet = sheet_of(window)
     assert sheet.isVisible()
@@ -120,7 +120,7 @@ def test_the_button_begins_and_opens_the_sheet_in_which_it_ends(window, recorder
     assert not sheet.isVisible()
 
 
-def test_what_is_chosen_is_what_is_recorded(window, recorder):
+def test_only_selected_topics_are_recorded(window, recorder):
     session = recorder.session
     window.commands.run("recording.sheet")
     sheet = sheet_of(window)
@@ -141,7 +141,7 @@ def test_what_is_chosen_is_what_is_recorded(window, recorder):
     assert (order["topics"], order["left_out"], order["note"]) == (["/**"], ["/odom"], "second try")
 
 
-def test_a_pattern_that_can_be_none_says_so(window, recorder):
+def test_invalid_topic_pattern_is_reported_and_not_recorded(window, recorder):
     window.commands.run("recording.sheet")
     sheet = sheet_of(window)
     sheet._choose_mode("pattern")
@@ -155,7 +155,7 @@ def test_a_pattern_that_can_be_none_says_so(window, recorder):
     assert not sheet.wrong.isVisible()
 
 
-def test_patterns_are_tokens_that_keys_make_and_take_away(window, recorder):
+def test_topic_patterns_are_tokens_added_and_removed_by_keyboard(window, recorder):
     window.commands.run("recording.sheet")
     sheet = sheet_of(window)
     sheet._choose_mode("pattern")
@@ -181,7 +181,7 @@ def test_patterns_are_tokens_that_keys_make_and_take_away(window, recorder):
     assert not list(unsaid(field))
 
 
-def test_it_ends_after_what_is_chosen_and_says_how_large_it_will_be(window, recorder):
+def test_recording_stops_after_the_chosen_limit_and_its_size_is_estimated(window, recorder):
     window.commands.run("recording.sheet")
     sheet = sheet_of(window)
     assert sheet.ends_words.text() == "when you stop it"
@@ -216,7 +216,7 @@ def test_it_ends_after_what_is_chosen_and_says_how_large_it_will_be(window, reco
     assert recorder.session.recordings.choice.ends_min is None
 
 
-def test_keeping_needs_the_flight_recorder_which_one_press_switches_on(window, recorder):
+def test_saving_the_last_seconds_offers_to_enable_the_flight_recorder(window, recorder):
     window.commands.run("recording.keep")
     assert recorder.ops() == []
     assert "flight recorder is off" in window.toast.accessibleName()
@@ -248,14 +248,14 @@ def test_keeping_needs_the_flight_recorder_which_one_press_switches_on(window, r
     assert recorder.ops()[-1] == "end_ring"
 
 
-def test_one_topic_alone_and_none_of_another_network(window, recorder):
+def test_single_topic_is_recorded_but_none_of_another_network(window, recorder):
     assert window.commands.run("record.topic:/odom")
     assert recorder.line.orders[0]["topics"] == ["/odom"]
     assert recorder.session.recordings.choice == RecordingChoice()
     assert not window.commands.run("record.topic:ros2 /odom")
 
 
-def test_a_recording_that_has_gone_is_said_and_what_shows_stays(window, recorder, tmp_path, monkeypatch):
+def test_missing_recording_file_is_reported_and_the_shown_one_stays(window, recorder, tmp_path, monkeypatch):
     path = tmp_path / "a.mcap"
     opened: list[Path] = []
     monkeypatch.setattr(recorder.session, "open_recording", opened.append)
@@ -268,7 +268,7 @@ def test_a_recording_that_has_gone_is_said_and_what_shows_stays(window, recorder
 
 
 @pytest.mark.parametrize(("size", "percent"), [((1440, 900), 100), ((1024, 600), 200)])
-def test_the_words_of_the_sheet_are_translated_and_fit(qtbot, pseudo, window, recorder, theme, percent, size):
+def test_texts_of_the_sheet_are_translated_and_fit(qtbot, pseudo, window, recorder, theme, percent, size):
     window.resize(*size)
     theme.set_text_percent(percent)
     window.commands.run("recording.sheet")

@@ -12,7 +12,9 @@ from tests.ui.fakes.processes import Runner
 pytest_plugins = ["tests.ui.shell_fixtures"]
 
 
-def test_second_behaviour_says_which_one_it_stopped(window: MainWindow, commands: Commands) -> None:
+def test_starting_a_second_behaviour_reports_which_one_was_stopped(
+    window: MainWindow, commands: Commands
+) -> None:
     session = window.session
     runs, seconds = session.runs, itertools.count(0.0, 10.0)
     runs._make_runner, runs._clock = Runner, lambda: next(seconds)
@@ -26,7 +28,7 @@ def test_second_behaviour_says_which_one_it_stopped(window: MainWindow, commands
     assert "Quiz" in window.toast.text
 
 
-def test_run_again_is_no_other_behaviour(window: MainWindow, commands: Commands) -> None:
+def test_restarting_the_same_behaviour_reports_no_stop(window: MainWindow, commands: Commands) -> None:
     session = window.session
     runs, seconds = session.runs, itertools.count(0.0, 10.0)
     runs._make_runner, runs._clock = Runner, lambda: next(seconds)

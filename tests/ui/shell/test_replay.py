@@ -93,7 +93,7 @@ def live(session: Session, seq: int) -> Message:
     return message
 
 
-def test_the_inspector_shows_exactly_the_message_of_the_playhead_and_then_live_again(
+def test_inspector_shows_the_message_at_the_playhead_and_then_live_messages(
     qtbot, window, session, path, whole
 ):
     window.show_layout("developer")
@@ -124,7 +124,7 @@ def test_the_inspector_shows_exactly_the_message_of_the_playhead_and_then_live_a
     assert "timeline" not in window.bench.open_names()
 
 
-def test_a_picture_of_a_paused_recording_is_not_silent_and_as_old_as_it_was_then(
+def test_image_of_a_paused_recording_is_not_silent_and_keeps_its_recorded_age(
     qtbot, window, session, path, whole
 ):
     window.show_layout("developer")
@@ -142,7 +142,7 @@ def test_a_picture_of_a_paused_recording_is_not_silent_and_as_old_as_it_was_then
     assert "Last image" not in image.view.words
 
 
-def test_robots_and_alarms_go_by_the_live_network_meanwhile(qtbot, window, session, path):
+def test_robots_and_alarms_use_the_live_network_during_a_replay(qtbot, window, session, path):
     watch = session.watch("/a")
     opened(qtbot, window, path)
     said = live(session, 2000)
@@ -152,7 +152,7 @@ def test_robots_and_alarms_go_by_the_live_network_meanwhile(qtbot, window, sessi
     watch.close()
 
 
-def test_nothing_is_sent(qtbot, window, session, path, monkeypatch):
+def test_replay_publishes_and_subscribes_nothing(qtbot, window, session, path, monkeypatch):
     asked = []
     monkeypatch.setattr(session.source, "submit", lambda what, job: asked.append(what))
     monkeypatch.setattr(session.source, "watch", asked.append)
@@ -164,7 +164,7 @@ def test_nothing_is_sent(qtbot, window, session, path, monkeypatch):
     assert asked == []
 
 
-def test_a_recording_is_opened_by_the_menu_a_drop_and_another_one(
+def test_recording_is_opened_by_menu_and_drop_and_replaces_the_open_one(
     qtbot, window, session, answers, path, tmp_path
 ):
     answers.path = path
@@ -181,7 +181,7 @@ def test_a_recording_is_opened_by_the_menu_a_drop_and_another_one(
     until(qtbot, window, lambda: first.has_ended)
 
 
-def test_a_file_that_is_no_recording_is_said_and_leads_back(qtbot, window, session, tmp_path):
+def test_invalid_recording_raises_an_alert_and_can_be_closed(qtbot, window, session, tmp_path):
     broken = tmp_path / "broken.mcap"
     broken.write_bytes(b"no recording")
     window.commands.run(f"recording.open:{broken}")
@@ -195,7 +195,7 @@ def test_a_file_that_is_no_recording_is_said_and_leads_back(qtbot, window, sessi
     assert session.replay is None
 
 
-def test_the_tool_bar_and_the_status_bar_say_which_source_shows(qtbot, window, session, path):
+def test_tool_bar_and_status_bar_show_the_current_source(qtbot, window, session, path):
     window.show_layout("developer")
     source = window.tools.source
     window.tools.refresh()
@@ -211,7 +211,7 @@ def test_the_tool_bar_and_the_status_bar_say_which_source_shows(qtbot, window, s
     assert (source.text(), source.back.isVisible()) == ("Live network", False)
 
 
-def test_keys_play_step_mark_and_zoom(qtbot, window, session, path, whole):
+def test_keys_play_step_bookmark_and_zoom(qtbot, window, session, path, whole):
     replay = opened(qtbot, window, path)
     panel = window.bench.docks["timeline"].panel
     window.tick()
@@ -244,7 +244,7 @@ def test_keys_play_step_mark_and_zoom(qtbot, window, session, path, whole):
     replay.remove_bookmark(replay.bookmarks[0])
 
 
-def test_the_mouse_seeks_chooses_and_zooms(qtbot, window, session, path, whole):
+def test_mouse_seeks_selects_and_zooms(qtbot, window, session, path, whole):
     replay = opened(qtbot, window, path)
     canvas = window.bench.docks["timeline"].panel.canvas
     until(qtbot, window, lambda: replay.densities.newest is not None)
@@ -268,7 +268,7 @@ def test_the_mouse_seeks_chooses_and_zooms(qtbot, window, session, path, whole):
     assert abs(canvas.x_of(at_ns) - x) <= 1.5
 
 
-def test_lanes_are_darker_where_more_came():
+def test_timeline_lanes_are_darker_where_the_message_density_is_higher():
     made = shades([0, 1, 2, 4], 4, QColor("#ffffff"))
     alphas = [made.pixelColor(x, 0).alphaF() for x in range(4)]
     assert made.format() == QImage.Format.Format_ARGB32_Premultiplied
@@ -276,7 +276,7 @@ def test_lanes_are_darker_where_more_came():
     assert alphas[1] < alphas[2] < alphas[3] == pytest.approx(0.76, abs=0.01)
 
 
-def test_a_plot_has_what_was_before_the_playhead_and_begins_anew_live(qtbot, window, session, path, whole):
+def test_plot_shows_data_before_the_playhead_and_restarts_when_live(qtbot, window, session, path, whole):
     opened(qtbot, window, path)
     window.plot("/a", "x")
     plot = window.bench.docks["plot"].panel
@@ -291,7 +291,7 @@ def test_a_plot_has_what_was_before_the_playhead_and_begins_anew_live(qtbot, win
     assert len(plot.shown[0].curve.samples) == 0
 
 
-def test_pictures_are_those_of_the_playhead(qtbot, window, session, path, whole):
+def test_images_are_those_at_the_playhead(qtbot, window, session, path, whole):
     opened(qtbot, window, path)
     image = window.bench.docks["image"].panel
     go_to(qtbot, window, whole[40][0])
@@ -301,9 +301,7 @@ def test_pictures_are_those_of_the_playhead(qtbot, window, session, path, whole)
 
 
 @pytest.mark.parametrize("moved", [False, True])
-def test_the_timeline_keeps_its_height_however_often_a_recording_is_opened(
-    qtbot, window, session, path, moved
-):
+def test_timeline_keeps_its_height_when_recordings_are_reopened(qtbot, window, session, path, moved):
     window.resize(1440, 900)
     window.show()
     heights = []
@@ -326,7 +324,7 @@ def test_the_timeline_keeps_its_height_however_often_a_recording_is_opened(
     assert heights == pytest.approx([364 if moved else 324] * 3, abs=2)
 
 
-def test_a_plotted_topic_that_is_not_in_the_recording_is_not_listed_in_it(qtbot, window, session, path):
+def test_plotted_topic_missing_in_the_recording_is_not_listed_in_it(qtbot, window, session, path):
     window.show_layout("developer")
     window.plot("/ghost", "x")
     replay = opened(qtbot, window, path)

@@ -139,7 +139,7 @@ def shown(qtbot, window, path) -> Iterator[Shown]:
         made.replay.remove_bookmark(mark)
 
 
-def test_a_press_leads_to_a_run_or_an_alarm_which_are_marked(shown):
+def test_click_seeks_to_a_run_or_alarm_and_both_are_marked(shown):
     canvas = shown.canvas
 
     def colours(step: int, middle: float) -> list[str]:
@@ -163,7 +163,7 @@ def test_a_press_leads_to_a_run_or_an_alarm_which_are_marked(shown):
         shown.wait(lambda step=step: shown.replay.player.position_ns == at(step))
 
 
-def test_bookmarks_are_renamed_and_deleted_with_undo_but_notes_stay(shown, window, monkeypatch):
+def test_bookmarks_are_renamed_and_deleted_with_undo_and_notes_are_kept(shown, window, monkeypatch):
     shown.replay.seek(at(80))
     shown.wait(lambda: shown.replay.player.position_ns == at(80))
     QTest.keyClick(shown.canvas, Qt.Key.Key_F2)

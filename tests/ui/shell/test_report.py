@@ -80,7 +80,7 @@ def lines(sheet: ReportSheet) -> str:
     return " ".join(text for _where, text in said_by(sheet))
 
 
-def test_it_opens_in_the_field_and_says_what_goes_in(sheet: ReportSheet) -> None:
+def test_sheet_focuses_the_text_field_and_lists_what_is_included(sheet: ReportSheet) -> None:
     assert sheet.isVisible()
     assert sheet.happened.edit.hasFocus()
     for words in ("Nothing is sent", "Included", "connection doctor", "Not included", "Keys, passwords"):
@@ -90,7 +90,7 @@ def test_it_opens_in_the_field_and_says_what_goes_in(sheet: ReportSheet) -> None
     assert not sheet.show_file.isVisible()
 
 
-def test_it_asks_where_and_suggests_a_name_with_the_day(sheet: ReportSheet, answers: Answers) -> None:
+def test_save_dialog_suggests_a_name_with_the_date(sheet: ReportSheet, answers: Answers) -> None:
     sheet.write.click()
     (asked,) = answers.asked
     assert asked.startswith(f"Write report: {documents_folder() / 'nep-studio-report-'}")
@@ -98,7 +98,7 @@ def test_it_asks_where_and_suggests_a_name_with_the_day(sheet: ReportSheet, answ
     assert sheet.write.isEnabled(), "who gives up can go on"
 
 
-def test_what_was_typed_is_written_and_the_file_can_be_shown(
+def test_typed_text_is_written_and_the_file_can_be_shown(
     qtbot, sheet: ReportSheet, answers: Answers, tmp_path: Path, opened: Opened
 ) -> None:
     answers.path = tmp_path / "report"
@@ -115,7 +115,7 @@ def test_what_was_typed_is_written_and_the_file_can_be_shown(
     assert opened.urls == [QUrl.fromLocalFile(str(tmp_path)).toString()]
 
 
-def test_where_folders_can_not_be_shown_the_place_is_said(
+def test_folder_path_is_shown_when_the_file_manager_cannot_be_opened(
     qtbot, window: MainWindow, sheet: ReportSheet, answers: Answers, tmp_path: Path, opened: Opened
 ) -> None:
     opened.works = False
@@ -125,7 +125,7 @@ def test_where_folders_can_not_be_shown_the_place_is_said(
     assert window.toast._words.text() == f"The file is in {tmp_path}"
 
 
-def test_behaviours_go_in_only_when_they_are_switched_on_each_time(
+def test_behaviours_are_included_only_when_enabled_each_time(
     qtbot, window: MainWindow, sheet: ReportSheet, session: Session, answers: Answers, tmp_path: Path
 ) -> None:
     sheet.shut()
@@ -149,7 +149,7 @@ def test_behaviours_go_in_only_when_they_are_switched_on_each_time(
     assert not sheet.work.isChecked()
 
 
-def test_a_place_that_takes_nothing_is_said_and_what_was_typed_stays(
+def test_unwritable_target_is_reported_and_typed_text_is_kept(
     qtbot, sheet: ReportSheet, answers: Answers, tmp_path: Path
 ) -> None:
     (tmp_path / "file").write_text("no folder")
@@ -163,7 +163,7 @@ def test_a_place_that_takes_nothing_is_said_and_what_was_typed_stays(
     assert sheet.write.hasFocus()
 
 
-def test_a_report_that_is_done_when_the_sheet_is_closed_is_told_by_a_toast(
+def test_report_finished_after_the_sheet_is_closed_is_announced_by_a_toast(
     qtbot, window: MainWindow, sheet: ReportSheet, answers: Answers, tmp_path: Path
 ) -> None:
     answers.path = tmp_path / "report.zip"
@@ -172,7 +172,7 @@ def test_a_report_that_is_done_when_the_sheet_is_closed_is_told_by_a_toast(
     qtbot.waitUntil(lambda: window.toast._words.text().startswith("The report is in"))
 
 
-def test_a_crash_is_offered_by_the_banner_and_its_report_is_in_the_file(
+def test_banner_offers_a_crash_report_that_contains_the_crash(
     qtbot, window: MainWindow, session: Session, home: Path, answers: Answers, tmp_path: Path
 ) -> None:
     CrashReports().add(Crash("studio", "by signal 11", "where it was"))
@@ -193,7 +193,7 @@ def test_a_crash_is_offered_by_the_banner_and_its_report_is_in_the_file(
     assert b"where it was" in crashes[0]
 
 
-def test_what_was_dismissed_is_not_offered_again(window: MainWindow, session: Session, home: Path) -> None:
+def test_dismissed_crash_is_not_offered_again(window: MainWindow, session: Session, home: Path) -> None:
     CrashReports().add(Crash("robot", "by signal 11"))
     window.show()
     offer(session.alerts, CrashReports())
@@ -206,7 +206,7 @@ def test_what_was_dismissed_is_not_offered_again(window: MainWindow, session: Se
     assert not session.alerts.has(ALERT)
 
 
-def test_it_works_by_keys(qtbot, sheet: ReportSheet, answers: Answers, tmp_path: Path) -> None:
+def test_sheet_works_by_keyboard(qtbot, sheet: ReportSheet, answers: Answers, tmp_path: Path) -> None:
     answers.path = tmp_path / "report.zip"
     QTest.keyClicks(sheet.happened.edit, "By keys")
     reached = []
@@ -223,7 +223,7 @@ def test_it_works_by_keys(qtbot, sheet: ReportSheet, answers: Answers, tmp_path:
 
 
 @pytest.mark.parametrize("percent", [100, 200])
-def test_its_words_are_translated_and_fit(
+def test_texts_are_translated_and_fit(
     qtbot,
     pseudo: None,
     theme: Theme,
@@ -253,13 +253,13 @@ def test_its_words_are_translated_and_fit(
 # ---- commands
 
 
-def test_the_palette_and_the_menu_have_it(window: MainWindow, commands: Commands) -> None:
+def test_palette_and_menu_contain_the_report_command(window: MainWindow, commands: Commands) -> None:
     assert "help.report" in [entry.name for entry in commands.entries.all() if entry.kind == "command"]
     menus = [each.menu() for each in window.menu_bar.actions()]
     assert commands.actions["help.report"] in menus[-1].actions()
 
 
-def test_new_versions_have_an_entry_only_where_the_project_has_a_page() -> None:
+def test_new_version_entry_exists_only_when_the_project_has_a_web_page() -> None:
     assert releases("") == ()
     (made,) = releases("https://example.org/releases")
     assert (made.id, made.menu) == ("help.releases", "Help")
@@ -267,7 +267,7 @@ def test_new_versions_have_an_entry_only_where_the_project_has_a_page() -> None:
 
 
 @pytest.mark.parametrize("works", [True, False])
-def test_looking_for_a_new_version_only_opens_the_page(
+def test_checking_for_a_new_version_only_opens_the_page(
     window: MainWindow, session: Session, answers: Answers, opened: Opened, works: bool
 ) -> None:
     opened.works = works
@@ -280,5 +280,5 @@ def test_looking_for_a_new_version_only_opens_the_page(
     assert ("example.org" in said[0]) is not works
 
 
-def test_its_buttons_have_names(sheet: ReportSheet) -> None:
+def test_buttons_have_accessible_names(sheet: ReportSheet) -> None:
     assert all(button.accessibleName() for button in sheet.findChildren(Button))

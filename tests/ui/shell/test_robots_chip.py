@@ -21,20 +21,20 @@ def chip(*states: str, run: str = "ready", silent: str | None = None) -> tuple[s
         ("ready", "paused", "Robot 1 is paused"),
     ],
 )
-def test_one_robot_says_what_it_does(state: str, run: str, words: str) -> None:
+def test_single_robot_shows_its_state(state: str, run: str, words: str) -> None:
     assert chip(state, run=run) == (words, "ok")
 
 
-def test_robots_that_went_away_do_not_count() -> None:
+def test_disconnected_robots_are_not_counted() -> None:
     assert chip("away") == ("No robot", "off")
     assert chip("ready", "away") == ("Robot 1 ready", "ok")
 
 
-def test_several_are_counted() -> None:
+def test_several_robots_are_counted() -> None:
     assert chip("ready", "busy", run="running") == ("2 robots", "ok")
 
 
-def test_one_that_is_silent_is_named() -> None:
+def test_silent_robot_is_named() -> None:
     assert chip("silent") == ("Not responding", "error")
     assert chip("silent", silent="camera silent") == ("Camera silent", "error")
     assert chip("silent", "ready") == ("Robot 1: not responding", "error")

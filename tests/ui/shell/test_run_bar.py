@@ -77,7 +77,7 @@ def tools(qtbot, theme: Theme) -> ToolBar:
         ("unanswered", False, False, False, "Stop again", "error"),
     ],
 )
-def test_each_state_is_as_in_the_picture(bar: RunBar, state, run, pause, step, stop, look) -> None:
+def test_each_state_matches_the_design(bar: RunBar, state, run, pause, step, stop, look) -> None:
     bar.show_view(VIEWS[state])
     can_press = run or state == "running"  # it is Restart then
     assert (bar.run.isEnabled(), bar.pause.isEnabled(), bar.step.isEnabled()) == (can_press, pause, step)
@@ -91,12 +91,12 @@ def test_each_state_is_as_in_the_picture(bar: RunBar, state, run, pause, step, s
 
 
 @pytest.mark.parametrize("status", ["ok", "off", "error"])
-def test_the_last_stop_has_the_icon_of_its_own_result(bar: RunBar, status: StopStatus) -> None:
+def test_icon_shows_the_result_of_the_last_stop(bar: RunBar, status: StopStatus) -> None:
     bar.show_view(replace(VIEWS["running"], last_stop="1 of 2 robots stopped", last_stop_status=status))
     assert (bar.result.look, bar.result.status) == ("reminder", status)
 
 
-def test_nothing_jumps_between_the_states(bar: RunBar) -> None:
+def test_buttons_keep_their_position_in_all_states(bar: RunBar) -> None:
     places = set()
     for view in VIEWS.values():
         bar.show_view(view)
@@ -105,14 +105,14 @@ def test_nothing_jumps_between_the_states(bar: RunBar) -> None:
     assert len(places) == 1
 
 
-def test_paused_says_go_on(bar: RunBar) -> None:
+def test_run_button_shows_resume_when_paused(bar: RunBar) -> None:
     bar.show_view(VIEWS["paused"])
     assert bar.run.text() == "Resume"
     bar.show_view(VIEWS["ready"])
     assert bar.run.text() == "Run"
 
 
-def test_restart_has_the_place_of_run_and_is_filled_once_the_blocks_differ(bar: RunBar) -> None:
+def test_restart_replaces_run_and_is_filled_when_the_blocks_were_edited(bar: RunBar) -> None:
     bar.show_view(VIEWS["running"])
     assert (bar.run.text(), bar.run.icon_name, bar.run.kind) == ("Restart", "rotate-ccw", "plain")
     bar.show_view(replace(VIEWS["running"], edited=True))
@@ -123,7 +123,7 @@ def test_restart_has_the_place_of_run_and_is_filled_once_the_blocks_differ(bar: 
     assert not bar.restart.isVisible()
 
 
-def test_the_buttons_trigger_their_commands(theme: Theme, bar: RunBar) -> None:
+def test_buttons_trigger_their_commands(theme: Theme, bar: RunBar) -> None:
     told: list[str] = []
     names = ("run.run", "run.restart", "run.pause", "run.step", "run.stop", "run.confirm", *PACES)
 
@@ -153,7 +153,7 @@ def test_the_buttons_trigger_their_commands(theme: Theme, bar: RunBar) -> None:
         ("paused", True, False, "Greeting is paused"),
     ],
 )
-def test_compact_states(tools: ToolBar, state: str, run: bool, pause: bool, words: str) -> None:
+def test_compact_bar_shows_all_states(tools: ToolBar, state: str, run: bool, pause: bool, words: str) -> None:
     tools.show_view(VIEWS[state])
     assert (tools.run.isVisible(), tools.pause.isVisible()) == (run, pause)
     spoken = tools.result.text if tools.result.isVisible() else tools.words.text()
@@ -162,7 +162,7 @@ def test_compact_states(tools: ToolBar, state: str, run: bool, pause: bool, word
     assert tools.confirm.isVisible() == (state == "unanswered")
 
 
-def test_stop_is_where_it_was_in_every_compact_state(tools: ToolBar) -> None:
+def test_stop_keeps_its_position_in_every_compact_state(tools: ToolBar) -> None:
     places = set()
     for view in VIEWS.values():
         tools.show_view(view)
@@ -173,7 +173,7 @@ def test_stop_is_where_it_was_in_every_compact_state(tools: ToolBar) -> None:
 
 @pytest.mark.parametrize("place", ["runBar", "toolBar", "appBar"])
 @pytest.mark.parametrize("word", ["Stop", "Stopping", "Stop again"])
-def test_stop_has_room_for_each_of_its_words_and_its_key(qtbot, theme: Theme, place, word) -> None:
+def test_stop_button_fits_all_its_texts_and_its_shortcut(qtbot, theme: Theme, place, word) -> None:
     stop = StopButton(theme, place)
     qtbot.addWidget(stop)
     size = stop.sizeHint()
@@ -186,7 +186,7 @@ def test_stop_has_room_for_each_of_its_words_and_its_key(qtbot, theme: Theme, pl
     assert needed + 12 <= size.width() - 2 * 4, "within its frame, with some air"
 
 
-def test_a_detail_that_is_too_long_for_its_line_has_two(bar: RunBar) -> None:
+def test_detail_that_is_too_long_for_one_line_uses_two(bar: RunBar) -> None:
     fault = "“walk” stopped: Pepper did not say within 20 s that it had arrived, and it may have met a wall"
     bar.show_view(replace(VIEWS["proven"], detail=fault, result=None))
     sentence = bar.sentence
@@ -200,7 +200,7 @@ def test_a_detail_that_is_too_long_for_its_line_has_two(bar: RunBar) -> None:
     assert fault in sentence.toolTip()
 
 
-def test_in_a_narrow_window_the_sentence_has_room_beside_what_a_stop_brought(qtbot, bar: RunBar) -> None:
+def test_state_text_keeps_its_width_beside_a_stop_result_in_a_narrow_window(qtbot, bar: RunBar) -> None:
     bar.show_view(replace(VIEWS["proven"], result="Pepper stopped (41 ms)"))
     assert bar.pause.sizeHint().width() == bar.pause.full_width()
     bar.resize(1024, 60)
@@ -208,7 +208,7 @@ def test_in_a_narrow_window_the_sentence_has_room_beside_what_a_stop_brought(qtb
     assert bar.pause.sizeHint().width() < bar.pause.full_width()
 
 
-def test_a_long_good_result_leaves_room_for_a_fault(qtbot, bar: RunBar) -> None:
+def test_long_successful_result_is_shortened_to_leave_room_for_an_error(qtbot, bar: RunBar) -> None:
     good = "the robot of the second group and all others have stopped (41 ms), as far as anybody can tell"
     fault = replace(VIEWS["proven"], title="Stopped after 14 s because of an error", result=good)
     bar.resize(1093, 60)
@@ -219,7 +219,7 @@ def test_a_long_good_result_leaves_room_for_a_fault(qtbot, bar: RunBar) -> None:
     qtbot.waitUntil(lambda: bar.result.width() >= bar.result.sizeHint().width())
 
 
-def test_a_title_without_a_detail_stands_in_the_middle(bar: RunBar) -> None:
+def test_title_without_a_detail_is_vertically_centred(bar: RunBar) -> None:
     bar.show_view(replace(VIEWS["proven"], title="Stopped", detail=""))
     assert [text for text, _font, _role in bar.sentence.lines(300.0)] == ["Stopped"]
     assert bar.sentence.accessibleName() == "Stopped"

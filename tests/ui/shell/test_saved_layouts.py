@@ -53,7 +53,9 @@ def use(window: MainWindow, commands: Commands, name: str) -> None:
     next(e for e in commands.menus._layouts.actions() if e.text() == name).trigger()
 
 
-def test_a_layout_gets_a_name_and_the_built_in_one_stays(shown: MainWindow, commands: Commands) -> None:
+def test_layout_is_saved_under_a_name_and_the_built_in_one_stays(
+    shown: MainWindow, commands: Commands
+) -> None:
     before = opened(shown)
     keep_as(shown, commands, "Only topics")
     assert shown.toast.text == "Saved layout “Only topics”"
@@ -66,7 +68,7 @@ def test_a_layout_gets_a_name_and_the_built_in_one_stays(shown: MainWindow, comm
     assert opened(shown) == {"topics"}
 
 
-def test_names_that_cant_be_are_said(shown: MainWindow, commands: Commands) -> None:
+def test_invalid_layout_names_are_reported(shown: MainWindow, commands: Commands) -> None:
     sheet = keep_as(shown, commands, "developer")
     assert sheet.isVisible()
     assert sheet.wrong.text() == "“developer” already exists."
@@ -81,7 +83,7 @@ def test_names_that_cant_be_are_said(shown: MainWindow, commands: Commands) -> N
     assert shown.saved_layouts.all() == ()
 
 
-def test_a_layout_is_renamed(shown: MainWindow, commands: Commands) -> None:
+def test_layout_is_renamed(shown: MainWindow, commands: Commands) -> None:
     keep_as(shown, commands, "One")
     commands.run("layout.rename")
     sheet = shown.findChild(NameSheet)
@@ -93,7 +95,7 @@ def test_a_layout_is_renamed(shown: MainWindow, commands: Commands) -> None:
     assert shown.saved_layouts.own("developer") == "Two"
 
 
-def test_a_deleted_layout_comes_back_by_undo(shown: MainWindow, commands: Commands) -> None:
+def test_deleted_layout_is_restored_by_undo(shown: MainWindow, commands: Commands) -> None:
     keep_as(shown, commands, "One")
     shown.bench.docks["console"].close()
     small = opened(shown)
@@ -106,7 +108,7 @@ def test_a_deleted_layout_comes_back_by_undo(shown: MainWindow, commands: Comman
     assert opened(shown) == small
 
 
-def test_the_next_start_shows_the_same_layout(
+def test_selected_layout_is_restored_after_restart(
     qtbot, shown: MainWindow, commands: Commands, session: Session, theme: Theme
 ) -> None:
     keep_as(shown, commands, "Mine")
@@ -133,7 +135,7 @@ DAMAGED: tuple[object, ...] = (
 
 
 @pytest.mark.parametrize("damaged", DAMAGED)
-def test_a_damaged_layout_is_as_at_first_and_said_in_the_console(
+def test_damaged_layout_falls_back_to_its_default_and_is_logged_in_the_console(
     qtbot, session: Session, theme: Theme, damaged: object
 ) -> None:
     session.settings.set("layouts", {"developer": damaged, "own:": 3, "own:Old": {"base": "gone"}})
@@ -147,7 +149,7 @@ def test_a_damaged_layout_is_as_at_first_and_said_in_the_console(
     window.close()
 
 
-def test_settings_of_another_kind_change_nothing(qtbot, session: Session, theme: Theme) -> None:
+def test_settings_of_the_wrong_type_are_ignored(qtbot, session: Session, theme: Theme) -> None:
     session.settings.set("layouts", cast("object", "none"))
     session.settings.set("chosen_layouts", {"developer": 5})
     window = MainWindow(session, theme, PANELS, [])
@@ -157,7 +159,7 @@ def test_settings_of_another_kind_change_nothing(qtbot, session: Session, theme:
     window.close()
 
 
-def test_what_does_not_apply_is_grey_in_the_menu(shown: MainWindow, commands: Commands) -> None:
+def test_unavailable_entries_are_disabled_in_the_menu(shown: MainWindow, commands: Commands) -> None:
     lists = commands.menus
     lists._refresh("View")
     assert not commands.actions["layout.delete"].isEnabled()
@@ -170,7 +172,7 @@ def test_what_does_not_apply_is_grey_in_the_menu(shown: MainWindow, commands: Co
     commands.actions.enable_all()
 
 
-def test_the_palette_shows_own_layouts(shown: MainWindow, commands: Commands) -> None:
+def test_palette_lists_custom_layouts(shown: MainWindow, commands: Commands) -> None:
     keep_as(shown, commands, "Two cameras")
     use(shown, commands, "Developer")
     found = {entry.words: entry for entry in commands.entries.all()}
@@ -178,7 +180,7 @@ def test_the_palette_shows_own_layouts(shown: MainWindow, commands: Commands) ->
     assert shown.saved_layouts.own("developer") == "Two cameras"
 
 
-def test_what_can_not_be_written_is_not_said_to_be_kept(shown: MainWindow, commands: Commands) -> None:
+def test_unwritable_layout_is_reported_as_not_saved(shown: MainWindow, commands: Commands) -> None:
     path = shown.session.settings.path
     keep_as(shown, commands, "One")
     path.unlink()

@@ -38,7 +38,7 @@ def press(segments, value: str) -> None:
     QTest.mouseClick(segments._segments[value], Qt.MouseButton.LeftButton)
 
 
-def test_every_choice_applies_at_once_and_is_kept(
+def test_every_choice_applies_at_once_and_is_saved(
     sheet: SettingsSheet, window: MainWindow, home: Path
 ) -> None:
     press(sheet.mode, "dark")
@@ -55,7 +55,7 @@ def test_every_choice_applies_at_once_and_is_kept(
     again.deleteLater()
 
 
-def test_what_menus_change_shows_here(sheet: SettingsSheet, commands: Commands) -> None:
+def test_changes_made_in_menus_are_shown_in_the_settings(sheet: SettingsSheet, commands: Commands) -> None:
     commands.run("theme.dark")
     commands.run("text.larger")
     commands.run("theme.contrast")
@@ -64,7 +64,7 @@ def test_what_menus_change_shows_here(sheet: SettingsSheet, commands: Commands) 
     assert not commands.actions["theme.contrast"].isChecked()
 
 
-def test_the_folder_for_pictures_is_kept(
+def test_snapshot_folder_is_saved(
     sheet: SettingsSheet, window: MainWindow, answers: Answers, tmp_path: Path
 ) -> None:
     settings = window.session.settings
@@ -77,7 +77,7 @@ def test_the_folder_for_pictures_is_kept(
     assert sheet.folder.text() == str(tmp_path)
 
 
-def test_the_shortcuts_are_one_press_away(sheet: SettingsSheet, window: MainWindow) -> None:
+def test_settings_link_to_the_keyboard_shortcuts(sheet: SettingsSheet, window: MainWindow) -> None:
     QTest.mouseClick(sheet.shortcuts, Qt.MouseButton.LeftButton)
     assert not sheet.isVisible()
     shown = window.findChild(ShortcutSheet)
@@ -85,7 +85,7 @@ def test_the_shortcuts_are_one_press_away(sheet: SettingsSheet, window: MainWind
     assert shown.isVisible()
 
 
-def test_old_settings_for_motion_are_understood(home: Path, theme: Theme) -> None:
+def test_legacy_reduced_motion_setting_is_migrated(home: Path, theme: Theme) -> None:
     settings = Settings(home)
     settings.set("less_motion", True)
     WindowState(settings, lambda _sentence: None).apply_theme(theme)
@@ -98,7 +98,7 @@ def test_old_settings_for_motion_are_understood(home: Path, theme: Theme) -> Non
 # -- recent files ---------------------------------------------------------------------------------
 
 
-def test_recent_files_that_are_gone_say_so_and_the_list_can_be_cleared(
+def test_missing_recent_files_are_disabled_and_the_list_can_be_cleared(
     window: MainWindow, commands: Commands, tmp_path: Path
 ) -> None:
     there = tmp_path / "there.nepb"
@@ -120,7 +120,7 @@ def test_recent_files_that_are_gone_say_so_and_the_list_can_be_cleared(
     assert [file.name for file in settings.recent_known] == ["there", "gone"]
 
 
-def test_a_disk_that_keeps_nothing_is_told_once_until_it_keeps_again(tmp_path: Path) -> None:
+def test_failed_settings_write_is_reported_once_until_a_write_succeeds(tmp_path: Path) -> None:
     (tmp_path / "home").write_text("no folder")
     told: list[str] = []
     state = WindowState(Settings(tmp_path / "home"), told.append)
@@ -138,7 +138,7 @@ def test_a_disk_that_keeps_nothing_is_told_once_until_it_keeps_again(tmp_path: P
     assert len(told) == 2
 
 
-def test_the_language_is_kept_for_the_next_start(
+def test_language_is_saved_for_the_next_start(
     monkeypatch, window: MainWindow, commands: Commands, home: Path
 ) -> None:
     monkeypatch.setattr("nep.i18n.offered", lambda: [("en", "English"), ("es", "Español")])
@@ -156,7 +156,7 @@ def test_the_language_is_kept_for_the_next_start(
     assert not sheet.from_next_start.isVisible()
 
 
-def test_many_languages_are_a_list_to_open(
+def test_many_languages_are_shown_in_a_drop_down_list(
     monkeypatch, window: MainWindow, commands: Commands, home: Path
 ) -> None:
     names = [("en", "English"), ("es", "Español"), ("fr", "Français"), ("ja", "日本語")]
@@ -175,7 +175,7 @@ def test_many_languages_are_a_list_to_open(
     assert sheet.from_next_start.isVisible()
 
 
-def test_it_says_whether_robots_are_heard(
+def test_settings_show_whether_the_robot_voice_is_available(
     sheet: SettingsSheet, window: MainWindow, commands: Commands
 ) -> None:
     class Silent:
@@ -192,7 +192,7 @@ def test_it_says_whether_robots_are_heard(
     assert sheet.voice.text().startswith("This computer has no voice for French. ")
 
 
-def test_another_language_offers_a_restart_that_waits_until_nothing_moves(
+def test_language_change_offers_a_restart_that_waits_until_robots_stop(
     qtbot, window: MainWindow, commands: Commands
 ) -> None:
     window.can_restart = True

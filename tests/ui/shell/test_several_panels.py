@@ -93,12 +93,14 @@ def apart(one: Dock, other: Dock) -> bool:
         ("plot#²", ("plot#²", 1)), (f"plot#{2**64}", (f"plot#{2**64}", 1)),
     ],
 )  # fmt: skip
-def test_a_key_says_the_kind_and_which_one(key, kind) -> None:
+def test_panel_key_encodes_kind_and_number(key, kind) -> None:
     assert kind_of(key) == kind
     assert key_of(*kind) == key
 
 
-def test_one_more_is_beside_the_first_with_a_number_and_its_own_topic(qtbot, bench, window) -> None:
+def test_additional_panel_opens_beside_the_first_with_a_number_and_its_own_topic(
+    qtbot, bench, window
+) -> None:
     first = bench.docks["inspector"]
     first.panel.show_topic("/odom")
     choose(first, MORE)
@@ -114,7 +116,7 @@ def test_one_more_is_beside_the_first_with_a_number_and_its_own_topic(qtbot, ben
     assert first.x() == second.x()
 
 
-def test_one_more_beside_a_place_with_tabs_leaves_the_tabs(qtbot, bench, window) -> None:
+def test_additional_panel_beside_a_tabbed_dock_keeps_the_tabs(qtbot, bench, window) -> None:
     first = bench.docks["image"]
     bench.tabifyDockWidget(first, bench.docks["console"])
     first.raise_()
@@ -126,20 +128,20 @@ def test_one_more_beside_a_place_with_tabs_leaves_the_tabs(qtbot, bench, window)
     assert second.title.tabs == ()
 
 
-def test_a_panel_that_makes_sense_once_offers_no_more(bench) -> None:
+def test_single_instance_panel_does_not_offer_another(bench) -> None:
     assert MORE not in [action.text() for action in bench.docks["topics"].menu().actions()]
     assert bench.open("topics#2") is None
     assert bench.open("inspector#9") is None
     assert bench.open(f"inspector#{2**64}") is None
 
 
-def test_there_is_a_bound(bench, window) -> None:
+def test_number_of_panels_of_a_kind_is_limited(bench, window) -> None:
     opened = [bench.open_another("image") for _ in range(MOST_OF_A_KIND)]
     assert len([dock for dock in opened if dock is not None]) == MOST_OF_A_KIND - 1
     assert window.toast.text == f"{MOST_OF_A_KIND} are already open, the maximum"
 
 
-def test_they_come_back_with_their_topics_at_the_next_start(qtbot, bench, window) -> None:
+def test_panels_are_restored_with_their_topics_after_restart(qtbot, bench, window) -> None:
     for key, topic in (("inspector", "/odom"), ("inspector#2", "/cmd"), ("image#2", "/camera")):
         dock = bench.docks.get(key) or bench.open_another(kind_of(key)[0])
         assert dock is not None
@@ -162,7 +164,7 @@ def test_they_come_back_with_their_topics_at_the_next_start(qtbot, bench, window
     again.shut()
 
 
-def test_a_layout_of_an_earlier_version_comes_back_and_one_of_a_later_version_too(qtbot, bench) -> None:
+def test_layouts_of_earlier_and_later_versions_are_restored(qtbot, bench) -> None:
     kept = json.loads(json.dumps(bench.save()))
     bench.open_another("inspector")
     assert bench.restore(kept)
@@ -172,7 +174,7 @@ def test_a_layout_of_an_earlier_version_comes_back_and_one_of_a_later_version_to
     assert [key for key in bench.open_names() if "#" in key] == ["inspector#3"]
 
 
-def test_one_that_is_closed_ends_and_can_be_brought_back(qtbot, bench, window) -> None:
+def test_closed_additional_panel_is_destroyed_and_can_be_restored(qtbot, bench, window) -> None:
     second = bench.open_another("inspector")
     assert second is not None
     panel = second.panel
@@ -188,7 +190,7 @@ def test_one_that_is_closed_ends_and_can_be_brought_back(qtbot, bench, window) -
     assert bench.docks["inspector#2"] is not second
 
 
-def test_the_first_is_kept_as_it_is_when_it_is_closed(bench) -> None:
+def test_first_panel_is_kept_when_it_is_closed(bench) -> None:
     first, second = bench.docks["inspector"], bench.open_another("inspector")
     assert second is not None
     first.close()
@@ -197,7 +199,7 @@ def test_the_first_is_kept_as_it_is_when_it_is_closed(bench) -> None:
     assert again is first, "the free number is the first"
 
 
-def test_a_topic_goes_to_the_one_that_was_used_last_or_to_one_more(qtbot, bench, window) -> None:
+def test_topic_opens_in_the_last_used_panel_or_in_an_additional_one(qtbot, bench, window) -> None:
     window.open_topic("/a")
     assert topic_of(bench, "inspector") == "/a"
     window.context.open_beside("/b")
@@ -213,7 +215,7 @@ def test_a_topic_goes_to_the_one_that_was_used_last_or_to_one_more(qtbot, bench,
     assert topic_of(bench, "inspector") == "/e", "one that shows nothing yet is taken first"
 
 
-def test_the_menu_and_the_palette_know_them(bench, window) -> None:
+def test_menu_and_palette_list_the_additional_panels(bench, window) -> None:
     bench.open_another("inspector")
     menus = window.commands.menus
     menus._refresh("View")
@@ -226,7 +228,7 @@ def test_the_menu_and_the_palette_know_them(bench, window) -> None:
     assert "inspector#2" in bench.docks
 
 
-def test_one_more_is_found_in_the_palette(bench, window, qtbot) -> None:
+def test_command_for_an_additional_panel_is_found_in_the_palette(bench, window, qtbot) -> None:
     window.activateWindow()
     qtbot.waitUntil(window.isActiveWindow)
     window.commands.run("palette.open")
@@ -240,7 +242,7 @@ def test_one_more_is_found_in_the_palette(bench, window, qtbot) -> None:
     assert bench.docks["inspector#2"].isVisible()
 
 
-def test_every_kind_that_the_palette_lists_has_a_heading(bench, window) -> None:
+def test_every_kind_listed_in_the_palette_has_a_heading(bench, window) -> None:
     kinds = {entry.kind for entry in window.commands.view._entries.all()}
     assert kinds <= TITLES.keys()
     assert "another" in kinds

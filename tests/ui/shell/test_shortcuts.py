@@ -37,19 +37,19 @@ def keys(qapp: object, tmp_path: Path) -> Shortcuts:
     return Shortcuts(Settings(tmp_path), lambda _sentence: None, COMMANDS)
 
 
-def test_no_two_commands_have_the_same_key_at_first(keys: Shortcuts) -> None:
+def test_default_shortcuts_are_unique(keys: Shortcuts) -> None:
     given = [key for row in COMMANDS for key in keys.of(row.id)]
     assert sorted(given) == sorted(set(given))
     assert all(key == QKeySequence(key).toString() for key in given)
 
 
-def test_ctrl_y_does_again_what_was_undone(window: MainWindow, commands: Commands, keys: Shortcuts) -> None:
+def test_ctrl_y_is_redo(window: MainWindow, commands: Commands, keys: Shortcuts) -> None:
     assert keys.of("edit.redo") == ("Ctrl+Shift+Z", "Ctrl+Y")
     assert [key.toString() for key in commands.actions["edit.redo"].shortcuts()] == ["Ctrl+Shift+Z", "Ctrl+Y"]
     assert keys.holder("Ctrl+Y") == "edit.redo"
 
 
-def test_on_a_mac_no_key_is_the_systems_or_types_a_sign(qapp: object, tmp_path: Path) -> None:
+def test_macos_shortcuts_avoid_system_keys_and_option_characters(qapp: object, tmp_path: Path) -> None:
     """Ctrl is Cmd there, Meta the key that says Ctrl; Option types signs, Cmd+Tab changes the program."""
     keys = Shortcuts(Settings(tmp_path), lambda _sentence: None, COMMANDS, platform="darwin")
     given = [key for row in COMMANDS for key in keys.of(row.id)]
@@ -63,7 +63,7 @@ def test_on_a_mac_no_key_is_the_systems_or_types_a_sign(qapp: object, tmp_path: 
     assert not keys.own("tab.next")
 
 
-def test_keys_are_spoken_as_they_stand_on_a_mac() -> None:
+def test_shortcuts_are_formatted_with_macos_symbols() -> None:
     assert spoken_key("Ctrl+Shift+S", "darwin") == "⇧⌘S"
     assert spoken_key("Meta+Tab", "darwin") == "⌃Tab"
     assert spoken_key("Ctrl++", "darwin") == "⌘+"
@@ -74,9 +74,7 @@ def test_keys_are_spoken_as_they_stand_on_a_mac() -> None:
     assert tip_with_key("Save", "", "darwin") == "Save"
 
 
-def test_a_mac_has_its_menus_at_the_top_of_the_screen(
-    qtbot, theme: Theme, window: MainWindow, commands
-) -> None:
+def test_macos_menu_bar_is_native(qtbot, theme: Theme, window: MainWindow, commands) -> None:
     for platform, native in (("darwin", True), ("linux", False), ("win32", False)):
         bar = AppBar(theme, LAYOUTS, platform)
         qtbot.addWidget(bar)
@@ -89,7 +87,9 @@ def test_a_mac_has_its_menus_at_the_top_of_the_screen(
 
 
 @pytest.mark.parametrize("held", [CTRL, Qt.KeyboardModifier.ShiftModifier])
-def test_keys_that_move_in_a_text_are_left_to_it(qtbot, theme: Theme, held: Qt.KeyboardModifier) -> None:
+def test_text_navigation_keys_are_left_to_the_text_field(
+    qtbot, theme: Theme, held: Qt.KeyboardModifier
+) -> None:
     left: list[str] = []
     field = FilterField(theme, "Filter")
     qtbot.addWidget(field)
@@ -108,7 +108,7 @@ def test_keys_that_move_in_a_text_are_left_to_it(qtbot, theme: Theme, held: Qt.K
     assert (left, number.text()) == (["filter", "console"], "4")
 
 
-def test_a_new_key_is_kept(keys: Shortcuts, tmp_path: Path) -> None:
+def test_changed_shortcut_is_saved(keys: Shortcuts, tmp_path: Path) -> None:
     keys.give("file.save", "Ctrl+Alt+S")
     again = Shortcuts(Settings(tmp_path), lambda _sentence: None, COMMANDS)
     assert again.of("file.save") == ("Ctrl+Alt+S",)
@@ -116,18 +116,18 @@ def test_a_new_key_is_kept(keys: Shortcuts, tmp_path: Path) -> None:
     assert not again.own("file.open")
 
 
-def test_a_key_leaves_the_command_that_had_it(keys: Shortcuts) -> None:
+def test_reassigned_shortcut_is_removed_from_its_previous_command(keys: Shortcuts) -> None:
     keys.give("file.open", "Ctrl+S")
     assert keys.of("file.save") == ()
     assert keys.holder("Ctrl+S") == "file.open"
 
 
-def test_two_commands_swap(keys: Shortcuts) -> None:
+def test_two_commands_swap_their_shortcuts(keys: Shortcuts) -> None:
     keys.swap("file.open", "Ctrl+S")
     assert (keys.of("file.open"), keys.of("file.save")) == (("Ctrl+S",), ("Ctrl+O",))
 
 
-def test_one_or_all_are_reset(keys: Shortcuts, tmp_path: Path) -> None:
+def test_one_or_all_shortcuts_are_reset(keys: Shortcuts, tmp_path: Path) -> None:
     keys.swap("file.open", "Ctrl+S")
     keys.reset("file.open")
     assert (keys.of("file.open"), keys.of("file.save")) == (("Ctrl+O",), ("Ctrl+S",))
@@ -141,7 +141,7 @@ def test_one_or_all_are_reset(keys: Shortcuts, tmp_path: Path) -> None:
     assert Settings(tmp_path).get("shortcuts", {"not": "kept"}) == {}
 
 
-def test_stop_keeps_f12_and_may_have_a_second_key(keys: Shortcuts) -> None:
+def test_stop_keeps_f12_and_may_have_a_second_shortcut(keys: Shortcuts) -> None:
     keys.give("run.stop", "")
     assert keys.of("run.stop") == ("F12",)
     keys.give("run.stop", "Ctrl+.")
@@ -153,7 +153,7 @@ def test_stop_keeps_f12_and_may_have_a_second_key(keys: Shortcuts) -> None:
     assert keys.of("run.stop") == ("F12", "Ctrl+.")
 
 
-def test_stops_second_key_is_left_to_whom_a_person_gave_it(tmp_path: Path, qapp: object) -> None:
+def test_default_second_shortcut_of_stop_yields_to_a_user_assignment(tmp_path: Path, qapp: object) -> None:
     settings = Settings(tmp_path)
     settings.set("shortcuts", {"run.step": ["Ctrl+."]})
     keys = Shortcuts(settings, print, COMMANDS)
@@ -163,7 +163,9 @@ def test_stops_second_key_is_left_to_whom_a_person_gave_it(tmp_path: Path, qapp:
     assert keys.of("run.stop") == ("F12", "Ctrl+.")
 
 
-def test_nobody_else_gets_f12_not_even_from_the_settings(tmp_path: Path, qapp: object) -> None:
+def test_f12_cannot_be_assigned_to_another_command_even_in_the_settings_file(
+    tmp_path: Path, qapp: object
+) -> None:
     settings = Settings(tmp_path)
     settings.set("shortcuts", {"run.run": ["F12"], "run.stop": [], "no.such": ["F2"], "file.open": 7})
     keys = Shortcuts(settings, lambda _sentence: None, COMMANDS)
@@ -184,7 +186,9 @@ def test_nobody_else_gets_f12_not_even_from_the_settings(tmp_path: Path, qapp: o
         (Qt.Key.Key_S, CTRL, ""),
     ],
 )
-def test_keys_that_cant_be(keys: Shortcuts, key: Qt.Key, held: Qt.KeyboardModifier, said: str) -> None:
+def test_invalid_shortcuts_are_rejected_with_a_reason(
+    keys: Shortcuts, key: Qt.Key, held: Qt.KeyboardModifier, said: str
+) -> None:
     refusal = keys.refusal("file.open", QKeyCombination(held, key))
     assert said in refusal
     assert bool(refusal) == bool(said)
@@ -218,7 +222,7 @@ def press(sheet: ShortcutSheet, key: Qt.Key, held: Qt.KeyboardModifier = NONE) -
     QTest.keyClick(sheet.field, key, held)
 
 
-def test_the_sheet_lists_every_command_and_every_fixed_key(sheet: ShortcutSheet) -> None:
+def test_sheet_lists_every_command_and_every_fixed_shortcut(sheet: ShortcutSheet) -> None:
     shown = [line.entry.id for line in sheet.rows.lines.lines if isinstance(line, Match)]
     assert shown == list(dict.fromkeys(shown))
     assert set(shown) == {f"command:{row.id}" for row in COMMANDS if row.in_shortcuts} | {
@@ -229,7 +233,7 @@ def test_the_sheet_lists_every_command_and_every_fixed_key(sheet: ShortcutSheet)
     assert {"File", "View", "Run", "Blocks"} <= set(headings)
 
 
-def test_a_new_key_works_at_once_everywhere(
+def test_changed_shortcut_works_at_once_everywhere(
     sheet: ShortcutSheet, window: MainWindow, commands: Commands
 ) -> None:
     choose(sheet, "Pause")
@@ -253,7 +257,9 @@ def test_a_new_key_works_at_once_everywhere(
     assert palette.rows.entry.key == "F7"
 
 
-def test_a_conflict_names_the_other_and_swaps(sheet: ShortcutSheet, commands: Commands) -> None:
+def test_shortcut_conflict_names_the_other_command_and_can_swap(
+    sheet: ShortcutSheet, commands: Commands
+) -> None:
     choose(sheet, "Open a file")
     press(sheet, Qt.Key.Key_Return)
     press(sheet, Qt.Key.Key_S, CTRL)
@@ -266,7 +272,7 @@ def test_a_conflict_names_the_other_and_swaps(sheet: ShortcutSheet, commands: Co
     assert not sheet.swap.isVisible()
 
 
-def test_esc_leaves_a_key_as_it_is(sheet: ShortcutSheet, commands: Commands) -> None:
+def test_esc_cancels_recording_a_shortcut(sheet: ShortcutSheet, commands: Commands) -> None:
     choose(sheet, "Save")
     press(sheet, Qt.Key.Key_Return)
     press(sheet, Qt.Key.Key_Escape)
@@ -274,7 +280,7 @@ def test_esc_leaves_a_key_as_it_is(sheet: ShortcutSheet, commands: Commands) -> 
     assert commands.shortcuts.of("file.save") == ("Ctrl+S",)
 
 
-def test_f12_stops_while_a_key_is_awaited(sheet: ShortcutSheet, commands: Commands) -> None:
+def test_f12_stops_while_a_shortcut_is_recorded(sheet: ShortcutSheet, commands: Commands) -> None:
     stops: list[str] = []
     commands.actions["run.stop"].triggered.connect(lambda: stops.append("stop"))
     choose(sheet, "Save")
@@ -284,7 +290,9 @@ def test_f12_stops_while_a_key_is_awaited(sheet: ShortcutSheet, commands: Comman
     assert commands.shortcuts.of("file.save") == ("Ctrl+S",)
 
 
-def test_no_command_is_done_by_the_key_that_is_recorded(sheet: ShortcutSheet, commands: Commands) -> None:
+def test_recording_a_shortcut_does_not_trigger_its_current_command(
+    sheet: ShortcutSheet, commands: Commands
+) -> None:
     done: list[str] = []
     commands.actions["text.larger"].triggered.connect(lambda: done.append("larger"))
     choose(sheet, "Save")
@@ -294,7 +302,7 @@ def test_no_command_is_done_by_the_key_that_is_recorded(sheet: ShortcutSheet, co
     assert "“Larger text”" in sheet.said.text()
 
 
-def test_keys_are_taken_away_and_reset(sheet: ShortcutSheet, commands: Commands) -> None:
+def test_shortcuts_are_removed_and_reset(sheet: ShortcutSheet, commands: Commands) -> None:
     keys = commands.shortcuts
     choose(sheet, "Save")
     sheet.rows.setFocus()
@@ -315,7 +323,7 @@ def test_keys_are_taken_away_and_reset(sheet: ShortcutSheet, commands: Commands)
     assert sheet.said.text() == "F12 always remains a shortcut of Stop."
 
 
-def test_ctrl_enter_in_the_palette_leads_here(
+def test_ctrl_enter_in_the_palette_opens_the_shortcut_sheet(
     sheet: ShortcutSheet, window: MainWindow, commands: Commands
 ) -> None:
     sheet.shut()
@@ -332,7 +340,7 @@ def test_ctrl_enter_in_the_palette_leads_here(
     assert commands.shortcuts.of("file.save_as") == ("F7",)
 
 
-def test_ctrl_f_finds_blocks_in_the_behaviour_layout_only(
+def test_ctrl_f_searches_blocks_only_in_the_behaviour_layout(
     qtbot, window: MainWindow, commands: Commands
 ) -> None:
     find = commands.actions["blocks.find"]

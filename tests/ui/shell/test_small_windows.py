@@ -119,7 +119,9 @@ def _pairs(widgets: list[QWidget]) -> Iterator[str]:
 
 @pytest.mark.parametrize("mode", ["light", "dark"])
 @pytest.mark.parametrize("percent", TEXT)
-def test_every_size_shows_everything_whole(qtbot, window: MainWindow, mode: Mode, percent: int) -> None:
+def test_nothing_is_clipped_or_overlaps_at_any_window_and_text_size(
+    qtbot, window: MainWindow, mode: Mode, percent: int
+) -> None:
     window.theme.set_mode(mode)
     window.theme.set_text_percent(percent)
     faults: list[str] = []
@@ -155,7 +157,7 @@ def tabs_of(bench: Workbench, name: str) -> set[str]:
     return there & FOLDING
 
 
-def test_panels_fold_into_tabs_step_by_step_and_come_back(qtbot, window: MainWindow) -> None:
+def test_panels_collapse_into_tabs_gradually_and_are_restored(qtbot, window: MainWindow) -> None:
     window.resize(1440, 900)
     bench = window.show_layout("behaviour")
     docks = bench.docks
@@ -188,7 +190,7 @@ def test_panels_fold_into_tabs_step_by_step_and_come_back(qtbot, window: MainWin
     assert docks["problems"].x() == docks["behaviour"].x()
 
 
-def test_what_is_folded_comes_back_folded_at_the_next_start(qtbot, window: MainWindow) -> None:
+def test_collapsed_panels_stay_collapsed_after_restart(qtbot, window: MainWindow) -> None:
     window.resize(1024, 600)
     bench = window.show_layout("behaviour")
     settle(qtbot, window)
@@ -203,7 +205,7 @@ def test_what_is_folded_comes_back_folded_at_the_next_start(qtbot, window: MainW
     again.shut()
 
 
-def test_a_folded_panel_tells_how_much_waits_in_it(qtbot, window: MainWindow) -> None:
+def test_tab_of_a_collapsed_panel_shows_a_count_badge(qtbot, window: MainWindow) -> None:
     window.resize(1024, 600)
     bench = window.show_layout("behaviour")
     settle(qtbot, window)
@@ -222,7 +224,7 @@ def test_a_folded_panel_tells_how_much_waits_in_it(qtbot, window: MainWindow) ->
     qtbot.waitUntil(lambda: badge() is None)
 
 
-def test_in_a_narrow_title_the_other_tabs_are_icons_with_their_names(qtbot, window: MainWindow) -> None:
+def test_narrow_title_shows_other_tabs_as_icons_with_accessible_names(qtbot, window: MainWindow) -> None:
     window.theme.set_text_percent(200)
     window.resize(1024, 600)
     bench = window.show_layout("behaviour")
@@ -237,7 +239,7 @@ def test_in_a_narrow_title_the_other_tabs_are_icons_with_their_names(qtbot, wind
     assert tabs["Problems"].toolTip() == ""
 
 
-def test_the_app_bar_shortens_its_words_before_its_menus(qtbot, window: MainWindow, tmp_path: Path) -> None:
+def test_app_bar_shortens_its_texts_before_its_menus(qtbot, window: MainWindow, tmp_path: Path) -> None:
     window.resize(1024, 600)
     window.show_layout("behaviour")
     settle(qtbot, window)
@@ -257,7 +259,7 @@ def test_the_app_bar_shortens_its_words_before_its_menus(qtbot, window: MainWind
     assert button.toolTip() == ""
 
 
-def test_a_field_right_of_the_menus_has_the_room_that_is_there(qtbot, window: MainWindow) -> None:
+def test_search_field_right_of_the_menus_fits_the_available_width(qtbot, window: MainWindow) -> None:
     window.resize(1024, 600)
     window.show_start()
     settle(qtbot, window)
@@ -269,7 +271,7 @@ def test_a_field_right_of_the_menus_has_the_room_that_is_there(qtbot, window: Ma
     assert abs(place(bar.switch).center().x() - place(bar).center().x()) < 3, "in the middle"
 
 
-def test_the_question_of_the_start_page_is_higher_in_a_low_window(qtbot, window: MainWindow) -> None:
+def test_question_of_the_start_page_is_placed_higher_in_a_low_window(qtbot, window: MainWindow) -> None:
     window.show_start()
     tops = []
     for height in (600, 900, 600):
@@ -279,9 +281,7 @@ def test_the_question_of_the_start_page_is_higher_in_a_low_window(qtbot, window:
     assert tops[0] == tops[2] < tops[1]
 
 
-def test_a_chip_beside_tabs_loses_its_words_before_they_lose_theirs(
-    qtbot, theme: Theme, window: MainWindow
-) -> None:
+def test_chip_beside_tabs_loses_its_text_before_the_tabs_do(qtbot, theme: Theme, window: MainWindow) -> None:
     chip = Chip(theme, "ready")
 
     class WithChip(PanelWidget):
@@ -323,19 +323,19 @@ STOP = QRect(780, 50, 230, 52)
         (QRect(60, 60, 900, 300), (60, 102)),  # too wide for that: below it
     ],
 )
-def test_a_menu_that_would_cover_stop_goes_aside(menu: QRect, goes_to: tuple[int, int]) -> None:
+def test_menu_that_would_cover_stop_is_moved_aside(menu: QRect, goes_to: tuple[int, int]) -> None:
     assert beside(menu, STOP, SCREEN).topLeft().toTuple() == goes_to
     assert beside(menu, STOP, SCREEN).size() == menu.size()
 
 
-def test_a_menu_that_is_too_large_to_go_aside_is_narrower() -> None:
+def test_menu_that_is_too_wide_to_move_aside_is_narrowed() -> None:
     assert beside(QRect(0, 0, 1000, 590), STOP, SCREEN) == QRect(0, 0, 780, 590)
     early = QRect(100, 50, 230, 52)  # left of this there is no room for words
     assert beside(QRect(0, 0, 1000, 590), early, SCREEN) == QRect(0, 0, 1000, 590)
 
 
 @pytest.mark.parametrize("wide", [24, 34, 90])
-def test_a_count_on_a_tab_is_whole_however_narrow_it_is(qtbot, theme: Theme, wide: int) -> None:
+def test_count_badge_on_a_narrow_tab_is_not_clipped(qtbot, theme: Theme, wide: int) -> None:
     tab = TitleTab(theme, "Problems", "triangle-alert", False)
     qtbot.addWidget(tab)
     tab.set_bare(True)

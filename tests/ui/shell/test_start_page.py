@@ -47,7 +47,7 @@ def words(page: StartPage) -> str:
     )
 
 
-def test_it_offers_a_robot_a_behaviour_and_examples(page: StartPage) -> None:
+def test_start_page_offers_a_robot_a_behaviour_and_examples(page: StartPage) -> None:
     seen = words(page)
     for part in ("What would you like to do?", "Use the virtual robot", "New behaviour", "Open an example"):
         assert part in seen
@@ -70,7 +70,7 @@ def filled(page: StartPage) -> list[str]:
     return [b.text() for b in page.findChildren(Button) if b.kind == "primary"]
 
 
-def test_who_is_new_is_offered_the_first_steps_before_all_else(qtbot, page: StartPage) -> None:
+def test_first_steps_are_offered_first_to_a_new_user(qtbot, page: StartPage) -> None:
     page.offer_first_steps()
     page.focus_first()
     qtbot.waitUntil(lambda: cards(page)[0] is page.learn_card)
@@ -87,7 +87,7 @@ def test_who_is_new_is_offered_the_first_steps_before_all_else(qtbot, page: Star
     assert order == ["First steps", "Cancel", "Use the virtual robot", "New behaviour"]
 
 
-def test_not_now_makes_it_one_of_three(qtbot, page: StartPage) -> None:
+def test_not_now_turns_the_first_steps_offer_into_one_of_three_cards(qtbot, page: StartPage) -> None:
     before = cards(page)
     page.offer_first_steps()
     (no,) = [each for each in page.findChildren(Button) if each.text() == "Cancel"]
@@ -101,13 +101,13 @@ def test_not_now_makes_it_one_of_three(qtbot, page: StartPage) -> None:
     assert "Learn in five minutes" in words(page)
 
 
-def test_who_has_begun_something_is_offered_nothing_before_it(page: StartPage) -> None:
+def test_first_steps_are_not_offered_when_work_is_open(page: StartPage) -> None:
     page.offer_first_steps()
     page.show_open([OpenWork("a", "Greeting")])
     assert not page.offers_first_steps
 
 
-def test_what_is_pressed_is_told(qtbot, page: StartPage, tmp_path: Path) -> None:
+def test_pressed_buttons_emit_their_signals(qtbot, page: StartPage, tmp_path: Path) -> None:
     told: list[object] = []
     page.virtual_robot.connect(lambda: told.append("robot"))
     page.new_behaviour.connect(lambda: told.append("new"))
@@ -123,7 +123,7 @@ def test_what_is_pressed_is_told(qtbot, page: StartPage, tmp_path: Path) -> None
     assert told == ["robot", "new", "learn", tmp_path / "Quiz.nepb", "developer"]
 
 
-def test_open_work_stands_first_and_leads_back(page: StartPage) -> None:
+def test_open_work_is_listed_first_and_opens_its_tab(page: StartPage) -> None:
     assert "Open now" not in words(page)
     page.show_open(
         [OpenWork("a", "Greeting", unsaved=True), OpenWork("b", "Quiz", path="/q.nepb", runs=True)]
@@ -142,13 +142,13 @@ def test_open_work_stands_first_and_leads_back(page: StartPage) -> None:
     assert "Open now" not in words(page)
 
 
-def test_help_leads_to_all_examples(page: StartPage) -> None:
+def test_help_shows_all_examples_and_focuses_the_first(page: StartPage) -> None:
     page.focus_examples()
     assert page.focusWidget() is page.example_cards[0]
     assert all(card.isVisible() for card in page.example_cards)
 
 
-def test_help_leads_to_examples_that_are_in_sight(qtbot, page: StartPage) -> None:
+def test_help_scrolls_the_examples_into_view(qtbot, page: StartPage) -> None:
     page.resize(1280, 700)
     page.show_open([OpenWork("a", "Greeting")])
     page.hide()
@@ -158,7 +158,7 @@ def test_help_leads_to_examples_that_are_in_sight(qtbot, page: StartPage) -> Non
         qtbot.waitUntil(lambda card=card: card.visibleRegion().boundingRect() == card.rect())
 
 
-def test_who_comes_back_after_the_examples_sees_the_top(qtbot, page: StartPage) -> None:
+def test_returning_to_the_start_page_scrolls_to_the_top(qtbot, page: StartPage) -> None:
     page.resize(1100, 500)
     bar = page.findChild(QScrollArea).verticalScrollBar()
     page.focus_examples()
@@ -167,7 +167,7 @@ def test_who_comes_back_after_the_examples_sees_the_top(qtbot, page: StartPage) 
     assert bar.value() == 0
 
 
-def test_open_rows_stay_while_nothing_changed(page: StartPage) -> None:
+def test_open_work_rows_are_reused_when_unchanged(page: StartPage) -> None:
     work = [OpenWork("a", "Greeting")]
     page.show_open(work)
     row = page.open_work.rows[0]
@@ -175,7 +175,7 @@ def test_open_rows_stay_while_nothing_changed(page: StartPage) -> None:
     assert page.open_work.rows == [row]
 
 
-def test_recent_files_stand_there_with_their_day(page: StartPage, tmp_path: Path) -> None:
+def test_recent_files_are_listed_with_their_date(page: StartPage, tmp_path: Path) -> None:
     page.show_recent(
         [RecentFile(tmp_path / f"{n}.nepb", f"Story {n}", NOW.timestamp() - n * 86400) for n in range(4)], NOW
     )
@@ -194,11 +194,11 @@ def test_recent_files_stand_there_with_their_day(page: StartPage, tmp_path: Path
     ("days", "said"),
     [(0, "Today, 9:00"), (1, "Yesterday"), (3, "17 November"), (400, "16 October 2025")],
 )
-def test_days_are_said_in_words(days: int, said: str) -> None:
+def test_dates_are_formatted_in_words(days: int, said: str) -> None:
     assert day_words(NOW - dt.timedelta(days=days), NOW) == said
 
 
-def test_the_robots_chip_is_there_only_with_a_robot(qtbot, page: StartPage) -> None:
+def test_robots_chip_is_shown_only_with_a_robot(qtbot, page: StartPage) -> None:
     assert not page.robot_card.chip.isVisible()
     page.show_robot("Pepper ready", "ok")
     assert page.robot_card.chip.isVisible()
@@ -221,7 +221,7 @@ def test_large_text_scrolls_and_clips_nothing(qtbot, page: StartPage, theme: The
             assert shown.height() >= room, shown.text()
 
 
-def test_in_a_low_window_with_large_text_the_first_button_is_in_sight(
+def test_first_button_is_visible_with_large_text_in_a_low_window(
     qtbot, page: StartPage, theme: Theme
 ) -> None:
     page.resize(1024, 530)
@@ -232,7 +232,7 @@ def test_in_a_low_window_with_large_text_the_first_button_is_in_sight(
     qtbot.waitUntil(first.art.isVisible)
 
 
-def test_the_shipped_examples_are_read_with_their_blocks() -> None:
+def test_shipped_examples_are_loaded_with_their_blocks() -> None:
     found = read_examples(resources.folder() / "examples")
     assert len(found) >= 3
     for example in found[:3]:
@@ -241,9 +241,7 @@ def test_the_shipped_examples_are_read_with_their_blocks() -> None:
         assert example.rows[0].category == "events"
 
 
-def test_what_an_example_is_called_and_does_is_said_in_the_language_of_studio(
-    monkeypatch, tmp_path: Path
-) -> None:
+def test_example_titles_and_descriptions_are_translated(monkeypatch, tmp_path: Path) -> None:
     monkeypatch.setattr("nep.i18n._current", None)
     extract(tmp_path)
     compile_all(tmp_path)
@@ -253,7 +251,7 @@ def test_what_an_example_is_called_and_does_is_said_in_the_language_of_studio(
         assert each.text.startswith("[")
 
 
-def test_a_damaged_example_is_left_out(tmp_path: Path) -> None:
+def test_damaged_example_is_skipped(tmp_path: Path) -> None:
     (tmp_path / "a.nepb").write_text("{", "utf-8")
     (tmp_path / "b.nepb").write_text(json.dumps({"workspace": 3}), "utf-8")
     (tmp_path / "c.nepb").write_text(json.dumps({"name": "C", "workspace": {}}), "utf-8")
@@ -270,11 +268,11 @@ def test_a_damaged_example_is_left_out(tmp_path: Path) -> None:
         ("robot_pepper_when_touched", "events"),
     ],
 )
-def test_a_blocks_category_is_in_its_type(kind: str, category: str) -> None:
+def test_block_category_is_derived_from_its_type(kind: str, category: str) -> None:
     assert category_of(kind) == category
 
 
-def test_rows_follow_the_blocks_and_stand_inside_others() -> None:
+def test_preview_rows_follow_the_blocks_and_indent_nested_ones() -> None:
     inner = {"type": "robot_pepper_do_say", "inputs": {"TEXT": {"shadow": {"type": "values_text"}}}}
     repeat = {
         "type": "control_repeat",
@@ -292,11 +290,11 @@ def test_rows_follow_the_blocks_and_stand_inside_others() -> None:
 
 
 @pytest.mark.parametrize("workspace", [{}, {"blocks": 3}, {"blocks": {"blocks": [1, None]}}])
-def test_a_workspace_without_blocks_has_no_rows(workspace: dict[str, object]) -> None:
+def test_workspace_without_blocks_has_no_preview_rows(workspace: dict[str, object]) -> None:
     assert rows(workspace) == ()
 
 
-def test_a_row_of_examples_and_all_of_them_when_asked(qtbot, theme: Theme) -> None:
+def test_one_row_of_examples_is_shown_and_all_on_request(qtbot, theme: Theme) -> None:
     shipped = read_examples(resources.path("examples"))
     page = StartPage(theme, shipped)
     qtbot.addWidget(page)
@@ -314,5 +312,5 @@ def test_a_row_of_examples_and_all_of_them_when_asked(qtbot, theme: Theme) -> No
     assert len(shown()) == 4
 
 
-def test_few_examples_need_no_link(page: StartPage) -> None:
+def test_few_examples_need_no_show_all_link(page: StartPage) -> None:
     assert not [each for each in page.findChildren(LinkButton) if each.isVisible() and "All" in each.text()]

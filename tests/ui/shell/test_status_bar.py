@@ -25,7 +25,7 @@ def facts(session: object) -> StatusFacts:
     return StatusFacts(session, clock=time.gmtime)  # type: ignore[arg-type]
 
 
-def test_health_names_the_alerts_before_the_robots(session: fakes.Session) -> None:
+def test_health_item_shows_alerts_before_robots(session: fakes.Session) -> None:
     assert facts(session).health() == ("circle-x", "1 alert", "error")
     session.alerts.put("slow", "warn", "Slow.")
     assert facts(session).health()[1] == "2 alerts"
@@ -34,7 +34,7 @@ def test_health_names_the_alerts_before_the_robots(session: fakes.Session) -> No
     assert facts(session).health() == ("circle-check", "Pepper: no problems", "ok")
 
 
-def test_health_agrees_with_the_health_panel(session: fakes.Session) -> None:
+def test_health_item_matches_the_health_panel(session: fakes.Session) -> None:
     session.alerts.resolve("message:/faces")
     link = session.fleet.links[0]
     link.values["battery"] = 7
@@ -43,7 +43,7 @@ def test_health_agrees_with_the_health_panel(session: fakes.Session) -> None:
     assert facts(session).health() == ("circle-x", "Pepper: 2 to check", "error")
 
 
-def test_a_robot_that_has_told_nothing_is_connected_and_not_well(session: fakes.Session) -> None:
+def test_robot_that_has_not_reported_is_connected_and_not_healthy(session: fakes.Session) -> None:
     session.alerts.resolve("message:/faces")
     link = session.fleet.links[0]
     link.answered_s, link.values = None, {}
@@ -52,18 +52,18 @@ def test_a_robot_that_has_told_nothing_is_connected_and_not_well(session: fakes.
     assert facts(session).health() == ("circle-dashed", "Pepper is connected", "off")
 
 
-def test_a_robot_that_has_gone_is_to_be_looked_at(session: fakes.Session) -> None:
+def test_disconnected_robot_counts_as_to_check(session: fakes.Session) -> None:
     session.alerts.resolve("message:/faces")
     link = session.fleet.links[0]
     link.connected = False
     assert facts(session).health() == ("triangle-alert", "Pepper: 1 to check", "warn")
 
 
-def test_health_without_a_robot() -> None:
+def test_health_item_shows_no_robot_when_none_is_connected() -> None:
     assert facts(fakes.Session()).health() == ("circle-dashed", "No robot", "off")
 
 
-def test_saving_is_said_with_its_time(session: fakes.Session) -> None:
+def test_save_state_shows_its_time(session: fakes.Session) -> None:
     assert facts(session).saved()[1] == ""
     session.document.saved_at = 8 * 3600 + 41 * 60
     assert facts(session).saved()[1] == "Saved 8:41"
@@ -71,7 +71,7 @@ def test_saving_is_said_with_its_time(session: fakes.Session) -> None:
     assert facts(session).saved()[1] == "Not saved · backed up"
 
 
-def test_work_that_the_disk_does_not_take_is_not_called_safe(session: fakes.Session) -> None:
+def test_unsaved_work_that_cannot_be_backed_up_is_reported(session: fakes.Session) -> None:
     session.document.dirty = True
     session.document._journal_error = (
         "can't back up unsaved work (No space left on device); save the file now"
@@ -81,7 +81,7 @@ def test_work_that_the_disk_does_not_take_is_not_called_safe(session: fakes.Sess
     assert facts(session).saved()[1] == "Not saved · backed up"
 
 
-def test_traffic_counts_live_topics_only(session: fakes.Session) -> None:
+def test_traffic_item_counts_live_topics_only(session: fakes.Session) -> None:
     session.traffic.messages_per_s = 268.6
     assert facts(session).traffic()[1] == "7 nodes, 12 topics, 269 messages/s"
     session.traffic.messages_per_s = None
@@ -90,13 +90,13 @@ def test_traffic_counts_live_topics_only(session: fakes.Session) -> None:
     assert facts(session).traffic()[1] == ""
 
 
-def test_losses_are_there_only_when_there_are_any(session: fakes.Session) -> None:
+def test_lost_messages_are_shown_only_when_there_are_any(session: fakes.Session) -> None:
     assert facts(session).lost()[1] == ""
     session.traffic.lost_30s = 12
     assert facts(session).lost() == ("triangle-alert", "12 lost in 30 s", "warn")
 
 
-def test_what_came_faster_than_the_window_shows_is_told(session: fakes.Session) -> None:
+def test_number_of_messages_not_shown_is_reported(session: fakes.Session) -> None:
     session.traffic.shown_30s = session.traffic.sent_30s = 900
     assert facts(session).shown()[1] == ""
     session.traffic.sent_30s = 4900
@@ -111,12 +111,12 @@ def test_what_came_faster_than_the_window_shows_is_told(session: fakes.Session) 
         ("none", "No master"),
     ],
 )
-def test_the_master(session: fakes.Session, kind: str, words: str) -> None:
+def test_master_item_shows_its_state(session: fakes.Session, kind: str, words: str) -> None:
     session.master = MasterState(kind, session.master.address)
     assert facts(session).master()[1] == words
 
 
-def test_facts_without_words_leave_no_gap(qtbot, theme: Theme) -> None:
+def test_empty_status_items_leave_no_gap(qtbot, theme: Theme) -> None:
     bar = StatusBar(theme)
     qtbot.addWidget(bar)
     bar.resize(900, 26)
@@ -141,5 +141,5 @@ def test_facts_without_words_leave_no_gap(qtbot, theme: Theme) -> None:
         (["silent", "silent"], "running", ("2 robots not responding", "error")),
     ],
 )
-def test_the_chip_of_the_robots(states: list[str], run: str, chip: tuple[str, str]) -> None:
+def test_robots_chip_summarises_the_robot_states(states: list[str], run: str, chip: tuple[str, str]) -> None:
     assert robots_chip(robots_in(*states, run=run, silent="camera silent")) == chip

@@ -127,7 +127,7 @@ OPENED = [
 
 @pytest.mark.parametrize("opened", OPENED, ids=lambda each: each.__name__)
 @pytest.mark.parametrize("key", KEYS, ids=("F12", "Ctrl+."))
-def test_stop_works_with_it_open(
+def test_stop_works_with_any_sheet_or_menu_open(
     qtbot, window: MainWindow, stops: list[str], opened: Callable[[MainWindow], None], key: tuple
 ) -> None:
     opened(window)
@@ -146,7 +146,7 @@ def presses(window: MainWindow, stops: list[str]) -> list[str]:
 
 
 @pytest.mark.parametrize("opened", OPENED[:4], ids=lambda each: each.__name__)
-def test_the_first_press_on_stop_stops_and_closes_what_pops_up(
+def test_first_press_on_stop_stops_and_closes_popups(
     window: MainWindow, presses: list[str], opened: Callable[[MainWindow], None]
 ) -> None:
     opened(window)
@@ -161,7 +161,7 @@ def test_the_first_press_on_stop_stops_and_closes_what_pops_up(
     assert QApplication.activePopupWidget() is None
 
 
-def test_a_press_beside_what_pops_up_and_beside_stop_only_closes_it(
+def test_press_outside_a_popup_and_outside_stop_only_closes_the_popup(
     window: MainWindow, presses: list[str]
 ) -> None:
     a_menu(window)
@@ -172,14 +172,14 @@ def test_a_press_beside_what_pops_up_and_beside_stop_only_closes_it(
     assert QApplication.activePopupWidget() is None
 
 
-def test_stop_held_down_stops_once(window: MainWindow, stops: list[str]) -> None:
+def test_stop_key_triggers_once_per_press(window: MainWindow, stops: list[str]) -> None:
     handle = QGuiApplication.focusWindow()
     QTest.keyPress(handle, Qt.Key.Key_F12)
     QTest.keyRelease(handle, Qt.Key.Key_F12)
     assert stops == ["stop"]
 
 
-def test_nothing_in_the_window_is_modal() -> None:
+def test_no_widget_in_the_window_is_modal() -> None:
     found = [
         f"{path.name}: {ast.unparse(node)}"
         for path in Path(app.ui.__file__).parent.rglob("*.py")
@@ -195,7 +195,7 @@ def test_nothing_in_the_window_is_modal() -> None:
 
 
 @pytest.mark.parametrize("key", KEYS, ids=["F12", "Ctrl+."])
-def test_stop_works_with_a_field_in_the_hand(
+def test_stop_works_during_drag_and_drop_of_a_field(
     qtbot, window: MainWindow, commands: Commands, stops: list[str], monkeypatch, key
 ) -> None:
     """Qt's loop of a drag stands still until it is cancelled; what it does with keys is its own."""
@@ -218,7 +218,7 @@ def test_stop_works_with_a_field_in_the_hand(
 
 
 @pytest.mark.parametrize("key", [Qt.Key.Key_Escape, Qt.Key.Key_Shift, Qt.Key.Key_Control])
-def test_keys_of_the_drag_itself_are_left_to_it(window: MainWindow, monkeypatch, key: Qt.Key) -> None:
+def test_keys_that_control_a_drag_are_not_intercepted(window: MainWindow, monkeypatch, key: Qt.Key) -> None:
     ended: list[str] = []
     monkeypatch.setattr(QDrag, "cancel", staticmethod(lambda: ended.append("cancelled")))
     keys = DragKeys(ended.append)

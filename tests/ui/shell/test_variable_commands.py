@@ -56,7 +56,7 @@ def typed(sheet: NameSheet, words: str) -> NameSheet:
     return sheet
 
 
-def test_a_new_variable_is_asked_for_and_made(shown: MainWindow, commands: Commands) -> None:
+def test_new_variable_is_named_in_a_sheet_and_created(shown: MainWindow, commands: Commands) -> None:
     commands.run("variable.new")
     sheet = sheet_of(shown)
     assert sheet.heading.text() == "New variable"
@@ -74,7 +74,7 @@ def test_a_new_variable_is_asked_for_and_made(shown: MainWindow, commands: Comma
     assert editor(shown).edited[1] == {"do": "new", "name": "names", "list": True}
 
 
-def test_a_name_that_is_used_is_not_suggested(shown: MainWindow, commands: Commands) -> None:
+def test_existing_name_is_not_suggested(shown: MainWindow, commands: Commands) -> None:
     used = [{"id": str(number), "name": name} for number, name in enumerate(["count", "Count 2"])]
     shown.session.document.edited({**SAVED, "variables": used})
     commands.run("variable.new")
@@ -82,7 +82,7 @@ def test_a_name_that_is_used_is_not_suggested(shown: MainWindow, commands: Comma
 
 
 @pytest.mark.parametrize("name", ["score", "SCORE", "名前"])
-def test_a_used_name_is_said_while_it_is_typed(shown: MainWindow, commands: Commands, name: str) -> None:
+def test_existing_name_is_reported_while_typing(shown: MainWindow, commands: Commands, name: str) -> None:
     commands.run("variable.new")
     sheet = sheet_of(shown)
     typed(sheet, name)
@@ -97,7 +97,7 @@ def test_a_used_name_is_said_while_it_is_typed(shown: MainWindow, commands: Comm
     assert editor(shown).edited == []
 
 
-def test_another_name_may_differ_in_capitals_only(shown: MainWindow, commands: Commands) -> None:
+def test_renamed_variable_may_differ_only_in_letter_case(shown: MainWindow, commands: Commands) -> None:
     commands.run("variable.rename:s")
     sheet = sheet_of(shown)
     assert (sheet.heading.text(), sheet.field.text()) == ("New name for “Score”", "Score")
@@ -107,7 +107,7 @@ def test_another_name_may_differ_in_capitals_only(shown: MainWindow, commands: C
     assert not sheet.isVisible()
 
 
-def test_what_goes_with_a_deleted_variable_is_said_and_can_be_taken_back(
+def test_deleting_a_variable_reports_removed_blocks_and_can_be_undone(
     shown: MainWindow, commands: Commands
 ) -> None:
     commands.run("variable.delete:s")
@@ -119,7 +119,7 @@ def test_what_goes_with_a_deleted_variable_is_said_and_can_be_taken_back(
     assert shown.toast.text == "Deleted “名前”"
 
 
-def test_each_use_is_shown_in_turn(shown: MainWindow, commands: Commands) -> None:
+def test_uses_of_a_variable_are_shown_in_turn(shown: MainWindow, commands: Commands) -> None:
     for _ in range(3):
         commands.run("variable.find:s")
     assert [edit["id"] for edit in editor(shown).edited] == ["set", "get", "set"]
@@ -128,7 +128,7 @@ def test_each_use_is_shown_in_turn(shown: MainWindow, commands: Commands) -> Non
     assert uses_of(parse_workspace(SAVED), "s") == ["set", "get"]
 
 
-def test_a_value_can_be_given_only_while_the_behaviour_runs(shown: MainWindow, commands: Commands) -> None:
+def test_value_can_be_set_only_while_the_behaviour_runs(shown: MainWindow, commands: Commands) -> None:
     commands.run("variable.put:s")
     assert not shown.findChildren(NameSheet)
 
@@ -139,7 +139,7 @@ def test_a_value_can_be_given_only_while_the_behaviour_runs(shown: MainWindow, c
      ("0,2", 0.2), ("1.234,5", "1.234,5"), ("1_000", "1_000"),
      ("1e999", "1e999"), ("nan", "nan"), ("18446744073709551615", 2**64 - 1)],
 )  # fmt: skip
-def test_what_is_typed_is_a_number_where_it_is_one(words: str, value: object) -> None:
+def test_typed_value_is_parsed_as_a_number_if_possible(words: str, value: object) -> None:
     made = value_of(words)
     assert made == value
     assert type(made) is type(value)

@@ -51,7 +51,7 @@ def rows(sheet: VersionHistorySheet) -> list[tuple[str, str]]:
     return told
 
 
-def test_each_save_makes_a_version_that_says_what_is_different(
+def test_each_save_creates_a_version_that_lists_its_differences(
     qtbot, commands, shown, tmp_path: Path
 ) -> None:
     commands.files.open(saved(tmp_path / "Mine.nepb"))
@@ -65,7 +65,7 @@ def test_each_save_makes_a_version_that_says_what_is_different(
     assert sheet.rows.hasFocus()
 
 
-def test_enter_opens_the_chosen_one_as_a_copy(qtbot, commands, shown, tmp_path: Path) -> None:
+def test_enter_opens_the_selected_version_as_a_copy(qtbot, commands, shown, tmp_path: Path) -> None:
     path = saved(tmp_path / "Mine.nepb")
     commands.files.open(path)
     for id in "xy":
@@ -87,7 +87,7 @@ def test_enter_opens_the_chosen_one_as_a_copy(qtbot, commands, shown, tmp_path: 
     assert (path.read_bytes(), oldest.is_file()) == (before, True)
 
 
-def test_the_button_and_a_double_click_open_too(qtbot, commands, shown, tmp_path: Path) -> None:
+def test_button_and_double_click_open_a_version_too(qtbot, commands, shown, tmp_path: Path) -> None:
     path = saved(tmp_path / "Mine.nepb")
     keep_earlier(path)
     commands.files.open(path)
@@ -103,7 +103,7 @@ def test_the_button_and_a_double_click_open_too(qtbot, commands, shown, tmp_path
     assert len(shown.session.documents) == 3
 
 
-def test_one_that_can_not_be_read_says_so_and_does_not_open(qtbot, commands, shown, tmp_path: Path) -> None:
+def test_unreadable_version_is_reported_and_does_not_open(qtbot, commands, shown, tmp_path: Path) -> None:
     path = saved(tmp_path / "Mine.nepb")
     path.write_text("not json", "utf-8")
     keep_earlier(path)
@@ -114,7 +114,9 @@ def test_one_that_can_not_be_read_says_so_and_does_not_open(qtbot, commands, sho
     assert sheet.isVisible()
 
 
-def test_versions_of_other_files_of_that_name_stand_below(qtbot, commands, shown, tmp_path: Path) -> None:
+def test_versions_of_other_files_with_the_same_name_are_listed_below(
+    qtbot, commands, shown, tmp_path: Path
+) -> None:
     for folder in ("here", "there"):
         (tmp_path / folder).mkdir()
         keep_earlier(saved(tmp_path / folder / "Mine.nepb"))
@@ -124,7 +126,7 @@ def test_versions_of_other_files_of_that_name_stand_below(qtbot, commands, shown
     assert rows(sheet) == [same, ("Versions of other files named Mine", ""), same]
 
 
-def test_with_none_it_says_what_makes_one(qtbot, commands, shown, tmp_path: Path) -> None:
+def test_empty_list_explains_what_creates_a_version(qtbot, commands, shown, tmp_path: Path) -> None:
     commands.files.open(saved(tmp_path / "Mine.nepb"))
     sheet = opened(qtbot, commands, shown)
     assert not sheet.rows.isVisible()
@@ -132,7 +134,9 @@ def test_with_none_it_says_what_makes_one(qtbot, commands, shown, tmp_path: Path
     sheet.shut()
 
 
-def test_a_behaviour_without_a_file_is_saved_from_here(qtbot, commands, shown, answers, tmp_path) -> None:
+def test_behaviour_without_a_file_is_saved_from_the_version_list(
+    qtbot, commands, shown, answers, tmp_path
+) -> None:
     answers.path = tmp_path / "New.nepb"
     shown.session.document.edited(BLOCKS)
     sheet = opened(qtbot, commands, shown)
@@ -143,20 +147,20 @@ def test_a_behaviour_without_a_file_is_saved_from_here(qtbot, commands, shown, a
     assert not sheet.isVisible()
 
 
-def test_when_in_plain_words() -> None:
+def test_version_time_is_formatted_in_plain_words() -> None:
     now = dt.datetime(2026, 11, 20, 15, 0, tzinfo=dt.timezone.utc)
     told = [when_words(now - dt.timedelta(days=days, hours=1), now) for days in (0, 1, 3, 400)]
     assert told == ["Today, 14:00", "Yesterday, 14:00", "17 November, 14:00", "16 October 2025, 14:00"]
 
 
-def test_what_is_different_in_plain_words() -> None:
+def test_version_differences_are_described_in_plain_words() -> None:
     assert difference_words(Difference(14)) == "14 blocks, unchanged since"
     assert difference_words(Difference(1, moved=True)) == "1 block, reordered"
     found = Difference(14, added=3, removed=1, changed=2)
     assert difference_words(found) == "14 blocks, 3 added, 1 removed, 2 changed since"
 
 
-def test_many_versions_stay_inside_the_window(qtbot, commands, shown, tmp_path: Path) -> None:
+def test_long_version_list_stays_inside_the_window(qtbot, commands, shown, tmp_path: Path) -> None:
     path = tmp_path / "Mine.nepb"
     for number in range(25):
         saved(path)

@@ -126,7 +126,7 @@ def test_client_of_a_real_server_is_listed_and_disconnected(
     web.close()
 
 
-def test_figures_change_in_place_and_keep_selection_and_expansion(desk: Desk) -> None:
+def test_topic_figures_are_updated_in_place_and_keep_selection_and_expansion(desk: Desk) -> None:
     server, model, table = with_pages(desk), desk.sheet.model, desk.sheet.table
     table.setExpanded(model.index(0, 0), False)
     table.setCurrentIndex(model.index(0, 0, model.index(1, 0)))
@@ -139,7 +139,7 @@ def test_figures_change_in_place_and_keep_selection_and_expansion(desk: Desk) ->
     assert (topic.topic, topic.rate) == ("/buttons", 12.0)
 
 
-def test_page_that_left_stays_struck_through_without_a_button(desk: Desk) -> None:
+def test_disconnected_page_is_struck_through_without_a_button(desk: Desk) -> None:
     server, sheet = with_pages(desk), desk.sheet
     server.leave(1)
     sheet.refresh()
@@ -151,7 +151,7 @@ def test_page_that_left_stays_struck_through_without_a_button(desk: Desk) -> Non
     assert [each.id for each in server.pages] == [2]
 
 
-def test_button_of_a_row_disconnects_its_page(desk: Desk) -> None:
+def test_row_button_disconnects_its_page(desk: Desk) -> None:
     server, sheet = with_pages(desk), desk.sheet
     row = QRectF(sheet.table.visualRect(sheet.model.index(1, 0)))
     button = sheet.table.cell("disconnect", row).center().toPoint()
@@ -163,7 +163,7 @@ def test_button_of_a_row_disconnects_its_page(desk: Desk) -> None:
     assert server.kept_out == set()
 
 
-def test_many_pages_are_refreshed_within_a_frame_of_work(desk: Desk) -> None:
+def test_refreshing_many_pages_takes_less_than_a_frame(desk: Desk) -> None:
     server, sheet = desk.switch_on(), desk.sheet
     topics = [replace(CAMERA, topic=f"/topic{number}") for number in range(50)]
     server.pages = tuple(page(number, *topics) for number in range(100))
@@ -201,7 +201,7 @@ def test_token_is_hidden_and_copied_in_full(desk: Desk) -> None:
     assert access.token.text() == desk.web.token
 
 
-def test_code_opens_the_test_page_and_is_light_in_the_dark_theme(desk: Desk, theme: Theme) -> None:
+def test_qr_code_opens_the_test_page_and_stays_light_in_the_dark_theme(desk: Desk, theme: Theme) -> None:
     desk.web.open_to(WIFI.host)
     desk.switch_on()
     code = desk.sheet.access.qr
@@ -219,13 +219,13 @@ def test_code_opens_the_test_page_and_is_light_in_the_dark_theme(desk: Desk, the
     assert image.pixelColor(int(quiet) + side // 2, int(quiet) + side // 2).lightness() == 0
 
 
-def test_there_is_no_code_while_only_this_computer_can_connect(desk: Desk) -> None:
+def test_qr_code_is_empty_while_only_this_computer_can_connect(desk: Desk) -> None:
     desk.switch_on()
     assert desk.sheet.access.qr.text == ""
     assert desk.sheet.access.qr.accessibleName() != ""
 
 
-def test_origins_are_tokens_and_a_wrong_one_stays_as_typed(desk: Desk) -> None:
+def test_allowed_origins_are_tokens_and_an_invalid_one_is_kept_as_typed(desk: Desk) -> None:
     field = desk.sheet.permissions.origins
     field.edit.setFocus()
     QTest.keyClicks(field.edit, "http://lab.example 192.168.1.20")
@@ -237,7 +237,7 @@ def test_origins_are_tokens_and_a_wrong_one_stays_as_typed(desk: Desk) -> None:
     assert (desk.web.origins, list(field.tokens)) == ((), [])
 
 
-def test_robots_are_chosen_by_check_boxes_and_apply_at_once(desk: Desk) -> None:
+def test_allowed_robots_are_selected_by_check_boxes_and_apply_at_once(desk: Desk) -> None:
     server, choice = desk.switch_on(), desk.sheet.permissions.robots
     desk.web.set_robots(["Rover"])  # allowed before, not connected now
     choice.choose.click()
@@ -247,7 +247,7 @@ def test_robots_are_chosen_by_check_boxes_and_apply_at_once(desk: Desk) -> None:
     assert "Turtle" in choice.words.text()
 
 
-def test_tab_goes_as_one_reads(desk: Desk) -> None:
+def test_tab_order_follows_the_reading_order(desk: Desk) -> None:
     with_pages(desk)
     desk.web.add_origin("http://lab.example")
     desk.sheet.permissions.robots.open_list()
@@ -264,7 +264,7 @@ def test_tab_goes_as_one_reads(desk: Desk) -> None:
     assert unsaid(desk.sheet) == []
 
 
-def test_refused_robot_leads_to_the_choice_of_robots(desk: Desk) -> None:
+def test_rejected_robot_links_to_the_selection_of_robots(desk: Desk) -> None:
     server, sheet = desk.switch_on(), desk.sheet
     server.refusals = (Refusal(1.0, "http://lab.example", "refused", kind="robot", robot="Turtle"),)
     sheet.refresh()
@@ -289,7 +289,7 @@ def test_each_tab_has_its_own_switch(desk: Desk) -> None:
     assert desk.web.full_url in QGuiApplication.clipboard().text()
 
 
-def test_taken_port_offers_a_free_one(qtbot, theme: Theme, master: Master, events: queue.Queue) -> None:
+def test_port_in_use_offers_a_free_one(qtbot, theme: Theme, master: Master, events: queue.Queue) -> None:
     web = WebPages(master.address, events.put, addresses=tuple)
     desk = Desk(qtbot, theme, web, events)
     web.sentence, web.free_port, web._failed = "Port 9090 is in use.", 9091, frozenset({"rosbridge"})
@@ -310,7 +310,7 @@ def test_test_page_opens_in_the_browser_of_this_computer(desk: Desk) -> None:
 
 
 @pytest.mark.parametrize(("size", "percent"), [((1024, 700), 150), ((1100, 700), 200), ((1600, 1000), 100)])
-def test_its_words_are_translated_and_fit(
+def test_texts_are_translated_and_fit(
     qtbot, pseudo, theme: Theme, desk: Desk, size: tuple[int, int], percent: int
 ) -> None:
     theme.set_text_percent(percent)
@@ -334,7 +334,7 @@ def test_its_words_are_translated_and_fit(
     qtbot.waitUntil(lambda: clipped(desk.sheet) == [])  # Qt lays out later
 
 
-def test_it_lies_at_the_right_edge_below_stop(qtbot, theme: Theme, window) -> None:
+def test_sheet_is_placed_at_the_right_edge_below_stop(qtbot, theme: Theme, window) -> None:
     window.show()
     window.commands.run("layout.developer")
     window.commands.run("network.web")
@@ -349,7 +349,7 @@ def test_it_lies_at_the_right_edge_below_stop(qtbot, theme: Theme, window) -> No
     assert not sheet.isVisible()
 
 
-def test_status_bar_says_who_can_connect_and_opens_the_sheet(window) -> None:
+def test_status_bar_shows_who_can_connect_and_opens_the_sheet(window) -> None:
     window.show()
     window.commands.run("layout.developer")
     web = window.session.web_pages

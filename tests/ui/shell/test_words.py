@@ -161,7 +161,7 @@ def everything(qtbot, window: MainWindow, look: Look) -> None:
         sheet.shut()
 
 
-def test_the_window_says_every_word_in_the_chosen_language(qtbot, whole: MainWindow, tmp_path: Path) -> None:
+def test_all_texts_of_the_window_are_translated(qtbot, whole: MainWindow, tmp_path: Path) -> None:
     found: set[str] = set()
     paths = (plain.tip(str(tmp_path / "Mine.nepb")), str(snapshots.folder(whole.session.settings)))
     languages = [name for _code, name in i18n.offered()]  # each is called what it calls itself
@@ -175,7 +175,7 @@ def test_the_window_says_every_word_in_the_chosen_language(qtbot, whole: MainWin
 
 
 @pytest.mark.parametrize("size", [(1440, 900), (1100, 700)])
-def test_the_window_has_room_for_longer_words(qtbot, whole: MainWindow, size: tuple[int, int]) -> None:
+def test_window_has_room_for_longer_translations(qtbot, whole: MainWindow, size: tuple[int, int]) -> None:
     whole.resize(*size)
     faults: list[str] = []
 
@@ -187,7 +187,7 @@ def test_the_window_has_room_for_longer_words(qtbot, whole: MainWindow, size: tu
     assert "\n".join(faults) == ""
 
 
-def test_every_menu(qtbot, whole: MainWindow) -> None:
+def test_all_menus_are_translated(qtbot, whole: MainWindow) -> None:
     found: list[str] = []
     for layout in ("start", "behaviour", "developer"):
         if layout != "start":
@@ -204,7 +204,7 @@ def test_every_menu(qtbot, whole: MainWindow) -> None:
     assert found == []
 
 
-def test_every_command_and_every_key(whole: MainWindow) -> None:
+def test_all_commands_and_shortcuts_are_translated(whole: MainWindow) -> None:
     shown = whole.commands.shortcuts
     said = [text for each in COMMANDS for text in (each.words, _(each.menu), _(each.tip))]
     said += [whole.commands.actions.why_not(each.id) for each in COMMANDS]
@@ -222,7 +222,7 @@ def test_every_command_and_every_key(whole: MainWindow) -> None:
     assert all("{" not in each for each in said)
 
 
-def test_what_is_said_while_a_command_is_sought_or_gets_a_key(qtbot, whole: MainWindow) -> None:
+def test_command_palette_and_shortcut_sheet_are_translated(qtbot, whole: MainWindow) -> None:
     whole.commands.run("palette.open")
     (palette,) = whole.findChildren(Palette)
     for typed in ("", "ŕúñ", "nowhere"):
@@ -243,7 +243,7 @@ def test_what_is_said_while_a_command_is_sought_or_gets_a_key(qtbot, whole: Main
     assert forgotten(sheet) == []
 
 
-def test_the_earlier_versions(qtbot, whole: MainWindow, tmp_path: Path) -> None:
+def test_version_history_is_translated(qtbot, whole: MainWindow, tmp_path: Path) -> None:
     whole.commands.files.open(tmp_path / "Mine.nepb")
     for block in "xy":
         whole.session.document.edited(changed(block))
@@ -256,7 +256,7 @@ def test_the_earlier_versions(qtbot, whole: MainWindow, tmp_path: Path) -> None:
     assert untranslated(whole.toast.text, "Mine") == []
 
 
-def test_the_question_for_a_name(whole: MainWindow) -> None:
+def test_name_dialog_is_translated(whole: MainWindow) -> None:
     whole.commands.run("layout.developer")
     whole.commands.run("layout.keep")
     (sheet,) = whole.findChildren(NameSheet)
@@ -277,7 +277,7 @@ def test_the_question_for_a_name(whole: MainWindow) -> None:
 
 @pytest.mark.parametrize("here", [(), (("192.168.1.20", "wlan0"), ("10.8.0.2", "tun0"))])
 @pytest.mark.parametrize("address", ["127.0.0.1:7780", "192.168.1.9:7780"])
-def test_the_sheet_for_other_computers(qtbot, pseudo, tmp_path: Path, here, address: str) -> None:
+def test_network_access_sheet_is_translated(qtbot, pseudo, tmp_path: Path, here, address: str) -> None:
     own = tuple(OwnAddress(*each) for each in here)
     reach = RemoteAccess(
         address, Settings(tmp_path), Alerts(), print, ask=lambda _hosts, _address: None, here=lambda: own
@@ -294,7 +294,7 @@ def test_the_sheet_for_other_computers(qtbot, pseudo, tmp_path: Path, here, addr
     reach.close()
 
 
-def test_the_question_before_a_robot_moves(qtbot, pseudo, tmp_path: Path) -> None:
+def test_motion_permission_question_is_translated(qtbot, pseudo, tmp_path: Path) -> None:
     window = QWidget()
     window.resize(1100, 700)
     qtbot.addWidget(window)
@@ -316,14 +316,14 @@ def test_the_question_before_a_robot_moves(qtbot, pseudo, tmp_path: Path) -> Non
     ],
 )  # fmt: skip
 @pytest.mark.parametrize("run", ["ready", "running", "paused"])
-def test_the_chip_of_robots(pseudo, states: tuple[str, ...], run: str) -> None:
+def test_robots_chip_is_translated(pseudo, states: tuple[str, ...], run: str) -> None:
     words, _status = robots_chip(robots_in(*states, run=run))
     assert words
     assert untranslated(words, "Robot 1", "Robot 2") == []
 
 
 @pytest.mark.parametrize("session", [fakes.Session, fakes.Session.full], ids=["empty", "full"])
-def test_the_facts_of_the_status_bar(pseudo, session) -> None:
+def test_status_bar_items_are_translated(pseudo, session) -> None:
     facts = StatusFacts(session())
     told = [facts.health(), facts.saved(), facts.topics(), facts.master(), facts.traffic()]
     told += [facts.lost(), facts.shown(), facts.window()]
@@ -333,7 +333,7 @@ def test_the_facts_of_the_status_bar(pseudo, session) -> None:
     assert [words for _icon, words, _status in told if untranslated(words, "Pepper", "Master")] == []
 
 
-def test_what_is_said_of_files(whole: MainWindow, tmp_path: Path) -> None:
+def test_messages_about_files_are_translated(whole: MainWindow, tmp_path: Path) -> None:
     files, toast = whole.commands.files, whole.toast
     alerts = whole.session.alerts
     strange = [tmp_path / "a.png", tmp_path / "b.png"]
@@ -353,13 +353,13 @@ def test_what_is_said_of_files(whole: MainWindow, tmp_path: Path) -> None:
     assert untranslated(toast.text) == []
 
 
-def test_what_is_said_where_no_window_can_open(pseudo) -> None:
+def test_startup_errors_without_a_display_are_translated(pseudo) -> None:
     data = ("DISPLAY", "WAYLAND_DISPLAY", "QTWEBENGINE_DISABLE_SANDBOX")
     assert untranslated(why_not({}, "linux", 1000), *data) == []
     assert untranslated(why_not({"DISPLAY": ":0"}, "linux", 0), *data) == []
 
 
-def test_what_stands_in_place_of_a_layout_or_a_panel(qtbot, whole: MainWindow) -> None:
+def test_placeholders_of_layouts_and_panels_are_translated(qtbot, whole: MainWindow) -> None:
     for layout in ("behaviour", "developer"):
         place = Placeholder(layout)
         qtbot.addWidget(place)
@@ -371,7 +371,7 @@ def test_what_stands_in_place_of_a_layout_or_a_panel(qtbot, whole: MainWindow) -
     dock.body.show_panel()
 
 
-def test_the_words_of_qt_itself(qapp, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_texts_of_qt_itself_are_translated(qapp, monkeypatch: pytest.MonkeyPatch) -> None:
     assert translate_qt(qapp) is None, "English has no need of it"
     monkeypatch.setattr("app.ui.application.language", lambda: "es")
     translator = translate_qt(qapp)
@@ -385,5 +385,5 @@ def test_the_words_of_qt_itself(qapp, monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 @pytest.mark.parametrize("count", [1, *range(5, 13)])
-def test_the_link_to_all_examples(pseudo, count: int) -> None:
+def test_link_to_all_examples_is_translated(pseudo, count: int) -> None:
     assert untranslated(all_words(count)) == []

@@ -38,7 +38,7 @@ class Run:
         self.is_asked = True
 
 
-def test_several_windows_that_one_logout_ended_are_one_offer(session: Session, home: Path) -> None:
+def test_crashes_of_several_windows_are_combined_into_one_offer(session: Session, home: Path) -> None:
     tell_of_crashes(session, Run(Crash("studio", "without a word"), Crash("studio", "without a word")))
     assert [each.id for each in session.alerts.active] == [ALERT]
     assert len(CrashReports().all()) == 2
@@ -47,14 +47,14 @@ def test_several_windows_that_one_logout_ended_are_one_offer(session: Session, h
     assert not again.alerts.active
 
 
-def test_a_run_that_ended_in_order_offers_nothing(session: Session, home: Path) -> None:
+def test_clean_exit_offers_no_crash_report(session: Session, home: Path) -> None:
     with StudioRun(home / "runs", home / "log"):
         pass
     tell_of_crashes(session, StudioRun(home / "runs", home / "log"))
     assert not session.alerts.active
 
 
-def test_work_and_settings_of_a_newer_studio_are_told_in_the_persons_words(pseudo: None, home: Path) -> None:
+def test_work_and_settings_of_a_newer_studio_are_reported(pseudo: None, home: Path) -> None:
     (home / "journal").mkdir(parents=True)
     entry = {"format": 2, "pid": 2**22 + 7, "born_s": 1.0, "name": "Mine"}
     (home / "journal" / "a.json").write_text(json.dumps(entry))
@@ -68,12 +68,12 @@ def test_work_and_settings_of_a_newer_studio_are_told_in_the_persons_words(pseud
     assert [words for words in told.values() if untranslated(words, "Mine", "settings", "json")] == []
 
 
-def test_where_nothing_is_newer_nothing_is_told(session: Session) -> None:
+def test_nothing_is_reported_without_data_of_a_newer_studio(session: Session) -> None:
     tell_of_what_was_found(session)
     assert not session.alerts.active
 
 
-def test_the_first_start_of_another_version_keeps_that_it_ran(window: MainWindow, home: Path) -> None:
+def test_first_start_of_another_version_is_recorded(window: MainWindow, home: Path) -> None:
     window.state.keep(studio_versions.KEY, [{"version": "0.0.9", "since_s": 1000.0}])
     keep_version(window, 2000.0)
     keep_version(window, 3000.0)
@@ -83,7 +83,7 @@ def test_the_first_start_of_another_version_keeps_that_it_ran(window: MainWindow
 
 @pytest.mark.skipif(sys.platform == "win32", reason="signals")
 @pytest.mark.parametrize("name", ["SIGINT", "SIGTERM", "SIGHUP"])
-def test_who_asks_studio_to_end_ends_it_in_order(qtbot, window: MainWindow, name: str) -> None:
+def test_termination_signal_closes_the_window_cleanly(qtbot, window: MainWindow, name: str) -> None:
     before = {each: signal.getsignal(each) for each in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)}
     signal.signal(signal.SIGHUP, signal.SIG_DFL)
     run = Run()
@@ -99,7 +99,7 @@ def test_who_asks_studio_to_end_ends_it_in_order(qtbot, window: MainWindow, name
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="signals")
-def test_who_lets_it_outlive_the_terminal_is_obeyed(window: MainWindow) -> None:
+def test_ignored_sighup_stays_ignored(window: MainWindow) -> None:
     before = {each: signal.getsignal(each) for each in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)}
     signal.signal(signal.SIGHUP, signal.SIG_IGN)  # as nohup does
     try:

@@ -27,7 +27,7 @@ from tests.ui.shell_parts import free_address
 ROOT = Path(__file__).parents[3]
 
 
-def test_nothing_is_done_before_the_first_paint(qtbot: QtBot) -> None:
+def test_deferred_steps_do_not_run_before_the_first_paint(qtbot: QtBot) -> None:
     window = QWidget()
     qtbot.addWidget(window)
     done: list[str] = []
@@ -52,7 +52,7 @@ class Ear(QObject):
         return True
 
 
-def test_a_click_comes_between_two_steps(qtbot: QtBot) -> None:
+def test_click_is_handled_between_two_deferred_steps(qtbot: QtBot) -> None:
     window = QWidget()
     qtbot.addWidget(window)
     seen: list[str] = []
@@ -68,7 +68,7 @@ def test_a_click_comes_between_two_steps(qtbot: QtBot) -> None:
     assert seen == ["one", "click", "two"]
 
 
-def test_a_window_that_is_not_painted_begins_a_little_later(qtbot: QtBot) -> None:
+def test_window_that_is_not_painted_runs_the_steps_a_little_later(qtbot: QtBot) -> None:
     window = QWidget()
     qtbot.addWidget(window)
     done: list[int] = []
@@ -77,7 +77,7 @@ def test_a_window_that_is_not_painted_begins_a_little_later(qtbot: QtBot) -> Non
     assert done == [1]
 
 
-def test_a_step_that_fails_stops_none_of_the_others(qtbot: QtBot, caplog: pytest.LogCaptureFixture) -> None:
+def test_failing_step_does_not_prevent_the_others(qtbot: QtBot, caplog: pytest.LogCaptureFixture) -> None:
     window = QWidget()
     qtbot.addWidget(window)
     done: list[int] = []
@@ -93,7 +93,7 @@ def test_a_step_that_fails_stops_none_of_the_others(qtbot: QtBot, caplog: pytest
     assert "no such file" in caplog.text
 
 
-def test_the_steps_find_every_panel() -> None:
+def test_deferred_steps_import_every_panel() -> None:
     panels = PanelRegistry()
     for step in panels.steps():
         step()
@@ -102,7 +102,7 @@ def test_the_steps_find_every_panel() -> None:
     assert panels["console"].name == "console"
 
 
-def test_the_window_is_built_without_panels_editor_and_heavy_packages(tmp_path: Path) -> None:
+def test_window_is_built_without_importing_panels_editor_and_heavy_packages(tmp_path: Path) -> None:
     """What the first paint needs: a line more here is time that every start takes."""
     late = ["PySide6.QtWebEngineCore", "PySide6.QtNetwork", "cv2", "numpy", "psutil", "nep.programs.doctor"]
     late += ["pyqtgraph", "app.ui.blockly.view", "app.ui.panels.console.panel", "importlib.metadata"]
@@ -131,7 +131,7 @@ def test_the_window_is_built_without_panels_editor_and_heavy_packages(tmp_path: 
 
 
 @pytest.mark.parametrize("mode", ["light", "dark"])
-def test_everything_that_shows_first_has_our_fonts(
+def test_widgets_of_the_first_paint_use_our_fonts(
     qtbot: QtBot, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, mode: str
 ) -> None:
     monkeypatch.setenv("NEP_STUDIO_HOME", str(tmp_path))

@@ -27,7 +27,7 @@ def python(*arguments: str, words: str = "") -> subprocess.CompletedProcess[str]
     )
 
 
-def test_the_window_takes_files_and_its_colours() -> None:
+def test_window_parser_accepts_files_and_theme() -> None:
     options = window_parser().parse_intermixed_args(["story.nepb", "--theme", "dark", "--demo", "tour.nepb"])
     assert options.files == [Path("story.nepb"), Path("tour.nepb")]
     assert (options.theme, options.demo, options.self_drive, options.new_window) == (
@@ -38,36 +38,36 @@ def test_the_window_takes_files_and_its_colours() -> None:
     )
 
 
-def test_a_behaviour_runs_with_a_master_and_a_wait() -> None:
+def test_run_parser_accepts_file_master_and_robot_wait() -> None:
     options = run_parser().parse_args(["a.nepb", "--robot-wait", "3", "--master", "127.0.0.1:5"])
     assert (options.file, options.robot_wait, options.master) == (Path("a.nepb"), 3.0, "127.0.0.1:5")
 
 
-def test_running_loads_no_qt(tmp_path: Path) -> None:
+def test_headless_run_does_not_import_qt(tmp_path: Path) -> None:
     code = f"import sys; from app.__main__ import main; c = main(['run', {str(tmp_path / 'none.nepb')!r}]); "
     code += "assert c == 2, c; assert not [m for m in sys.modules if m.startswith('PySide6')]"
     done = python("-c", code)
     assert done.returncode == 0, done.stderr
 
 
-def test_the_child_of_a_frozen_build_answers() -> None:
+def test_child_process_entry_reports_ready() -> None:
     done = python("-m", "app", "--child")
     assert '{"is": "ready"}' in done.stdout.replace('{"is":"ready"}', '{"is": "ready"}')
 
 
-def test_only_our_own_processes_are_started(capsys: pytest.CaptureFixture[str]) -> None:
+def test_only_known_child_processes_are_started(capsys: pytest.CaptureFixture[str]) -> None:
     assert hand_over("os", []) == 2
     assert main(["--module", "antigravity"]) == 2
     assert "no process 'os'" in capsys.readouterr().err
 
 
-def test_the_recorder_of_a_frozen_build_is_a_process_of_its_own() -> None:
+def test_recorder_of_a_frozen_build_runs_in_its_own_process() -> None:
     done = python("-m", "app", "--module", "nep.recordings.child", "--help")
     assert done.returncode == 0, done.stderr
     assert "--master" in done.stdout
 
 
-def test_a_module_gets_its_options() -> None:
+def test_module_entry_passes_its_options() -> None:
     done = python("-m", "app", "--module", "nep", "--help")
     assert done.returncode == 0
     assert "topic" in done.stdout

@@ -40,7 +40,7 @@ def told(monkeypatch: pytest.MonkeyPatch) -> list[str]:
     return found
 
 
-def test_a_widget_that_fails_everywhere_is_shown_all_the_same(qtbot, fail, told: list[str]) -> None:
+def test_widget_whose_overrides_raise_is_still_shown(qtbot, fail, told: list[str]) -> None:
     class Bad(QWidget):
         def paintEvent(self, _event: QPaintEvent) -> None:
             painter = QPainter(self)  # still active when it fails
@@ -72,7 +72,7 @@ def test_a_widget_that_fails_everywhere_is_shown_all_the_same(qtbot, fail, told:
     assert bad.isVisible()
 
 
-def test_a_layout_and_a_model_that_fail(qtbot, fail, told: list[str]) -> None:
+def test_errors_in_layout_and_model_overrides_are_logged(qtbot, fail, told: list[str]) -> None:
     class Row(QHBoxLayout):
         def heightForWidth(self, _width: int) -> int:
             fail()
@@ -107,7 +107,7 @@ def test_a_layout_and_a_model_that_fail(qtbot, fail, told: list[str]) -> None:
     assert view.model().index(0).data() is None
 
 
-def test_a_function_that_is_no_override_raises_as_ever(qapp) -> None:
+def test_method_that_is_no_override_still_raises(qapp) -> None:
     class Own(QWidget):
         def count(self) -> int:
             return int("x")
@@ -116,7 +116,7 @@ def test_a_function_that_is_no_override_raises_as_ever(qapp) -> None:
         Own().count()
 
 
-def test_every_override_of_ours_is_guarded() -> None:
+def test_every_qt_override_is_guarded() -> None:
     """A name with a capital inside is Qt's: guarded, or known to need no guard."""
     # Qt does not call them (pyqtgraph does, where it paints), or a table of Qt has them (a protocol).
     ours = {"setText", "installEventFilter", "insertWidget", "pictureOfCarried", "columnWidth"}

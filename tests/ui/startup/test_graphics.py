@@ -19,13 +19,15 @@ from app.ui.startup import graphics
         ({graphics.CHOICE: "software"}, True, {graphics.CHOICE: "software"}, True),
     ],
 )
-def test_it_is_chosen_unless_a_person_has_chosen(given, has_one, wanted, is_so) -> None:
+def test_software_rendering_is_chosen_without_a_gpu_unless_the_user_set_it(
+    given, has_one, wanted, is_so
+) -> None:
     environ = dict(given)
     assert graphics.draw_by_software(environ, "linux", lambda _platform: has_one) is is_so
     assert environ == wanted
 
 
-def test_linux_is_asked_for_its_devices(tmp_path, monkeypatch) -> None:
+def test_linux_gpu_is_detected_by_its_render_device(tmp_path, monkeypatch) -> None:
     monkeypatch.setattr(graphics, "DEVICES", (str(tmp_path / "renderD*"),))
     assert not graphics.has_graphics_processor("linux")
     (tmp_path / "card0").touch()  # what only shows a screen computes nothing
@@ -34,7 +36,7 @@ def test_linux_is_asked_for_its_devices(tmp_path, monkeypatch) -> None:
     assert graphics.has_graphics_processor("linux")
 
 
-def test_a_stand_in_of_windows_is_no_driver() -> None:
+def test_windows_basic_display_adapter_is_not_a_gpu_driver() -> None:
     assert not graphics.has_driver(["Microsoft Basic Display Adapter"])
     assert graphics.has_driver(["Microsoft Basic Display Adapter", "Intel(R) UHD Graphics 620"])
     assert graphics.has_driver([])
@@ -42,5 +44,5 @@ def test_a_stand_in_of_windows_is_no_driver() -> None:
 
 
 @pytest.mark.skipif(sys.platform != "win32", reason="Windows tells it")
-def test_windows_tells_of_its_adapters() -> None:
+def test_windows_display_adapters_are_listed() -> None:
     assert graphics.adapters()

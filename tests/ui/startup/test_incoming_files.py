@@ -46,12 +46,12 @@ def drop(window: QWidget, data: QMimeData) -> bool:
     return over.isAccepted()
 
 
-def test_dropped_files_are_taken_together(window, taken) -> None:
+def test_dropped_files_are_opened_together(window, taken) -> None:
     assert drop(window, mime("file:///a/One.nepb", "file:///a/Zwei%20B.nepb"))
     assert taken == [[Path("/a/One.nepb"), Path("/a/Zwei B.nepb")]]
 
 
-def test_what_is_no_file_of_this_computer_is_left_alone(window, taken) -> None:
+def test_drop_of_a_url_or_text_is_ignored(window, taken) -> None:
     text = QMimeData()
     text.setText("hello")
     assert not drop(window, mime("https://example.org/a.nepb"))
@@ -86,7 +86,7 @@ sys.exit(0)
 """
 
 
-def test_the_system_opens_files_beside_the_browser_of_the_editor() -> None:
+def test_file_open_events_are_handled_while_the_editor_browser_is_loaded() -> None:
     """What macOS does, which tells the application; a filter of all events ended Studio (SIGSEGV) there."""
     environ = {**os.environ, "QT_QPA_PLATFORM": "offscreen"}
     if hasattr(os, "geteuid") and os.geteuid() == 0:

@@ -30,13 +30,13 @@ def _as_before() -> Iterator[None]:
     (gc.enable if enabled else gc.disable)()
 
 
-def test_the_window_never_waits_for_as_long_as_python_would_let_it() -> None:
+def test_switch_interval_is_shortened_to_keep_the_gui_responsive() -> None:
     sys.setswitchinterval(0.005)
     interpreter.shorten_switch_interval()
     assert sys.getswitchinterval() <= 0.001
 
 
-def test_studio_does_so_when_it_starts() -> None:
+def test_studio_shortens_the_switch_interval_at_startup() -> None:
     program = (
         "import sys\n"
         "from app.ui.application import make_application\n"
@@ -50,7 +50,7 @@ def test_studio_does_so_when_it_starts() -> None:
     assert float(said.stdout) == pytest.approx(interpreter.SWITCH_INTERVAL_S)
 
 
-def test_what_stands_is_put_aside_and_later_garbage_is_collected() -> None:
+def test_long_lived_objects_are_frozen_and_later_garbage_is_collected() -> None:
     standing = [[n] for n in range(1000)]
     gc.disable()
     interpreter.freeze_garbage()
@@ -75,7 +75,7 @@ class Deleted:
             item.me = item  # type: ignore[attr-defined]
 
 
-def test_things_of_qt_are_deleted_in_the_thread_of_the_window_however_busy_others_are(qtbot: QtBot) -> None:
+def test_qt_objects_are_deleted_in_the_gui_thread_even_with_busy_threads(qtbot: QtBot) -> None:
     deleted, made = Deleted(), 300
     owner = QObject()
     gc.collect()
@@ -99,7 +99,7 @@ def test_things_of_qt_are_deleted_in_the_thread_of_the_window_however_busy_other
     assert set(deleted.by) == {threading.get_ident()}
 
 
-def test_the_older_are_looked_at_less_often(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_older_gc_generations_are_collected_less_often(monkeypatch: pytest.MonkeyPatch) -> None:
     asked: list[int] = []
     monkeypatch.setattr(gc, "collect", asked.append)
     few, many = interpreter.COLLECTIONS, interpreter.COLLECTIONS + 1
@@ -110,7 +110,7 @@ def test_the_older_are_looked_at_less_often(monkeypatch: pytest.MonkeyPatch) -> 
     assert asked == [0, 1, 2]
 
 
-def test_it_settles_a_while_after_the_last_start(qtbot: object, qapp: object) -> None:
+def test_gc_freeze_runs_a_while_after_the_last_restart_of_its_timer(qtbot: object, qapp: object) -> None:
     owner = QObject()
     timer = interpreter.GcFreezeTimer(owner)
     timer.setInterval(20)

@@ -28,13 +28,15 @@ X11 = {"DISPLAY": ":0"}
         ({}, "win32", 1, ""),
     ],
 )
-def test_why_no_window_opens(environ: dict[str, str], platform: str, user: int, said: str) -> None:
+def test_reason_why_no_window_can_open_is_reported(
+    environ: dict[str, str], platform: str, user: int, said: str
+) -> None:
     assert said in why_not(environ, platform, user)
     assert bool(said) == bool(why_not(environ, platform, user))
 
 
 @pytest.mark.skipif(not sys.platform.startswith("linux"), reason="screens have no name elsewhere")
-def test_without_a_screen_it_ends_with_a_sentence(tmp_path: Path) -> None:
+def test_studio_without_a_display_exits_with_a_message(tmp_path: Path) -> None:
     hidden = {"DISPLAY", "WAYLAND_DISPLAY", "QT_QPA_PLATFORM"}
     environ = {name: value for name, value in os.environ.items() if name not in hidden}
     environ["NEP_STUDIO_HOME"] = str(tmp_path)
@@ -47,7 +49,7 @@ def test_without_a_screen_it_ends_with_a_sentence(tmp_path: Path) -> None:
 
 
 @pytest.mark.skipif(not hasattr(os, "geteuid") or os.geteuid() != 0, reason="needs root")
-def test_as_root_with_the_browsers_sandbox_it_ends_with_a_sentence(tmp_path: Path) -> None:
+def test_studio_as_root_with_browser_sandbox_exits_with_a_message(tmp_path: Path) -> None:
     environ = {**os.environ, "QT_QPA_PLATFORM": "offscreen", "NEP_STUDIO_HOME": str(tmp_path)}
     environ["NEP_MASTER"] = "127.0.0.1:1"
     for name in ("QTWEBENGINE_DISABLE_SANDBOX", "QTWEBENGINE_CHROMIUM_FLAGS"):
@@ -59,7 +61,7 @@ def test_as_root_with_the_browsers_sandbox_it_ends_with_a_sentence(tmp_path: Pat
 
 
 @pytest.mark.skipif(not sys.platform.startswith("linux"), reason="screens have no name elsewhere")
-def test_with_a_screen_that_is_not_there_it_ends_with_a_sentence(tmp_path: Path) -> None:
+def test_studio_with_an_unreachable_display_exits_with_a_message(tmp_path: Path) -> None:
     environ = {
         **{name: value for name, value in os.environ.items() if name != "WAYLAND_DISPLAY"},
         "DISPLAY": ":64999",

@@ -56,25 +56,25 @@ def chosen(environ: dict[str, str], platform: str, *, answers: bool = True) -> t
     return environ.get(CHOICE, ""), len(asked)
 
 
-def test_a_portal_that_answers_is_used_on_linux_only() -> None:
+def test_responding_desktop_portal_is_used_on_linux_only() -> None:
     assert chosen(dict(BUS), "linux") == (THEME, 1)
     assert chosen(dict(BUS), "linux", answers=False) == ("", 1)
     assert chosen(dict(BUS), "win32") == ("", 0)
     assert chosen(dict(BUS), "darwin") == ("", 0)
 
 
-def test_what_somebody_chose_stays_and_nobody_is_asked() -> None:
+def test_platform_theme_set_by_the_user_is_kept_without_a_portal_query() -> None:
     assert chosen({**BUS, CHOICE: "kde"}, "linux") == ("kde", 0)
 
 
-def test_without_a_bus_nothing_is_asked(tmp_path: Path) -> None:
+def test_portal_is_not_queried_without_a_session_bus(tmp_path: Path) -> None:
     assert chosen({}, "linux") == ("", 0)
     assert chosen({"XDG_RUNTIME_DIR": str(tmp_path)}, "linux") == ("", 0)
     (tmp_path / "bus").write_text("")
     assert not has_bus({"XDG_RUNTIME_DIR": str(tmp_path)}), "a file is no bus"
 
 
-def test_the_systems_dialogs_are_there_on_windows_macos_and_by_the_portal() -> None:
+def test_system_dialogs_are_available_on_windows_macos_and_with_a_portal() -> None:
     assert has_system_dialogs({}, "win32")
     assert has_system_dialogs({}, "darwin")
     assert has_system_dialogs({CHOICE: THEME}, "linux")
@@ -82,7 +82,7 @@ def test_the_systems_dialogs_are_there_on_windows_macos_and_by_the_portal() -> N
 
 
 @pytest.mark.skipif(shutil.which("dbus-run-session") is None, reason="needs dbus-run-session (package dbus)")
-def test_a_real_bus_is_asked_and_says_nothing_to_the_person() -> None:
+def test_portal_query_on_a_real_session_bus_prints_nothing() -> None:
     environ = {**os.environ, "PYTHONPATH": str(Path(__file__).resolve().parents[3])}
     command = ["dbus-run-session", "--", sys.executable, "-c", BOTH, FAKE, ASK]
     said = subprocess.run(command, capture_output=True, text=True, check=True, env=environ).stdout

@@ -36,7 +36,7 @@ def test_only_known_noise_is_dropped(caplog: pytest.LogCaptureFixture, words: st
     assert [record.getMessage() for record in caplog.records] == ([words] if heard else [])
 
 
-def test_what_ends_the_program_is_always_said(caplog: pytest.LogCaptureFixture) -> None:
+def test_fatal_qt_messages_are_always_logged(caplog: pytest.LogCaptureFixture) -> None:
     on_qt_message(QtMsgType.QtFatalMsg, QMessageLogContext(), "Unable to detect GPU vendor")
     assert caplog.records[0].levelno == logging.CRITICAL
 
@@ -50,14 +50,14 @@ def test_what_ends_the_program_is_always_said(caplog: pytest.LogCaptureFixture) 
         ("--log-level=0", "--log-level=0"),
     ],
 )
-def test_flags_of_the_user_stay_as_they_are(before: str | None, after: str) -> None:
+def test_chromium_flags_of_the_user_are_kept(before: str | None, after: str) -> None:
     environ = {} if before is None else {FLAGS: before}
     quiet_chromium(environ)
     assert environ[FLAGS] == after
     assert "sandbox" not in environ[FLAGS]
 
 
-def test_the_log_is_kept_until_the_console_takes_it() -> None:
+def test_log_records_are_buffered_until_the_console_takes_them() -> None:
     log = Log()
     logger = logging.getLogger("qt.test_messages")
     logger.addHandler(log)
@@ -85,7 +85,7 @@ class Stuck(io.StringIO):
         return super().write(text)
 
 
-def test_a_terminal_that_takes_nothing_does_not_stop_the_window():
+def test_blocked_terminal_does_not_block_the_window():
     stuck = Stuck()
     handler = TerminalHandler(stuck)
     for n in range(1000):
@@ -117,7 +117,7 @@ raise ValueError("at the end")
 """
 
 
-def test_a_windowed_studio_tells_the_console_and_a_file_what_nobody_caught(tmp_path: Path) -> None:
+def test_windowed_studio_logs_uncaught_exceptions_to_console_and_file(tmp_path: Path) -> None:
     environment = {**os.environ, "NEP_STUDIO_HOME": str(tmp_path / "home")}
     out = tmp_path / "told.json"
     subprocess.run([sys.executable, "-c", WINDOWED, str(out)], env=environment, check=False, timeout=50)
@@ -128,7 +128,7 @@ def test_a_windowed_studio_tells_the_console_and_a_file_what_nobody_caught(tmp_p
     assert [words in written for words in ("in a thread", "of Qt", "at the end")] == [True] * 3
 
 
-def test_what_the_console_has_in_its_own_words_is_in_the_log_file_only(tmp_path: Path) -> None:
+def test_record_already_shown_in_the_console_is_written_to_the_log_file_only(tmp_path: Path) -> None:
     logger, log, file = logging.getLogger("studio.test_messages"), Log(), LogFile(tmp_path)
     for handler in (log, file):
         logger.addHandler(handler)

@@ -54,7 +54,7 @@ class Told(SandboxTrial):
 @pytest.mark.skipif(
     (sys.platform, platform.machine()) != ("linux", "x86_64"), reason="the guard has its numbers"
 )
-def test_each_guard_is_found_out() -> None:
+def test_each_namespace_restriction_is_detected() -> None:
     done = subprocess.run(
         [sys.executable, "-c", GUARDED], cwd=ROOT, capture_output=True, text=True, timeout=60, check=True
     )
@@ -64,13 +64,13 @@ def test_each_guard_is_found_out() -> None:
     assert guarded == ["False"] * 3
 
 
-def test_without_name_spaces_the_filter_stays_and_so_do_the_users_flags() -> None:
+def test_without_namespaces_seccomp_and_user_flags_are_kept() -> None:
     environ = {FLAGS: "--log-level=3"}
     fit_sandbox(environ, Told(False))
     assert environ == {FLAGS: f"--log-level=3 {FILTER_ALONE}"}
 
 
-def test_with_name_spaces_or_without_a_trial_nothing_is_changed() -> None:
+def test_nothing_is_changed_with_namespaces_or_without_a_trial() -> None:
     environ: dict[str, str] = {}
     fit_sandbox(environ, Told(True))
     fit_sandbox(environ, None)
@@ -81,5 +81,7 @@ def test_with_name_spaces_or_without_a_trial_nothing_is_changed() -> None:
     ("environ", "platform"),
     [({}, "win32"), ({}, "darwin"), ({OFF: "1"}, "linux"), ({FLAGS: "--no-sandbox"}, "linux")],
 )
-def test_where_somebody_has_decided_nothing_is_tried(environ: dict[str, str], platform: str) -> None:
+def test_no_trial_is_made_when_the_user_set_the_sandbox_option(
+    environ: dict[str, str], platform: str
+) -> None:
     assert begin_trial(environ, platform) is None

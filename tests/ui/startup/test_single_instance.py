@@ -53,11 +53,11 @@ def second(name: str, *files: str, cwd: Path) -> subprocess.Popen[bytes]:
     return subprocess.Popen([sys.executable, "-c", SECOND, name, *files], cwd=cwd, env=environ)
 
 
-def test_nobody_there_means_a_window_of_its_own(name: str) -> None:
+def test_start_without_a_running_instance_opens_its_own_window(name: str) -> None:
     assert hand_over(name, StartRequest()) is False
 
 
-def test_another_process_hands_over_whole_paths(qtbot, name: str, tmp_path: Path) -> None:
+def test_second_process_hands_over_absolute_paths(qtbot, name: str, tmp_path: Path) -> None:
     asked: list[StartRequest] = []
     meeting = meet(name, asked.append)
     assert meeting.open
@@ -93,7 +93,7 @@ def starting(name: str, turn: Path) -> subprocess.Popen[str]:
     )
 
 
-def test_of_two_starts_at_once_the_second_waits_for_the_window_of_the_first(
+def test_second_of_two_simultaneous_starts_waits_for_the_window_of_the_first(
     qtbot, name: str, tmp_path: Path
 ) -> None:
     turn, asked = FileLock(tmp_path / "starting"), []
@@ -108,7 +108,7 @@ def test_of_two_starts_at_once_the_second_waits_for_the_window_of_the_first(
     turn.release()
 
 
-def test_a_start_that_dies_before_its_window_is_there_is_not_waited_for(name: str, tmp_path: Path) -> None:
+def test_start_that_dies_before_its_window_opens_is_not_waited_for(name: str, tmp_path: Path) -> None:
     turn = FileLock(tmp_path / "starting")
     process = starting(name, tmp_path / "starting")
     assert process.stdout is not None
@@ -121,7 +121,7 @@ def test_a_start_that_dies_before_its_window_is_there_is_not_waited_for(name: st
     turn.release()
 
 
-def test_the_second_window_does_not_take_the_place_of_the_first(qtbot, name: str, tmp_path: Path) -> None:
+def test_second_window_does_not_replace_the_first_server(qtbot, name: str, tmp_path: Path) -> None:
     asked: list[StartRequest] = []
     first = meet(name, asked.append)
     later = meet(name, asked.append)
@@ -133,7 +133,7 @@ def test_the_second_window_does_not_take_the_place_of_the_first(qtbot, name: str
 
 
 @pytest.mark.skipif(os.name != "posix", reason="a named pipe goes with its process")
-def test_what_a_killed_studio_left_is_no_hindrance(qtbot, name: str) -> None:
+def test_stale_socket_of_a_killed_studio_is_replaced(qtbot, name: str) -> None:
     code = "import sys; from app.ui.startup.single_instance import *; "
     code += "m = SingleInstanceServer(sys.argv[1], print); print(m.open, flush=True); sys.stdin.read()"
     environ = {**os.environ, "PYTHONPATH": str(Path(__file__).parents[3])}
@@ -150,7 +150,7 @@ def test_what_a_killed_studio_left_is_no_hindrance(qtbot, name: str) -> None:
     meeting.close()
 
 
-def test_nonsense_is_no_start(qtbot, name: str) -> None:
+def test_malformed_start_request_is_rejected(qtbot, name: str) -> None:
     asked: list[StartRequest] = []
     meeting = meet(name, asked.append)
     for data in (b"{\n", b"[]\n", b'{"files": "x"}\n', b"[" * 200_000 + b"\n", b"x" * 1_100_000):
@@ -163,7 +163,7 @@ def test_nonsense_is_no_start(qtbot, name: str) -> None:
     meeting.close()
 
 
-def test_only_this_user_reaches_the_window(qtbot, name: str) -> None:
+def test_socket_is_accessible_to_the_same_user_only(qtbot, name: str) -> None:
     meeting = meet(name, lambda _asked: None)
     if os.name == "posix":
         assert Path(name).stat().st_mode & 0o077 == 0
@@ -183,7 +183,7 @@ needs_modes = pytest.mark.skipif(os.name != "posix", reason="Windows has pipes w
 
 
 @needs_modes
-def test_it_lies_in_the_runtime_folder_one_for_each_folder_of_studio(runtime: Path, tmp_path: Path) -> None:
+def test_socket_is_in_the_runtime_folder_with_one_per_studio_folder(runtime: Path, tmp_path: Path) -> None:
     one, other = Path(place(tmp_path / "a")), Path(place(tmp_path / "b"))
     assert one.parent == other.parent == runtime / "nep-studio"
     assert one != other
@@ -194,7 +194,7 @@ def test_it_lies_in_the_runtime_folder_one_for_each_folder_of_studio(runtime: Pa
 
 @needs_modes
 @pytest.mark.parametrize("wrong", ["open", "linked", "missing", "relative"])
-def test_a_runtime_folder_that_others_reach_is_not_used(
+def test_runtime_folder_accessible_to_others_is_not_used(
     runtime: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, wrong: str
 ) -> None:
     home = runtime / "home"  # a short name: with several workers that of `tmp_path` is too long for a socket
@@ -211,7 +211,7 @@ def test_a_runtime_folder_that_others_reach_is_not_used(
 
 
 @needs_modes
-def test_no_private_folder_means_no_meeting_and_a_start_all_the_same(
+def test_without_a_private_folder_studio_starts_without_a_socket(
     runtime: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """A stranger has made the folders before us."""
@@ -222,7 +222,7 @@ def test_no_private_folder_means_no_meeting_and_a_start_all_the_same(
 
 
 @needs_modes
-def test_what_is_no_socket_of_ours_is_not_talked_to(qtbot, runtime: Path, tmp_path: Path) -> None:
+def test_file_that_is_not_our_socket_is_not_connected_to(qtbot, runtime: Path, tmp_path: Path) -> None:
     name = place(tmp_path)
     os.mkfifo(name)
     assert hand_over(name, StartRequest()) is False
@@ -235,9 +235,7 @@ def test_what_is_no_socket_of_ours_is_not_talked_to(qtbot, runtime: Path, tmp_pa
 
 
 @needs_modes
-def test_another_user_at_the_other_end_is_not_served(
-    qtbot, name: str, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_connection_of_another_user_is_rejected(qtbot, name: str, monkeypatch: pytest.MonkeyPatch) -> None:
     asked: list[StartRequest] = []
     meeting = meet(name, asked.append)
     monkeypatch.setattr(single_instance, "peer_of", lambda _descriptor: os.geteuid() + 1)
@@ -252,7 +250,7 @@ def test_another_user_at_the_other_end_is_not_served(
 
 
 @pytest.mark.skipif(sys.platform not in {"linux", "darwin"}, reason="the system does not tell")
-def test_the_system_tells_who_is_at_the_other_end(tmp_path: Path) -> None:
+def test_peer_user_id_is_reported_by_the_system(tmp_path: Path) -> None:
     ours, theirs = socket_module.socketpair()
     with ours, theirs:
         assert peer_of(ours.fileno()) == os.geteuid()
@@ -261,7 +259,7 @@ def test_the_system_tells_who_is_at_the_other_end(tmp_path: Path) -> None:
 
 
 @needs_modes
-def test_one_that_never_answers_does_not_hold_a_start_up(qtbot, name: str, monkeypatch) -> None:
+def test_unresponsive_instance_does_not_block_a_start(qtbot, name: str, monkeypatch) -> None:
     monkeypatch.setattr(single_instance, "ANSWER_MS", 50)
     code = "import socket, sys\ns = socket.socket(socket.AF_UNIX)\ns.bind(sys.argv[1])\ns.listen()\n"
     code += "print('up', flush=True)\nc, _ = s.accept()\nsys.stdin.read()\n"
@@ -275,12 +273,12 @@ def test_one_that_never_answers_does_not_hold_a_start_up(qtbot, name: str, monke
     process.communicate()
 
 
-def test_a_start_is_read() -> None:
+def test_start_request_is_parsed() -> None:
     assert parse(b'{"files": ["/a.nepb"], "demo": true}') == StartRequest((Path("/a.nepb"),), True)
     assert parse(b"\xff") is None
 
 
-def test_a_window_that_goes_while_a_later_start_talks_to_it_raises_nothing(
+def test_window_that_closes_during_a_later_start_raises_nothing(
     qtbot, name: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Qt deletes the connection with the window, and says then that it is disconnected."""

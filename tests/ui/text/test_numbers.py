@@ -32,12 +32,12 @@ from tests.pseudo import untranslated
         (seconds_words(1.42), "1.4 s"), (seconds_words(14.3), "14 s"), (seconds_words(180), "3 min"),
     ],
 )  # fmt: skip
-def test_figures_in_words(made: str, words: str) -> None:
+def test_figures_are_formatted_as_text(made: str, words: str) -> None:
     assert made == words
 
 
 @pytest.mark.usefixtures("pseudo")
-def test_the_words_on_keys_are_translated_and_letters_stay() -> None:
+def test_key_names_are_translated_and_letters_are_not() -> None:
     said = [spoken_key("Ctrl+Shift+S"), spoken_key("Up, PgDown"), spoken_key("Meta+Tab", "darwin")]
     assert untranslated(" ".join(said).replace("Ctrl", "ctrl")) == []
     assert "Tab" not in said[2]

@@ -28,17 +28,17 @@ class Fleet:
 TOLD = {"battery": 84, "pose": {"x": 1.25, "y": None}, "sees_face": True}
 
 
-def test_sensors_and_their_fields_have_words_with_units() -> None:
+def test_sensors_and_their_fields_are_formatted_with_units() -> None:
     words, old = live_words(Fleet(Pepper=Link(values=TOLD)), SENSORS)
     assert words == {"Pepper/battery": "84 %", "Pepper/pose/x": "1.25 m", "Pepper/sees_face": "yes"}
     assert old == set()
 
 
-def test_what_is_not_told_yet_is_blank() -> None:
+def test_unknown_sensor_values_are_blank() -> None:
     assert live_words(Fleet(Pepper=Link()), [("Pepper", "battery")]) == ({"Pepper/battery": ""}, set())
 
 
-def test_a_robot_that_fell_silent_is_old_and_one_that_is_away_says_nothing() -> None:
+def test_values_of_a_silent_robot_are_stale_and_a_disconnected_robot_has_none() -> None:
     _, old = live_words(Fleet(Pepper=Link(values=TOLD, state="silent")), SENSORS)
     assert old == {"Pepper/battery", "Pepper/pose/x", "Pepper/sees_face"}
     assert live_words(Fleet(Pepper=Link(values=TOLD, connected=False)), SENSORS) == ({}, set())

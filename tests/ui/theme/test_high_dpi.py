@@ -16,12 +16,12 @@ from PySide6.QtWidgets import QApplication
 
 application = QApplication(["nep-studio"])
 assert application.devicePixelRatio() == float(sys.argv[1]), application.devicePixelRatio()
-sys.exit(pytest.main(["-q", "tests/ui/theme/test_text_sizes.py::test_the_window_cuts_no_words"]))
+sys.exit(pytest.main(["-q", "tests/ui/theme/test_text_sizes.py::test_window_clips_no_text"]))
 """
 
 
 @pytest.mark.parametrize("scale", ["1.25", "1.5"])
-def test_the_window_cuts_no_words_between_whole_scales(scale: str) -> None:
+def test_window_clips_no_text_at_fractional_scales(scale: str) -> None:
     done = subprocess.run(
         [sys.executable, "-c", LOOK, scale],
         cwd=Path(__file__).parents[3],

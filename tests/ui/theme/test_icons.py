@@ -45,41 +45,41 @@ def test_every_icon_of_the_design_is_shipped() -> None:
     assert wanted <= icons.names()
 
 
-def test_the_licences_are_beside_the_files() -> None:
+def test_licences_are_shipped_beside_the_icons() -> None:
     assert "ISC License" in resources.path("icons", "LICENSE.txt").read_text("utf-8")
     for name in ("Inter", "JetBrainsMono", "MPLUS1p"):
         text = resources.path("fonts", f"LICENSE-{name}.txt").read_text("utf-8")
         assert "SIL Open Font License, Version 1.1" in text
 
 
-def test_an_icon_has_the_colour_of_its_role_and_follows_the_theme(theme: Theme) -> None:
+def test_icon_has_the_colour_of_its_role_and_follows_the_theme(theme: Theme) -> None:
     icon = theme.icon("square", "accent")
     assert inks(icon.pixmap(QSize(48, 48), 1.0).toImage()) == {theme.colour("accent").name()}
     theme.set_mode("dark")
     assert inks(icon.pixmap(QSize(48, 48), 1.0).toImage()) == {theme.colour("accent").name()}
 
 
-def test_a_disabled_icon_is_grey(theme: Theme) -> None:
+def test_disabled_icon_is_grey(theme: Theme) -> None:
     image = theme.icon("square", "accent").pixmap(QSize(48, 48), 1.0, QIcon.Mode.Disabled).toImage()
     assert inks(image) == {theme.colour("textDisabled").name()}
 
 
 @pytest.mark.parametrize("ratio", [1.0, 1.5, 2.0])
-def test_an_icon_is_painted_at_the_screens_ratio(theme: Theme, ratio: float) -> None:
+def test_icon_is_rendered_at_the_device_pixel_ratio(theme: Theme, ratio: float) -> None:
     pixmap = theme.icon("play").pixmap(QSize(20, 20), ratio)
     assert pixmap.width() == round(20 * ratio)
     assert pixmap.devicePixelRatio() == ratio
 
 
 @pytest.mark.parametrize("name", ["plya", "", "../LICENSE", "a\tb", "<svg/>", "x" * 100_000])
-def test_an_unknown_icon_is_told_and_another_one_stands_in(qapp, caplog, name: str) -> None:
+def test_unknown_icon_is_logged_and_replaced_by_a_fallback(qapp, caplog, name: str) -> None:
     engine = icons.IconEngine(name, lambda _mode, _state: QColor("#102030"))
     assert inks(engine.scaledPixmap(QSize(24, 24), QIcon.Mode.Normal, QIcon.State.Off, 2.0).toImage())
     assert caplog.records[0].getMessage().startswith(f"unknown icon '{name[:80]}'")
     assert ("did you mean 'play'?" in caplog.text) == (name == "plya")
 
 
-def test_every_icon_that_the_code_names_is_shipped() -> None:
+def test_every_icon_used_in_the_code_is_shipped() -> None:
     """Words in the code that stand where icons stand: what a person mistyped is found here."""
     before = r'(?:paint_icon(?:_again)?\([^"\n]*|\bicon\(|icon=|Button\(theme, "[^"]*", )'
     given = re.compile(before + r'"([a-z0-9-]+)"')
@@ -103,7 +103,7 @@ def test_every_shape_is_an_svg_that_paints_something(qapp) -> None:
     assert not blank
 
 
-def test_a_problem_of_every_block_is_painted(qtbot, theme: Theme, caplog) -> None:
+def test_problem_row_is_painted_for_every_block_type(qtbot, theme: Theme, caplog) -> None:
     for block in Catalogue([robot()]).blocks.values():
         problem = Problem("error", "a", block.style, "it", "Something is wrong with it.", icon=block.icon)
         row = ProblemRow(theme, Listed(problem, ()), large=True)
@@ -113,7 +113,7 @@ def test_a_problem_of_every_block_is_painted(qtbot, theme: Theme, caplog) -> Non
     assert not caplog.records
 
 
-def test_painting_puts_the_icon_into_its_square(qapp: object) -> None:
+def test_icon_is_painted_into_its_rectangle(qapp: object) -> None:
     image = QImage(40, 40, QImage.Format.Format_ARGB32)
     image.fill(Qt.GlobalColor.transparent)
     painter = QPainter(image)
@@ -123,7 +123,7 @@ def test_painting_puts_the_icon_into_its_square(qapp: object) -> None:
     assert image.pixelColor(10, 10).alpha() == 0
 
 
-def test_copies_of_an_icon_outlive_the_first(theme: Theme) -> None:
+def test_copies_of_an_icon_outlive_the_original(theme: Theme) -> None:
     copies = []
     for _ in range(50):
         icon = QIcon(icons.IconEngine("play", lambda _mode, _state: QColor("#123456")))
@@ -133,7 +133,7 @@ def test_copies_of_an_icon_outlive_the_first(theme: Theme) -> None:
     assert all(not copy.pixmap(QSize(16, 16), 1.0).isNull() for copy in copies)
 
 
-def test_an_icon_that_is_painted_again_and_again_is_drawn_once_and_looks_the_same(qapp) -> None:
+def test_repeatedly_painted_icon_is_rendered_once_and_looks_the_same(qapp) -> None:
     def painted(paint: Callable[[QPainter], None]) -> QImage:
         image = QImage(40, 40, QImage.Format.Format_RGB32)
         image.setDevicePixelRatio(2.0)

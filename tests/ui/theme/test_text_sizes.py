@@ -88,7 +88,7 @@ def settle(qtbot, root, *, longer: bool) -> None:
         (False, 200, True),
     ],
 )
-def test_no_panel_cuts_its_words(qtbot, theme: Theme, full: bool, percent: int, longer: bool) -> None:
+def test_panels_clip_no_text(qtbot, theme: Theme, full: bool, percent: int, longer: bool) -> None:
     theme.set_text_percent(percent)
     faults = []
     for name in SIZES:
@@ -103,7 +103,7 @@ def test_no_panel_cuts_its_words(qtbot, theme: Theme, full: bool, percent: int, 
 
 @pytest.mark.parametrize("percent", [100, 150, 200])
 @pytest.mark.parametrize("width", [384, 640])
-def test_an_action_is_read_and_tried_without_scrolling_sideways(
+def test_action_is_readable_and_can_be_tried_without_horizontal_scrolling(
     qtbot, theme: Theme, percent: int, width: int
 ) -> None:
     theme.set_text_percent(percent)
@@ -159,7 +159,7 @@ def whole(qtbot, session: Session, theme: Theme, tmp_path: Path) -> Iterator[tup
         ((1024, 600), 200, False),
     ],
 )
-def test_the_window_cuts_no_words(
+def test_window_clips_no_text(
     qtbot,
     whole: tuple[MainWindow, Commands],
     size: tuple[int, int],
@@ -203,7 +203,7 @@ def test_the_window_cuts_no_words(
 
 
 @pytest.mark.parametrize("percent", [100, 150, 200])
-def test_the_status_bar_shortens_what_has_no_room(qtbot, theme: Theme, percent: int) -> None:
+def test_status_bar_elides_items_that_do_not_fit(qtbot, theme: Theme, percent: int) -> None:
     theme.set_text_percent(percent)
     bar = StatusBar(theme)
     qtbot.addWidget(bar)

@@ -43,17 +43,17 @@ def test_roles_have_the_colours_of_their_mode(theme: Theme) -> None:
     assert theme.dark
 
 
-def test_an_unknown_role_is_an_error(theme: Theme) -> None:
+def test_unknown_role_raises(theme: Theme) -> None:
     with pytest.raises(KeyError, match="sparkle"):
         theme.colour("sparkle")
 
 
-def test_alpha_stands_last_in_a_token() -> None:
+def test_alpha_is_the_last_component_of_a_colour_token() -> None:
     assert qt_colour("#1C1B1966") == QColor(0x1C, 0x1B, 0x19, 0x66)
 
 
 @pytest.mark.parametrize("mode", ["light", "dark"])
-def test_the_palette_is_the_designs(qapp: QApplication, mode: str) -> None:
+def test_qt_palette_uses_the_design_tokens(qapp: QApplication, mode: str) -> None:
     theme = Theme("dark" if mode == "dark" else "light")
     palette = theme.palette()
     assert palette.color(QPalette.ColorRole.Window) == theme.colour("window")
@@ -63,7 +63,7 @@ def test_the_palette_is_the_designs(qapp: QApplication, mode: str) -> None:
     assert disabled == theme.colour("textDisabled")
 
 
-def test_the_system_is_followed_only_when_asked(qapp: QApplication) -> None:
+def test_system_colour_scheme_is_followed_only_in_system_mode(qapp: QApplication) -> None:
     hints = Hints()
     theme = Theme("system", hints=hints)  # type: ignore[arg-type]
     told: list[bool] = []
@@ -77,7 +77,7 @@ def test_the_system_is_followed_only_when_asked(qapp: QApplication) -> None:
     assert not theme.dark
 
 
-def test_a_change_of_mode_repaints_a_label_at_once(qtbot, theme: Theme) -> None:
+def test_mode_change_repaints_a_label_at_once(qtbot, theme: Theme) -> None:
     theme.apply()
     shown = label("words", role="accentText")
     qtbot.addWidget(shown)
@@ -88,7 +88,7 @@ def test_a_change_of_mode_repaints_a_label_at_once(qtbot, theme: Theme) -> None:
     assert shown.palette().color(QPalette.ColorRole.WindowText) == theme.colour("accentText")
 
 
-def test_text_grows_with_the_percentage(theme: Theme) -> None:
+def test_text_size_grows_with_the_percentage(theme: Theme) -> None:
     assert theme.font("body").pixelSize() == 13
     theme.set_text_percent(200)
     assert theme.font("body").pixelSize() == 26
@@ -96,7 +96,7 @@ def test_text_grows_with_the_percentage(theme: Theme) -> None:
     assert theme.text_percent == 200
 
 
-def test_labels_take_font_and_size_of_their_kind(qtbot, theme: Theme) -> None:
+def test_labels_use_font_and_size_of_their_kind(qtbot, theme: Theme) -> None:
     theme.apply()
     made = {kind: label("Stop", kind) for kind in ("small", "heading", "code")}
     for shown in made.values():
@@ -111,7 +111,7 @@ def test_labels_take_font_and_size_of_their_kind(qtbot, theme: Theme) -> None:
     assert QFontInfo(made["heading"].font()).family() == "Inter"
 
 
-def test_the_bundled_fonts_load_in_all_four_weights(qapp: QApplication) -> None:
+def test_bundled_fonts_load_in_all_four_weights(qapp: QApplication) -> None:
     assert fonts.load() == ()
     for family in ("Inter", "JetBrains Mono"):
         assert family in QFontDatabase.families()
@@ -120,7 +120,7 @@ def test_the_bundled_fonts_load_in_all_four_weights(qapp: QApplication) -> None:
             assert (QFontInfo(font).family(), QFontInfo(font).weight()) == (family, weight)
 
 
-def test_figures_have_one_width(qapp: QApplication, theme: Theme) -> None:
+def test_digits_have_equal_width(qapp: QApplication, theme: Theme) -> None:
     font = theme.font("body")
     assert font.isFeatureSet(QFont.Tag("tnum"))
     shown = QLabel("1")
@@ -128,7 +128,7 @@ def test_figures_have_one_width(qapp: QApplication, theme: Theme) -> None:
     assert shown.fontMetrics().horizontalAdvance("1111") == shown.fontMetrics().horizontalAdvance("8888")
 
 
-def test_reduced_motion_has_no_durations_but_still_shows_things(theme: Theme) -> None:
+def test_reduced_motion_sets_animations_to_zero_and_keeps_toast_durations(theme: Theme) -> None:
     assert theme.duration("changedFade") == 800
     theme.reduced_motion = True
     assert theme.duration("changedFade") == 0
@@ -141,7 +141,7 @@ def test_high_contrast_has_strong_edges_and_no_tints(theme: Theme) -> None:
     assert theme.colour("okTint") == theme.colour("panel")
 
 
-def test_the_block_editor_gets_the_colours_of_the_mode(theme: Theme) -> None:
+def test_block_editor_gets_the_colours_of_the_mode(theme: Theme) -> None:
     theme.set_mode("dark")
     tokens = theme.blockly_tokens()
     assert tokens["dark"] is True
@@ -149,14 +149,14 @@ def test_the_block_editor_gets_the_colours_of_the_mode(theme: Theme) -> None:
     assert tokens["block"]["events"]["tertiary"] == "#A9986B"
 
 
-def test_the_sheet_names_no_object_and_has_no_holes(theme: Theme) -> None:
+def test_style_sheet_has_no_object_names_and_no_unfilled_placeholders(theme: Theme) -> None:
     sheet = theme.style_sheet()
     assert "{" in sheet
     assert not re.search(r"[{}]{2}|\{[a-zA-Z]+\}", sheet)
     assert not re.search(r"#[a-z][A-Za-z_]+\s*\{", sheet)
 
 
-def test_colours_are_written_nowhere_but_in_the_tokens() -> None:
+def test_colours_are_defined_only_in_the_tokens() -> None:
     # A robot's drawing, its lamps and boxes on a picture have colours that no theme changes.
     own = {path.name for path in UI.glob("robot_*.py")} | {
         "choices.py",
@@ -172,7 +172,7 @@ def test_colours_are_written_nowhere_but_in_the_tokens() -> None:
     assert written == []
 
 
-def test_in_high_contrast_every_pair_and_every_edge_can_be_seen(theme: Theme) -> None:
+def test_every_colour_pair_and_edge_is_visible_in_high_contrast(theme: Theme) -> None:
     pairs = RAW["contrast"]["pairs"]
     for mode in ("light", "dark"):
         theme.set_mode(mode)
@@ -188,7 +188,7 @@ def test_in_high_contrast_every_pair_and_every_edge_can_be_seen(theme: Theme) ->
         assert theme.hex("border") != theme.hex("controlBorder")
 
 
-def test_wishes_follow_the_system_only_when_they_say_so() -> None:
+def test_contrast_and_motion_follow_the_system_only_in_system_mode() -> None:
     class Asked(QObject):
         contrastPreferenceChanged = Signal()  # noqa: N815  Qt's name
         wish = Qt.ContrastPreference.NoPreference

@@ -82,14 +82,14 @@ def ciede2000(one, other) -> float:
     return math.sqrt(dl**2 + dc**2 + dh**2 + cross * dc * dh)
 
 
-def test_contrast_and_distance_agree_with_known_values() -> None:
+def test_contrast_and_colour_distance_match_reference_values() -> None:
     assert contrast("#000000", "#FFFFFF") == pytest.approx(21.0)
     # the first pair of the published CIEDE2000 test data
     assert ciede2000((50, 2.6772, -79.7751), (50, 0, -82.7485)) == pytest.approx(2.0425, abs=1e-4)
 
 
 @pytest.mark.parametrize("mode", MODES)
-def test_every_listed_pair_has_its_contrast(mode: str) -> None:
+def test_every_listed_colour_pair_has_its_required_contrast(mode: str) -> None:
     roles = TOKENS.colours[mode]
     pairs = RAW["contrast"]["pairs"]
     assert len(pairs) > 40
@@ -98,14 +98,14 @@ def test_every_listed_pair_has_its_contrast(mode: str) -> None:
 
 
 @pytest.mark.parametrize("mode", MODES)
-def test_curves_stand_out_from_the_panel(mode: str) -> None:
+def test_curve_colours_contrast_with_the_panel(mode: str) -> None:
     panel = TOKENS.colours[mode]["panel"]
     assert all(contrast(colour, panel) >= 3 for colour in TOKENS.series[mode])
 
 
 @pytest.mark.parametrize("mode", MODES)
 @pytest.mark.parametrize("name", sorted(TOKENS.blocks))
-def test_blocks_can_be_read_and_seen(mode: str, name: str) -> None:
+def test_block_texts_and_edges_have_enough_contrast(mode: str, name: str) -> None:
     block, roles = TOKENS.blocks[name][mode], TOKENS.colours[mode]
     assert contrast(TOKENS.block_text[name], block["primary"]) >= 4.5
     assert max(contrast(block[part], roles["workspace"]) for part in ("primary", "tertiary")) >= 3
@@ -113,7 +113,7 @@ def test_blocks_can_be_read_and_seen(mode: str, name: str) -> None:
 
 
 @pytest.mark.parametrize("eyes", sorted(SEEN))
-def test_every_eye_tells_block_colours_apart(eyes: str) -> None:
+def test_block_colours_are_distinguishable_with_colour_vision_deficiencies(eyes: str) -> None:
     wanted = RAW["colourBlind"]["least"][eyes]
     colours = [lab(block["light"]["primary"], eyes) for block in TOKENS.blocks.values()]
     assert min(ciede2000(one, other) for one, other in itertools.combinations(colours, 2)) >= wanted

@@ -30,13 +30,13 @@ def window(qtbot) -> QWidget:
 
 
 @pytest.mark.parametrize("key", [Qt.Key_Return, Qt.Key_Enter, Qt.Key_Space])
-def test_a_button_with_the_keyboard_is_pressed(qtbot, window, key):
+def test_enter_presses_the_focused_button(qtbot, window, key):
     window.button.setFocus()
     QTest.keyClick(window.windowHandle(), key)
     qtbot.waitUntil(lambda: window.pressed == ["button"])
 
 
-def test_fields_and_other_keys_are_left_alone(qtbot, window):
+def test_text_fields_and_other_keys_are_not_affected(qtbot, window):
     window.button.setFocus()
     QTest.keyClick(window.windowHandle(), Qt.Key_Return, Qt.ControlModifier)
     QTest.keyClick(window.windowHandle(), Qt.Key_A)

@@ -22,23 +22,23 @@ def keys(texts: list[str]) -> list[str]:
     return [key_of(text[place]) for text, place in zip(texts, letters_of(texts), strict=True) if place >= 0]
 
 
-def test_beginnings_come_first_and_nothing_is_twice() -> None:
+def test_initial_letters_come_first_and_no_letter_is_used_twice() -> None:
     assert keys(["Cut", "Copy", "Copy as image", "Paste", "Última", "42"]) == ["C", "O", "A", "P", "U"]
     assert letters_of(["aa", "aA", ""]) == [0, -1, -1]
 
 
-def test_words_are_read_without_their_signs_and_key() -> None:
+def test_ampersand_and_shortcut_are_stripped_from_menu_texts() -> None:
     assert plain_words("C&ut\tCtrl+X") == "Cut"
 
 
-def test_the_bar_has_a_plain_letter_for_every_menu(language: str) -> None:
+def test_menu_bar_has_a_unique_ascii_letter_for_every_menu(language: str) -> None:
     titles = marked([i18n.gettext(name) for name in MENUS])
     chosen = [title[title.index("&") + 1].upper() for title in titles]
     assert len(set(chosen)) == len(MENUS), titles
     assert all(each.isascii() and each.isalpha() for each in chosen), titles
 
 
-def test_no_letter_is_doubled_within_a_menu(language: str) -> None:
+def test_no_letter_is_used_twice_within_a_menu(language: str) -> None:
     for menu in MENUS:
         entries = [command.words for command in COMMANDS if command.menu == menu and not command.under]
         entries += {i18n.gettext(each.under) for each in COMMANDS if each.menu == menu and each.under}

@@ -17,7 +17,7 @@ def place_of(place: PicturePlace, at: QPointF) -> tuple[float, float]:
     return round(found.x(), 6), round(found.y(), 6)
 
 
-def test_at_first_it_fits_in_the_middle_and_may_fill() -> None:
+def test_image_is_fitted_and_centred_by_default_and_may_fill_the_view() -> None:
     place = PicturePlace()
     assert place.area(VIEW, PICTURE) == QRectF(0, 50, 400, 200)
     assert place.area(VIEW, PICTURE, fill=True) == QRectF(0, 50, 400, 200)  # too much would be cut
@@ -28,7 +28,7 @@ def test_at_first_it_fits_in_the_middle_and_may_fill() -> None:
 
 @pytest.mark.parametrize("turned", [0, 90, 180, 270])
 @pytest.mark.parametrize(("across", "down"), list(itertools.product([False, True], repeat=2)))
-def test_zooming_keeps_what_is_under_the_mouse_however_it_is_turned(turned, across, down) -> None:
+def test_zoom_keeps_the_point_under_the_mouse_in_every_orientation(turned, across, down) -> None:
     place = PicturePlace()
     place.turn(turned)
     for wanted, flip in ((across, True), (down, False)):
@@ -43,7 +43,7 @@ def test_zooming_keeps_what_is_under_the_mouse_however_it_is_turned(turned, acro
     assert place_of(place, at) == pytest.approx(before, abs=1e-5)
 
 
-def test_moving_takes_the_picture_with_the_mouse_up_to_its_edge() -> None:
+def test_panning_moves_the_image_with_the_mouse_up_to_its_edge() -> None:
     place = PicturePlace()
     place.set_zoom(2.0)
     before = place_of(place, QPointF(100, 100))
@@ -55,7 +55,7 @@ def test_moving_takes_the_picture_with_the_mouse_up_to_its_edge() -> None:
     assert place.area(VIEW, PICTURE).topLeft() == QPointF(-10, -10)
 
 
-def test_what_fits_cannot_be_moved() -> None:
+def test_image_that_fits_cannot_be_panned() -> None:
     place = PicturePlace()
     place.move(30, 30, VIEW, PICTURE)
     assert place.area(VIEW, PICTURE) == QRectF(0, 50, 400, 200)
@@ -72,7 +72,7 @@ def test_zoom_has_limits() -> None:
 
 
 @pytest.mark.parametrize("turns", range(1, 4))
-def test_turning_is_what_is_seen_also_when_flipped(turns: int) -> None:
+def test_rotation_direction_is_the_same_when_flipped(turns: int) -> None:
     upright, flipped = PicturePlace(), PicturePlace()
     flipped.flip(across=True)
     corner = QPointF(0, 0)
@@ -86,7 +86,7 @@ def test_turning_is_what_is_seen_also_when_flipped(turns: int) -> None:
     assert (round(mapped.x(), 6), round(mapped.y(), 6)) == seen
 
 
-def test_four_quarters_and_two_flips_are_nothing() -> None:
+def test_four_quarter_turns_and_two_flips_are_the_identity() -> None:
     place = PicturePlace()
     place.set_zoom(2.0)
     place.move(40, 30, VIEW, PICTURE)
@@ -102,7 +102,7 @@ def test_four_quarters_and_two_flips_are_nothing() -> None:
     assert after == before
 
 
-def test_it_comes_back_with_the_layout_and_nonsense_is_left_out() -> None:
+def test_placement_is_restored_with_the_layout_and_invalid_state_is_ignored() -> None:
     place = PicturePlace()
     place.zoom_at(4.0, QPointF(10, 90), VIEW, PICTURE)
     place.turn(270)

@@ -39,7 +39,7 @@ def names(model: TableModel[Row]) -> list[str]:
     return [model.data(model.index(row, 0)) for row in range(model.rowCount())]  # type: ignore[misc]
 
 
-def test_the_model_keeps_all_of_qts_rules_while_rows_come_go_and_move(qtmodeltester, model) -> None:
+def test_model_obeys_qt_rules_while_rows_are_added_removed_and_moved(qtmodeltester, model) -> None:
     qtmodeltester.check(model)
     for wanted in (["c", "a", "d", "b"], ["a"], [], ["x", "y", "z"], ["z", "y", "x"], ["y", "q"]):
         model.set_rows([Row(name) for name in wanted])
@@ -47,7 +47,7 @@ def test_the_model_keeps_all_of_qts_rules_while_rows_come_go_and_move(qtmodeltes
         qtmodeltester.check(model)
 
 
-def test_many_removed_rows_at_once_are_one_reset(qtbot, model) -> None:
+def test_many_rows_removed_at_once_are_one_model_reset(qtbot, model) -> None:
     model.set_rows([Row(f"{number:05}") for number in range(2000)])
     removed = QSignalSpy(model.rowsRemoved)
     with qtbot.waitSignal(model.modelReset):
@@ -56,7 +56,7 @@ def test_many_removed_rows_at_once_are_one_reset(qtbot, model) -> None:
     assert model.rowCount() == 1000
 
 
-def test_a_cell_tells_what_a_delegate_a_tooltip_and_a_screen_reader_need(model) -> None:
+def test_cell_provides_data_for_delegate_tooltip_and_screen_reader(model) -> None:
     rate = model.index(0, 1)
     assert model.data(rate) == "2.0"
     assert model.data(rate, CELL_ROLE) == Cell("2.0")
@@ -66,7 +66,7 @@ def test_a_cell_tells_what_a_delegate_a_tooltip_and_a_screen_reader_need(model) 
     assert int(model.data(rate, Qt.ItemDataRole.TextAlignmentRole)) & int(Qt.AlignmentFlag.AlignRight)
 
 
-def test_what_is_not_known_is_sorted_last_in_both_directions() -> None:
+def test_unknown_values_are_sorted_last_in_both_directions() -> None:
     rows = [Row("none"), Row("two", 2.0), Row("one", 1.0)]
     rising, falling = Order(COLUMNS[1]), Order(COLUMNS[1], falling=True)
     assert [row.name for row in rising.sort(rows)] == ["one", "two", "none"]
@@ -83,7 +83,7 @@ def view(qtbot, model) -> TableView[Row]:
     return made
 
 
-def test_the_chosen_row_stays_chosen_when_others_come_and_the_order_changes(view, model) -> None:
+def test_selected_row_is_kept_when_rows_are_added_and_the_order_changes(view, model) -> None:
     view.choose("a")
     model.set_rows([Row("0"), Row("b"), Row("a"), Row("c")])
     assert view.chosen_key() == "a"
@@ -91,7 +91,7 @@ def test_the_chosen_row_stays_chosen_when_others_come_and_the_order_changes(view
     assert view.chosen_key() == "a"
 
 
-def test_a_press_and_return_open_a_row_and_the_slash_asks_for_the_filter(qtbot, view) -> None:
+def test_click_and_return_open_a_row_and_slash_requests_the_filter(qtbot, view) -> None:
     opened: list[str] = []
     view.opened.connect(opened.append)
     QTest.mouseClick(view.viewport(), Qt.MouseButton.LeftButton, pos=QPoint(40, 26 + 13))
@@ -102,7 +102,7 @@ def test_a_press_and_return_open_a_row_and_the_slash_asks_for_the_filter(qtbot, 
         QTest.keyClicks(view, "/")
 
 
-def test_pressing_a_head_sorts_and_pressing_it_again_turns_the_order(qtbot, view) -> None:
+def test_click_on_a_header_sorts_and_another_click_reverses_the_order(qtbot, view) -> None:
     with qtbot.waitSignal(view.order_changed):
         view.horizontalHeader().sectionClicked.emit(1)
     assert (view.order.column, view.order.falling) == (COLUMNS[1], True)  # figures: the largest first
@@ -110,7 +110,7 @@ def test_pressing_a_head_sorts_and_pressing_it_again_turns_the_order(qtbot, view
     assert view.order.falling is False
 
 
-def test_only_rows_that_can_be_seen_are_told_with_one_signal(qapp, view, model) -> None:
+def test_only_visible_rows_are_updated_with_one_signal(qapp, view, model) -> None:
     model.set_rows([Row(f"{number:05}", 1.0) for number in range(10_000)])
     qapp.processEvents()  # the view lays out its rows
     told = QSignalSpy(model.dataChanged)
@@ -145,7 +145,7 @@ def brush(qapp, view) -> Brush:
     return made
 
 
-def test_only_figures_that_changed_are_painted_again(qapp, view, model, brush) -> None:
+def test_only_changed_cells_are_repainted(qapp, view, model, brush) -> None:
     view.tell_visible_changed()
     qapp.processEvents()
     assert brush.painted.isEmpty()
@@ -155,9 +155,7 @@ def test_only_figures_that_changed_are_painted_again(qapp, view, model, brush) -
     assert brush.painted == QRegion(view.visualRect(model.index(1, 1)))
 
 
-def test_a_figure_that_changed_while_something_else_was_painted_is_painted_again(
-    qapp, view, model, brush
-) -> None:
+def test_cell_that_changed_during_another_repaint_is_repainted(qapp, view, model, brush) -> None:
     row = model.row_at(model.index(0, 0))
     row.rate = 7.5
     view.viewport().repaint()
@@ -168,7 +166,7 @@ def test_a_figure_that_changed_while_something_else_was_painted_is_painted_again
     assert brush.painted == QRegion(view.visualRect(model.index(0, 1)))
 
 
-def test_what_was_painted_is_not_remembered_of_all_rows(qapp, view, model) -> None:
+def test_cache_of_painted_cells_is_bounded(qapp, view, model) -> None:
     model.set_rows([Row(f"{number:05}", 1.0) for number in range(REMEMBERED)])
     for first in range(0, REMEMBERED, 5):
         view.scrollTo(model.index(first, 0), QTableView.ScrollHint.PositionAtTop)
@@ -177,7 +175,7 @@ def test_what_was_painted_is_not_remembered_of_all_rows(qapp, view, model) -> No
     assert len(view._cells._painted) <= REMEMBERED + 50
 
 
-def test_the_stretching_column_takes_what_is_left(view) -> None:
+def test_stretch_column_takes_the_remaining_width(view) -> None:
     assert view.columnWidth(0) == view.viewport().width() - view.columnWidth(1)
     view.resize(150, 200)
     assert view.columnWidth(0) == 100  # never narrower than its own width
@@ -189,7 +187,7 @@ def test_row_height_follows_the_density(view) -> None:
     assert view.cell_font(Cell("x")).pixelSize() == 14
 
 
-def test_a_column_that_a_person_asked_for_does_not_give_way(view) -> None:
+def test_column_chosen_by_the_user_is_not_hidden_when_space_is_short(view) -> None:
     columns = (
         COLUMNS[0],
         replace(COLUMNS[1], yields=1),
@@ -204,7 +202,7 @@ def test_a_column_that_a_person_asked_for_does_not_give_way(view) -> None:
     assert choice.fit([100, 60, 60], 300) == {0, 1, 2}  # the first names the row
 
 
-def test_the_choice_of_columns_is_kept_and_what_is_no_choice_is_left_out() -> None:
+def test_column_choice_is_saved_and_invalid_state_is_ignored() -> None:
     choice = ColumnChoice(COLUMNS)
     choice.show("rate", False)
     again = ColumnChoice(COLUMNS)
@@ -215,7 +213,7 @@ def test_the_choice_of_columns_is_kept_and_what_is_no_choice_is_left_out() -> No
 
 
 @pytest.mark.qt_log_ignore("does not support (grabbing the keyboard|raise)", extend=True)
-def test_a_right_click_on_the_head_offers_the_columns(qtbot, qapp, view) -> None:
+def test_context_menu_of_the_header_lists_the_columns(qtbot, qapp, view) -> None:
     view.horizontalHeader().customContextMenuRequested.emit(QPoint(10, 10))
     menu = qapp.activePopupWidget()
     assert menu is not None
@@ -223,7 +221,7 @@ def test_a_right_click_on_the_head_offers_the_columns(qtbot, qapp, view) -> None
     menu.close()
 
 
-def test_a_cell_paints_its_curve(qapp, view, model) -> None:
+def test_cell_paints_its_sparkline(qapp, view, model) -> None:
     delegate = view.itemDelegate()
     image = QImage(80, 26, QImage.Format.Format_RGB32)
     image.fill(view.theme.colour("panel"))

@@ -63,7 +63,7 @@ def slider(qtbot, theme: Theme) -> SliderWithUnit:
     return made
 
 
-def test_a_slider_steps_with_the_keyboard(qtbot, slider: SliderWithUnit) -> None:
+def test_slider_steps_by_keyboard(qtbot, slider: SliderWithUnit) -> None:
     told: list[float] = []
     slider.changed.connect(told.append)
     keys = (Qt.Key.Key_Right, Qt.Key.Key_PageDown, Qt.Key.Key_Home, Qt.Key.Key_End)
@@ -73,7 +73,7 @@ def test_a_slider_steps_with_the_keyboard(qtbot, slider: SliderWithUnit) -> None
     assert slider.field.text() == "1.00"
 
 
-def test_the_wheel_needs_the_focus(qtbot, slider: SliderWithUnit) -> None:
+def test_wheel_changes_the_slider_only_with_focus(qtbot, slider: SliderWithUnit) -> None:
     slider.activateWindow()
     slider.field.setFocus()
     qtbot.waitUntil(slider.field.hasFocus)
@@ -85,12 +85,12 @@ def test_the_wheel_needs_the_focus(qtbot, slider: SliderWithUnit) -> None:
     assert slider.value > 0.5
 
 
-def test_a_double_click_brings_the_default_back(slider: SliderWithUnit) -> None:
+def test_double_click_restores_the_default(slider: SliderWithUnit) -> None:
     QTest.mouseDClick(slider.track, Qt.MouseButton.LeftButton)
     assert slider.value == 0.25
 
 
-def test_a_press_on_the_track_goes_there(slider: SliderWithUnit) -> None:
+def test_click_on_the_track_moves_the_slider_there(slider: SliderWithUnit) -> None:
     place = QPoint(slider.track.width() - 10, slider.track.height() // 2)
     QTest.mouseClick(slider.track, Qt.MouseButton.LeftButton, pos=place)
     assert slider.value == pytest.approx(1.0)
@@ -105,7 +105,7 @@ def test_a_press_on_the_track_goes_there(slider: SliderWithUnit) -> None:
         ("nan", "Enter a number."),
     ],
 )
-def test_a_wrong_number_stays_and_is_explained(slider: SliderWithUnit, typed: str, sentence: str) -> None:
+def test_invalid_number_is_kept_and_explained(slider: SliderWithUnit, typed: str, sentence: str) -> None:
     slider.field.setText(typed)
     slider.field.editingFinished.emit()
     assert slider.field.text() == typed
@@ -118,17 +118,17 @@ def test_a_wrong_number_stays_and_is_explained(slider: SliderWithUnit, typed: st
     assert slider.field.sentence == ""
 
 
-def test_limits_that_make_no_range_are_refused(theme: Theme) -> None:
+def test_empty_range_raises(theme: Theme) -> None:
     with pytest.raises(ValueError, match="no range from 1 to 1"):
         SliderWithUnit(theme, 1, 1)
 
 
 @pytest.mark.parametrize(("step", "digits"), [(1, 0), (5, 0), (0.5, 1), (0.05, 2), (1e-9, 6)])
-def test_a_step_tells_its_decimals(step: float, digits: int) -> None:
+def test_decimals_are_derived_from_the_step(step: float, digits: int) -> None:
     assert decimals_of(step) == digits
 
 
-def test_segments_choose_with_arrows_and_tell_only_a_person(qtbot, theme: Theme) -> None:
+def test_segments_are_selected_by_arrow_keys_and_only_user_changes_emit_a_signal(qtbot, theme: Theme) -> None:
     made = Segments(theme, [("a", "One", None), ("b", "Two", "bot")], "a", check=True)
     shown(qtbot, made)
     told: list[str] = []
@@ -147,7 +147,7 @@ def test_segments_choose_with_arrows_and_tell_only_a_person(qtbot, theme: Theme)
     assert (made.value, told) == ("b", ["a", "b"])
 
 
-def test_a_chip_without_words_is_hidden_and_makes_no_window(qtbot, theme: Theme) -> None:
+def test_chip_without_text_is_hidden_and_opens_no_window(qtbot, theme: Theme) -> None:
     holder = QWidget()
     chip = Chip(theme, "", "ok", parent=holder)
     loose = Chip(theme, "ready", "ok")
@@ -171,12 +171,12 @@ def test_buttons_are_filled_by_their_kind(qtbot, theme: Theme) -> None:
     assert theme.colour("accent").name() not in colours(primary)
 
 
-def test_an_icon_button_says_its_name_and_key(theme: Theme) -> None:
+def test_icon_button_names_its_action_and_shortcut(theme: Theme) -> None:
     button = IconButton(theme, "pause", "Pause", "F8")
     assert (button.accessibleName(), button.toolTip()) == ("Pause", "Pause (F8)")
 
 
-def test_run_keeps_its_width_when_it_becomes_go_on(theme: Theme) -> None:
+def test_run_button_keeps_its_width_when_its_text_is_resume(theme: Theme) -> None:
     button = RunButton(theme, "Run", "play", widest="Resume")
     before = button.sizeHint()
     button.set_word("Resume")
@@ -186,7 +186,7 @@ def test_run_keeps_its_width_when_it_becomes_go_on(theme: Theme) -> None:
 @pytest.mark.parametrize(
     ("place", "least"), [("runBar", (164, 44)), ("toolBar", (132, 30)), ("appBar", (112, 30))]
 )
-def test_stop_keeps_its_size_and_its_red_in_every_state(qtbot, theme: Theme, place: str, least) -> None:
+def test_stop_keeps_its_size_and_red_colour_in_every_state(qtbot, theme: Theme, place: str, least) -> None:
     stop = StopButton(theme, place)  # type: ignore[arg-type]
     shown(qtbot, stop)
     before = stop.sizeHint()
@@ -199,7 +199,7 @@ def test_stop_keeps_its_size_and_its_red_in_every_state(qtbot, theme: Theme, pla
         assert stop.accessibleName() == word
 
 
-def test_a_bar_knows_what_it_does_not_know(theme: Theme) -> None:
+def test_value_bar_clamps_its_fraction_and_is_empty_for_nan(theme: Theme) -> None:
     bar = ValueBar(theme)
     assert bar.fraction is None
     bar.set_fraction(1.7)
@@ -208,7 +208,7 @@ def test_a_bar_knows_what_it_does_not_know(theme: Theme) -> None:
     assert bar.fraction is None
 
 
-def test_a_sparkline_paints_a_stroke(qtbot, theme: Theme) -> None:
+def test_sparkline_paints_a_stroke(qtbot, theme: Theme) -> None:
     spark = Sparkline(theme)
     shown(qtbot, spark)
     before = colours(spark)
@@ -226,7 +226,7 @@ def stroke(values: list[float]) -> list[int]:
     return [y for y in range(16) if any(image.pixelColor(x, y).lightness() < 128 for x in range(56))]
 
 
-def test_a_sparkline_stands_on_zero(qapp) -> None:
+def test_sparkline_has_a_baseline_of_zero(qapp) -> None:
     steady = stroke([30.0, 29.0, 30.0, 29.5])
     assert max(steady) <= 3, "a rate that changes little is a level line at the top"
     assert min(stroke([0.0, 0.0, 0.0])) >= 13, "none is on the ground"
@@ -237,7 +237,7 @@ def test_a_sparkline_stands_on_zero(qapp) -> None:
     assert stroke([1.0, float("nan")]) == stroke([float("inf"), 2.0]) == []
 
 
-def test_an_empty_state_leads_on(qtbot, theme: Theme) -> None:
+def test_empty_state_button_runs_its_action(qtbot, theme: Theme) -> None:
     done: list[str] = []
     made = EmptyState(
         theme,
@@ -253,7 +253,7 @@ def test_an_empty_state_leads_on(qtbot, theme: Theme) -> None:
     assert made._buttons == []
 
 
-def test_a_switch_is_turned_with_space(qtbot, theme: Theme) -> None:
+def test_switch_is_toggled_with_space(qtbot, theme: Theme) -> None:
     switch = Switch(theme, "loud")
     shown(qtbot, switch)
     QTest.keyClick(switch, Qt.Key.Key_Space)
@@ -261,7 +261,7 @@ def test_a_switch_is_turned_with_space(qtbot, theme: Theme) -> None:
     assert theme.colour("accent").name() in colours(switch)
 
 
-def test_a_combo_box_keeps_what_is_not_offered_out(theme: Theme) -> None:
+def test_combo_box_ignores_unknown_values(theme: Theme) -> None:
     choice = ComboBox(theme, [("en", "English"), ("fr", "French")], name="Language")
     choice.set_value("fr")
     choice.set_value("xx")
@@ -270,7 +270,7 @@ def test_a_combo_box_keeps_what_is_not_offered_out(theme: Theme) -> None:
     assert choice.value == "fr"
 
 
-def test_a_status_item_without_words_is_not_there(qtbot, theme: Theme) -> None:
+def test_status_item_without_text_is_hidden(qtbot, theme: Theme) -> None:
     holder = QWidget()
     item = StatusItem(theme, "lock", "This computer only")
     item.setParent(holder)
@@ -281,7 +281,7 @@ def test_a_status_item_without_words_is_not_there(qtbot, theme: Theme) -> None:
     assert not item.isHidden()
 
 
-def test_a_search_field_shows_its_key_only_while_empty(qtbot, theme: Theme) -> None:
+def test_search_field_shows_its_shortcut_only_while_empty(qtbot, theme: Theme) -> None:
     field = SearchField(theme, "Filter", "/")
     field.resize(200, 28)
     shown(qtbot, field)
@@ -292,7 +292,7 @@ def test_a_search_field_shows_its_key_only_while_empty(qtbot, theme: Theme) -> N
 
 
 @pytest.mark.parametrize("percent", [100, 150, 200])
-def test_controls_grow_with_their_text(theme: Theme, percent: int) -> None:
+def test_controls_grow_with_the_text_size(theme: Theme, percent: int) -> None:
     theme.set_text_percent(percent)
     button = Button(theme, "Use the virtual robot", "bot", size="large")
     font = QFontMetricsF(theme.font("button"))
@@ -302,7 +302,7 @@ def test_controls_grow_with_their_text(theme: Theme, percent: int) -> None:
     assert chip.sizeHint().height() >= QFontMetricsF(theme.font("small")).height()
 
 
-def test_an_empty_place_that_is_low_says_its_words_without_the_picture(qtbot, theme: Theme) -> None:
+def test_empty_state_in_a_low_panel_hides_its_image(qtbot, theme: Theme) -> None:
     theme.apply()
     empty = EmptyState(theme, "eye", "No robot connected", "Connect a robot to see what it feels.")
     place = QWidget()
@@ -317,7 +317,7 @@ def test_an_empty_place_that_is_low_says_its_words_without_the_picture(qtbot, th
     assert empty._tile.isVisible()
 
 
-def test_an_empty_place_that_is_very_low_keeps_its_next_step_in_sight(qtbot, theme: Theme) -> None:
+def test_empty_state_in_a_very_low_panel_keeps_its_button_visible(qtbot, theme: Theme) -> None:
     theme.apply()
     step = EmptyAction("New variable", lambda: None)
     words = "A variable keeps a number, a text or a list, and shows here what it is while the program runs."
@@ -339,7 +339,7 @@ def test_an_empty_place_that_is_very_low_keeps_its_next_step_in_sight(qtbot, the
 
 @pytest.mark.parametrize(("ratio", "thick"), [(1.0, 1), (1.25, 1), (1.5, 1), (2.0, 2)])
 @pytest.mark.parametrize("edge", [Qt.Edge.TopEdge, Qt.Edge.BottomEdge, Qt.Edge.LeftEdge, Qt.Edge.RightEdge])
-def test_a_hairline_is_as_thin_at_every_place_and_scale(
+def test_hairline_has_the_same_thickness_at_every_position_and_scale(
     qapp, ratio: float, thick: int, edge: Qt.Edge
 ) -> None:
     for place in range(1, 9):
@@ -358,7 +358,7 @@ def test_a_hairline_is_as_thin_at_every_place_and_scale(
         assert len(across) == thick
 
 
-def test_what_scrolls_takes_the_height_of_longer_words(qtbot) -> None:
+def test_scroll_area_grows_with_longer_text(qtbot) -> None:
     window = QWidget()
     qtbot.addWidget(window)
     words = QLabel("short")
@@ -377,7 +377,7 @@ def test_what_scrolls_takes_the_height_of_longer_words(qtbot) -> None:
     qtbot.waitUntil(lambda: about.height() == before)
 
 
-def test_tab_goes_through_rows_and_not_into_the_window_of_a_dropped_list(qtbot) -> None:
+def test_tab_moves_through_rows_and_not_into_a_combo_box_popup(qtbot) -> None:
     column = ScrollColumn("Rows")
     qtbot.addWidget(column)
     choice = QComboBox()
@@ -388,7 +388,7 @@ def test_tab_goes_through_rows_and_not_into_the_window_of_a_dropped_list(qtbot) 
     assert stops_of(choice) == [choice]
 
 
-def test_a_steady_label_is_laid_out_anew_only_for_more_room(qtbot) -> None:
+def test_steady_label_is_laid_out_again_only_for_wider_text(qtbot) -> None:
     label = SteadyLabel("body", "text")
     qtbot.addWidget(label)
     label.setText("15 fps (15 shown)")

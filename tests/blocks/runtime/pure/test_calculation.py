@@ -84,12 +84,12 @@ def worked_out(name: str, *values: object) -> object:
         ("is_divisible", (1, 0), "“is_divisible” can't divide by 0."),
     ],
 )
-def test_what_is_worked_out(name, values, expected):
+def test_calculation_results(name, values, expected):
     assert worked_out(name, *values) == expected
 
 
 @pytest.mark.parametrize("wrong", [math.nan, math.inf, -math.inf, None, "", "two", [1], {"a": 1}])
-def test_what_is_no_number_is_refused_in_a_sentence(wrong):
+def test_non_number_is_rejected_with_explanation(wrong):
     functions = [name for name in calculation.__all__ if name != "counting"]
     wide = {"mapped": 5, "limited": 3}
     two = ("smaller", "larger", "is_divisible", "rounded_to")
@@ -115,16 +115,16 @@ def test_what_is_no_number_is_refused_in_a_sentence(wrong):
         (LARGE, LARGE + 2, 2, [LARGE, LARGE + 2]),
     ],
 )
-def test_counting(first, last, step, expected):
+def test_counting_range_includes_first_and_last(first, last, step, expected):
     assert list(calculation.counting(first, last, step)) == expected
 
 
-def test_counting_by_nothing_is_told():
+def test_counting_with_step_zero_is_rejected():
     with pytest.raises(BehaviourError, match="“count” needs a step other than 0"):
         calculation.counting(1, 3, 0)
 
 
-def test_the_blocks_run_and_an_error_is_on_its_block():
+def test_number_blocks_run_and_error_names_its_block():
     root = block("numbers_function", "root", FUNCTION="sqrt", NUMBER=number(-4))
     count = block(
         "control_count", VAR={"id": "n"}, FIRST=number(3), LAST=number(1), STEP=number(1),
@@ -139,7 +139,7 @@ def test_the_blocks_run_and_an_error_is_on_its_block():
     )
 
 
-def test_every_choice_of_a_block_reads_well_and_runs():
+def test_every_option_of_a_block_is_readable_and_runs():
     from app.blocks.toolbox.catalogue import Catalogue
 
     known = Catalogue([]).blocks

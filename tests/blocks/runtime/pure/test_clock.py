@@ -13,7 +13,7 @@ from tests.blocks.samples import block, started, text, workspace, write
 MOMENT = datetime.fromisoformat("2026-11-23 07:05:09")
 
 
-def test_parts_of_a_moment():
+def test_date_parts_are_extracted():
     told = {part: clock.part_of_moment(MOMENT, part) for _words, part in PARTS}
     assert told == {
         "year": 2026, "month": 11, "day": 23, "weekday": 1, "day name": "Monday", "hour": 7, "minute": 5,
@@ -41,26 +41,26 @@ PARTS = options()
         ("2026-11-22 14:30:05", "2026-11-22 14:30:05"),
     ],
 )
-def test_moments_are_read_as_people_write_them(written, expected):
+def test_common_date_formats_are_parsed(written, expected):
     assert str(clock.read_moment(written, MOMENT)) == expected
 
 
 @pytest.mark.parametrize(
     "wrong", ["", "soon", "25:00", "2026-13-01", "-1", "0", "18446744073709551615", "nan", "👍"]
 )
-def test_what_is_no_moment_is_told(wrong):
+def test_invalid_date_is_rejected_with_explanation(wrong):
     with pytest.raises(BehaviourError, match="needs a time such as 14:30"):
         clock.read_moment(wrong, MOMENT)
 
 
-def test_seconds_since_now_and_since_what_is_to_come():
+def test_seconds_since_is_positive_for_past_and_negative_for_future():
     moment = str(clock.now("date and time"))
     assert 0 <= clock.seconds_since(moment) < 60
     later = datetime.fromisoformat(moment) + timedelta(days=1)
     assert clock.seconds_since(f"{later:%Y-%m-%d %H:%M:%S}") < 0
 
 
-def test_the_timer_counts_and_is_reset():
+def test_timer_counts_and_resets():
     run = play(
         workspace(
             started(
@@ -78,7 +78,7 @@ def test_the_timer_counts_and_is_reset():
     assert run.runtime.error.block == "since"
 
 
-def test_the_clock_of_scripts_stands_while_paused():
+def test_script_clock_stops_while_paused():
     time_s = [10.0]
     scheduler = Scheduler(lambda: time_s[0])
     began = scheduler.running_s()

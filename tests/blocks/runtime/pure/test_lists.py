@@ -17,7 +17,7 @@ from tests.blocks.samples import block, get, list_of, number, started, text, wor
 FRUITS = list_of(text("apple"), text("pear"), text("fig"))
 
 
-def test_items_are_counted_from_1_and_named_in_words() -> None:
+def test_list_items_are_counted_from_1_and_described_in_words() -> None:
     fruits = lists.new_list("apple", "pear", "fig")
     assert [lists.item(fruits, where) for where in (1, 2.0, "first", "last")] == [
         "apple", "pear", "apple", "fig",
@@ -65,13 +65,13 @@ def test_items_are_counted_from_1_and_named_in_words() -> None:
         ),
     ],
 )  # fmt: skip
-def test_what_a_list_cannot_do_is_said_in_words(act, sentence) -> None:
+def test_invalid_list_operation_is_explained(act, sentence) -> None:
     with pytest.raises(BehaviourError) as caught:
         act()
     assert caught.value.sentence == sentence
 
 
-def test_no_list_is_inside_itself_and_doubling_ends() -> None:
+def test_list_is_copied_when_added_to_itself_and_list_size_is_limited() -> None:
     mine: list[object] = []
     lists.add_item(mine, mine)
     lists.add_item(mine, mine)
@@ -92,7 +92,7 @@ def test_no_list_is_inside_itself_and_doubling_ends() -> None:
 
 @settings(max_examples=300, deadline=None)
 @given(st.lists(st.text(max_size=4)), st.text(min_size=1, max_size=2))
-def test_splitting_undoes_joining(items, between) -> None:
+def test_split_reverses_join(items, between) -> None:
     whole = lists.join_items(items, between)
     assert between.join(map(str, lists.split_text(whole, between))) == whole
 
@@ -104,7 +104,7 @@ operations = st.lists(
 
 @settings(max_examples=500, deadline=None)
 @given(operations)
-def test_changing_a_list_is_what_it_says(steps) -> None:
+def test_list_changes_match_reference_implementation(steps) -> None:
     """Against a reference that counts from 0 and knows no errors."""
     mine: list[object] = []
     reference: list[object] = []
@@ -134,7 +134,7 @@ def test_changing_a_list_is_what_it_says(steps) -> None:
         assert mine == reference
 
 
-def test_a_behaviour_with_lists() -> None:
+def test_behaviour_with_lists_runs() -> None:
     fruits = {"id": "fruits"}
     run = play(
         workspace(
@@ -161,7 +161,7 @@ def test_a_behaviour_with_lists() -> None:
     assert "new_list('apple', 'pear', 'fig')" in run.program.source
 
 
-def test_an_error_in_a_list_names_its_block() -> None:
+def test_error_in_list_names_its_block() -> None:
     gone = block("lists_get", "it", WHERE="number", NUMBER=number(5), LIST=FRUITS)
     run = play(workspace(started(write(gone))))
     assert run.runtime.error is not None
@@ -169,7 +169,7 @@ def test_an_error_in_a_list_names_its_block() -> None:
     assert run.runtime.error.sentence == "The list has only 3 items; it has no item 5."
 
 
-def test_a_gap_that_is_not_there_is_not_missed() -> None:
+def test_hidden_list_slot_is_not_required() -> None:
     first = block("lists_get", WHERE="first", LIST=FRUITS)
     run = play(workspace(started(write(first))))
     assert run.lines == ["apple"]
@@ -177,12 +177,12 @@ def test_a_gap_that_is_not_there_is_not_missed() -> None:
     assert "first item of list of “apple” “pear” “fig”" in readings
 
 
-def test_an_empty_gap_of_a_new_list_is_said() -> None:
+def test_empty_slot_of_new_list_is_reported() -> None:
     run = play(workspace(started(write(list_of() | {"extraState": {"items": 2}}))))
     assert run.program.problems[0].sentence == "list of needs a value. Drag one into its slot."
 
 
-def test_a_list_that_was_put_in_is_a_copy_however_deep() -> None:
+def test_nested_list_is_deep_copied_when_added() -> None:
     inner: list[object] = [1]
     outer = lists.new_list([inner])
     lists.add_item(outer, [[inner]])
@@ -223,7 +223,7 @@ def test_a_list_that_was_put_in_is_a_copy_however_deep() -> None:
         ("is_empty_list", ("",), "This needs a list, not a text."),
     ],
 )
-def test_what_is_worked_out_from_a_list(name, given, expected):
+def test_list_calculation_results(name, given, expected):
     try:
         result = getattr(lists, name)(*given)
     except BehaviourError as error:
@@ -231,7 +231,7 @@ def test_what_is_worked_out_from_a_list(name, given, expected):
     assert (type(result), result) == (type(expected), expected)
 
 
-def test_a_copy_is_another_list():
+def test_copied_list_is_independent():
     inner: list[object] = [1]
     items: list[object] = [inner]
     copied = lists.copy_of(items)
@@ -240,7 +240,7 @@ def test_a_copy_is_another_list():
     assert (items, copied) == ([], [[1]])
 
 
-def test_a_shuffled_list_has_the_same_items_in_another_order():
+def test_shuffled_list_has_same_items_in_another_order():
     items: list[object] = [*range(100)]
     mixed = lists.shuffled(items)
     assert mixed != items

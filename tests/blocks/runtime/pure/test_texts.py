@@ -35,7 +35,7 @@ def worked_out(name: str, *given: object) -> object:
         ("日本", 2),
     ],
 )
-def test_letters_are_those_that_people_see(words, count):
+def test_letters_are_grapheme_clusters(words, count):
     assert values.length(words) == count
     assert "".join(values.letters(words)) == words
 
@@ -104,17 +104,17 @@ def test_letters_are_those_that_people_see(words, count):
         ("has_number", ("",), False),
     ],
 )  # fmt: skip
-def test_what_is_done_with_text(name, given, expected):
+def test_text_operation_results(name, given, expected):
     result = worked_out(name, *given)
     assert (type(result), result) == (type(expected), expected)
 
 
-def test_a_text_does_not_grow_without_end():
+def test_text_length_is_limited():
     with pytest.raises(BehaviourError, match="too long"):
         texts.replaced("a" * 1000, "a", "b" * 2000)
 
 
-def test_the_blocks_run_and_an_error_is_on_its_block():
+def test_text_blocks_run_and_error_names_its_block():
     far = block("texts_letter", "far", WHERE="number", NUMBER=number(9), TEXT=text("Hello"))
     first = block("texts_letter", WHERE="first", NUMBER=number(9), TEXT=text("Ada"))
     run = play(workspace(started(write(first), write(far))))

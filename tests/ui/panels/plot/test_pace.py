@@ -9,13 +9,13 @@ import pytest
 from app.ui.panels.plot.pace import DRAW_EVERY, DRAWING_SHARE, DrawingPace
 
 
-def test_a_quick_drawing_comes_as_often_as_the_plot_moves_on() -> None:
+def test_fast_plot_redraws_as_often_as_it_advances_one_pixel() -> None:
     pace = DrawingPace()
     assert [pace.every(pixel_s) for pixel_s in (0.0, 1 / 15, 0.1, 0.2, 1e9)] == [2, 2, 3, 6, 8]
 
 
 @pytest.mark.parametrize("took_s", [0.004, 0.012, 0.02])
-def test_drawings_take_no_more_than_their_share(took_s: float) -> None:
+def test_drawing_stays_within_its_cpu_share(took_s: float) -> None:
     pace = DrawingPace()
     for _turn in range(100):
         pace.took(took_s)
@@ -24,7 +24,7 @@ def test_drawings_take_no_more_than_their_share(took_s: float) -> None:
     assert pace.every(0.0) <= DRAW_EVERY[1]
 
 
-def test_the_slowest_is_still_drawn_some_times_a_second() -> None:
+def test_slowest_plot_still_redraws_several_times_per_second() -> None:
     pace = DrawingPace()
     for _turn in range(100):
         pace.took(3.0)
@@ -35,7 +35,7 @@ class Canvas:
     painted_s = 0.0
 
 
-def test_what_was_painted_counts_once() -> None:
+def test_paint_time_is_counted_once() -> None:
     pace, canvas = DrawingPace(), Canvas()
     canvas.painted_s = 100.0
     with pace.drawing(canvas):

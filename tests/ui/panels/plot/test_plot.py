@@ -101,14 +101,14 @@ def cell(panel: PlotPanel, name: str, column: str) -> str:
 # -- curves ------------------------------------------------------------------------------------------------
 
 
-def test_with_no_curves_it_says_how_to_get_one(panel, window) -> None:
+def test_plot_without_curves_explains_how_to_add_one(panel, window) -> None:
     assert panel.pages.currentIndex() == 0
     assert window.session.series.topics == ()
     press(button(panel.empty, "Add a curve"))
     assert has_keys(panel.add)
 
 
-def test_a_field_from_elsewhere_is_plotted_and_its_topic_looked_at(panel, window) -> None:
+def test_field_added_by_another_panel_is_plotted_and_its_topic_watched(panel, window) -> None:
     panel.plot_field("/odom", "speed")
     assert window.session.series.topics == ("/odom",)
     assert "/odom" in window.session.watched
@@ -123,7 +123,7 @@ def test_a_field_from_elsewhere_is_plotted_and_its_topic_looked_at(panel, window
     assert panel.pages.currentIndex() == 0
 
 
-def test_what_was_lost_is_a_gap_and_not_a_line(panel) -> None:
+def test_lost_messages_are_a_gap_in_the_curve(panel) -> None:
     show(panel, "/odom.speed")
     send(panel, "/odom", sine(0, 20))
     send(panel, "/odom", sine(40, 60), dropped=400)
@@ -136,7 +136,7 @@ def test_what_was_lost_is_a_gap_and_not_a_line(panel) -> None:
     assert "400 messages lost: gaps" in panel.about.text()
 
 
-def test_a_million_points_are_two_for_each_pixel(panel) -> None:
+def test_million_points_are_reduced_to_two_per_pixel(panel) -> None:
     show(panel, "/odom.speed")
     samples = panel.shown[0].curve.samples
     times = np.arange(1_000_000) / 1000
@@ -149,7 +149,7 @@ def test_a_million_points_are_two_for_each_pixel(panel) -> None:
     assert len(drawn(panel, panel.theme.series(0))) > 0.9 * panel.canvas.area.width()
 
 
-def test_states_have_lanes_and_of_yes_or_no_only_true_is_shown(panel) -> None:
+def test_states_have_lanes_and_booleans_show_only_true(panel) -> None:
     show(panel, "/odom.speed", "/odom.mode", "/odom.on")
     send(panel, "/odom", sine(0, 60))
     panel._changed()
@@ -173,7 +173,7 @@ def test_curves_differ_in_more_than_their_colour(panel) -> None:
     assert [bool(pen.dashPattern()) for pen in pens] == [bool(dash) for dash in DASHES]
 
 
-def test_what_can_not_be_plotted_says_what_was_meant(panel) -> None:
+def test_invalid_field_suggests_the_intended_one(panel) -> None:
     show(panel, "/odom.sped")
     send(panel, "/odom", sine(0, 3))
     look(panel)
@@ -188,7 +188,7 @@ def test_what_can_not_be_plotted_says_what_was_meant(panel) -> None:
 @pytest.mark.parametrize(
     "values", [[1.7e308, -1.7e308], [5e-324, 0], [2**64 - 1, 2**64 - 2], [7, 7], [1e300, 1e300]]
 )
-def test_the_largest_and_smallest_numbers_are_drawn(panel, values) -> None:
+def test_largest_and_smallest_numbers_are_drawn(panel, values) -> None:
     show(panel, "/odom.speed")
     send(panel, "/odom", [(t / 10, {"speed": value}) for t, value in enumerate(values * 20)])
     look(panel)
@@ -199,7 +199,7 @@ def test_the_largest_and_smallest_numbers_are_drawn(panel, values) -> None:
     assert drawn(panel, panel.theme.series(0))
 
 
-def test_a_number_alone_between_two_gaps_is_a_dot(panel) -> None:
+def test_single_value_between_two_gaps_is_drawn_as_a_dot(panel) -> None:
     show(panel, "/odom.speed")
     for begin in (0, 20, 40):
         send(panel, "/odom", [(begin, {"speed": 5})], dropped=3)
@@ -211,7 +211,7 @@ def test_a_number_alone_between_two_gaps_is_a_dot(panel) -> None:
     assert len(places) < 20
 
 
-def test_what_changes_within_a_pixel_is_painted_once(panel) -> None:
+def test_state_changes_within_a_pixel_are_painted_once(panel) -> None:
     show(panel, "/odom.mode")
     send(panel, "/odom", [(t / 100, {"mode": f"step {t}"}) for t in range(6000)])
     panel._changed()
@@ -221,7 +221,7 @@ def test_what_changes_within_a_pixel_is_painted_once(panel) -> None:
     assert wide / 3 < len(boxes) < 2.5 * wide
 
 
-def test_what_is_missing_is_told_below(panel) -> None:
+def test_footer_reports_undecodable_and_discarded_messages(panel) -> None:
     show(panel, "/odom.speed")
     send(panel, "/odom", sine(0, 60))
     bad = Message("/odom", b"{", "json", "json", stamp_ns=panel.session.series.origin_ns, publisher=1)
@@ -235,7 +235,7 @@ def test_what_is_missing_is_told_below(panel) -> None:
 # -- time --------------------------------------------------------------------------------------------------
 
 
-def test_it_follows_what_comes_and_pauses_while_the_data_go_on(panel) -> None:
+def test_plot_follows_new_data_and_pauses_while_data_are_still_recorded(panel) -> None:
     show(panel, "/odom.speed")
     send(panel, "/odom", sine(0, 70))
     look(panel)
@@ -264,7 +264,7 @@ def wheel(panel: PlotPanel, steps: int, modifiers=Qt.KeyboardModifier.NoModifier
     look(panel)
 
 
-def test_the_wheel_zooms_time_and_with_ctrl_values(panel) -> None:
+def test_wheel_zooms_the_time_axis_and_ctrl_wheel_the_value_axis(panel) -> None:
     show(panel, "/odom.speed")
     send(panel, "/odom", sine(0, 70))
     look(panel)
@@ -298,7 +298,7 @@ def drag(widget: QWidget, begin: QPointF, end: QPointF) -> None:
         QApplication.sendEvent(widget, QMouseEvent(kind, at, widget.mapToGlobal(at), which, held, nothing))
 
 
-def test_a_drag_moves_and_stays_there(panel) -> None:
+def test_drag_pans_the_plot_and_pauses_following(panel) -> None:
     show(panel, "/odom.speed")
     send(panel, "/odom", sine(0, 70))
     look(panel)
@@ -309,7 +309,7 @@ def test_a_drag_moves_and_stays_there(panel) -> None:
     assert panel.freeze.isChecked()
 
 
-def test_zooming_never_leaves_what_numbers_can_say() -> None:
+def test_zoom_stays_within_the_range_of_floats() -> None:
     view = TimeView()
     for factor in (1e-30, 1e30, 1e30, 1e-5):
         view.zoom(factor, 5.0, view.shown(0.0, 10.0))
@@ -325,7 +325,7 @@ def test_zooming_never_leaves_what_numbers_can_say() -> None:
 # -- A and B -----------------------------------------------------------------------------------------------
 
 
-def test_a_and_b_by_the_mouse_and_the_keys(panel) -> None:
+def test_cursors_a_and_b_are_moved_by_mouse_and_keys(panel) -> None:
     show(panel, "/odom.speed", "/odom.mode")
     send(panel, "/odom", sine(0, 60))
     look(panel)
@@ -358,7 +358,7 @@ def test_a_and_b_by_the_mouse_and_the_keys(panel) -> None:
 # -- the table ---------------------------------------------------------------------------------------------
 
 
-def test_the_eye_hides_and_the_menu_changes_axis_and_colour(panel, window) -> None:
+def test_eye_icon_hides_a_curve_and_its_menu_changes_axis_and_colour(panel, window) -> None:
     show(panel, "/odom.speed", "/odom.turn")
     send(panel, "/odom", [(t, {"speed": 1, "turn": 1000 + t}) for t in range(50)])
     look(panel)
@@ -387,7 +387,7 @@ def test_the_eye_hides_and_the_menu_changes_axis_and_colour(panel, window) -> No
     assert [(each.name, each.right, each.look.colour) for each in panel.shown][1] == ("/odom.turn", True, 3)
 
 
-def test_the_plots_keys_work_in_the_table_too(panel) -> None:
+def test_plot_keys_work_in_the_table_too(panel) -> None:
     show(panel, "/odom.speed")
     look(panel)
     panel.table.setFocus()
@@ -407,7 +407,7 @@ def test_the_plots_keys_work_in_the_table_too(panel) -> None:
         (12345, "12\u2009345"), (4.2e-7, f"4.2e{MINUS}07"), (10**400, "∞"), ([1], ""),
     ],
 )  # fmt: skip
-def test_values_in_the_table(value, words) -> None:
+def test_table_shows_the_values_of_the_curves(value, words) -> None:
     assert value_words(value) == words
 
 
@@ -425,7 +425,7 @@ def adding(panel, window, qtbot) -> PlotPanel:
     return panel
 
 
-def test_fields_are_offered_with_their_values_and_taken_by_enter(adding, window) -> None:
+def test_fields_are_suggested_with_values_and_accepted_by_enter(adding, window) -> None:
     panel = adding
     assert "/odom" in window.session.watched
     QTest.keyClicks(panel.add, "pos")
@@ -456,7 +456,7 @@ def test_tab_completes_to_the_next_dot(adding) -> None:
     assert panel.add.text() == "mean(/odom.speed"
 
 
-def test_what_is_calculated_is_typed_and_all_elements_are_added_at_once(adding, window) -> None:
+def test_expression_is_accepted_and_all_array_elements_are_added_at_once(adding, window) -> None:
     panel = adding
     QTest.keyClicks(panel.add, "/odom.speed * 2")
     QTest.keyClick(panel.add, Qt.Key.Key_Return)
@@ -470,7 +470,7 @@ def test_what_is_calculated_is_typed_and_all_elements_are_added_at_once(adding, 
     assert panel.shown[0].curve.samples.values.tolist() == [6.0]
 
 
-def test_a_typing_error_stays_with_what_was_meant(adding) -> None:
+def test_typing_error_stays_in_the_field_with_a_suggestion(adding) -> None:
     panel = adding
     panel.add.setText("/odon.speed + 1")
     QTest.keyClick(panel.add, Qt.Key.Key_Return)
@@ -481,7 +481,7 @@ def test_a_typing_error_stays_with_what_was_meant(adding) -> None:
     assert panel.add.text() == ""
 
 
-def test_pictures_are_not_subscribed_to_find_numbers_in_them(adding, window) -> None:
+def test_image_topics_are_not_subscribed_to_find_numeric_fields(adding, window) -> None:
     codecs = {
         window.session.topics[name].codec for name in window.session.watched if name in window.session.topics
     }
@@ -493,7 +493,7 @@ def test_pictures_are_not_subscribed_to_find_numbers_in_them(adding, window) -> 
 # -- from elsewhere ----------------------------------------------------------------------------------------
 
 
-def test_a_field_travels_in_the_hand() -> None:
+def test_field_is_added_by_drag_and_drop() -> None:
     data = field_in_hand("ros2 /odom", 'pose["first name"]')
     assert dropped_field(data) == ("ros2 /odom", 'pose["first name"]')
     assert data.text() == 'ros2 /odom.pose["first name"]'
@@ -503,7 +503,7 @@ def test_a_field_travels_in_the_hand() -> None:
     assert dropped_field(data) is None
 
 
-def test_a_topic_of_which_nobody_knows_a_field_is_asked_for(panel) -> None:
+def test_topic_without_known_fields_prompts_for_the_field(panel) -> None:
     panel.plot_field("/odom", "")
     assert panel.add.text() == "/odom."
     QTest.keyClicks(panel.add, "x")
@@ -513,7 +513,7 @@ def test_a_topic_of_which_nobody_knows_a_field_is_asked_for(panel) -> None:
 # -- one over another --------------------------------------------------------------------------------------
 
 
-def test_the_second_curve_over_the_first(panel) -> None:
+def test_second_curve_is_plotted_over_the_first(panel) -> None:
     show(panel, "/odom.x", "/odom.y")
     angles = np.linspace(0, 6, 300).tolist()
     send(panel, "/odom", [(a * 5, {"x": float(np.cos(a)), "y": float(np.sin(a))}) for a in angles])
@@ -536,7 +536,7 @@ def test_the_second_curve_over_the_first(panel) -> None:
 @pytest.mark.parametrize(
     "values", [[1.7e308, -1.7e308], [5e-324, 0], [2**64 - 1, 2**64 - 2], [7, 7], [1e300, 1e300], [10**400, 1]]
 )
-def test_the_largest_and_smallest_numbers_are_drawn_over_each_other(panel, values) -> None:
+def test_largest_and_smallest_numbers_are_drawn_in_xy_mode(panel, values) -> None:
     show(panel, "/odom.x", "/odom.y")
     rows = [(t / 10, {"x": value, "y": value}) for t, value in enumerate(values * 20)]
     send(panel, "/odom", rows)
@@ -554,7 +554,7 @@ def test_the_largest_and_smallest_numbers_are_drawn_over_each_other(panel, value
 # -- kept, exported ----------------------------------------------------------------------------------------
 
 
-def test_a_layout_brings_it_back_also_when_the_topics_are_not_there(qtbot, panel, window) -> None:
+def test_layout_restores_the_plot_even_if_topics_are_missing(qtbot, panel, window) -> None:
     show(panel, "/odom.speed", "/odom.speed - /cmd.linear", right=True)
     panel.shown[0].hidden = True
     panel._choose_span("300")
@@ -580,7 +580,7 @@ def test_a_layout_brings_it_back_also_when_the_topics_are_not_there(qtbot, panel
      {"curves": [{"topic": "/a", "path": "b", "colour": "x", "pattern": -3, "right": 7}]},
      {"span": "x"}, {"span": float("inf")}, {"span": -1}, {"curves": None, "across": 3}],
 )  # fmt: skip
-def test_a_damaged_layout_leaves_a_plot_that_works(panel, state) -> None:
+def test_damaged_layout_leaves_a_working_plot(panel, state) -> None:
     panel.restore_state(state)
     show(panel, "/odom.speed")
     send(panel, "/odom", sine(0, 5))
@@ -588,7 +588,7 @@ def test_a_damaged_layout_leaves_a_plot_that_works(panel, state) -> None:
     assert panel.points.text().startswith("100 points")
 
 
-def test_numbers_pictures_and_drawings_are_exported(qtbot, panel, window, tmp_path: Path) -> None:
+def test_data_images_and_svg_are_exported(qtbot, panel, window, tmp_path: Path) -> None:
     show(panel, "/odom.speed", "/odom.mode")
     send(panel, "/odom", sine(0, 100))
     panel._changed()
@@ -610,7 +610,7 @@ def test_numbers_pictures_and_drawings_are_exported(qtbot, panel, window, tmp_pa
     assert window.toasts[-1] == "Exported a.svg"
 
 
-def test_what_can_not_be_written_is_told(qtbot, panel, window, tmp_path: Path) -> None:
+def test_export_that_cannot_be_written_is_reported(qtbot, panel, window, tmp_path: Path) -> None:
     show(panel, "/odom.speed")
     look(panel)
     (tmp_path / "file").write_text("x")
@@ -625,7 +625,7 @@ def test_what_can_not_be_written_is_told(qtbot, panel, window, tmp_path: Path) -
     ]
 
 
-def test_a_name_is_copied(panel, window) -> None:
+def test_curve_name_is_copied(panel, window) -> None:
     show(panel, "/odom.speed")
     menu = panel.table.menu_of(panel.shown[0])
     next(action for action in menu.actions() if action.text() == "Copy name").trigger()
