@@ -136,7 +136,7 @@ class MasterServer:
         self._submitted.append(submission)
         self._waker.wake()
         if not submission.done.wait(timeout_s):
-            raise WaitTimeoutError("an answer of the master", timeout_s)
+            raise WaitTimeoutError(_("a reply from the master"), timeout_s)
         if submission.reply is None:
             raise ClosedError(f"the master at '{self.address}'")
         return submission.reply

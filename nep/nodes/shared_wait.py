@@ -8,6 +8,7 @@ from contextlib import suppress
 
 from nep.backends.base import SubscriberTransport
 from nep.errors import TooManyFilesError
+from nep.i18n import _
 from nep.system.descriptors import is_lack, limit, opened
 from nep.system.wakeup import Waker
 
@@ -43,7 +44,7 @@ class SharedWait:
         except OSError as error:
             self._waker.close()
             if is_lack(error.errno):
-                raise TooManyFilesError("a thread that waits", opened(), limit()) from error
+                raise TooManyFilesError(_("a waiting thread"), opened(), limit()) from error
             raise
         self._selector.register(self._waker.fd, selectors.EVENT_READ)
         self._armed: dict[SubscriberTransport, _ReadyCallback] = {}

@@ -150,7 +150,7 @@ def check_topic(topic: str) -> str:
     try:
         size = len(topic.encode("utf-8"))
     except UnicodeEncodeError:
-        raise BadTopicError(ascii(topic), _("it is not valid Unicode text")) from None
+        raise BadTopicError(ascii(topic)[1:-1], _("it is not valid Unicode text")) from None
     if not 1 <= size <= TOPIC_MAX_BYTES:
         raise BadTopicError(
             topic, _("it has {size} bytes; 1 to {most} are allowed").format(size=size, most=TOPIC_MAX_BYTES)

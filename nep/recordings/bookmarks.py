@@ -102,7 +102,9 @@ class Bookmarks:
 
     def _index_of(self, bookmark: Bookmark) -> int:
         if bookmark not in self._saved:
-            raise ValueError(_("a note made during the recording can't be changed"))
+            raise ValueError(
+                _("this bookmark was removed, or made during the recording, and can't be changed")
+            )
         return self._saved.index(bookmark)
 
     # ---- on the disk
@@ -125,7 +127,9 @@ class Bookmarks:
         try:
             text = orjson.dumps(plain, option=orjson.OPT_INDENT_2)
         except TypeError as error:  # a lone surrogate
-            raise RecordingError(str(self.path), _("the name contains invalid characters")) from error
+            raise RecordingError(
+                str(self.path), _("the name of a bookmark contains invalid characters")
+            ) from error
         try:
             if self._is_damaged:
                 replace_file(self.path, self.path.with_name(f"{self.path.name}.damaged"))

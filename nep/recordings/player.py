@@ -203,7 +203,9 @@ class Playback:
             start_ns = max(start_ns, self._recording.start_ns)
             end_ns = min(end_ns, self._recording.end_ns)
             if start_ns >= end_ns:
-                raise ValueError(_("the part to repeat is empty"))
+                raise ValueError(
+                    _("the start is not before the end of the part, or lies outside the recording")
+                )
             self._loop = (start_ns, end_ns)
             if not start_ns <= self._position_ns <= end_ns:
                 self.seek(start_ns)

@@ -275,7 +275,7 @@ class FlightRecorder:
             ValueError: `seconds` is not positive.
         """
         if not 0.0 < seconds < _MAX_SECONDS:
-            raise ValueError(_("the duration and the size of the flight recorder must be above 0"))
+            raise ValueError(_("the duration must be above 0 and finite"))
         target = Path(path)
         if not self._writer.flush():
             raise RecordingError(str(target), self._writer.problem or _("the disk does not respond"))

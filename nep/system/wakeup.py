@@ -9,6 +9,7 @@ import sys
 import threading
 
 from nep.errors import TooManyFilesError
+from nep.i18n import _
 from nep.system.descriptors import is_lack, limit, opened
 from nep.system.forks import watch
 
@@ -35,7 +36,7 @@ class Waker:
                 self._ends = socket.socketpair()
         except OSError as error:
             if is_lack(error.errno):
-                raise TooManyFilesError("a thread that waits", opened(), limit()) from error
+                raise TooManyFilesError(_("a waiting thread"), opened(), limit()) from error
             raise
         for end in self._ends:
             end.setblocking(False)

@@ -69,7 +69,7 @@ def typesys(load: Callable[[str], ModuleType] = importlib.import_module) -> Any:
 def _unavailable() -> BackendUnavailableError:
     if sys.platform != "darwin" and platform.machine().lower() not in _MACHINES_WITH_WHEELS:
         needs = _(
-            "Cyclone DDS has no wheel for '{machine}'; build 'cyclonedds' 11 on that computer and "
+            "Cyclone DDS has no wheel for '{machine}'; build 'cyclonedds' 11 on this computer and "
             "install 'rosbags'"
         )
         return BackendUnavailableError("ros2", needs.format(machine=platform.machine()))

@@ -217,7 +217,11 @@ class MessageTypes:
         wide = _(
             "'{name}' has the field '{field}' of type wstring, which 'ros2' does not support; use a string"
         )
-        unknown = _("'{name}' uses the unknown type '{kind}' for its field '{field}'; add that type, too")
+        unknown = _(
+            "'{name}' uses the type '{kind}' for its field '{field}', which is unknown or not "
+            "supported; "
+            "add that type, too"
+        )
         return {
             name: NepError(
                 (wide if field.kind.endswith(f"/{_WIDE}") else unknown).format(

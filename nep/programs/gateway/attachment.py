@@ -167,7 +167,7 @@ class NativeNetwork:
             if image_codec.raw_layout((created.extension or {}).get("encoding")) is not None:
                 raise EncodeError(
                     "image",
-                    "picture",
+                    "array",
                     _("they support only JPEG and PNG, which can't store this number type"),
                 )
             return created.data

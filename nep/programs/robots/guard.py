@@ -219,7 +219,7 @@ def refusal_words(topic: str, robots: Sequence[str], allowed: Collection[str]) -
     is_named = missing != [topic] and len(names) <= _MAX_NAMES_SHOWN
     options = " ".join(f"--allow-moving {shlex.quote(each)}" for each in (names if is_named else [shown]))
     if missing == [topic]:
-        said = _("'{topic}' moves a robot; make sure that nobody is in its way, then add {options}")
+        said = _("'{topic}' moves a robot; make sure that nobody is in the way, then add {options}")
         return said.format(topic=shown, options=options)
     robots = names[:_MAX_NAMES_SHOWN] + ["…"] * (len(names) > _MAX_NAMES_SHOWN)
     said = _("'{topic}' moves {robots}; make sure that nobody is in the way, then add {options}")

@@ -347,7 +347,7 @@ class WebServer:
         if error.errno == errno.EADDRINUSE:
             return AddressInUseError(address)
         if error.errno is not None and is_lack(error.errno):
-            return TooManyFilesError("a web server", opened(), limit())
+            return TooManyFilesError(_("a web server"), opened(), limit())
         if isinstance(error, PermissionError):
             return NepError(
                 _("port {port} needs administrator rights; choose a port above 1023").format(

@@ -58,7 +58,7 @@ const WORDS: Readonly<Record<string, string>> = {
   BLOCK_LABEL_BEGIN_STACK: lazy('Start of a stack'),
   BLOCK_LABEL_COLLAPSED: lazy('collapsed'),
   BLOCK_LABEL_CONTAINER: lazy('contains other blocks'),
-  BLOCK_LABEL_DISABLED: lazy('off'),
+  BLOCK_LABEL_DISABLED: lazy('disabled'),
   BLOCK_LABEL_HAS_BRANCHES: lazy('has %1 branches'),
   BLOCK_LABEL_HAS_INPUT: lazy('has a slot'),
   BLOCK_LABEL_HAS_INPUTS: lazy('has slots'),

@@ -133,7 +133,7 @@ export function registerMenu(clipboard: Clipboard): void {
     when: (it) => own(it) && it.block!.isDeletable(), run: (it) => remove(it.block!)});
 
   Blockly.ShortcutRegistry.registry.register({
-    name: SWITCH, keyCodes: [ctrl(Blockly.utils.KeyCodes.E)], displayText: () => t('Disable block'),
+    name: SWITCH, keyCodes: [ctrl(Blockly.utils.KeyCodes.E)], displayText: () => t('Disable or enable the block'),
     preconditionFn: (workspace) => !workspace.isDragging() && !workspace.isFlyout,
     callback: () => {
       const it = focusedBlock();

@@ -231,7 +231,7 @@ export class FindBar {
   private show(): void {
     this.found.forEach((block, number) => block.getSvgRoot()?.classList.toggle('nepFoundNow', number === this.at));
     this.count.textContent = !this.words.value.trim() ? '' :
-      this.found.length ? t('{number} of {count}', {number: this.at + 1, count: this.found.length}) : t('none');
+      this.found.length ? t('{number} of {count}', {number: this.at + 1, count: this.found.length}) : t('No results');
     this.bar.classList.toggle('none', Boolean(this.words.value.trim()) && !this.found.length);
   }
 }
