@@ -19,7 +19,7 @@ from xdist.workermanage import WorkerController
 
 from nep.masters.master import Master
 from nep.text import escaped
-from tests import leftovers
+from tests import leftovers, long_groups
 from tests.nep.programs import GREETINGS_S
 
 gc.disable()  # until all tests are read: what is made meanwhile stays
@@ -80,8 +80,12 @@ LONG_S = {
 }
 """... and files that take longer than so many tests would. Speed alone depends on it."""
 _GRACE_S = 20.0
+_GRACE_AFTER_LEAK_S = 1.0
 _PAST_TIMEOUT_S = 60.0
+_SKIPPED = "skipped_groups"
+_selection = pytest.StashKey[tuple[tuple[str, ...], str | None]]()
 _allowances = leftovers.Allowances()
+_grace = leftovers.Grace(_GRACE_S, _GRACE_AFTER_LEAK_S)
 
 
 def may_take(worker: str, workers: int, processors: int, scope: str) -> bool:
@@ -144,11 +148,12 @@ class ByFile(LoadScopeScheduling):
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:
-    """``--driver FILE``: the drivers of this file, too. ``--long``: what takes long, too."""
+    """Add ``--driver FILE`` (test the drivers of this file, too) and ``--long`` (run all tests)."""
     told = "a driver of yours to hold tests/robots/driver/test_contract.py against (may be given again)"
-    parser.addoption(
-        "--long", action="store_true", help="let faults last, one after the other; also what is marked long"
+    told_long = (
+        "run all tests: also those marked long, the groups of tests/long_groups.py, and each fault alone"
     )
+    parser.addoption("--long", action="store_true", help=told_long)
     parser.addoption("--driver", action="append", default=[], metavar="FILE", help=told)
     told = "the same for a driver program in any language, by its command (docs/write-a-driver.md)"
     parser.addoption("--driver-command", action="append", default=[], metavar="COMMAND", help=told)
@@ -158,12 +163,42 @@ def pytest_addoption(parser: pytest.Parser) -> None:
             parser.addini(name, "an option of pytest-qt, which is not here", type="linelist")
 
 
+def _selected(config: pytest.Config) -> tuple[tuple[str, ...], str | None]:
+    """Return the names of skipped groups, and the revision that the files were compared with."""
+    if _selection not in config.stash:
+        if config.getoption("--long"):
+            config.stash[_selection] = ((), None)
+        else:
+            changes = long_groups.changes()
+            given = long_groups.relative_arguments(config.args, config.invocation_params.dir)
+            config.stash[_selection] = (long_groups.skipped_groups(changes.paths, given), changes.base)
+    return config.stash[_selection]
+
+
+def pytest_configure_node(node: WorkerController) -> None:
+    """Pass the skipped groups to a worker: each must collect the same tests, also when a file changes."""
+    node.workerinput[_SKIPPED] = _selected(node.config)[0]
+
+
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
-    """What is marked "long" runs only when it is asked for: the whole suite has little time."""
+    """Deselect tests that are marked "long" and those of skipped groups, unless ``--long`` is given."""
     if config.getoption("--long"):
         return
-    config.hook.pytest_deselected(items=[each for each in items if each.get_closest_marker("long")])
-    items[:] = [each for each in items if each.get_closest_marker("long") is None]
+    worker = getattr(config, "workerinput", None)
+    skipped = _selected(config)[0] if worker is None else worker[_SKIPPED]
+    long = {
+        item
+        for item in items
+        if item.get_closest_marker("long") or long_groups.is_skipped(item.nodeid, skipped)
+    }
+    config.hook.pytest_deselected(items=[item for item in items if item in long])
+    items[:] = [item for item in items if item not in long]
+
+
+def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter, config: pytest.Config) -> None:
+    """Name the skipped groups of long tests, and how to run them."""
+    if line := long_groups.report(*_selected(config)):
+        terminalreporter.write_line(line)
 
 
 def pytest_collection_finish() -> None:
@@ -187,18 +222,20 @@ def pytest_runtest_makereport() -> Generator[None, pytest.TestReport, pytest.Tes
 
 
 @pytest.fixture(autouse=True)
-def _nothing_is_left() -> Iterator[None]:
-    """Fails a test that leaves a thread, a socket, a pipe or a file behind (0.4 ms a test)."""
+def _nothing_is_left(request: pytest.FixtureRequest) -> Iterator[None]:
+    """Fail a test that leaves a thread, a socket, a pipe or a file open (0.4 ms per test)."""
     threads, open_before = leftovers.threads(), leftovers.descriptors()
     yield
-    deadline = time.monotonic() + _GRACE_S
+    deadline = time.monotonic() + _grace.seconds(request.path)
     for thread in leftovers.threads() - threads:
         thread.join(max(0.0, deadline - time.monotonic()))
     left = sorted(thread.name for thread in leftovers.threads() - threads)
     if left:
+        _grace.add_leak(request.path)
         pytest.fail(f"threads are left behind: {left}")
     refused = _allowances.refused(open_before, deadline)
     if refused:
+        _grace.add_leak(request.path)
         pytest.fail(f"descriptors are left behind: {refused}")
 
 

@@ -96,6 +96,26 @@ def _is_unnamed(family: str, address: object) -> bool:
     return family == "AF_NETLINK" or (family == "AF_UNIX" and (not address or bool(chosen)))
 
 
+class Grace:
+    """Time for threads to end and descriptors to close after a test: short once a test of the file leaked.
+
+    A leak costs the whole grace, and one mistake often makes all tests of a file leak.
+    """
+
+    def __init__(self, first_s: float, later_s: float) -> None:
+        self._first_s = first_s
+        self._later_s = min(first_s, later_s)
+        self._leaky: set[Path] = set()
+
+    def seconds(self, file: Path) -> float:
+        """Return the grace for the next test of a file."""
+        return self._later_s if file in self._leaky else self._first_s
+
+    def add_leak(self, file: Path) -> None:
+        """Note that a test of the file leaked."""
+        self._leaky.add(file)
+
+
 class Allowances:
     """What may be there after a test that was not before it. One for each process of tests."""
 

@@ -9,6 +9,8 @@ from pathlib import Path
 
 import pytest
 
+from tests.leftovers import Grace
+
 ROOT = Path(__file__).parents[1]
 
 INNER = """
@@ -107,3 +109,11 @@ def test_leftover_resource_fails_the_test_that_created_it(report: str, test: str
 def test_clean_tests_and_library_resources_pass(report: str, test: str) -> None:
     assert f"PASSED test_inner.py::{test}\n" in report
     assert f"ERROR test_inner.py::{test} " not in report
+
+
+def test_grace_is_short_after_the_first_leak_of_a_file() -> None:
+    grace = Grace(20.0, 1.0)
+    leaky, tidy = Path("test_leaky.py"), Path("test_tidy.py")
+    assert grace.seconds(leaky) == 20.0
+    grace.add_leak(leaky)
+    assert (grace.seconds(leaky), grace.seconds(tidy)) == (1.0, 20.0)

@@ -1,0 +1,220 @@
+"""Groups of tests that run only with ``--long``, or when files that they depend on have changed.
+
+A group runs when a file of its tests or its sources differs from the last release, is changed in the working
+tree or is new; or when the command line names its tests. Without a release tag, the comparison is with the
+branch point from ``main`` or, on ``main``, with the parent commit. A shallow clone may have neither: then no
+group runs. CI runs all groups nightly with ``--long`` (.github/workflows/ci.yml).
+
+Each group leaves at least one quick test of its area in every run.
+"""
+
+from __future__ import annotations
+
+import subprocess
+from collections.abc import Iterable, Sequence
+from pathlib import Path
+from typing import NamedTuple
+
+ROOT = Path(__file__).resolve().parents[1]
+_MAIN = ("origin/HEAD", "origin/main", "main")
+_GIT_TIMEOUT_S = 30.0
+
+
+class Group(NamedTuple):
+    """A group of long tests.
+
+    Attributes:
+        name: Name shown to the developer.
+        tests: Prefixes of the paths of its tests; ``path::part``: only node IDs that contain the part.
+        sources: Prefixes of other paths that the tests depend on.
+        quick: Prefixes of the paths of tests that run always.
+    """
+
+    name: str
+    tests: tuple[str, ...]
+    sources: tuple[str, ...]
+    quick: tuple[str, ...] = ()
+
+    @property
+    def files(self) -> tuple[str, ...]:
+        """Prefixes of the paths of the test files."""
+        return tuple(prefix.partition("::")[0] for prefix in self.tests)
+
+    def includes(self, node_id: str) -> bool:
+        """Return True for a test of the group."""
+        return not node_id.startswith(self.quick) and any(
+            node_id.startswith(path) and part in node_id
+            for path, _, part in (prefix.partition("::") for prefix in self.tests)
+        )
+
+
+GROUPS = (
+    Group(
+        "films",  # every run has the film of test_path_mouse.py
+        tests=("tests/e2e/test_hour_mouse.py", "tests/e2e/test_hour_keys.py", "tests/e2e/test_path_keys.py"),
+        sources=("tests/e2e/film.py", "tests/e2e/fingers.py", "tests/e2e/hour.py"),
+    ),
+    Group(
+        "ROS 2",  # every run has the contract of back ends over Cyclone DDS: test_ros2.py[test_contract.py-]
+        tests=("tests/nep/backends/test_ros2.py::[ros2_", "tests/nep/bridges/test_ros2_bridge.py"),
+        sources=(
+            "nep/backends/ros2/",
+            "nep/backends/base.py",
+            "nep/backends/typed_services.py",
+            "nep/programs/bridges/",
+            "tests/nep/backends/cyclone_service_peer.py",
+            "tests/nep/backends/dust_",
+            "tests/nep/backends/fastdds_peer.cpp",
+            "tests/nep/backends/ros2_",
+            "tests/nep/backends/test_contract",
+            "tests/nep/bridges/joined.py",
+            "tests/nep/bridges/ros2_",
+        ),
+    ),
+    Group(
+        "interop",  # every run has tests/interop/gateway and the programs of test_javascript.py
+        tests=(
+            "tests/interop/test_matrix.py",
+            "tests/interop/test_pictures.py",
+            "tests/interop/test_programs.py",
+            "tests/interop/test_services.py",
+            "tests/interop/test_under_attack.py",
+            "tests/e2e/test_rize.py",
+        ),
+        sources=(
+            "nep/backends/zeromq/",
+            "nep/masters/",
+            "nep/messages/",
+            "nep/programs/gateway/",
+            "nep/protocol/",
+            "tests/interop/",
+        ),
+    ),
+    Group(
+        "soak",
+        tests=("tests/e2e/test_soak.py",),
+        sources=(
+            "app/core/messages/",
+            "app/core/network/",
+            "app/core/series/",
+            "app/ui/pictures/",
+            "bench/soak.py",
+            "bench/studio_window.py",
+            "nep/backends/zeromq/",
+        ),
+    ),
+    Group(
+        "high DPI",  # every run has tests/ui/theme/test_text_sizes.py
+        tests=("tests/ui/theme/test_high_dpi.py",),
+        sources=(
+            "app/ui/shell/",
+            "app/ui/theme/",
+            "app/ui/widgets/",
+            "tests/ui/clipping.py",
+            "tests/ui/theme/",
+        ),
+    ),
+    Group(
+        "layout permutations",
+        tests=("tests/ui/shell/test_layout_orders.py",),
+        sources=("app/ui/panels/base.py", "app/ui/panels/registry.py", "app/ui/shell/"),
+    ),
+    Group(
+        "installers",
+        tests=("tests/installers/",),
+        sources=("dev.py", "installers/", "pyproject.toml", "requirements/", "tests/test_installers.py"),
+        quick=("tests/installers/test_contents.py",),
+    ),
+)
+
+
+class Changes(NamedTuple):
+    """Paths of changed files, and the revision that they are compared with; None when it is unknown."""
+
+    base: str | None
+    paths: frozenset[str] = frozenset()
+
+
+def changes(root: Path = ROOT) -> Changes:
+    """Return the files of the working tree that differ from the last release or its replacement."""
+    base = _base(root)
+    changed = _git(root, "diff", "--name-only", "--no-renames", "-z", base, "--") if base else None
+    new = _git(root, "ls-files", "--others", "--exclude-standard", "-z")
+    if changed is None or new is None:
+        return Changes(None)
+    return Changes(base, frozenset(filter(None, f"{changed}\0{new}".split("\0"))))
+
+
+def _base(root: Path) -> str | None:
+    parent = _git(root, "rev-parse", "--verify", "--quiet", "HEAD^")
+    if not parent:
+        return None
+    # From the parent: the commit of a release is itself compared with the release before it.
+    if tag := _git(root, "describe", "--tags", "--abbrev=0", "--match=v[0-9]*", parent):
+        return tag
+    head = _git(root, "rev-parse", "HEAD")
+    for main in _MAIN:
+        base = _git(root, "merge-base", "HEAD", main)
+        if base and base != head:
+            return base[:12]
+    return parent[:12]
+
+
+def _git(root: Path, *arguments: str) -> str | None:
+    # None when git is missing or fails, as outside a repository.
+    try:
+        done = subprocess.run(
+            ["git", *arguments],
+            cwd=root,
+            capture_output=True,
+            encoding="utf-8",
+            errors="surrogateescape",
+            timeout=_GIT_TIMEOUT_S,
+            check=False,
+        )
+    except (OSError, subprocess.TimeoutExpired):
+        return None
+    return done.stdout.strip() if done.returncode == 0 else None
+
+
+def skipped_groups(changed: Iterable[str], arguments: Sequence[str] = ("tests",)) -> tuple[str, ...]:
+    """Return the names of groups to skip, in the order of `GROUPS`.
+
+    Args:
+        changed: Paths of changed files, relative to the repository.
+        arguments: Files, folders or node IDs given to pytest, relative to the repository. Groups outside of
+            them are omitted, and so are those whose tests they name.
+    """
+    paths = tuple(changed)
+    return tuple(
+        group.name
+        for group in GROUPS
+        if not any(path.startswith((*group.sources, *group.files)) for path in paths)
+        and any(name.startswith(argument) for argument in arguments for name in group.files)
+        and not any(argument.startswith(group.files) for argument in arguments)
+    )
+
+
+def relative_arguments(arguments: Iterable[str], folder: Path) -> tuple[str, ...]:
+    """Return pytest's arguments, given in `folder`, relative to the repository; "" is the repository."""
+    found = []
+    for argument in arguments:
+        path, separator, test = argument.partition("::")
+        full = (folder / path).resolve()
+        if full.is_relative_to(ROOT):
+            relative = full.relative_to(ROOT).as_posix().removeprefix(".")
+            found.append(f"{relative}{'/' if relative and full.is_dir() else ''}{separator}{test}")
+    return tuple(found)
+
+
+def is_skipped(node_id: str, skipped: Sequence[str]) -> bool:
+    """Return True for a test that belongs to a skipped group."""
+    return any(group.name in skipped and group.includes(node_id) for group in GROUPS)
+
+
+def report(skipped: Sequence[str], base: str | None) -> str:
+    """Return the line that names the skipped groups and how to run them; "" when all run."""
+    if not skipped:
+        return ""
+    reason = f"unchanged since {base}" if base else "changed files unknown in this clone"
+    return f"Skipped ({reason}): {', '.join(skipped)}. To run all tests: python3 dev.py test -- --long"
