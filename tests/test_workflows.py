@@ -89,6 +89,14 @@ def test_ci_runs_the_readme_command_on_three_systems_with_oldest_and_newest_pyth
     assert [runner.partition("-")[0] for runner in matrix["runner"]] == ["windows", "macos", "ubuntu"]
 
 
+def test_all_tests_run_nightly() -> None:
+    ci = workflow("ci")
+    nightly = ci["jobs"]["nightly"]
+    assert "schedule" in ci["on"]
+    assert "schedule" in nightly["if"]
+    assert nightly["steps"][-1]["run"] == "python dev.py test -- --long"
+
+
 # ---- the steps, run here --------------------------------------------------------------------------
 
 
