@@ -14,13 +14,13 @@ import hypothesis
 import pytest
 from _pytest.faulthandler import fault_handler_stderr_fd_key
 from xdist.remote import Producer
-from xdist.scheduler import LoadScopeScheduling
 from xdist.workermanage import WorkerController
 
 from nep.masters.master import Master
 from nep.text import escaped
 from tests import leftovers, long_groups
 from tests.nep.programs import GREETINGS_S
+from tests.scheduler import FileScheduling
 
 gc.disable()  # until all tests are read: what is made meanwhile stays
 if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
@@ -36,49 +36,6 @@ hypothesis.settings.register_profile(
 hypothesis.settings.load_profile("nep")
 pytest.register_assert_rewrite("tests.robots.whose_words_count")  # a contract: others hold to it
 os.environ["NEP_LANG"] = "en"  # what tests read is English, also on a computer that is set to something else
-WITH_FIXED_PORTS = ("tests/interop/", "tests/e2e/test_rize.py")
-MOSTLY_WAITING = ("tests/nep/", "tests/clients/", "tests/core/", "tests/robots/", "tests/blocks/")
-"""They open no window, and wait for timeouts and other processes for two thirds of their time and more."""
-USUAL_S, USUAL_OF_STUDIO_S = 0.2, 12.0
-"""What a test takes, all in all, and one that starts Studio, ..."""
-LONG_S = {
-    "ports": 200.0,
-    "tests/e2e/test_hour_mouse.py": 130.0,
-    "tests/e2e/test_hour_keys.py": 120.0,
-    "tests/core/run/test_run_file.py": 50.0,
-    "tests/nep/backends/test_ros2.py": 85.0,
-    "tests/e2e/test_path_mouse.py": 70.0,
-    "tests/e2e/test_path_keys.py": 60.0,
-    "tests/e2e/test_soak.py": 65.0,
-    "tests/nep/bridges/test_bridge.py": 50.0,
-    "tests/nep/bridges/test_command.py": 40.0,
-    "tests/nep/bridges/test_loops.py": 30.0,
-    "tests/ui/shell/test_layout_orders.py": 50.0,
-    "tests/core/robots/test_stop_model.py": 60.0,
-    "tests/core/robots/test_claims.py": 33.0,
-    "tests/ui/theme/test_high_dpi.py": 32.0,
-    "tests/core/test_session.py": 32.0,
-    "tests/core/robots/test_robot_bad_days.py": 30.0,
-    "tests/core/robots/test_refused_stop.py": 25.0,
-    "tests/core/network/test_no_network.py": 21.0,
-    "tests/faults/test_faults.py": 25.0,
-    "tests/nep/cli/test_streams.py": 28.0,
-    "tests/nep/services/test_bad_days.py": 24.0,
-    "tests/nep/cli/test_command.py": 23.0,
-    "tests/clients/test_javascript.py": 30.0,
-    "tests/nep/nodes/test_processes.py": 17.0,
-    "tests/robots/driver/test_process.py": 20.0,
-    "tests/robots/virtual/test_simulated.py": 20.0,
-    "tests/robots/virtual/test_turtle.py": 16.0,
-    "tests/ui/shell/test_small_windows.py": 20.0,
-    "tests/ui/theme/test_text_sizes.py": 25.0,
-    "tests/test_readme.py": 15.0,
-    "tests/test_distribution.py": 25.0,
-    "tests/blocks/compiler/test_expressions.py": 20.0,
-    "tests/blocks/compiler/test_hostile.py": 20.0,
-    "tests/robots/driver/test_contract_of_any_file.py": 16.0,
-}
-"""... and files that take longer than so many tests would. Speed alone depends on it."""
 _GRACE_S = 20.0
 _GRACE_AFTER_LEAK_S = 1.0
 _PAST_TIMEOUT_S = 60.0
@@ -86,65 +43,6 @@ _SKIPPED = "skipped_groups"
 _selection = pytest.StashKey[tuple[tuple[str, ...], str | None]]()
 _allowances = leftovers.Allowances()
 _grace = leftovers.Grace(_GRACE_S, _GRACE_AFTER_LEAK_S)
-
-
-def may_take(worker: str, workers: int, processors: int, scope: str) -> bool:
-    """Whether a process of pytest-xdist may run the tests of `scope`: see `ByFile`."""
-    is_last = workers > processors + 1 and worker == f"gw{workers - 1}"
-    return not is_last or scope.startswith(MOSTLY_WAITING)
-
-
-class ByFile(LoadScopeScheduling):
-    """Tests of one file stay in one process; so do all that bind fixed ports, which exist once.
-
-    By name, not by mark: pytest-xdist 3.8 can't tell its groups to pytest 9.2. What takes long begins first:
-    at the end no process waits long for another. Where there are more processes than processors and one
-    (`tools.check.side_by_side`), the last is given only what is `MOSTLY_WAITING`: it fills the time in which
-    the others wait, and no more windows are open at a time than without it.
-    """
-
-    def _may_take(self, node: WorkerController, scope: str) -> bool:
-        return may_take(node.gateway.id, self.numnodes, os.cpu_count() or 1, scope)
-
-    def _split_scope(self, nodeid: str) -> str:
-        return "ports" if nodeid.startswith(WITH_FIXED_PORTS) else nodeid.partition("::")[0]
-
-    def _assign_work_unit(self, node: WorkerController) -> None:
-        """Give a process the file that takes longest of those that are left for it."""
-        left = [each for each in self.workqueue if self._may_take(node, each)] or list(self.workqueue)
-        longest = max(left, key=self._seconds)
-        self.workqueue.move_to_end(longest, last=False)
-        super()._assign_work_unit(node)
-
-    def _reschedule(self, node: WorkerController) -> None:
-        """Give a process more than it has in hand: it begins a test only when it knows the one after it."""
-        while not node.shutting_down and self._pending_of(self.assigned_work[node]) <= 2:
-            if self.workqueue and not any(self._may_take(node, each) for each in self.workqueue):
-                node.shutdown()
-            super()._reschedule(node)  # gives it a file, or tells it that there is no other
-
-    def remove_node(self, node: WorkerController) -> str | None:
-        """Give what a process that crashed had not done to the others, but for the test that it died of.
-
-        pytest-xdist gives that test away once more, and with it all files that were done: a process that
-        gets one of those has nothing to do or to report, is never given another, and the run never ends.
-        """
-        had = self.assigned_work.pop(node)
-        left = [
-            (scope, test) for scope, tests in had.items() for test, is_done in tests.items() if not is_done
-        ]
-        if not left:
-            return None
-        (its_scope, crashed), *_others = left
-        had[its_scope][crashed] = True
-        self.workqueue.update({scope: tests for scope, tests in had.items() if not all(tests.values())})
-        for other in self.nodes:
-            self._reschedule(other)
-        return crashed
-
-    def _seconds(self, scope: str) -> float:
-        each = USUAL_OF_STUDIO_S if scope.startswith("tests/e2e/") else USUAL_S
-        return LONG_S.get(scope, each * len(self.workqueue[scope]))
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:
@@ -208,9 +106,9 @@ def pytest_collection_finish() -> None:
     gc.enable()
 
 
-def pytest_xdist_make_scheduler(config: pytest.Config, log: Producer) -> ByFile:
-    """How pytest-xdist gives tests to its processes."""
-    return ByFile(config, log)
+def pytest_xdist_make_scheduler(config: pytest.Config, log: Producer) -> FileScheduling | None:
+    """Return the scheduler for ``--dist loadfile``; other values select those of pytest-xdist."""
+    return FileScheduling(config, log) if config.getvalue("dist") == "loadfile" else None
 
 
 @pytest.hookimpl(wrapper=True)

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from tests.conftest import may_take
+from tests.scheduler import may_take
 from tools.check import ROOT, Check, Outcome, checks, run, run_all, summary
 
 

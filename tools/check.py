@@ -63,7 +63,7 @@ def checks(*, fast: bool, pytest_arguments: Sequence[str] = ()) -> tuple[Check, 
 
 
 def side_by_side() -> tuple[str, ...]:
-    """Return options of pytest-xdist: two workers more than cores, at most six; see tests/conftest.py.
+    """Return options of pytest-xdist: two workers more than cores, at most six; see tests/scheduler.py.
 
     Many tests wait for processes and windows: on two cores, one worker more leaves a fifth of the time idle.
     With two more, some tests would wait too long for a robot or a page, so the last worker opens no windows.
