@@ -20,7 +20,7 @@ import pytest
 
 import nep
 from app import resources
-from app.robots import turtle
+from app.robots import simulated, turtle
 from app.robots.description.description import td_for
 from app.robots.driver.driver import Driver
 from app.run import FAILED, INTERRUPTED, MAY_NOT_MOVE, OK, ROBOT_MISSING, UNUSABLE, run_file
@@ -258,16 +258,16 @@ STROKED = {"Reaction to touch", "A quiz"}
 
 @contextmanager
 def virtual_pepper() -> Iterator[str]:
-    """A virtual robot in a process of its own; the address of its master, which nobody else uses."""
-    with Master("127.0.0.1:0", learn_s=0.0) as master:
-        command = [sys.executable, "-m", "app.robots.simulated", "--name", "Pepper"]
-        command += ["--owner-pid", str(os.getpid())]
-        process = subprocess.Popen(command, env={**os.environ, "NEP_MASTER": master.address})
-        try:
-            yield master.address
-        finally:
-            process.terminate()
-            process.wait(10)
+    """A virtual robot on threads of this process, and the address of its own master.
+
+    tests/test_readme.py and tests/robots/virtual run it as a process.
+    """
+    with (
+        Master("127.0.0.1:0", learn_s=0.0) as master,
+        nep.node("pepper", master=master.address) as node,
+        Driver(simulated.ROBOT, "Pepper", node),
+    ):
+        yield master.address
 
 
 def example_runs(name: str) -> tuple[int, str]:
@@ -279,7 +279,15 @@ def example_runs(name: str) -> tuple[int, str]:
     ]
     out, interrupted = io.StringIO(), threading.Event()
     with virtual_pepper() as address, ThreadPoolExecutor(1) as pool:
-        code = pool.submit(run_file, path, master=address, out=out, robot_wait_s=100, interrupted=interrupted)
+        code = pool.submit(
+            run_file,
+            path,
+            master=address,
+            out=out,
+            robot_wait_s=100,
+            interrupted=interrupted,
+            allow_moving=True,
+        )
         with nep.node("somebody", master=address) as node:
             hand, weather = node.new_pub("/Pepper/world", "json"), node.new_pub("/weather", "json")
             pause = threading.Event()
