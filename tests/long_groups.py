@@ -122,7 +122,7 @@ GROUPS = (
     Group(
         "installers",
         tests=("tests/installers/",),
-        sources=("dev.py", "installers/", "pyproject.toml", "requirements/", "tests/test_installers.py"),
+        sources=("dev.py", "installers/", "nep/locale/", "nep/version.py", "pyproject.toml", "requirements/"),
         quick=("tests/installers/test_contents.py",),
     ),
 )
