@@ -25,8 +25,8 @@ EXCLUDED_MODULES = (
     "readline",  # GNU's, under the General Public License; nothing of ours asks for lines by it
 )  # fmt: skip
 
-_LANGUAGES = ("en", "es")
-_CHROMIUM_LANGUAGES = ("en-US", "en-GB", "es", "es-419")
+_LANGUAGES = ("en", "es", "fr", "ja")
+_CHROMIUM_LANGUAGES = ("en-US", "en-GB", "es", "es-419", "fr", "ja")
 _PLUGINS = frozenset({
     "iconengines", "imageformats", "networkinformation", "platforminputcontexts", "platforms",
     "platformthemes", "printsupport", "styles", "texttospeech", "tls", "wayland-decoration-client",

@@ -302,7 +302,7 @@ class GuidePictures(SelfDrive):
             self._answers[element] = json.loads(answer) if isinstance(answer, str) and answer else None
 
         if self._page_is_there() and self._editor.web is not None:
-            self._editor.web.page.runJavaScript(script, take_screenshots)
+            self._editor.web.page.runJavaScript(script, take)
 
     def _place_of(self, panel: str) -> QRect:
         bench = self._window.bench

@@ -31,38 +31,54 @@ PROGRAM = "nep-studio"
 OLDEST_MACOS: Mapping[str, str] = {"arm64": "13.0", "x86_64": "13.0"}
 """Oldest macOS by processor, as required by Qt 6.11 and OpenCV (4.12 for Intel, no newer)."""
 APP_ICON, DOCUMENT_ICON = "nep-studio.icns", "behaviour.icns"
-LANGUAGES = ("en", "es")
+LANGUAGES = ("en", "es", "fr", "ja")
 
 _BEHAVIOUR = f"{BUNDLE_ID}.behaviour"
 _BEHAVIOUR_WORDS, _RECORDING_WORDS = "Robot behaviour", "Recording of messages"
-_WORDS: Mapping[str, tuple[str, str]] = {
+_WORDS: Mapping[str, tuple[str, str, str, str]] = {
     "NSLocalNetworkUsageDescription": (
-        "NEP Studio looks for robots and their programs on your network, and talks with them.",
-        "NEP Studio busca robots y sus programas en tu red y habla con ellos.",
+        "NEP Studio finds robots and their programs on your network and exchanges messages with them.",
+        "NEP Studio busca robots y sus programas en tu red e intercambia mensajes con ellos.",
+        "NEP Studio recherche les robots et leurs programmes sur votre réseau et communique avec eux.",
+        "NEP Studioは、ネットワーク上のロボットとそのプログラムを見つけ、メッセージをやり取りします。",
     ),
     "NSCameraUsageDescription": (
-        "A program that you started with NEP Studio wants to see with the camera of this computer.",
-        "Un programa que iniciaste con NEP Studio quiere ver con la cámara de esta computadora.",
+        "A program that you started with NEP Studio wants to use the camera of this computer.",
+        "Un programa que iniciaste con NEP Studio quiere usar la cámara de esta computadora.",
+        "Un programme que vous avez lancé avec NEP Studio souhaite utiliser la caméra de cet ordinateur.",
+        "NEP Studioで起動したプログラムが、このコンピューターのカメラを使おうとしています。",
     ),
     "NSMicrophoneUsageDescription": (
-        "A program that you started with NEP Studio wants to listen with the microphone of this computer.",
-        "Un programa que iniciaste con NEP Studio quiere escuchar con el micrófono de esta computadora.",
+        "A program that you started with NEP Studio wants to use the microphone of this computer.",
+        "Un programa que iniciaste con NEP Studio quiere usar el micrófono de esta computadora.",
+        "Un programme que vous avez lancé avec NEP Studio souhaite utiliser le micro de cet ordinateur.",
+        "NEP Studioで起動したプログラムが、このコンピューターのマイクを使おうとしています。",
     ),
     "NSDocumentsFolderUsageDescription": (
-        "NEP Studio opens and keeps your behaviours in this folder.",
+        "NEP Studio opens and saves your behaviours in this folder.",
         "NEP Studio abre y guarda tus comportamientos en esta carpeta.",
+        "NEP Studio ouvre et enregistre vos comportements dans ce dossier.",
+        "NEP Studioは、このフォルダーでふるまいを開き、保存します。",
     ),
     "NSDesktopFolderUsageDescription": (
-        "NEP Studio opens and keeps your behaviours on the desktop.",
+        "NEP Studio opens and saves your behaviours on the desktop.",
         "NEP Studio abre y guarda tus comportamientos en el escritorio.",
+        "NEP Studio ouvre et enregistre vos comportements sur le bureau.",
+        "NEP Studioは、デスクトップでふるまいを開き、保存します。",
     ),
     "NSDownloadsFolderUsageDescription": (
-        "NEP Studio opens and keeps your behaviours in this folder.",
+        "NEP Studio opens and saves your behaviours in this folder.",
         "NEP Studio abre y guarda tus comportamientos en esta carpeta.",
+        "NEP Studio ouvre et enregistre vos comportements dans ce dossier.",
+        "NEP Studioは、このフォルダーでふるまいを開き、保存します。",
     ),
-    _BEHAVIOUR_WORDS: (_BEHAVIOUR_WORDS, "Comportamiento de robot"),
-    _RECORDING_WORDS: (_RECORDING_WORDS, "Grabación de mensajes"),
-}
+    _BEHAVIOUR_WORDS: (
+        _BEHAVIOUR_WORDS, "Comportamiento de robot", "Comportement de robot", "ロボットのふるまい",
+    ),
+    _RECORDING_WORDS: (
+        _RECORDING_WORDS, "Grabación de mensajes", "Enregistrement de messages", "メッセージの記録",
+    ),
+}  # fmt: skip
 """Texts shown by macOS in the order of `LANGUAGES`. Document types are keyed by their English names.
 
 Studio uses neither camera nor microphone. Its libraries could, and macOS ends a program that requests access

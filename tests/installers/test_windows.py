@@ -131,14 +131,14 @@ def test_file_association_is_registered_and_unregistered() -> None:
     assert "Program Files" not in put + take
 
 
-def test_setup_texts_exist_in_both_languages() -> None:
+def test_setup_texts_exist_in_each_language() -> None:
     words = (REG_FILE.parent / "setup" / "words.nsh").read_text("utf-8")
     said = {
         language: {line.split()[1] for line in words.splitlines() if f"${{LANG_{language}}}" in line}
-        for language in ("ENGLISH", "SPANISH")
+        for language in ("ENGLISH", "SPANISH", "FRENCH", "JAPANESE")
     }
     used = (REG_FILE.parent / "setup" / "nep-studio.nsi").read_text("utf-8")
-    assert said["ENGLISH"] == said["SPANISH"]
+    assert all(each == said["ENGLISH"] for each in said.values())
     assert all(f"$({name})" in used for name in said["ENGLISH"])
 
 

@@ -63,6 +63,8 @@ Var IsMoved
 !insertmacro MUI_UNPAGE_INSTFILES
 !insertmacro MUI_LANGUAGE "English"
 !insertmacro MUI_LANGUAGE "Spanish"
+!insertmacro MUI_LANGUAGE "French"
+!insertmacro MUI_LANGUAGE "Japanese"
 !include "words.nsh"
 !insertmacro MUI_RESERVEFILE_LANGDLL
 

@@ -102,7 +102,8 @@ def made_up_app(folder: Path) -> Path:
     link(frameworks / "numpy" / ".dylibs", "__dot__dylibs")
     put(resources / "base_library.zip")
     link(frameworks / "base_library.zip", "../Resources/base_library.zip")
-    put(resources / "nep" / "locale" / "es" / "LC_MESSAGES" / "nep-studio.mo")
+    for language in ("es", "fr", "ja"):
+        put(resources / "nep" / "locale" / language / "LC_MESSAGES" / "nep-studio.mo")
     link(frameworks / "nep", "../Resources/nep")
     qt = frameworks / "PySide6" / "Qt" / "lib"
     framework(qt, "QtCore")

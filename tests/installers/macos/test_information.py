@@ -113,17 +113,18 @@ def test_every_permission_prompt_has_a_sentence_in_each_language(tmp_path: Path)
         assert read == sentences(language)
         assert asked <= read.keys()
         for key in asked:
-            assert re.fullmatch(r"[^.]+\.", read[key]), read[key]
-    english, spanish = (sentences(language) for language in ("en", "es"))
-    assert english.keys() == spanish.keys()
-    assert all(english[key] != spanish[key] for key in english)
+            assert re.fullmatch(r"[^.。]+[.。]", read[key]), read[key]
+    english, *others = (sentences(language) for language in LANGUAGES)
+    for other in others:
+        assert english.keys() == other.keys()
+        assert all(english[key] != other[key] for key in english)
 
 
 def test_type_names_are_translated_into_each_language() -> None:
     told = information(__version__, "arm64")
     for kind in (*told["UTExportedTypeDeclarations"], *told["UTImportedTypeDeclarations"]):
         assert sentences("en")[kind["UTTypeDescription"]] == kind["UTTypeDescription"]
-        assert sentences("es")[kind["UTTypeDescription"]]
+        assert all(sentences(language)[kind["UTTypeDescription"]] for language in LANGUAGES)
 
 
 def test_plist_languages_match_those_of_studio() -> None:

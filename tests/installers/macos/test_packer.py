@@ -34,7 +34,7 @@ elif words[1] == "PyInstaller":
     folder = Path(words[words.index("--distpath") + 1])
     (folder / "NEP Studio").mkdir(parents=True)
     app = made_up_app(folder)
-    for language in ("en", "es"):
+    for language in ("en", "es", "fr", "ja"):
         shutil.rmtree(app / "Contents" / "Resources" / f"{{language}}.lproj")
     (app / "Contents" / "Resources" / "behaviour.icns").unlink()
 else:
