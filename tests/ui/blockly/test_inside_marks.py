@@ -84,5 +84,5 @@ def test_block_menu_leads_to_the_hidden_items_that_exist(them):
     rows = open_menu(them, "loop")
     assert "Show where the program pauses inside" not in rows
     them.press(Qt.Key_Escape)
-    choose(them, "loop", "Show the note inside this block this block")
+    choose(them, "loop", "Show the note inside this block")
     them.wait_for(FOCUSED, "b")

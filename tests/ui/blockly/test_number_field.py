@@ -91,7 +91,7 @@ def test_typed_and_pasted_numbers_in_a_block_are_parsed_or_rejected(them: Person
     open_field(them)
     them.wait_for(SENTENCE, "")
     QTest.keyClicks(them.target, "abc")
-    them.wait_for(f"{SENTENCE}.includes('needs a number')")
+    them.wait_for(f"{SENTENCE}.includes('Enter a number.')")
     them.press(Qt.Key_Backspace)
     QTest.keyClick(them.target, Qt.Key_A, Qt.ControlModifier)
     QTest.keyClicks(them.target, "-1,5")
