@@ -109,7 +109,7 @@ def test_taken_port_raises_an_alert_and_is_served_once_it_is_free(fixed_ports, g
         airplay.bind(("127.0.0.1", 7000))
         airplay.listen()
         gateway_at()
-        assert "7000 is taken" in native.alerts["port:7000"]
+        assert "using port 7000" in native.alerts["port:7000"]
         assert original.ask("t", port=50000)["state"] == "success"
     native.wait(lambda: "port:7000" not in native.alerts)
     assert original.ask("t", port=7000)["state"] == "success"

@@ -177,9 +177,7 @@ def test_variable_without_a_name_gets_a_placeholder_that_is_not_saved(qtbot, vie
     saved = workspace(started(block("variables_set", "set", VAR={"id": "gone"}, VALUE=number(3))))
     saved["blocks"]["blocks"][0] |= {"x": 60, "y": 60}  # type: ignore[index]
     them = person(state=saved)
-    them.wait_for(
-        "document.querySelector('[data-id=set]').textContent.includes('unnamed\\u00a0variable')"
-    )
+    them.wait_for("document.querySelector('[data-id=set]').textContent.includes('unnamed\\u00a0variable')")
     assert "variables" not in them.newest()
     view.edit_variable({"do": "rename", "id": "gone", "name": "score"})
     qtbot.waitUntil(lambda: "variables" in them.newest(), timeout=WAIT_MS)
