@@ -78,7 +78,7 @@ MADE_BY_HAND = frozenset(
 )
 """Classes that programs instantiate. Others are created by nep, except those on pages of types."""
 INTERNAL = frozenset({
-    "Blackboard.deliver", "BlackboardWatch.attach", "BlackboardWatch.take", "Client.join",
+    "Blackboard.deliver", "BlackboardWatch.attach", "BlackboardWatch.store_messages", "Client.join",
     "Master.epoch", "Master.submit", "Message.decoded", "Message.kind", "Message.raw",
     "Message.seen_ns", "Node.open_parameters", "NodeParameter.as_map", "NodeParameter.form",
     "NodeParameter.with_value", "Publisher.refuse", "Respondent.service", "Server.join",

@@ -125,7 +125,7 @@ def first_steps(studio: Studio, film: Film, fingers: Fingers) -> None:
         fingers.to_page()
         fingers.press("b", held=["Ctrl"])
         fingers.until_in_page("Right", "when started")
-        until(lambda: str(studio.page(RING)).startswith("Enter takes it"), "the ring says how")
+        until(lambda: str(studio.page(RING)).startswith("Press Enter to pick it up"), "the ring says how")
     with film.step("Enter takes it, Enter puts it down; a sentence is found by its word"):
         fingers.put_down("events_started")
         done(studio, "Drag “when started” onto the page")

@@ -342,12 +342,12 @@ def test_spin_without_free_file_descriptors_raises_too_many_files_error(
         raise OSError(errno.EMFILE, "too many open files")
 
     monkeypatch.setattr(selectors, "DefaultSelector", no_room)
-    with pytest.raises(nep.TooManyFilesError, match=r"thread .*files open"):
+    with pytest.raises(nep.TooManyFilesError, match=r"waiting thread: .*files open"):
         nep.spin(*nodes)
 
     async def main() -> None:
         sub = nodes[1].new_sub("t")
-        with pytest.raises(nep.TooManyFilesError, match=r"thread .*files open"):
+        with pytest.raises(nep.TooManyFilesError, match=r"waiting thread: .*files open"):
             await sub.receive_async(0.01)
         monkeypatch.undo()
         assert await sub.receive_async(0.01) is None

@@ -77,7 +77,7 @@ def test_command_rejects_topics_that_move_a_robot_before_connecting(type_in, tmp
 
         code, said, _out = bridge("/Rover/command", msg_type="robot/command")
         assert code == 2
-        assert "'/Rover/command' moves a robot; make sure that nobody is in its way, then add" in said
+        assert "'/Rover/command' moves a robot; make sure that nobody is in the way, then add" in said
         assert "then add --allow-moving /Rover/command" in said
         describe(b.node("rover"), "Rover", "/orders")
         code, said, _out = bridge("/orders")

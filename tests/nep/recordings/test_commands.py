@@ -214,7 +214,7 @@ def test_play_command_publishes_only_the_named_topics(path, master, capfd):
         (("robot_action",), typer.BadParameter, "moves own; .*then add --allow-moving own"),
         (("--all", "--speed", "0"), typer.BadParameter, "^0 .*0\\.1 to 10"),
         (("/arm/joints", "--remap", "/x=/y"), typer.BadParameter, "--remap OLD=NEW"),
-        (("/arm/joints", "--from", "5"), typer.BadParameter, "is empty"),
+        (("/arm/joints", "--from", "5"), typer.BadParameter, "outside the recording"),
         (("/arm/joints", "--remap", "/arm/joints=robot_action"), typer.BadParameter, "moves own"),
         (
             ("/arm/joints", "--remap", "/arm/joints=/Fido/command"),

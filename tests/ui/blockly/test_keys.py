@@ -172,7 +172,7 @@ def test_find_in_workspace_wraps_around_and_focuses_the_match_on_close(view, the
     them.wait_for(count, "1 of 1")
     them.wait_for(now, ["w"])
     QTest.keyClicks(them.target, "x")
-    them.wait_for(count, "none")
+    them.wait_for(count, "No results")
     press(them, Qt.Key_Backspace, Qt.Key_Backspace, Qt.Key_Backspace)
     QTest.keyClicks(them.target, "t")
     them.wait_for(count, "1 of 2")

@@ -193,8 +193,9 @@ def test_settings_show_whether_the_robot_voice_is_available(
 
 
 def test_language_change_offers_a_restart_that_waits_until_robots_stop(
-    qtbot, window: MainWindow, commands: Commands
+    qtbot, monkeypatch, window: MainWindow, commands: Commands
 ) -> None:
+    monkeypatch.setattr("nep.i18n.offered", lambda: [("en", "English"), ("es", "Español")])
     window.can_restart = True
     window.show()
     commands.run("settings.open")
