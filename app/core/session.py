@@ -19,7 +19,7 @@ from app.core.console import Console
 from app.core.documents.document import Document
 from app.core.documents.journal import Journal
 from app.core.documents.open_documents import Documents
-from app.core.documents.saved_tabs import KeptTabs
+from app.core.documents.saved_tabs import SavedTabs
 from app.core.faults import FaultAlerts, log_errors
 from app.core.messages.image_streams import Images
 from app.core.network.decode_checks import Checks
@@ -158,7 +158,7 @@ class Session:
 
     def _add_programs(self, journal_folder: Path | None) -> None:
         self.documents = Documents(lambda: Document(lambda: Journal(journal_folder)))
-        self.tabs = KeptTabs(self.settings, self.documents, partial(self.console.add, "warn", "studio"))
+        self.tabs = SavedTabs(self.settings, self.documents, partial(self.console.add, "warn", "studio"))
         alerts, console, post_event, clock = self.alerts, self.console, self._mailbox.post_event, self._clock
         self.runs = Runs(
             self.documents,
@@ -345,7 +345,7 @@ class Session:
             self.tabs.follow()
         with self.guarded(lazy("check started programs")):
             self.launcher.check()
-            self.last_robots.keep(self.launcher)
+            self.last_robots.save(self.launcher)
             if self.master.kind == "none" and self._start_processes:
                 self.launcher.keep_master()
             self.web_pages.check()
@@ -373,8 +373,8 @@ class Session:
         ends: list[tuple[str, Callable[[], object]]] = [
             ("stop the program", self.runs.close),
             ("stop sending by hand", self.acting.close),
-            ("save the tabs", lambda: self.tabs.keep(ended_well=True)),
-            ("save the robots", partial(self.last_robots.keep, self.launcher)),
+            ("save the tabs", lambda: self.tabs.save(ended_well=True)),
+            ("save the robots", partial(self.last_robots.save, self.launcher)),
             ("save the alarms", self.alarms.close),
             ("close the behaviours", self.documents.end),
             ("silence the robots", self.voices.close),

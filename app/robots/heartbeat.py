@@ -42,7 +42,7 @@ class Heartbeat:
                 self._thread.start()
         self._changed.set()
 
-    def rest(self, robot: str) -> None:
+    def stop(self, robot: str) -> None:
         """Stop sending heartbeats to this robot."""
         with self._lock:
             self._robots.pop(robot, None)

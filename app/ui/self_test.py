@@ -253,13 +253,13 @@ class Told:
     def seen(self, step: Step) -> None:
         """Report the step; an empty screenshot fails the test."""
         if not step.picture:
-            self._test.seen(step.said())
+            self._test.record_success(step.said())
             return
         shown = colours(QImage(str(self._test.place.path(PICTURE))))
         if shown < MIN_COLOURS:
             self._test.fail(_("the window's picture has only {count} colours").format(count=shown))
         else:
-            self._test.seen(_("{count} colours").format(count=shown))
+            self._test.record_success(_("{count} colours").format(count=shown))
 
     def ended(self, well: bool, words: str) -> None:
         """Report the failure, if any; then the closing of the window is timed as the last step."""
@@ -292,7 +292,7 @@ def show_steps(test: SelfTest, *, web: bool) -> int:
         return 0
 
     def drive(window: MainWindow) -> SelfDrive:
-        test.seen(f"Qt {qVersion()}")
+        test.record_success(f"Qt {qVersion()}")
         test.report.add_computer(
             qt=qVersion(), pyside=PySide6.__version__, screen=QGuiApplication.platformName()
         )

@@ -317,7 +317,7 @@ class ClientTransport(Protocol):
     def forget(self, call: OpenCall) -> None:
         """Cancel a call; `then` isn't called."""
 
-    def known(self, timeout_s: float) -> tuple[str, ...]:
+    def service_names(self, timeout_s: float) -> tuple[str, ...]:
         """Return the names of services that have a server; empty if the back end can't know."""
 
     def close(self) -> None:

@@ -104,7 +104,7 @@ def play(
             raise typer.BadParameter(str(error)) from error
         with node_for("play", master) as node:
             limits.guard = MotionGuard(node)
-            limits.guard.settle(_ROBOT_DISCOVERY_S)
+            limits.guard.wait_for_descriptions(_ROBOT_DISCOVERY_S)
             chosen = limits.filter_allowed(chosen, named)
             if not chosen:
                 raise NepError(_("nothing to publish: all chosen topics are blocked"))

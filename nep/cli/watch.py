@@ -187,7 +187,7 @@ class _AlarmRunner:
             if action.kind == "send"
         ]
         if sends:
-            self._guard.settle(_ROBOT_DISCOVERY_S)
+            self._guard.wait_for_descriptions(_ROBOT_DISCOVERY_S)
         for action in sends:
             refusal = self._guard.refusal(action.name, action.msg_type)
             if refusal:

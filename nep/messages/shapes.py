@@ -24,7 +24,7 @@ __all__ = [
     "literal_shape",
     "map_shape",
     "missing_value",
-    "shown",
+    "short_repr",
     "tuple_shape",
     "union_shape",
     "wrong_type",
@@ -103,7 +103,7 @@ def missing_value(shape: ValueShape) -> ShapeMismatch:
     return ShapeMismatch(_("is missing; give {wanted}").format(wanted=shape.expected))
 
 
-def shown(value: object) -> str:
+def short_repr(value: object) -> str:
     """Return the shortened `repr` of a value for a message."""
     return escaped(shortened(repr(value), _MAX_TEXT_LENGTH))
 
@@ -239,7 +239,7 @@ def _datetime_shape(kind: type[datetime | date | time]) -> ValueShape:
         except ValueError:
             raise ShapeMismatch(
                 _("is {value}; give text such as {example}").format(
-                    value=shown(value), example=_EXAMPLES[kind]
+                    value=short_repr(value), example=_EXAMPLES[kind]
                 )
             ) from None
 
@@ -296,7 +296,9 @@ def literal_shape(values: Sequence[object]) -> ValueShape | None:
         for each in values:
             if _is_same(value, each):
                 return each
-        raise ShapeMismatch(_("is {value}; give {wanted}").format(value=shown(value), wanted=shape.expected))
+        raise ShapeMismatch(
+            _("is {value}; give {wanted}").format(value=short_repr(value), wanted=shape.expected)
+        )
 
     shape.read = shape.write = both
     return shape
@@ -320,7 +322,7 @@ def enum_shape(kind: type[Enum]) -> ValueShape | None:
             except ValueError:
                 pass
         wanted = shape.expected if is_flag else listed([repr(each.value) for each in members], "or")
-        raise ShapeMismatch(_("is {value}; give {wanted}").format(value=shown(value), wanted=wanted))
+        raise ShapeMismatch(_("is {value}; give {wanted}").format(value=short_repr(value), wanted=wanted))
 
     def write(value: object) -> object:
         if not isinstance(value, kind):

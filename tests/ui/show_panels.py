@@ -102,7 +102,7 @@ def show(name: str, session: Session, theme: Theme, folder: Path, suffix: str) -
         dock.refresh()
         wait(2500 if name == "behaviour" and _ == 2 else 10)
     dock.grab().save(str(folder / f"{name}-{suffix}.png"))
-    widget.shut()
+    widget.dispose()
     dock.close()
     dock.deleteLater()
 
@@ -127,7 +127,7 @@ def shown_panel(
         session.tick()
         dock.refresh()
     yield dock, widget
-    widget.shut()
+    widget.dispose()
     dock.close()
 
 

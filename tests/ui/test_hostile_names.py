@@ -113,7 +113,7 @@ def test_no_panel_interprets_a_name_as_markup(qtbot, name: str) -> None:
             assert not (markup and "<img" in told), widget
         if isinstance(widget, QAbstractItemView):
             assert not any("<img" in tip for tip in shown(widget)), widget
-    panel.shut()
+    panel.dispose()
 
 
 def test_banner_shows_names_literally(qtbot, theme: Theme) -> None:

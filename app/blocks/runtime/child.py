@@ -161,7 +161,7 @@ class Run:
         """Pause the scripts, their waits, and the motions of robots."""
         self._runtime.scheduler.pause()
         if self._network is not None:
-            self._network.rest()
+            self._network.hold_robots()
 
     def go_on(self) -> None:
         """Resume scripts, waits and motions."""
@@ -232,7 +232,7 @@ class Run:
         network.guard = self._guard
         self._network = network
         if self._begins_paused:
-            network.rest()
+            network.hold_robots()
         try:
             self._start_scripts(network)
             self._report_until_finished()

@@ -47,7 +47,7 @@ class Motions:
         self._slow: set[int] = set()  # scripts waiting at a block
         self._acting_for = threading.local()
 
-    def asked(self, call: RobotCall, robot: Robot, input: Mapping[str, object]) -> None:
+    def note_command(self, call: RobotCall, robot: Robot, input: Mapping[str, object]) -> None:
         """Note a new command: its resources no longer belong to an earlier motion."""
         action = robot.action(call.action)
         if action is None:
@@ -83,7 +83,7 @@ class Motions:
         elif slow:
             self._stand(motion.robot)
 
-    def rest(self) -> tuple[str, ...]:
+    def stop_all(self) -> tuple[str, ...]:
         """Stop all motions because the program is paused; return the names of the stopped robots."""
         with self._lock:
             self._paused = True

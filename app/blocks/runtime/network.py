@@ -190,7 +190,7 @@ class Network:
         call = RobotCall(new_id("cmd"), robot, action)
         with self._lock:
             self._calls[call.id] = call
-        self._motions.asked(call, described, input)
+        self._motions.note_command(call, described, input)
         if described.dialect == "rize":
             self._send(described, rize.to_command(described, action, input, call.id))
         else:
@@ -237,9 +237,9 @@ class Network:
 
     # ---- stopping
 
-    def rest(self) -> None:
+    def hold_robots(self) -> None:
         """Stop robots left in motion (a speed) until `go_on`, because the program is paused."""
-        self._motions.rest()
+        self._motions.stop_all()
 
     def go_on(self) -> None:
         """Resume the motions."""

@@ -114,7 +114,7 @@ class Replacements:
         self._counts: dict[tuple[str, str], int] = {}
         self._news: dict[tuple[str, str], Replacement] = {}
 
-    def asked(self, call: RobotCall, action: Action, block: str | None) -> None:
+    def note_command(self, call: RobotCall, action: Action, block: str | None) -> None:
         """Note a command of the calling script in this block."""
         self._commands.append(_Command(call, action, block, threading.get_ident()))
 
@@ -291,7 +291,7 @@ class RobotHandle:
     def _do(self, robot: Robot, action: Action, input: Mapping[str, object], words: str) -> RobotCall:
         while True:
             call = self._runtime.linked().invoke(self._name, action.name, input)
-            self._runtime.replaced.asked(call, action, self._runtime.scheduler.block())
+            self._runtime.replaced.note_command(call, action, self._runtime.scheduler.block())
             try:
                 self._wait_for_answer(robot, action, call, words)
             except EndScript:  # the program continues, but the robot must stop

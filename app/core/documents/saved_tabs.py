@@ -13,7 +13,7 @@ from app.errors import SettingsError
 KEY = "tabs"
 
 
-class KeptTabs:
+class SavedTabs:
     """Saves the open tabs in the settings, and restores them at the next start."""
 
     def __init__(self, settings: Settings, documents: Documents, complain: Callable[[str], object]) -> None:
@@ -33,7 +33,7 @@ class KeptTabs:
         kept: dict[str, object] = self._settings.get(KEY, {})
         self._last_session = kept
         taken = self._documents.put_back(kept, left, ended_well=kept.get("ended_well") is True)
-        self.keep()
+        self.save()
         return [each for each in left if each.journal not in taken]
 
     def recover(self, left: Sequence[Unsaved]) -> None:
@@ -41,12 +41,12 @@ class KeptTabs:
         newest_last = sorted(left, key=lambda each: each.edited_s)
         recovered = {each.journal.name: self._documents.recover(each) for each in newest_last}
         self._documents.arrange(self._last_session, recovered)
-        self.keep()
+        self.save()
 
     def edited(self, document: Document, *, was_blank: bool) -> None:
         """Save the tabs at the first edit of a new behaviour."""
         if was_blank and not document.blank:
-            self.keep()
+            self.save()
 
     def follow(self) -> None:
         """Save the tabs if they changed.
@@ -54,9 +54,9 @@ class KeptTabs:
         Called once a second, so that showing a tab doesn't wait for the disk.
         """
         if self._documents.revision != self._kept_revision:
-            self.keep()
+            self.save()
 
-    def keep(self, *, ended_well: bool = False) -> None:
+    def save(self, *, ended_well: bool = False) -> None:
         """Save the open tabs; ``ended_well`` when the window closes normally."""
         if not self.active:
             return

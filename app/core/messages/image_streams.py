@@ -126,24 +126,24 @@ class ImageStream:
         """Hold the current image, or show the newest again."""
         self._images.hold(self, held)
 
-    def shown(self) -> None:
+    def count_painted(self) -> None:
         """Count that the panel painted `picture`; called once for each."""
         if self.picture is not None:
             self._shown.add(self.picture.received_s)
 
-    def rest(self) -> None:
+    def suspend(self) -> None:
         """Suspend: nothing is received or decoded until `wake`; the image stays."""
         if not self._resting:
             self._resting = self.awaits_picture = True
             self._images.forget(self)
-            self._watch.rest()
+            self._watch.suspend()
 
-    def wake(self) -> None:
+    def resume(self) -> None:
         """Resume after a `rest`."""
         if self._resting and not self.closed:
             self._resting = False
             self.looked_s = self._images.clock()
-            self._watch.wake()
+            self._watch.resume()
             self._images.add(self)
 
     def close(self) -> None:

@@ -91,7 +91,7 @@ class MasterStart:
         self._thread = threading.Thread(target=self._start, name="studio-launcher", daemon=True)
         self._thread.start()
 
-    def keep(self) -> None:
+    def ensure_running(self) -> None:
         """Call `ensure` unless the back-off after a failure is still running. Call it repeatedly."""
         if self._clock() >= self._retry_at:
             self.ensure()

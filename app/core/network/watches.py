@@ -11,10 +11,10 @@ from typing import Protocol, final
 class Suspendable(Protocol):
     """A resource that costs while it is visible: a watch, a stream of images."""
 
-    def rest(self) -> None:
+    def suspend(self) -> None:
         """Suspend: it can't be seen for now. Idempotent."""
 
-    def wake(self) -> None:
+    def resume(self) -> None:
         """Resume after `rest`. Idempotent."""
 
 
@@ -39,13 +39,13 @@ class Watch:
         """True if the watch is suspended."""
         return self._resting
 
-    def rest(self) -> None:
+    def suspend(self) -> None:
         """Suspend the watch until `wake`."""
         if self._watches is not None and not self._resting:
             self._resting = True
             self._watches.leave(self.topics)
 
-    def wake(self) -> None:
+    def resume(self) -> None:
         """Resume the watch after `rest`."""
         if self._watches is not None and self._resting:
             self._resting = False
@@ -54,7 +54,7 @@ class Watch:
     def close(self) -> None:
         """Close the watch. Idempotent."""
         watches = self._watches
-        self.rest()
+        self.suspend()
         self._watches = None
         if watches is not None:
             watches.forget(self.topics)

@@ -287,7 +287,7 @@ class RecorderClient:
         if choice is not None:
             self._begin_ring(choice)
 
-    def keep(self, path: Path, seconds: float, note: str = "") -> bool:
+    def save_last(self, path: Path, seconds: float, note: str = "") -> bool:
         """Save the last seconds to a file; return False without a flight recorder, or with too many saves."""
         if self._ring is None or self._process is None or len(self.state.keeping) >= MAX_PENDING_SAVES:
             return False

@@ -207,7 +207,7 @@ class SessionRecordings:
             RingChoice(folder, float(wish.seconds), size_bytes, wish.patterns, wish.left_out)
         )
 
-    def keep(self, note: str = "", seconds: float | None = None, done: Done | None = None) -> str:
+    def save_last(self, note: str = "", seconds: float | None = None, done: Done | None = None) -> str:
         """Save the last seconds to a file; return a sentence why that can't start, or "".
 
         ``done`` is called with the result when the file is finished.
@@ -222,7 +222,9 @@ class SessionRecordings:
         number = 2
         while path in self._keeping:
             path, number = path.with_stem(f"{path.stem}-{number}"), number + 1
-        if not self.client.keep(path, seconds if seconds is not None else float(self.wish.seconds), note):
+        if not self.client.save_last(
+            path, seconds if seconds is not None else float(self.wish.seconds), note
+        ):
             return _("The last seconds can't be saved now.")
         self._keeping[path] = done
         return ""
@@ -230,7 +232,7 @@ class SessionRecordings:
     def carry(self, event: AlarmEvent, action: AlarmAction, done: Done) -> None:
         """Save the last seconds as the action of an alarm."""
         said = what_words(event.rule.condition, event.seen)
-        why_not = self.keep(said, action.seconds, done)
+        why_not = self.save_last(said, action.seconds, done)
         if why_not:
             words = _("nothing saved: {reason}")
             done(False, words.format(reason=f"{why_not[:1].lower()}{why_not[1:]}".rstrip(".")))

@@ -85,7 +85,7 @@ class Fleet:
         has_ended = self._processes.has_ended
         self.moved = MovedRobots(self._identity_of, has_ended, clock, self._own.other_programs)
         """Robots that a Stop must name."""
-        self._tries = Tries(self._send, self._heartbeat.rest, clock)
+        self._tries = Tries(self._send, self._heartbeat.stop, clock)
         self._messages = RobotMessages(self._own, self._tries, self.moved, clock)
         self._chosen = ""
         self._has_graph = False
@@ -124,7 +124,7 @@ class Fleet:
         return self._links.get(name)
 
     @property
-    def shown(self) -> RobotLink | None:
+    def current(self) -> RobotLink | None:
         """Robot of the panels for one robot: the chosen one if connected, else a virtual one or the first."""
         chosen = self._links.get(self._chosen)
         if chosen is not None and chosen.connected:
@@ -264,7 +264,7 @@ class Fleet:
             link.has_proven_stop |= name in report.still
             if not link.not_stopped:
                 self._tries.end_all(link, "canceled")
-            self._heartbeat.rest(name)
+            self._heartbeat.stop(name)
 
     def stands_still(self, names: Iterable[str]) -> None:
         """Apply the user's confirmation that these robots have stopped."""
@@ -472,7 +472,7 @@ class Fleet:
 
     def _leave_topics(self, link: RobotLink) -> None:
         # The description names other topics: invocations on the old ones fail.
-        self._heartbeat.rest(link.name)
+        self._heartbeat.stop(link.name)
         self._tries.end_all(link, "failed", _("{robot} has changed; try again").format(robot=link.name))
         if link.watch is not None:
             link.watch.close()
@@ -490,7 +490,7 @@ class Fleet:
         link.connected, link.gone_s = False, self._clock()
         self._record_unended_actions(link, link.identity)
         self.known.saw([link.robot])
-        self._heartbeat.rest(link.name)
+        self._heartbeat.stop(link.name)
         if link.watch is not None:
             link.watch.close()
             link.watch = None

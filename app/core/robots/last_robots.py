@@ -48,7 +48,7 @@ class LastRobots:
             if name and isinstance(model, str) and model in VIRTUAL_ROBOTS:
                 launcher.start_virtual_robot(name, model)
 
-    def keep(self, launcher: StartsRobots) -> None:
+    def save(self, launcher: StartsRobots) -> None:
         """Save the current robots if they changed.
 
         Called during the session, so that a crash loses none. Errors are reported by the settings.

@@ -158,7 +158,7 @@ class Launcher:
 
     def keep_master(self) -> None:
         """Call `ensure_master` with a back-off after failures. Call it repeatedly."""
-        self._master.keep()
+        self._master.ensure_running()
 
     def start_virtual_robot(self, name: str = "Pepper", model: str = "pepper") -> None:
         """Start a virtual robot of that name and model unless one is listed, also one of another Studio.

@@ -119,12 +119,12 @@ class SessionRoom:
         if revision != self._last_revision:
             self._last_revision, self._changed_s = revision, self._clock()
         elif revision != self._saved_revision and self._clock() - self._changed_s >= QUIET_S:
-            self.keep()
+            self.save()
             if revision != self._published_revision:
                 # later subscribers receive it from here, even if the program that changed it has ended
                 self._publish()
 
-    def keep(self) -> None:
+    def save(self) -> None:
         """Save the room for the next start; errors are reported by the settings."""
         if self._map.revision != self._saved_revision:
             self._saved_revision = self._map.revision
@@ -133,7 +133,7 @@ class SessionRoom:
 
     def close(self) -> None:
         """Save the room and close the publisher."""
-        self.keep()
+        self.save()
         if self._publisher is not None:
             self._publisher.close()
 

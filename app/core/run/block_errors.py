@@ -6,7 +6,7 @@ from collections.abc import Mapping
 
 from app.blocks.model.program import Program
 from app.blocks.model.workspace import saved_blocks
-from app.core.run.wanted import Wanted
+from app.core.run.wanted import RequestedRun
 from app.core.storage import deep_json
 
 _CONTENT = ("type", "fields", "inputs", "extraState", "enabled", "disabledReasons")
@@ -21,12 +21,12 @@ class BlockErrors:
 
     def __init__(self) -> None:
         self.by_block: Mapping[str, str] = {}
-        self._wanted: Wanted | None = None
+        self._wanted: RequestedRun | None = None
         self._not_started = False
         self._ran: Mapping[str, object] = {}
         self._checked: Program | int | None = None  # the newest program, or count of edits, that was checked
 
-    def begin(self, wanted: Wanted) -> None:
+    def begin(self, wanted: RequestedRun) -> None:
         """Clear the errors of the last run."""
         self.by_block, self._wanted, self._ran = {}, wanted, wanted.document.workspace
 
@@ -46,7 +46,7 @@ class BlockErrors:
             self.by_block = self._unchanged(self._wanted.document.workspace)
         return len(self.by_block) < count
 
-    def _unsolved(self, wanted: Wanted) -> Mapping[str, str]:
+    def _unsolved(self, wanted: RequestedRun) -> Mapping[str, str]:
         newest = wanted.document.newest()
         if newest is None or newest is self._checked:
             return self.by_block

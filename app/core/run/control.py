@@ -37,7 +37,7 @@ from app.core.run.view import (
     result_words,
     view_of,
 )
-from app.core.run.wanted import OpenBehaviours, Wanted
+from app.core.run.wanted import OpenBehaviours, RequestedRun
 from app.errors import AppError
 from nep.i18n import _
 
@@ -82,10 +82,12 @@ class Runs:
         self.also_stops: Callable[[], object] = tuple  # called by Stop before it stops robots
         self.document: Document | None = None  # the run's behaviour
         self._runner: Runner | None = None
-        self._current_request: Wanted | None = None  # the current run, else the last
+        self._current_request: RequestedRun | None = None  # the current run, else the last
         self._trial = Trial()
         self.asking = Asking()
-        self._pending_request: Wanted | None = None  # begins once the current run is proven to be stopped
+        self._pending_request: RequestedRun | None = (
+            None  # begins once the current run is proven to be stopped
+        )
         self._edits = EditsSinceRun()
         self._used: tuple[str, ...] = ()
         self._breakpoints: tuple[str, ...] = ()  # of the running program
@@ -151,7 +153,7 @@ class Runs:
             self.blocks_revision += 1
         if self.active:
             self._follow_breakpoints()
-        edited = self.active and self._edits.seen()
+        edited = self.active and self._edits.has_edits()
         if edited != self._run.edited:
             self._run = replace(self._run, edited=edited)
 
@@ -184,7 +186,7 @@ class Runs:
         if run.state == "paused":
             self.go_on()
         elif run.state != "running" or self._clock() - run.started_s >= DOUBLE_CLICK_S:
-            self._request(Wanted(self._documents.current))
+            self._request(RequestedRun(self._documents.current))
 
     def restart(self) -> None:
         """Restart the running or paused behaviour with its current blocks."""
@@ -197,7 +199,7 @@ class Runs:
         if variable is not None:
             self._show_variable(stack, variable)
             return
-        wanted, run = Wanted(self._documents.current, stack=stack), self._run
+        wanted, run = RequestedRun(self._documents.current, stack=stack), self._run
         again = self.active and self._current_request == wanted
         if not again or self._clock() - run.started_s >= DOUBLE_CLICK_S:
             self._request(wanted)
@@ -214,7 +216,7 @@ class Runs:
             self._pending_request is not None and self._pending_request.document is document
         )
 
-    def _request(self, wanted: Wanted) -> None:
+    def _request(self, wanted: RequestedRun) -> None:
         # Runs once the running program has stopped and its robots are proven to have stopped.
         if self._run.state in {"ready", "proven"}:
             self._begin(wanted)
@@ -228,7 +230,7 @@ class Runs:
     def step(self) -> None:
         """Run the next block of a paused program or the first of a new one; pause a running program."""
         if self._run.state in {"ready", "proven"}:
-            self._begin(Wanted(self._documents.current, paused=True))
+            self._begin(RequestedRun(self._documents.current, paused=True))
         elif self._run.state == "running":
             self.pause()
         elif self._run.state == "paused" and self._runner is not None:
@@ -410,7 +412,7 @@ class Runs:
 
     # -- private -----------------------------------------------------------------------------------------
 
-    def _begin(self, wanted: Wanted) -> None:
+    def _begin(self, wanted: RequestedRun) -> None:
         document, self._current_request = wanted.document, wanted
         is_same, self.document = self.document is document, document
         self._trial.begin(wanted)
@@ -445,7 +447,9 @@ class Runs:
         self._edits.ran(document if wanted.stack is None else None, program)
         self._show_start(self._documents.title(document), self._trial.start(program, used))
 
-    def _start_runner(self, program: Program, name: str, wanted: Wanted, owners: Mapping[str, str]) -> Runner:
+    def _start_runner(
+        self, program: Program, name: str, wanted: RequestedRun, owners: Mapping[str, str]
+    ) -> Runner:
         runner = self._make_runner(self._post_event)
         runner.start(
             program,
@@ -466,7 +470,7 @@ class Runs:
         text = _("trying “{block}”").format(block=trying) if trying else _("started")
         self._console.add("info", self._run.name, text)
 
-    def _runnable_program(self, wanted: Wanted) -> Program | None:
+    def _runnable_program(self, wanted: RequestedRun) -> Program | None:
         # None if it has no blocks to run or has problems; the run bar shows the reason.
         program = wanted.program()
         wrong = {} if program is None else wanted.problems(program)
@@ -480,7 +484,7 @@ class Runs:
         self._set_errors(wrong, not_started=True)
         return None
 
-    def _begin_now(self, wanted: Wanted) -> None:
+    def _begin_now(self, wanted: RequestedRun) -> None:
         # After the user's permission, unless another run has begun meanwhile.
         if self._run.state in {"ready", "proven"}:
             self._begin(wanted)

@@ -36,7 +36,7 @@ class EditsSinceRun:
         self._edits = 0 if document is None else document.edits
         self._compared, self._differs = program, False
 
-    def seen(self) -> bool:
+    def has_edits(self) -> bool:
         """Return whether the blocks differ now; each program is compared once."""
         if self._document is None:
             return False

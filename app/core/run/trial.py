@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from app.blocks.compiler.stack import Stack
 from app.blocks.model.program import Program
 from app.core.documents.document import Document
-from app.core.run.wanted import Wanted
+from app.core.run.wanted import RequestedRun
 from app.robots.description.description import Robot
 from nep.i18n import _
 
@@ -30,10 +30,10 @@ class Trial:
     def __init__(self) -> None:
         self.value: TriedValue | None = None
         self._tries = itertools.count(1)
-        self._request: Wanted | None = None
+        self._request: RequestedRun | None = None
         self._unit = ""
 
-    def begin(self, wanted: Wanted) -> None:
+    def begin(self, wanted: RequestedRun) -> None:
         """Begin with a request; discards the value of the previous trial."""
         self._request, self._unit, self.value = wanted, "", None
 
@@ -42,7 +42,7 @@ class Trial:
         if self._request is None:
             return ""
         self._unit = self._request.unit(program, robots)
-        return self._request.words(program)
+        return self._request.label(program)
 
     def parse_line(self, line: str) -> str | None:
         """Return a printed line formatted as the tried value; None if the trial has no value."""

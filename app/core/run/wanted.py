@@ -27,7 +27,7 @@ class OpenBehaviours(Protocol):
 
 
 @dataclass(frozen=True, slots=True)
-class Wanted:
+class RequestedRun:
     """Request to run a behaviour, or one ``stack`` of it; ``paused``: hold before the first block."""
 
     document: Document
@@ -66,7 +66,7 @@ class Wanted:
             return {block: sentence for block, sentence in found.items() if block != SHOW}
         return _absent(program, self.stack)
 
-    def words(self, program: Program) -> str:
+    def label(self, program: Program) -> str:
         """Return the label of the tried block; "" for a whole behaviour."""
         if self.stack is None:
             return ""

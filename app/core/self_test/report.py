@@ -109,7 +109,7 @@ class Report:
             self._steps.append(StepReport(name, words, bound_s, self.now_ms()))
             self._write()
 
-    def seen(self, said: str = "") -> None:
+    def record_success(self, said: str = "") -> None:
         """Record that the step succeeded."""
         with self._lock:
             step = self.step

@@ -51,9 +51,9 @@ class SelfTest:
         self.report.begin(name, words, bound_s)
         self._wait_until(time.monotonic() + bound_s + bounds.GRACE_S, words)
 
-    def seen(self, said: str = "") -> None:
+    def record_success(self, said: str = "") -> None:
         """Record that the step succeeded; ``said`` gives details."""
-        self.report.seen(said)
+        self.report.record_success(said)
 
     def fail(self, why: str) -> None:
         """Record that the test failed; the first sentence counts."""
@@ -78,7 +78,7 @@ class SelfTest:
             if code != 0:
                 self.fail(_("Studio ended with exit code {code}").format(code=code))
         if not self.report.why:
-            self.seen()  # it has closed
+            self.record_success()  # it has closed
         self._end_processes()
         well = self.report.end()
         self._finish()
@@ -117,7 +117,7 @@ class SelfTest:
             self.fail(_("These processes did not exit: {names}").format(names=names))
             end_family()
         else:
-            self.seen()
+            self.record_success()
 
     # -- watchdog -----------------------------------------------------------------------------------------
 

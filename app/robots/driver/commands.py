@@ -155,7 +155,7 @@ class CommandHandler:
         def run(call: Call) -> Mapping[str, object]:
             returned = self._done(function(call, **_typed(spec, function, complete)), call)
             try:
-                return spec.returns.told(returned)
+                return spec.returns.to_output(returned)
             except RobotValueError as error:
                 raise Failed(
                     _("{name} finished, but its result is invalid: {error}").format(

@@ -27,7 +27,7 @@ from app.robots.driver.schema import (
     returned_type,
     schema_of,
 )
-from app.robots.driver.schema_values import check_sendable, plain, told, told_fields
+from app.robots.driver.schema_values import check_sendable, plain, to_json, told_fields
 from app.robots.driver.tasks import BEAT_S
 from nep.i18n import _
 from nep.system.syntax import parse_module
@@ -145,13 +145,13 @@ class Returned:
             return schema
         return {"type": "object", "properties": {"value": {"title": "value", **schema}}}
 
-    def told(self, value: object) -> Mapping[str, object]:
+    def to_output(self, value: object) -> Mapping[str, object]:
         """Convert a function's return value to the output. Raises RobotValueError if the type is wrong."""
-        made = self._told(value)
+        made = self._to_output(value)
         check_sendable(made)
         return made
 
-    def _told(self, value: object) -> Mapping[str, object]:
+    def _to_output(self, value: object) -> Mapping[str, object]:
         if self.fields:
             if value is None:
                 return {}
@@ -159,7 +159,7 @@ class Returned:
             if only and not isinstance(value, Mapping):
                 value = {only[0]: value}
             return told_fields(self.fields, value)
-        found = plain(value) if self.kind is None else told(self.kind, value)
+        found = plain(value) if self.kind is None else to_json(self.kind, value)
         if isinstance(found, dict):
             return found
         return {} if found is None else {"value": found}
@@ -193,13 +193,13 @@ class SensorSpec:
     is_object: bool = False
     kind: object = None
 
-    def told(self, value: object) -> object:
+    def to_json(self, value: object) -> object:
         """Convert a value for publishing. Raises RobotValueError if the type is wrong."""
         if self.is_image:
             return value
         if isinstance(self.kind, Mapping):
             return told_fields(self.kind, value)
-        return told(self.kind, value) if self.is_object else {"value": told(self.kind, value)}
+        return to_json(self.kind, value) if self.is_object else {"value": to_json(self.kind, value)}
 
 
 @dataclass(frozen=True)

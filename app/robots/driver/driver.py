@@ -186,7 +186,7 @@ class Driver:
         """
         spec = self.kind.sensors[sensor]
         try:
-            told = spec.told(value)
+            told = spec.to_json(value)
         except RobotValueError as error:
             words = lazy("{robot}'s sensor '{sensor}': {error}")
             raise RobotValueError(words, robot=self.name, sensor=sensor, error=error) from error

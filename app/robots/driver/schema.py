@@ -14,7 +14,7 @@ from typing import Annotated, Any, NoReturn, TypeAlias, get_args, get_origin, ge
 
 from app.errors import RobotValueError
 from app.robots.description.json_access import as_part
-from app.robots.driver.schema_values import bare, choices_in, fields_of, shown, told, without_none
+from app.robots.driver.schema_values import bare, choices_in, fields_of, shown, to_json, without_none
 from nep.i18n import _
 
 Schema: TypeAlias = dict[str, object]
@@ -295,7 +295,7 @@ def input_schema(function: Callable[..., object]) -> Schema | None:
 
 def _default(kind: object, default: object, name: str) -> object:
     try:
-        return told(kind, default)
+        return to_json(kind, default)
     except RobotValueError as error:
         raise TypeError(str(error.inside(_("the default of '{name}'").format(name=name)))) from error
 

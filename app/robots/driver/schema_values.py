@@ -137,7 +137,7 @@ def given(annotation: object, value: object) -> object:
     return value
 
 
-def told(annotation: object, value: object) -> object:
+def to_json(annotation: object, value: object) -> object:
     """Convert a driver's value of this type to JSON. Raises RobotValueError if it is invalid."""
     kind, is_optional = without_none(bare(annotation)[0])
     kind = bare(kind)[0]
@@ -184,7 +184,7 @@ def told_fields(
     for name, each in value.items():
         try:
             is_unknown = each is None and name not in required
-            made[str(name)] = told(kinds[name], each) if name in kinds and not is_unknown else plain(each)
+            made[str(name)] = to_json(kinds[name], each) if name in kinds and not is_unknown else plain(each)
         except RobotValueError as error:
             raise error.inside(str(name)) from error
     for name in required:
@@ -278,7 +278,7 @@ def _collection(kind: object, value: object) -> object:
 
 def _told_at(kind: object, value: object, place: int | str) -> object:
     try:
-        return told(kind, value)
+        return to_json(kind, value)
     except RobotValueError as error:
         named = f"“{place}”" if isinstance(place, str) else _("value {number}").format(number=place)
         raise error.inside(named) from error

@@ -266,21 +266,21 @@ class PanelWidget(QWidget):
     def restore_state(self, state: Mapping[str, object]) -> None:
         """Restore the state from `save_state`; invalid entries are ignored."""
 
-    def looks(self) -> Iterable[Suspendable | None]:
+    def suspendables(self) -> Iterable[Suspendable | None]:
         """Return watches and streams to suspend while the panel is hidden; None entries are skipped."""
         return ()
 
-    def rest(self) -> None:
+    def suspend(self) -> None:
         """Suspend the panel's watches after it has been hidden for a while; its contents stay."""
-        for look in self.looks():
+        for look in self.suspendables():
             if look is not None:
-                look.rest()
+                look.suspend()
 
-    def wake(self) -> None:
+    def resume(self) -> None:
         """Resume the panel's watches when it becomes visible."""
-        for look in self.looks():
+        for look in self.suspendables():
             if look is not None:
-                look.wake()
+                look.resume()
 
-    def shut(self) -> None:
+    def dispose(self) -> None:
         """Close watches and streams before the panel is removed from the window."""

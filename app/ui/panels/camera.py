@@ -90,7 +90,7 @@ class CameraPanel(OneRobotPanel):
     def wanted_robot(self) -> RobotLink | None:
         """Return the chosen robot if it has a camera, else the first connected robot with one."""
         fleet = self.session.fleet
-        shown = fleet.shown
+        shown = fleet.current
         there = [shown, *fleet.connected] if shown is not None and shown.connected else fleet.connected
         return next((link for link in there if camera_of(link) is not None), None)
 
@@ -110,11 +110,11 @@ class CameraPanel(OneRobotPanel):
         self.empty.set_actions([])
         self.pages.setCurrentWidget(self.empty)
 
-    def looks(self) -> Iterable[Suspendable | None]:
+    def suspendables(self) -> Iterable[Suspendable | None]:
         return (self._stream, self._watch)
 
-    def shut(self) -> None:
-        super().shut()
+    def dispose(self) -> None:
+        super().dispose()
         if self._stream is not None:
             self._stream.close()
             self._stream = None

@@ -46,7 +46,7 @@ class OneRobotPanel(PanelWidget):
 
     def turn_to(self, link: RobotLink) -> None:
         """Switch to this robot and watch its topics."""
-        self.shut()
+        self.dispose()
         self._robot, self._shown, self._revision = link.name, self.key_of(link), self.session.fleet.revision
         self._watch = self.session.fleet.look_at(link.name)
         self.show_robot(link)
@@ -56,7 +56,7 @@ class OneRobotPanel(PanelWidget):
     def wanted_robot(self) -> RobotLink | None:
         """Return the robot to show; None keeps the current one."""
         fleet = self.session.fleet
-        return fleet.shown or fleet.link(self._robot)
+        return fleet.current or fleet.link(self._robot)
 
     def key_of(self, link: RobotLink) -> object:
         """Return the properties that determine the panel's widgets; a change calls `show_robot` again."""
@@ -71,10 +71,10 @@ class OneRobotPanel(PanelWidget):
     def refresh_robot(self, link: RobotLink | None) -> None:
         """Show the robot's current state; None before the first robot."""
 
-    def looks(self) -> Iterable[Suspendable | None]:
+    def suspendables(self) -> Iterable[Suspendable | None]:
         return (self._watch,)
 
-    def shut(self) -> None:
+    def dispose(self) -> None:
         if self._watch is not None:
             self._watch.close()
             self._watch = None

@@ -176,7 +176,7 @@ class PictureView(QWidget):
                 )
                 self.update()
             if not stream.held:
-                stream.shown()
+                stream.count_painted()
         if not stream.held or picture is not shown:
             self._boxes = boxes  # boxes on a frozen image are frozen too
             shown = self._picture

@@ -143,7 +143,7 @@ class DocumentController:
                     continue
                 self._documents.close(document)
                 gone.append(kept)
-            self._session.tabs.keep()
+            self._session.tabs.save()
             self._tell_closed([each for each in gone if each.words])
 
         self.with_newest(closed)
@@ -178,7 +178,7 @@ class DocumentController:
         except AppError as error:
             self._complain(words_of(error), "file.save_as", _("Save somewhere else"))
             return False
-        self._session.tabs.keep()
+        self._session.tabs.save()
         if old is not None and document.path is not None:
             try:
                 self._session.settings.rename_recent(old, document.path)
@@ -191,7 +191,7 @@ class DocumentController:
     def move(self, document: Document, place: int) -> None:
         """Move a tab to another position."""
         self._documents.move(document, place)
-        self._session.tabs.keep()
+        self._session.tabs.save()
 
     def save(self) -> None:
         """Save, or ask where if the behaviour has no file yet."""
@@ -237,7 +237,7 @@ class DocumentController:
             self._cant_save(error)
             return
         self._documents.saved(document)
-        self._session.tabs.keep()
+        self._session.tabs.save()
         self._session.alerts.resolve("file")
         if document.path is not None:
             self._remember(document.path)
@@ -273,7 +273,7 @@ class DocumentController:
         except AppError as error:
             self._complain(words_of(error), "file.open", _("Open another file"))
             return
-        self._session.tabs.keep()
+        self._session.tabs.save()
         self._session.alerts.resolve("file")
         self._shown()
 

@@ -248,7 +248,7 @@ class MemoryClient:
             call.end(kind(self.spec.service, call.timeout_s or 0.0))
         return due
 
-    def known(self, timeout_s: float) -> tuple[str, ...]:  # noqa: ARG002 - immediate
+    def service_names(self, timeout_s: float) -> tuple[str, ...]:  # noqa: ARG002 - immediate
         """Return the names of services that have a server."""
         with self.hub.lock:
             return tuple(sorted(self.hub.servers))

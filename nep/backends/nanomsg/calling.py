@@ -185,7 +185,7 @@ class NanomsgClient(ClientCalls[_Call]):
             self._run_callback(call, kind(self.spec.service, call.timeout_s or 0.0))
         return due
 
-    def known(self, timeout_s: float) -> tuple[str, ...]:  # noqa: ARG002 - no master to query
+    def service_names(self, timeout_s: float) -> tuple[str, ...]:  # noqa: ARG002 - no master to query
         """Return an empty tuple: without a master the servers are unknown."""
         return ()
 

@@ -194,7 +194,7 @@ class RosClient(ClientCalls[_Call]):
         if call.connection is not None:
             call.connection.end()
 
-    def known(self, timeout_s: float) -> tuple[str, ...]:
+    def service_names(self, timeout_s: float) -> tuple[str, ...]:
         """Return the names of services that have a server."""
         try:
             return tuple(sorted(self.process.master.services(timeout_s)))

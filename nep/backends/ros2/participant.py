@@ -246,7 +246,7 @@ class Participant:
         """Combine policies to a Qos object."""
         return self.dds.qos.Qos(*policies)
 
-    def settle(self) -> None:
+    def wait_for_discovery(self) -> None:
         """Wait until existing participants are discovered. Returns at once if that was done."""
         if self._is_settled:
             return

@@ -71,7 +71,7 @@ class Ros2Transport:
                     "master='{other}'"
                 ).format(name=self.node.name, domain=participant.number, other=configuration.master)
             )
-        participant.settle()
+        participant.wait_for_discovery()
         return participant
 
     def _check_open(self) -> None:

@@ -340,7 +340,7 @@ class ZenohClient(ClientCalls[_Call]):
             dues = [min(each.deadline, each.finished_at) for each in self._calls.values()]
         return min(dues, default=math.inf)
 
-    def known(self, timeout_s: float) -> tuple[str, ...]:  # noqa: ARG002 - immediate
+    def service_names(self, timeout_s: float) -> tuple[str, ...]:  # noqa: ARG002 - immediate
         """Return the names of services that have a server."""
         return tuple(sorted(self._session.roster.served))
 

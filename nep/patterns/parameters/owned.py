@@ -9,7 +9,7 @@ from typing import Protocol
 
 from nep.errors import ClosedError, ParameterError, did_you_mean
 from nep.i18n import _
-from nep.patterns.parameters.parameter import NodeParameter, declared, shown
+from nep.patterns.parameters.parameter import NodeParameter, declared, short_repr
 from nep.text import bounded_str, escaped
 
 __all__ = ["MSG_TYPE", "OnChange", "ParameterHost", "Parameters", "place_of"]
@@ -104,11 +104,11 @@ class Parameters:
         )
         with self._lock:
             if name in self._known:
-                raise ParameterError(name, shown(default), _("it is already declared; use 'set'"))
+                raise ParameterError(name, short_repr(default), _("it is already declared; use 'set'"))
             if len(self._known) >= _MAX_PARAMETERS:
                 raise ParameterError(
                     name,
-                    shown(default),
+                    short_repr(default),
                     _("a node can have at most {most} parameters").format(most=_MAX_PARAMETERS),
                 )
             if self._topic is None:
@@ -172,7 +172,7 @@ class Parameters:
                 if after.value == before.value and type(after.value) is type(before.value):
                     continue
                 if before.is_read_only and not is_own:
-                    raise ParameterError(name, shown(value), _("only its node can change it"))
+                    raise ParameterError(name, short_repr(value), _("only its node can change it"))
                 changed[name] = after
             if not changed:
                 return

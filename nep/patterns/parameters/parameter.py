@@ -15,7 +15,7 @@ from nep.patterns.parameters.form import ParameterForm, form_of
 from nep.protocol.wire import check_topic
 from nep.text import escaped, shortened
 
-__all__ = ["KINDS", "NodeParameter", "declared", "shown"]
+__all__ = ["KINDS", "NodeParameter", "declared", "short_repr"]
 
 KINDS: Mapping[str, type] = {
     "bool": bool,
@@ -77,7 +77,7 @@ class NodeParameter:
             if self.maximum is not None and found > self.maximum:
                 raise self._error(value, _("the maximum is {most}").format(most=self.maximum))
         if self.choices and found not in self.choices:
-            names = listed([shown(each) for each in self.choices], "or")
+            names = listed([short_repr(each) for each in self.choices], "or")
             raise self._error(value, _("use {choices}").format(choices=names))
         return found
 
@@ -120,7 +120,7 @@ class NodeParameter:
         return cast("object", orjson.loads(data))
 
     def _error(self, value: object, reason: str) -> ParameterError:
-        return ParameterError(self.name, shown(value), reason)
+        return ParameterError(self.name, short_repr(value), reason)
 
     def as_map(self) -> dict[str, object]:
         """Return the parameter as sent to others, in JSON types."""
@@ -156,19 +156,19 @@ def declared(
     if word not in KINDS:
         raise ParameterError(
             check_topic(name),
-            shown(default),
+            short_repr(default),
             _("its type must be {kinds}").format(kinds=listed([f"'{each}'" for each in KINDS], "or")),
         )
     for each in (minimum, maximum):
         if each is not None and (word not in {"int", "float"} or not _is_finite(each)):
             raise ParameterError(
                 check_topic(name),
-                shown(default),
+                short_repr(default),
                 _("only numbers can have limits, and the limits must be finite"),
             )
     bare = NodeParameter(check_topic(name), None, word, None, _clean_description(description), form=form)
     if len(choices) > _CHOICES_MAX:
-        raise ParameterError(name, shown(default), _("it has too many choices"))
+        raise ParameterError(name, short_repr(default), _("it has too many choices"))
     allowed = tuple(bare.with_value(each).value for each in choices)
     parameter = replace(bare, minimum=minimum, maximum=maximum, choices=allowed, is_read_only=is_read_only)
     value = parameter.with_value(default).value
@@ -181,7 +181,7 @@ def _form_of(name: str, kind: object, default: object) -> ParameterForm | None:
     try:
         return form_of(kind)
     except ValueError as error:
-        raise ParameterError(check_topic(name), shown(default), str(error)) from error
+        raise ParameterError(check_topic(name), short_repr(default), str(error)) from error
 
 
 def _clean_description(description: object) -> str:
@@ -195,7 +195,7 @@ def _is_finite(value: object) -> bool:
     return isinstance(value, float) and math.isfinite(value)
 
 
-def shown(value: object) -> str:
+def short_repr(value: object) -> str:
     """Return the shortened `repr` of a value for a message."""
     try:
         written = repr(value)

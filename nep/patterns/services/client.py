@@ -222,7 +222,7 @@ class Client:
         # Adds the existing services to the error.
         if error.address:
             return error
-        return NoServerError(error.service, error.timeout_s, self._transport.known(_SERVICE_QUERY_S))
+        return NoServerError(error.service, error.timeout_s, self._transport.service_names(_SERVICE_QUERY_S))
 
     def _settle(self, future: Future[object], outcome: Outcome) -> None:
         if not future.set_running_or_notify_cancel():

@@ -162,7 +162,7 @@ class AlarmEvaluator:
         losses, self._losses = self._losses, {}
         for track in self._tracks.values():
             condition = track.rule.condition
-            if condition.hears:
+            if condition.needs_topic:
                 topic = self._subscribed.get(condition.name)
                 if topic is None:
                     topic = self._subscribed[condition.name] = (
@@ -279,7 +279,7 @@ class AlarmEvaluator:
 
     def _evaluate_time(self, track: AlarmTrack, now: float) -> Turn | None:
         condition = track.rule.condition
-        subscription = self._subscribed.get(condition.name) if condition.hears else None
+        subscription = self._subscribed.get(condition.name) if condition.needs_topic else None
         if condition.kind == "silent" and subscription is not None and subscription.there_since is not None:
             silent_s = now - max(subscription.there_since, subscription.last or subscription.there_since)
             return track.observe(silent_s >= condition.for_s, silent_s, now)
@@ -293,7 +293,7 @@ class AlarmEvaluator:
                 return track.compare(percent, now, is_below=False)
         elif condition.kind == "leaves" and self._view is None:
             return None  # without a master it is unknown which nodes exist
-        return track.settle(now)
+        return track.advance(now)
 
     def _emit(self, track: AlarmTrack, turn: Turn) -> None:
         rule, now_s = track.rule, self._clock_s()
@@ -318,7 +318,7 @@ class AlarmEvaluator:
             if track is None:  # validate again only if the rule is not evaluated
                 return AlarmState("off" if problem_of(rule) is None else "faulty")
             condition = track.rule.condition
-            subscription = self._subscribed.get(condition.name) if condition.hears else None
+            subscription = self._subscribed.get(condition.name) if condition.needs_topic else None
             was_seen = track.was_seen or (subscription is not None and subscription.there_since is not None)
             if condition.is_about_value:
                 was_seen = subscription is not None and subscription.last is not None

@@ -95,7 +95,7 @@ class AlarmCondition:
         return float_of(self.limit) if is_number else math.nan  # type: ignore[arg-type]
 
     @property
-    def hears(self) -> bool:
+    def needs_topic(self) -> bool:
         """True if the topic must be subscribed."""
         return self.is_about_value or self.kind in {"silent", "rate_below", "rate_above"}
 
@@ -261,4 +261,6 @@ def _is_scalar(value: object) -> bool:
 
 def topics_of(rules: Sequence[AlarmRule]) -> frozenset[str]:
     """Return the topics that must be subscribed for these rules."""
-    return frozenset(rule.condition.name for rule in rules if rule.condition.hears and rule.condition.name)
+    return frozenset(
+        rule.condition.name for rule in rules if rule.condition.needs_topic and rule.condition.name
+    )

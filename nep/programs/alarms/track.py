@@ -124,7 +124,7 @@ class AlarmTrack:
 
     def observe(self, is_so: bool, seen: Scalar, now: float) -> Turn | None:
         """Process whether the condition holds now, and the value seen."""
-        turn = self.settle(now)
+        turn = self.advance(now)
         self.was_seen = True
         self.seen = seen
         if is_so:
@@ -137,9 +137,9 @@ class AlarmTrack:
             self._true_since = None
             if self.is_on and self._false_since is None:
                 self._false_since = now
-        return turn or self.settle(now)
+        return turn or self.advance(now)
 
-    def settle(self, now: float) -> Turn | None:
+    def advance(self, now: float) -> Turn | None:
         """Update the state for the time that has passed."""
         since, false_since = self._true_since, self._false_since
         if self.on_since is None:

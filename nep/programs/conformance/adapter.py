@@ -17,7 +17,7 @@ from typing import IO, Any, Protocol
 from nep.errors import NepError
 from nep.i18n import _
 from nep.masters.process import NO_CONSOLE
-from nep.programs.conformance.verdict import shown
+from nep.programs.conformance.verdict import printable
 
 __all__ = ["Adapter", "AdapterError", "AdapterProcess", "AdapterStreams"]
 
@@ -121,7 +121,7 @@ class Adapter:
             return None
         if "error" in reply:
             raise AdapterError(
-                _("the adapter reported an error: {error}").format(error=shown(reply["error"]))
+                _("the adapter reported an error: {error}").format(error=printable(reply["error"]))
             )
         return reply
 
@@ -138,7 +138,7 @@ class Adapter:
                 message = None
             if not isinstance(message, dict):
                 raise AdapterError(
-                    _("the adapter wrote {line}, which is not a JSON object").format(line=shown(line))
+                    _("the adapter wrote {line}, which is not a JSON object").format(line=printable(line))
                 )
             if isinstance(message.get("re"), int):
                 self._replies[message["re"]] = message

@@ -9,7 +9,7 @@ from contextlib import contextmanager
 from nep.errors import NepError
 from nep.i18n import _
 
-__all__ = ["BrokenRuleError", "at_most", "broken", "expect", "shown"]
+__all__ = ["BrokenRuleError", "at_most", "broken", "expect", "printable"]
 
 _MAX_SHOWN = 200
 
@@ -27,7 +27,9 @@ def expect(what: str, seen: object, wanted: object) -> None:
     """Raise `BrokenRuleError` unless ``seen`` equals ``wanted`` in type and value. ``what`` names a field."""
     if seen != wanted or type(seen) is not type(wanted):
         raise BrokenRuleError(
-            _("{what} is {seen}, expected {wanted}").format(what=what, seen=shown(seen), wanted=shown(wanted))
+            _("{what} is {seen}, expected {wanted}").format(
+                what=what, seen=printable(seen), wanted=printable(wanted)
+            )
         )
 
 
@@ -41,7 +43,7 @@ def at_most(seconds: float) -> Iterator[None]:
         raise broken(_("it took {seconds:.1f} s").format(seconds=took_s))
 
 
-def shown(value: object) -> str:
+def printable(value: object) -> str:
     """Return a printable form of a value, of limited length."""
     text = ascii(value)
     return text if len(text) <= _MAX_SHOWN else f"{text[:_MAX_SHOWN]}…"

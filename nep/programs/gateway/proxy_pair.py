@@ -121,7 +121,7 @@ class ProxyPair:
         return {role: len(handles) for role, handles in self._open_handles.items()}
 
     @property
-    def wanted(self) -> bool:
+    def has_subscribers(self) -> bool:
         """True if an original program subscribes to this line."""
         return any(self.shape.wants(filter_) for filter_ in self.filters)
 
@@ -170,12 +170,12 @@ class ProxyPair:
 
     def pass_on(self, frame: bytes, data: bytes) -> None:
         """Send a frame of this line to its own subscribers, unchanged unless a language needs shielding."""
-        if self.wanted:
+        if self.has_subscribers:
             self._send(self.shape.write(self._shielded(data)) if self._needs_shield else frame)
 
     def deliver(self, data: bytes | memoryview) -> None:
         """Send bytes of the native codec to this line's subscribers in this line's format."""
-        if self.wanted:
+        if self.has_subscribers:
             self._send(self.shape.write(self._shielded(bytes(data)) if self._needs_shield else data))
 
     def close(self) -> None:

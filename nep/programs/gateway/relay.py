@@ -100,7 +100,7 @@ class Relay:
         pair = self._pairs.pop(line, None)
         if pair is not None:
             pair.close()
-            self.settle((line.topic, line.codec))
+            self.update_endpoints((line.topic, line.codec))
             for role in tuple(pair.unserved):
                 self._clear_version(pair, role)
 
@@ -120,7 +120,7 @@ class Relay:
         changed = pair.read_connections()
         changed |= pair.read_filters()
         if changed:
-            self.settle((pair.line.topic, pair.line.codec))
+            self.update_endpoints((pair.line.topic, pair.line.codec))
         for frame in pair.frames(_MAX_BATCH):
             self._relay_frame(pair, frame)
         return changed
@@ -138,7 +138,7 @@ class Relay:
     def tick(self) -> None:
         """Retry failed subscriptions and update alerts. Call once a second."""
         for key in {(line.topic, line.codec) for line in self._pairs}:
-            self.settle(key)
+            self.update_endpoints(key)
         for topic, rejected in list(self._rejected.items()):
             if rejected.count != rejected.reported:
                 self._report_rejected(topic, rejected)
@@ -146,10 +146,10 @@ class Relay:
                 del self._rejected[topic]
                 self._alerts.resolve(f"message:{topic}")
 
-    def settle(self, key: Key) -> None:
+    def update_endpoints(self, key: Key) -> None:
         """Open or close native publishers and subscribers as original programs need them."""
         pairs = self._pairs_of(key)
-        wanted = any(pair.wanted for pair in pairs)
+        wanted = any(pair.has_subscribers for pair in pairs)
         if wanted and key not in self._subscribed:
             if self._native.subscribe(*key):
                 self._subscribed.add(key)

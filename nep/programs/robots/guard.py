@@ -103,7 +103,7 @@ class MotionGuard:
             return
         self.see(view)
 
-    def settle(self, timeout_s: float) -> bool:
+    def wait_for_descriptions(self, timeout_s: float) -> bool:
         """Wait up to `timeout_s` until all descriptions were read; return whether they were."""
         until = time.monotonic() + timeout_s
         while True:

@@ -38,7 +38,7 @@ class Bench:
     def do(self, action: str, state: str = "succeeded", **given: object) -> None:
         self.count += 1
         call = RobotCall(f"c{self.count}", "Turtle", action)
-        self.going.asked(call, TURTLE, given)
+        self.going.note_command(call, TURTLE, given)
         call.state = state
         self.going.ended(call)
 

@@ -11,7 +11,7 @@ from app.core.documents.document import Document
 from app.core.documents.file_format import BehaviourFile, write_file
 from app.core.documents.journal import Journal, Unsaved, left_behind
 from app.core.documents.open_documents import Documents
-from app.core.documents.saved_tabs import KeptTabs
+from app.core.documents.saved_tabs import SavedTabs
 from app.core.storage.settings import Settings
 from tests.core.documents.test_open_documents import OTHER, STARTED, all_kept, as_if_dead, names
 
@@ -24,7 +24,7 @@ class Start:
         self.complaints: list[str] = []
         self.journals = folder / "journal"
         self.documents = Documents(lambda: Document(lambda: Journal(self.journals)))
-        self.tabs = KeptTabs(Settings(folder), self.documents, self.complaints.append)
+        self.tabs = SavedTabs(Settings(folder), self.documents, self.complaints.append)
 
     def come_back(self) -> list[Unsaved]:
         return self.tabs.come_back(left_behind(self.journals) if self.journals.exists() else [])
@@ -36,7 +36,7 @@ class Start:
         assert self.come_back() == []
         self.documents.open(path)
         self.documents.current.edited(OTHER)
-        self.tabs.keep()
+        self.tabs.save()
         assert all_kept(self.documents)
 
 

@@ -286,14 +286,14 @@ def test_suspended_stream_decodes_nothing_and_keeps_its_picture(images: Images, 
     images.offer([jpeg((1, 2, 3), seq=1)])
     until(lambda: stream.picture is not None and other.picture is not None)
     assert not stream.awaits_picture
-    stream.rest()
-    stream.rest()
+    stream.suspend()
+    stream.suspend()
     images.offer([jpeg((1, 2, 3), seq=2)])
     until(lambda: other.picture is not None and other.picture.seq == 2)
     assert (stream.picture is not None and stream.picture.seq, stream.awaits_picture) == (1, True)
-    other.rest()
+    other.suspend()
     assert watched == [], "nobody looks"
-    stream.wake()
+    stream.resume()
     assert watched == ["/camera"]
     assert stream.awaits_picture, "what it has may be old"
     images.offer([jpeg((1, 2, 3), seq=3)])
@@ -312,9 +312,9 @@ def test_resumed_stream_is_not_reported_as_silent(kind: type[Images]) -> None:
     until(lambda: stream.picture is not None)
     now[0] = 104.0
     assert (stream.silent_s, stream.age_s) == (4.0, 4.0)
-    stream.rest()
+    stream.suspend()
     now[0] = 200.0
-    stream.wake()
+    stream.resume()
     now[0] = 201.0
     assert (stream.silent_s, stream.age_s) == (1.0, 101.0)
     images.close()
@@ -328,9 +328,9 @@ def test_held_picture_of_suspended_stream_can_be_enlarged_after_resume(images: I
     assert stream.picture is not None
     assert not stream.picture.whole
     stream.hold(True)
-    stream.rest()
+    stream.suspend()
     stream.want(None)
-    stream.wake()
+    stream.resume()
     until(lambda: stream.picture is not None and stream.picture.whole)
     assert (stream.picture.seq, stream.awaits_picture) == (1, True)
 

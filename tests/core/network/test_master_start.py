@@ -35,7 +35,7 @@ def test_foreign_program_at_master_address_is_named_once_and_retried_with_backof
 
     def ask() -> None:
         before = start._thread
-        start.keep()
+        start.ensure_running()
         if start._thread is not before:
             asked.append(now[0])
             start.close()

@@ -21,17 +21,17 @@ def test_suspended_watch_is_unsubscribed_but_remembered() -> None:
     calls: list[str] = []
     watches = Watches(*(lambda topic, sign=sign: calls.append(f"{sign}{topic}") for sign in "+-!"))
     first, second = watches.open(["/a"]), watches.open(["/a"])
-    first.rest()
-    first.rest()
+    first.suspend()
+    first.suspend()
     assert (calls, watches.watched("/a"), first.resting) == (["+/a"], True, True)
     second.close()
     assert calls == ["+/a", "-/a"], "the other one only rests, and still wants to know"
-    first.wake()
-    first.wake()
+    first.resume()
+    first.resume()
     assert calls == ["+/a", "-/a", "+/a"]
-    first.rest()
+    first.suspend()
     first.close()
     assert calls == ["+/a", "-/a", "+/a", "-/a", "!/a"]
-    first.wake()
+    first.resume()
     first.close()
     assert (calls[-1], len(calls), watches.watched("/a")) == ("!/a", 5, False)

@@ -230,7 +230,7 @@ def test_real_recorder_process_records_saves_and_finishes(master, tmp_path):
         for n in range(20):
             publisher.publish({"n": n})
         until(lambda: client.state.topics.get("/a") is not None and client.state.topics["/a"].received == 20)
-        assert client.keep(tmp_path / "kept.mcap", 60.0, "it fell")
+        assert client.save_last(tmp_path / "kept.mcap", 60.0, "it fell")
         until(lambda: not client.state.keeping)
         client.close(30.0)  # as Studio's end: the recording is finished
     assert not [each.title for each in client._alerts.active]

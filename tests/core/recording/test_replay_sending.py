@@ -232,7 +232,7 @@ def test_outbox_sends_only_allowed_messages_and_counts_omitted_ones():
     assert (sent.count, sent.skipped) == (0, 0)  # its publisher is not there yet: nothing has begun
     jobs.pop()(node)
     outbox.offer(messages, [0.0, 0.0, MAX_DELAY_S + 0.01])
-    assert (sent.count, sent.skipped, sent.heard) == (1, 1, 2)
+    assert (sent.count, sent.skipped, sent.subscriber_count) == (1, 1, 2)
     assert sent_words(sent) == "1 sent, 1 late message skipped"
     assert node.made[0].made == ("/test", "json", True)
     assert node.made[0].sent == [(bytes(messages[0].data), None)]

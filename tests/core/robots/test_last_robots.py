@@ -32,19 +32,19 @@ def test_running_virtual_robots_are_restored_and_stopped_ones_are_not(tmp_path: 
     assert next_start(tmp_path) == {}
     launcher.start_virtual_robot()
     launcher.start_virtual_robot("Turtle", "diffdrive")
-    robots.keep(launcher)
+    robots.save(launcher)
     assert next_start(tmp_path) == {"Pepper": "pepper", "Turtle": "diffdrive"}
     del launcher.wanted["Pepper"]
-    robots.keep(launcher)
+    robots.save(launcher)
     assert next_start(tmp_path) == {"Turtle": "diffdrive"}
     launcher.wanted.clear()
-    robots.keep(launcher)
+    robots.save(launcher)
     assert next_start(tmp_path) == {}
 
 
 def test_start_without_restored_robots_keeps_the_list(tmp_path: Path) -> None:
     Settings(tmp_path).set(KEPT, {"Pepper": "pepper"})
-    LastRobots(Settings(tmp_path)).keep(Launcher())
+    LastRobots(Settings(tmp_path)).save(Launcher())
     assert next_start(tmp_path) == {"Pepper": "pepper"}
 
 

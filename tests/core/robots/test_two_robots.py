@@ -67,13 +67,13 @@ def test_panels_show_the_chosen_robot_or_the_first_connected(session: Session, n
         there(session, "Pepper")
         with Driver(turtle.ROBOT, "Turtle", node):
             there(session, "Turtle")
-            shown = session.fleet.shown
+            shown = session.fleet.current
             assert shown is not None
             assert shown.name == "Pepper"
             session.fleet.choose("Turtle")
-            assert session.fleet.shown is session.fleet.link("Turtle")
+            assert session.fleet.current is session.fleet.link("Turtle")
         tick_until(session, lambda: len(session.fleet.connected) == 1, FOUND_S)
-        assert session.fleet.shown is session.fleet.link("Pepper")  # the chosen one has gone
+        assert session.fleet.current is session.fleet.link("Pepper")  # the chosen one has gone
 
 
 REAL = replace(turtle.ROBOT, virtual=False)

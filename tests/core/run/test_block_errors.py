@@ -9,7 +9,7 @@ import pytest
 
 from app.core.documents.document import Document
 from app.core.run.block_errors import BlockErrors
-from app.core.run.wanted import Wanted
+from app.core.run.wanted import RequestedRun
 from app.core.session import Session
 from app.core.storage.settings import Settings
 from tests.blocks.fakes import until
@@ -33,7 +33,7 @@ def test_error_of_stopped_program_is_cleared_when_its_block_changes(document: Do
     soon = text("soon")
     document.edited(waiting(soon))
     errors = BlockErrors()
-    errors.begin(Wanted(document))
+    errors.begin(RequestedRun(document))
     errors.put({"w": "“wait” needs a number"}, not_started=False)
     assert not errors.forget_repaired()
     document.edited(waiting(soon, "Other"))
@@ -47,7 +47,7 @@ def test_error_of_deleted_block_is_cleared(document: Document) -> None:
     soon = text("soon")
     document.edited(waiting(soon))
     errors = BlockErrors()
-    errors.begin(Wanted(document))
+    errors.begin(RequestedRun(document))
     errors.put({"w": "“wait” needs a number"}, not_started=False)
     document.edited(workspace(started()))
     assert errors.forget_repaired()
@@ -56,7 +56,7 @@ def test_error_of_deleted_block_is_cleared(document: Document) -> None:
 def test_error_that_prevented_start_is_cleared_when_blocks_are_fixed(document: Document) -> None:
     wait = block("control_wait_until", "w")
     document.edited(workspace(started(wait)))
-    wanted, errors = Wanted(document), BlockErrors()
+    wanted, errors = RequestedRun(document), BlockErrors()
     errors.begin(wanted)
     errors.put(wanted.problems(document.program()), not_started=True)
     assert list(errors.by_block) == ["w"]

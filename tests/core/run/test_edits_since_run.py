@@ -26,35 +26,35 @@ def program(runnable: str) -> Program:
 
 
 def test_no_edit_is_reported_before_the_first_run() -> None:
-    assert not EditsSinceRun().seen()
+    assert not EditsSinceRun().has_edits()
 
 
 def test_edit_is_reported_until_undone_or_run() -> None:
     edits, document = EditsSinceRun(), Document()
     edits.ran(document, program("a"))
-    assert not edits.seen()
+    assert not edits.has_edits()
     document.edited("b")
-    assert edits.seen()
+    assert edits.has_edits()
     document.edited("a")
-    assert not edits.seen()
+    assert not edits.has_edits()
     document.edited("b")
     edits.ran(document, program("b"))
-    assert not edits.seen()
+    assert not edits.has_edits()
 
 
 def test_edit_state_is_unchanged_during_background_compilation() -> None:
     edits, document = EditsSinceRun(), Document()
     edits.ran(document, program("a"))
     document.compiled = None
-    assert not edits.seen()
+    assert not edits.has_edits()
     document.edited("b")
-    assert edits.seen()
+    assert edits.has_edits()
 
 
 def test_connected_robot_is_not_an_edit() -> None:
     edits, document = EditsSinceRun(), Document()
     edits.ran(document, program("a"))
     document.compiled = program("a, and what the robot does")
-    assert not edits.seen()
+    assert not edits.has_edits()
     document.edited("a")
-    assert edits.seen()
+    assert edits.has_edits()

@@ -5,7 +5,7 @@ from __future__ import annotations
 from app.blocks.compiler.stack import Stack
 from app.core.documents.document import Document
 from app.core.run.trial import Trial
-from app.core.run.wanted import Wanted
+from app.core.run.wanted import RequestedRun
 from tests.blocks.samples import block, robot, say, started, workspace
 
 BATTERY = Stack("bat", "value", block("robot_pepper_get_battery", "bat", ROBOT="Pepper"))
@@ -16,7 +16,7 @@ def began(stack: Stack | None) -> tuple[Trial, str]:
     document = Document()
     document.set_connected([robot("Pepper")])
     document.edited(workspace(started(say("Hi") | {"id": "hi"})))
-    wanted = Wanted(document, stack=stack)
+    wanted = RequestedRun(document, stack=stack)
     program = wanted.program()
     assert program is not None
     made = Trial()
@@ -41,7 +41,7 @@ def test_empty_line_is_an_unknown_value() -> None:
 def test_next_run_clears_the_tried_value() -> None:
     trial, _words = began(BATTERY)
     trial.parse_line("84")
-    trial.begin(Wanted(Document()))
+    trial.begin(RequestedRun(Document()))
     assert trial.value is None
     assert trial.parse_line("printed") is None
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from app.blocks.compiler.stack import Stack
 from app.core.documents.document import Document
-from app.core.run.wanted import Wanted
+from app.core.run.wanted import RequestedRun
 from tests.blocks.samples import block, robot, say, started, workspace
 
 
@@ -18,25 +18,25 @@ def document(*connected: str) -> Document:
 
 
 def test_requested_behaviour_runs_completely() -> None:
-    wanted = Wanted(document("Pepper"))
+    wanted = RequestedRun(document("Pepper"))
     program = wanted.program()
     assert program is wanted.document.program()
     assert program is not None
     assert list(wanted.problems(program)) == ["gap"], "robots that are missing are skipped"
-    assert wanted.words(program) == ""
+    assert wanted.label(program) == ""
     assert not wanted.gives_value
 
 
 def test_requested_stack_is_named_by_its_first_block() -> None:
-    wanted = Wanted(document("Pepper", "Ada"), stack=Stack("ada"))
+    wanted = RequestedRun(document("Pepper", "Ada"), stack=Stack("ada"))
     program = wanted.program()
     assert program is not None
-    assert wanted.words(program) == "say"
+    assert wanted.label(program) == "say"
     assert "needs a condition" in wanted.problems(program)["gap"]
 
 
 def test_stack_with_block_of_disconnected_robot_cannot_be_tried() -> None:
-    wanted = Wanted(document("Pepper"), stack=Stack("ada", state=say("Hi", "Ada") | {"id": "ada"}))
+    wanted = RequestedRun(document("Pepper"), stack=Stack("ada", state=say("Hi", "Ada") | {"id": "ada"}))
     program = wanted.program()
     assert program is not None
     assert wanted.problems(program) == {"ada": "Ada is not connected, so it can't be tried."}
@@ -44,15 +44,15 @@ def test_stack_with_block_of_disconnected_robot_cannot_be_tried() -> None:
 
 def test_requested_value_has_its_unit() -> None:
     battery = block("robot_pepper_get_battery", "bat", ROBOT="Pepper")
-    wanted = Wanted(document("Pepper"), stack=Stack("bat", "value", battery))
+    wanted = RequestedRun(document("Pepper"), stack=Stack("bat", "value", battery))
     program = wanted.program()
     assert program is not None
     assert wanted.gives_value
     assert wanted.unit(program, [robot("Pepper")]) == "%"
     assert wanted.unit(program, []) == ""
     assert wanted.problems(program) == {}
-    assert wanted.words(program) == "battery"
+    assert wanted.label(program) == "battery"
 
 
 def test_deleted_stack_has_no_program() -> None:
-    assert Wanted(document("Pepper"), stack=Stack("nowhere")).program() is None
+    assert RequestedRun(document("Pepper"), stack=Stack("nowhere")).program() is None

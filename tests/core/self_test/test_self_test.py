@@ -66,7 +66,7 @@ def test_report_is_valid_at_any_moment(tmp_path: Path) -> None:
     assert not half["ok"]
     assert half["why"] == "Studio ended during the self-test; its last step was “window”."
     assert half["steps"][0]["ms"] is None
-    report.seen("it was painted")
+    report.record_success("it was painted")
     report.mark("first_paint")
     assert report.end()
     whole = told(tmp_path)

@@ -34,11 +34,11 @@ def test_robot_that_connects_later_is_protected_on_any_topic_it_describes(
     network: str, node: nep.Node
 ) -> None:
     guard = MotionGuard(node)
-    assert guard.settle(1.0)
+    assert guard.wait_for_descriptions(1.0)
     assert guard.refusal("/orders") == ""
     with nep.node("robot", "memory", master=network) as robot:
         describe(robot, "Rover", "/orders")
-        guard.settle(5.0)
+        guard.wait_for_descriptions(5.0)
         said = guard.refusal("/orders")
         assert "Rover" in said
         assert "--allow-moving Rover" in said  # its claim to be virtual is not believed
@@ -56,7 +56,7 @@ def test_allowed_robots_and_topics_are_not_rejected(network: str, node: nep.Node
         describe(robot, "Rover", "/orders")
         describe(robot, "Fido", "/orders")
         guard = MotionGuard(node, ["Rover"])
-        assert guard.settle(5.0)
+        assert guard.wait_for_descriptions(5.0)
         assert guard.refusal("/orders").count("--allow-moving") == 1
         assert "--allow-moving Fido" in guard.refusal("/orders")
         assert MotionGuard(node, ["/new"]).refusal("/new", "robot/command") == ""
@@ -70,7 +70,7 @@ def test_unreadable_description_protects_all_topics_its_program_subscribes_to(
         robot.new_pub("/Rover/description", "robot/description", latched=True).publish("broken")
         robot.new_sub("/orders")
         guard = MotionGuard(node)
-        assert not guard.settle(0.2)
+        assert not guard.wait_for_descriptions(0.2)
         assert "--allow-moving Rover" in guard.refusal("/orders")
         assert guard.refusal("/weather") == ""
         guard.close()
@@ -91,7 +91,7 @@ def test_hostile_descriptions_do_not_stop_the_guard_or_reduce_protection(
     with nep.node("robot", "memory", master=network) as robot, nep.node("x", "memory", master=network) as x:
         describe(robot, "Rover", "/orders")
         guard = MotionGuard(node)
-        assert guard.settle(5.0)
+        assert guard.wait_for_descriptions(5.0)
         strange = x.new_pub("/Rover/description", "robot/description", latched=True)
         for payload in HOSTILE:
             strange.publish(payload)

@@ -24,7 +24,7 @@ from app.robots.driver.schema import (
     input_schema,
     schema_of,
 )
-from app.robots.driver.schema_values import given, told
+from app.robots.driver.schema_values import given, to_json
 from app.robots.kit import Call, Kind, Link, action, event, safe_stop, sensor
 from tests.pseudo import untranslated
 from tests.robots.conftest import Ears, eventually
@@ -214,7 +214,7 @@ def test_values_round_trip_between_json_and_python(kind, json, python):
     made = given(kind, json)
     assert made == python
     assert type(made) is type(python)
-    assert given(kind, told(kind, made)) == python
+    assert given(kind, to_json(kind, made)) == python
 
 
 @pytest.mark.parametrize(
@@ -241,16 +241,16 @@ def test_values_round_trip_between_json_and_python(kind, json, python):
 )
 def test_value_of_another_type_is_rejected_with_a_message(kind, value, sentence):
     with pytest.raises(RobotValueError) as caught:
-        told(kind, value)
+        to_json(kind, value)
     assert str(caught.value) == sentence
 
 
 def test_numpy_numbers_and_arrays_become_numbers_and_lists():
-    assert told(float, np.float32(0.5)) == 0.5
-    assert told(int, np.int64(7)) == 7
-    assert told(bool, np.bool_(True)) is True
-    assert told(list[float], np.array([1.0, 2.0])) == [1.0, 2.0]
-    assert json.dumps(told(object, {"a": [np.int8(3)]})) == '{"a": [3]}'
+    assert to_json(float, np.float32(0.5)) == 0.5
+    assert to_json(int, np.int64(7)) == 7
+    assert to_json(bool, np.bool_(True)) is True
+    assert to_json(list[float], np.array([1.0, 2.0])) == [1.0, 2.0]
+    assert json.dumps(to_json(object, {"a": [np.int8(3)]})) == '{"a": [3]}'
 
 
 def test_recursive_type_is_rejected():
@@ -447,5 +447,5 @@ def test_type_error_message_is_translated():
         (dict[str, int], {"y": "zz"}),
     ):
         with pytest.raises(RobotValueError) as caught:
-            told(kind, value)
+            to_json(kind, value)
         assert untranslated(str(caught.value), "zz", "x", "y", "name") == []

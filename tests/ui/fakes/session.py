@@ -16,7 +16,7 @@ from functools import partial
 from app.core import session as session_module
 from app.core.console import Console
 from app.core.documents.open_documents import Documents
-from app.core.documents.saved_tabs import KeptTabs
+from app.core.documents.saved_tabs import SavedTabs
 from app.core.network import doctor as doctor_module
 from app.core.network.master import MasterState
 from app.core.network.topics import Topic
@@ -107,7 +107,7 @@ class Session(session_module.Session):
         self.voices = RobotVoices(self.settings, self.fleet, self.watch, self.console.add, self.clock)
         self.documents = Documents(Document)
         self.document.key = "behaviour-1"
-        self.tabs = KeptTabs(self.settings, self.documents, partial(self.console.add, "warn", "studio"))
+        self.tabs = SavedTabs(self.settings, self.documents, partial(self.console.add, "warn", "studio"))
         self.runs = Runs(
             self.documents, self.fleet, self,
             alerts=self.alerts, console=self.console, post_event=post, clock=self.clock,

@@ -471,4 +471,4 @@ def test_missing_system_libraries_replace_the_blocks_by_a_message_and_python_sti
     assert alert.severity == "error"
     panel.set_mode("python")
     assert panel.program.toPlainText()
-    panel.shut()
+    panel.dispose()

@@ -408,12 +408,12 @@ def test_try_sends_the_newest_image_of_the_chosen_topic(qtbot, theme) -> None:
     cameras.send(160, 120)
     sent = decoded(form.input()["p"])
     assert (sent.width(), sent.height()) == (160, 120)
-    cameras.made.rest()
-    cameras.made.wake()  # its panel was hidden: what it has may be from long ago
+    cameras.made.suspend()
+    cameras.made.resume()  # its panel was hidden: what it has may be from long ago
     assert form.input() == {}
     cameras.send(160, 120)
     assert decoded(form.input()["p"]).width() == 160
-    form.shut()
+    form.dispose()
     assert not choice._timer.isActive()
 
 

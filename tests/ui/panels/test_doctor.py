@@ -324,7 +324,7 @@ def test_every_panel_that_may_be_empty_opens_the_doctor_with_its_topic(qtbot, qa
         press(empty.findChildren(Button)[-1])  # those before may not be gone yet
         wanted = "/nothing" if name in {"inspector", "image"} else ""
         assert window.asked_why.pop() == (made, wanted)
-        made.shut()
+        made.dispose()
 
 
 def test_panels_report_that_they_are_paused(qtbot, window) -> None:

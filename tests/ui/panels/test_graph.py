@@ -101,7 +101,7 @@ def panel(qtbot, window: Window) -> Iterator[GraphPanel]:
     assert isinstance(made, GraphPanel)
     settle(qtbot, made)
     yield made
-    made.shut()
+    made.dispose()
 
 
 def show(window: Window, view: GraphView) -> None:
@@ -514,7 +514,7 @@ def test_graph_with_many_nodes_starts_with_collapsed_groups(qtbot, window: Windo
     scene = made.canvas.scene
     assert scene is not None
     assert {item.line for item in scene.nodes.values()} == {"67 nodes"}
-    made.shut()
+    made.dispose()
 
 
 def test_graph_is_panned_and_zoomed(panel: GraphPanel) -> None:
@@ -600,7 +600,7 @@ def test_empty_graph_explains_what_to_do(qtbot, qapp) -> None:
     window.session.master = MasterState("none", "127.0.0.1:7780")
     made.refresh()
     button(made, "Start a master here")
-    made.shut()
+    made.dispose()
 
 
 @pytest.mark.parametrize(

@@ -27,7 +27,7 @@ def panel(asked: Window) -> Iterator[HealthPanel]:
     made = asked.make(PANEL, (384, 300))
     assert isinstance(made, HealthPanel)
     yield made
-    made.shut()
+    made.dispose()
     made.close()
 
 
@@ -81,7 +81,7 @@ def test_without_a_robot_the_panel_explains_what_to_do(qapp) -> None:
     asked.session.join(pepper())
     panel.refresh()
     assert panel.pages.currentWidget() is not panel.empty
-    panel.shut()
+    panel.dispose()
 
 
 def test_panel_follows_the_shown_robot_and_names_it_when_there_are_two(panel, asked) -> None:

@@ -237,7 +237,7 @@ def test_image_panel_shows_the_first_image_topic_and_others_on_demand(qtbot, qap
         ("/robot/camera", True), ("/robot/depth", False),
     ]  # fmt: skip
     assert panel.view.isVisible()
-    panel.shut()
+    panel.dispose()
     assert all(one.closed for one in window.session.images.streams)
 
 
@@ -290,7 +290,7 @@ def test_camera_panel_follows_the_first_robot_with_a_camera(qtbot, qapp) -> None
     assert panel.view.words == "Last image 4 s ago"  # the last picture stays, grey
     assert panel.rate.text() == ""
     assert (panel.chip.text, panel.chip.status) == ("silent for 4 s", "error")
-    panel.shut()
+    panel.dispose()
     assert window.session.images.streams[0].closed
     assert window.session.looked_at == []
 
@@ -577,7 +577,7 @@ def test_camera_panel_shows_the_chosen_robot(qtbot, qapp) -> None:
     window.session.fleet.choose("Nao")
     panel.refresh()
     assert panel.subtitle() == "/Nao/camera"
-    panel.shut()
+    panel.dispose()
 
 
 def test_narrow_title_keeps_its_name_and_the_menu_has_all_actions(qtbot, qapp) -> None:

@@ -41,7 +41,7 @@ def panel(qtbot, window) -> Iterator[ImagePanel]:
     qtbot.addWidget(made)
     assert isinstance(made, ImagePanel)
     yield made
-    made.shut()
+    made.dispose()
 
 
 def sends(window: Window, panel: ImagePanel, topic: str, frame: np.ndarray, encoding: str) -> None:
@@ -118,7 +118,7 @@ def test_display_settings_are_kept_per_topic_and_restored_with_the_layout(qtbot,
     assert again.tune.isChecked()
     assert again.overlays.chosen == (MARKS,)
     again.restore_state({"look": {"contrast": "much"}, "layers": [3], "topic": DEPTH})
-    again.shut()
+    again.dispose()
 
 
 def test_annotation_topics_are_offered_watched_while_selected_and_drawn(panel, window) -> None:

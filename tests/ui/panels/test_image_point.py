@@ -48,7 +48,7 @@ def panel(qtbot, window) -> Iterator[ImagePanel]:
     ticks(window, made)
     assert made.view.picture is not None
     yield made
-    made.shut()
+    made.dispose()
 
 
 SHIFT = Qt.KeyboardModifier.ShiftModifier

@@ -42,7 +42,7 @@ def panel(qtbot, window) -> Iterator[InspectorPanel]:
         qtbot.addWidget(widget)
     assert isinstance(made, InspectorPanel)
     yield made
-    made.shut()
+    made.dispose()
 
 
 def choose(panel: InspectorPanel, *path: str | int) -> None:

@@ -36,7 +36,7 @@ def panel(qtbot, window) -> Iterator[InspectorPanel]:
     window.session.put(Topic(TOPIC))
     made.show_topic(TOPIC)
     yield made
-    made.shut()
+    made.dispose()
 
 
 def seen(*ages: int, stamp: int = 0) -> dict[str, object]:
@@ -117,7 +117,7 @@ def test_query_is_restored_with_the_layout_and_inactive_in_raw_view(qtbot, panel
     assert isinstance(again, InspectorPanel)
     again.restore_state(panel.save_state())
     assert again.finder.field.text() == "$..age"
-    again.shut()
+    again.dispose()
 
 
 def as_table(panel: InspectorPanel) -> None:

@@ -216,7 +216,7 @@ def test_inspector_shows_messages_of_another_network(qtbot, window: Window, look
             sink("ros /blackboard", [message("/blackboard", b'{"x": 8}')])
         ticks(window, panel)
     assert (panel.live.accessibleName(), panel.model.value()) == ("live", {"x": 8})
-    panel.shut()
+    panel.dispose()
     assert ros.wanted == set()
 
 
@@ -232,7 +232,7 @@ def test_inspector_shows_why_a_topic_cannot_be_decoded(qtbot, window: Window, lo
     said = [each.text() for each in panel.body.empty.findChildren(QLabel) if each.text()]
     assert said[0] == "Can't be decoded here"
     assert said[1] == "/blackboard on ROS 2: no type 'my/Own' is known here; install its package."
-    panel.shut()
+    panel.dispose()
 
 
 def test_images_of_another_network_are_shown_in_the_image_panel(qtbot, window: Window, look: Look) -> None:
@@ -245,7 +245,7 @@ def test_images_of_another_network_are_shown_in_the_image_panel(qtbot, window: W
     assert panel.subtitle() == "/camera on ROS 1"
     assert "/camera" in ros.wanted
     assert "ros /camera" in panel.topics()  # type: ignore[attr-defined]
-    panel.shut()
+    panel.dispose()
 
 
 @pytest.mark.parametrize("panel", [TOPICS, NODES, INSPECTOR], ids=lambda panel: panel.name)
@@ -266,4 +266,4 @@ def test_texts_are_translated_and_fit(qtbot, pseudo, window: Window, look: Look,
         assert [untranslated(made.networks.words.text(), "ROS 1")] == [[]]  # type: ignore[attr-defined]
     faults = [fault for fault in clipped(made) if f"at {9 - OUT_OF_SIGHT}," not in fault]  # no title's place
     assert faults == []
-    made.shut()
+    made.dispose()

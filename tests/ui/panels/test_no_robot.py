@@ -33,7 +33,7 @@ def test_panel_shows_that_the_virtual_robot_is_starting(qapp, panel) -> None:
     assert "No robot" not in words()
     session.launcher.stop_virtual_robot("Pepper")
     assert words() == before, "it is not wanted any more"
-    made.shut()
+    made.dispose()
     made.close()
 
 
@@ -54,7 +54,7 @@ def test_camera_does_not_offer_a_robot_that_is_already_starting(qtbot) -> None:
     )
     session.launcher.stop_virtual_robot("Pepper")
     qtbot.waitUntil(lambda: words() == before)
-    made.shut()
+    made.dispose()
     made.close()
 
 

@@ -97,7 +97,7 @@ def world(qtbot, robot: tuple[Window, nep.Node]) -> Iterator[World]:
     made.choose("robot")
     made.hear()
     yield made
-    made.panel.shut()
+    made.panel.dispose()
 
 
 def test_parameters_are_shown_with_their_allowed_values(world: World) -> None:
@@ -203,11 +203,11 @@ def test_node_without_parameters_explains_what_to_do(world: World) -> None:
 
 
 def test_hidden_panel_does_not_watch_the_parameters(world: World) -> None:
-    world.panel.rest()
+    world.panel.suspend()
     assert world.window.session.watched == []
-    world.panel.wake()
+    world.panel.resume()
     assert world.window.session.watched == [place_of(world.robot.id)]
-    world.panel.shut()
+    world.panel.dispose()
     assert world.window.session.watched == []
 
 
@@ -246,4 +246,4 @@ def test_texts_are_translated_and_fit(
         assert [text for text in said if untranslated(text, *data)] == []
         faults = [fault for fault in clipped(made.panel) if f"at {9 - OUT_OF_SIGHT}," not in fault]
         assert faults == []
-    made.panel.shut()
+    made.panel.dispose()

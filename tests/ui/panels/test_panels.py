@@ -76,8 +76,8 @@ def test_each_panel_survives_its_whole_life_cycle(qtbot, qapp, name, session) ->
     window.session.fleet.revision += 1
     ticks(window, panel, 3)
     panel.restore_state(panel.save_state())
-    panel.shut()
-    panel.shut()
+    panel.dispose()
+    panel.dispose()
     assert window.session.watched == []
     assert window.session.looked_at == []
     assert all(stream.closed for stream in window.session.images.streams)
@@ -98,7 +98,7 @@ def test_every_control_has_an_accessible_name(qtbot, qapp, name) -> None:
             for control in controls:
                 if control.isVisibleTo(place):
                     assert control.accessibleName(), control
-    panel.shut()
+    panel.dispose()
 
 
 @pytest.mark.parametrize(
@@ -114,7 +114,7 @@ def test_empty_panel_explains_what_to_do_next(qtbot, qapp, name) -> None:
         qtbot.addWidget(widget)
     said = " ".join(shown.text() for shown in panel.findChildren(QLabel) if shown.isVisible())
     assert len(said.split()) >= 5
-    panel.shut()
+    panel.dispose()
 
 
 def imported_panels(folder: Path) -> Iterator[tuple[str, str]]:

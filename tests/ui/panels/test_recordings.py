@@ -56,7 +56,7 @@ def panel(qtbot, window, folder) -> RecordingsPanel:
         qtbot.addWidget(widget)
     assert isinstance(made, RecordingsPanel)
     yield made
-    made.shut()
+    made.dispose()
 
 
 def names(panel: RecordingsPanel) -> list[str]:
@@ -338,7 +338,7 @@ def test_recording_saved_by_an_alarm_is_opened_from_its_history(qtbot, window, f
     menu.close()
     action.trigger()
     assert window.commands == [f"recording.open:{folder / 'alarm-2026-11-26-22-01-05.mcap'}"]
-    panel.shut()
+    panel.dispose()
 
 
 def test_topic_is_recorded_from_its_menu(qtbot, folder):
@@ -350,4 +350,4 @@ def test_topic_is_recorded_from_its_menu(qtbot, folder):
     (run,) = (each.run for each in panel.row_actions("/odom") if each.words == "Record topic")
     run()
     assert window.commands == ["record.topic:/odom"]
-    panel.shut()
+    panel.dispose()

@@ -161,7 +161,7 @@ def test_real_robot_has_a_link_to_its_actions_instead_of_a_drawing(qtbot, qapp) 
     assert not panel.reset.isVisibleTo(panel)
     press(button(panel, "Show actions"))
     assert window.commands == ["panel:robots"]
-    panel.shut()
+    panel.dispose()
     assert window.session.looked_at == []
 
 

@@ -69,7 +69,7 @@ def test_every_sensor_except_images_has_one_row(qtbot, window) -> None:
     assert shown["Distance"] == "0.82 m"
     assert shown["Position"] == "1.3, \u22120.3 m"
     assert window.session.looked_at == ["Pepper"]
-    panel.shut()
+    panel.dispose()
     assert window.session.looked_at == []
 
 

@@ -100,7 +100,7 @@ def test_recorded_topics_are_selected_renamed_armed_confirmed_sent_and_counted(q
     assert [token.text() for token in panel.strip.tokens] == ["/a as /test/a", "/base/cmd_vel"]
     going = sending.outbox.going
     until(qtbot, window, panel, lambda: all(each.is_ready for each in going))
-    until(qtbot, window, panel, lambda: going[0].heard)
+    until(qtbot, window, panel, lambda: going[0].subscriber_count)
     replay.play()
     until(qtbot, window, panel, lambda: sum(each.count + each.skipped for each in going) == COUNT)
     assert heard.listen(timeout_s=20.0)[0]

@@ -129,7 +129,7 @@ def test_action_is_readable_and_can_be_tried_without_horizontal_scrolling(
     assert clipped(dock) == []
     for card in widget.cards.values():
         assert card.try_button.mapTo(widget, card.try_button.rect().bottomRight()).x() < widget.width()
-    widget.shut()
+    widget.dispose()
 
 
 @pytest.fixture

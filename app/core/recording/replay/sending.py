@@ -67,7 +67,7 @@ class SentTopic:
     problem: str = ""
 
     @property
-    def heard(self) -> int:
+    def subscriber_count(self) -> int:
         """Number of subscribers."""
         return sum(publisher.subscribers for publisher in self.publishers.values())
 

@@ -220,9 +220,9 @@ class MovedRobots:
         for name in report.still:
             self.stood_still(name, report.programs(name), mark)
         for name in set(report.names) - {*report.silent, *report.still}:
-            self.told(name, mark)
+            self.note_stop_received(name, mark)
 
-    def told(self, name: str, mark: int) -> None:
+    def note_stop_received(self, name: str, mark: int) -> None:
         """End the motions of a robot that can't confirm (RIZE) and received a stop at ``mark``."""
         self._retain(name, lambda motion: motion.number > mark)
         if name in self._sent and self._sent[name].number <= mark:

@@ -554,7 +554,7 @@ class AlarmsPanel(PanelWidget):
     def theme_changed(self) -> None:
         self.table.set_row_height(self.row_height(), large=self.density == "comfortable")
 
-    def shut(self) -> None:
+    def dispose(self) -> None:
         if self.field is not None:
             self.field.leave(keeps_focus=False)
         if self._peek is not None:

@@ -452,10 +452,10 @@ class BehaviourPanel(PanelWidget):
     def restore_state(self, state: Mapping[str, object]) -> None:
         self.set_mode("python" if state.get("mode") == "python" else "blocks")
 
-    def looks(self) -> Iterable[Suspendable | None]:
+    def suspendables(self) -> Iterable[Suspendable | None]:
         return self._watches.values()
 
-    def shut(self) -> None:
+    def dispose(self) -> None:
         self._sensors = self._offered = ()
         self._look_at(set())
 

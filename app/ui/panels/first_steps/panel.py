@@ -261,8 +261,8 @@ class FirstStepsPanel(PanelWidget):
             self.context.run("file.new")
         self._show()
 
-    def rest(self) -> None:
-        super().rest()
+    def suspend(self) -> None:
+        super().suspend()
         if self._pointed_for:
             self._point_at_nothing()
 

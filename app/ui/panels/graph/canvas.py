@@ -120,7 +120,7 @@ class GraphCanvas(QWidget):
     def renew_soon(self) -> None:
         """Schedule an update of the visible figures; `renew` performs it."""
         if self.scene is not None:
-            self._waiting = self.scene.seen(self.visible())
+            self._waiting = self.scene.items_in(self.visible())
 
     def renew(self, figures: FiguresOf) -> int:
         """Update the figures of the next `MAX_UPDATES_PER_TICK` visible items and repaint only changed areas.

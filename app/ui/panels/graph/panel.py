@@ -576,7 +576,7 @@ class GraphPanel(PanelWidget):
         if isinstance(own := state.get("own"), bool):
             self._own.setChecked(own)
 
-    def shut(self) -> None:
+    def dispose(self) -> None:
         self._thread.close()
 
 

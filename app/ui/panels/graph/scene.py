@@ -172,7 +172,7 @@ class GraphScene:
 
     # -- figures ------------------------------------------------------------------------------------------
 
-    def seen(self, area: QRectF) -> list[NodeItem | LineItem]:
+    def items_in(self, area: QRectF) -> list[NodeItem | LineItem]:
         """Return the nodes and lines within an area."""
         nodes = [item for item in self.nodes.values() if item.rect.intersects(area)]
         return [*nodes, *(item for item in self.lines if item.bounds.intersects(area))]

@@ -72,7 +72,7 @@ class Overlays:
             found += before[2]
         return tuple(found)
 
-    def looks(self) -> Iterable[Suspendable]:
+    def suspendables(self) -> Iterable[Suspendable]:
         """Return the watches to suspend while the panel is hidden."""
         return tuple(self._watches.values())
 

@@ -366,11 +366,11 @@ class ImagePanel(PanelWidget):
             self._watch.close()
         self._watch, self._watched_robot = None, ""
 
-    def looks(self) -> Iterable[Suspendable | None]:
-        return (self._stream, self._watch, *self.overlays.looks())
+    def suspendables(self) -> Iterable[Suspendable | None]:
+        return (self._stream, self._watch, *self.overlays.suspendables())
 
-    def shut(self) -> None:
-        self.points.shut()
+    def dispose(self) -> None:
+        self.points.dispose()
         self._leave_stream()
         self.overlays.close()
 

@@ -235,7 +235,7 @@ class PointBar(QWidget):
         self._changed()
         self.turn(saved.get("on") is True)
 
-    def shut(self) -> None:
+    def dispose(self) -> None:
         """Disarm before the panel is closed."""
         self._view.forget_click()
         self._disarm()

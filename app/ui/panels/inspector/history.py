@@ -79,7 +79,7 @@ class HistoryStrip(QWidget):
         self.at = None
         self.refresh(at_once=True)
 
-    def shown(self) -> Message | None:
+    def selected_message(self) -> Message | None:
         """Return the selected message; None for the newest, or if it has been evicted."""
         return self.kept.at(self.at) if self.at is not None else None
 
@@ -134,7 +134,7 @@ class HistoryStrip(QWidget):
     def _words(self, place: int) -> str:
         if self.at is None:
             return _("the newest of {count}").format(count=len(self.kept))
-        message = self.shown()
+        message = self.selected_message()
         if message is None:
             return _("no longer available")
         words = _("{place} of {count}").format(place=place + 1, count=len(self.kept))

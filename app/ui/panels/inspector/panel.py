@@ -346,7 +346,7 @@ class InspectorPanel(PanelWidget):
 
     def _moved(self) -> None:
         self.reader.forget()
-        message = self.history.shown()
+        message = self.history.selected_message()
         if message is not None:
             self._add_message(message)
         elif self.history.at is None:
@@ -453,20 +453,20 @@ class InspectorPanel(PanelWidget):
             self._watch.close()
             self._watch = None
 
-    def wake(self) -> None:
+    def resume(self) -> None:
         if self._watch is not None and self._watch.resting:
             self._since_ns = time.time_ns()
             self.history.begin(self.session.series, self._topic)
-        super().wake()
+        super().resume()
 
-    def rest(self) -> None:
+    def suspend(self) -> None:
         self.history.pause()
-        super().rest()
+        super().suspend()
 
-    def looks(self) -> Iterable[Suspendable | None]:
+    def suspendables(self) -> Iterable[Suspendable | None]:
         return (self._watch,)
 
-    def shut(self) -> None:
+    def dispose(self) -> None:
         self._leave()
         self.reader.close()
         self.query.close_worker()

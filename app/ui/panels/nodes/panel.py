@@ -176,10 +176,10 @@ class NodesPanel(NetworkTable[NodeRow]):
         self.rebuild()
         self.table.choose(NodeRow(row.node).key)
 
-    def looks(self) -> Iterable[Suspendable | None]:
+    def suspendables(self) -> Iterable[Suspendable | None]:
         return (self._parameters.watching,)
 
-    def shut(self) -> None:
+    def dispose(self) -> None:
         self._parameters.close()
 
     def set_density(self, density: Density) -> None:

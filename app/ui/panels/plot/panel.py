@@ -170,7 +170,7 @@ class PlotPanel(PanelWidget):
     def source_changed(self) -> None:
         """Plot the same fields of the new source."""
         kept = self.save_state()
-        self.tools.add.shut()
+        self.tools.add.dispose()
         self.curves.close()
         self.curves = Curves(self.session.series, self._topic_names)
         self.shown.clear()
@@ -208,7 +208,7 @@ class PlotPanel(PanelWidget):
             self.add.complain(_("{field} is already shown.").format(field=text))
             return
         self.add.clear()
-        self.add.shut()
+        self.add.dispose()
         self._show_new(made, right=right)
         self.setFocus(Qt.FocusReason.OtherFocusReason)
 
@@ -272,7 +272,7 @@ class PlotPanel(PanelWidget):
         newest = self.curves.newest_s
         newest = self.session.series.now_s() if newest is None else newest
         starts = [float(each.curve.samples.times[0]) for each in self.shown if len(each.curve.samples)]
-        return self.view.shown(min(starts, default=newest - self.view.span_s), newest)
+        return self.view.visible_range(min(starts, default=newest - self.view.span_s), newest)
 
     def _draw(self) -> None:
         begin_s, end_s = self._range()
@@ -584,8 +584,8 @@ class PlotPanel(PanelWidget):
         self._fit_table()
         self._soon()
 
-    def shut(self) -> None:
-        self.add.shut()
+    def dispose(self) -> None:
+        self.add.dispose()
         self.curves.close()
         self.exporter.close()
 

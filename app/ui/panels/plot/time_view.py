@@ -22,7 +22,7 @@ class TimeView:
         """True if the range follows new data."""
         return self.held_s is None
 
-    def shown(self, oldest_s: float, newest_s: float) -> tuple[float, float]:
+    def visible_range(self, oldest_s: float, newest_s: float) -> tuple[float, float]:
         """Return the visible range for data in a range."""
         end_s = newest_s if self.held_s is None else self.held_s
         if self.is_all:

@@ -160,13 +160,13 @@ class AddCurve(SearchField):
     def focusOutEvent(self, event: QFocusEvent) -> None:
         super().focusOutEvent(event)
         if event.reason() != Qt.FocusReason.PopupFocusReason:
-            self.shut()
+            self.dispose()
 
     def hideEvent(self, event: QEvent) -> None:
         super().hideEvent(event)  # type: ignore[arg-type]
-        self.shut()
+        self.dispose()
 
-    def shut(self) -> None:
+    def dispose(self) -> None:
         """Unsubscribe from topics and hide the list."""
         self._timer.stop()
         self.offers.close()
@@ -308,7 +308,7 @@ class AddCurve(SearchField):
             self._commit(right=bool(event.modifiers() & Qt.KeyboardModifier.ShiftModifier))
         elif key == Qt.Key.Key_Escape:
             self.clear()
-            self.shut()
+            self.dispose()
             self.left.emit()
         elif (
             key not in {Qt.Key.Key_Home, Qt.Key.Key_End}

@@ -353,10 +353,10 @@ class PublishPanel(PanelWidget):
         self._wanted = str(state.get("message", ""))
         self._rebuild()
 
-    def looks(self) -> Iterable[Suspendable | None]:
+    def suspendables(self) -> Iterable[Suspendable | None]:
         return (self._peek,)
 
-    def shut(self) -> None:
+    def dispose(self) -> None:
         self._end_peek()
         self.acting.disarm()
 

@@ -455,7 +455,7 @@ class RecordingsPanel(TablePanel[RecordingFacts]):
         folder.triggered.connect(lambda _on=False: self.context.run("recording.folder"))
         return [*super().more_actions(), folder]
 
-    def shut(self) -> None:
+    def dispose(self) -> None:
         self._folder.close()
         self._opener.close()
         self._artist.close()

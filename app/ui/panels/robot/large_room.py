@@ -33,7 +33,7 @@ class LargeRoom(QWidget):
         self.screen_button = Button(theme, _("Full screen"), "fullscreen", size="small")
         self.screen_button.clicked.connect(self.fill_screen)
         self.back = Button(theme, _("Back to the panels"), "minimize-2", size="small")
-        self.back.clicked.connect(self.shut)
+        self.back.clicked.connect(self.dispose)
         row = QHBoxLayout()
         row.setContentsMargins(10, 6, 10, 6)
         row.addWidget(label(_("Room"), "title"))
@@ -74,7 +74,7 @@ class LargeRoom(QWidget):
         window.setWindowState(window.windowState() ^ Qt.WindowState.WindowFullScreen)
         self.screen_button.set_word(_("Leave full screen") if self.filled else _("Full screen"))
 
-    def shut(self) -> None:
+    def dispose(self) -> None:
         """Close the overlay, leave full screen mode and hand the stage back."""
         if self.filled:
             self.fill_screen()
@@ -90,13 +90,13 @@ class LargeRoom(QWidget):
         if watched is self._top and isinstance(event, QKeyEvent) and self.isVisible():
             pressed = event.type() == QEvent.Type.KeyPress
             if pressed and event.key() == Qt.Key.Key_Escape:
-                self.shut()
+                self.dispose()
                 return True
         return super().eventFilter(watched, event)
 
     def keyPressEvent(self, event: QKeyEvent) -> None:
         if event.key() == Qt.Key.Key_Escape:
-            self.shut()
+            self.dispose()
         else:
             super().keyPressEvent(event)
 

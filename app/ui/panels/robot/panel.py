@@ -309,7 +309,7 @@ class RobotPanel(OneRobotPanel):
     def enlarge(self) -> None:
         """Toggle the enlarged room."""
         if self._large is not None:
-            self._large.shut()
+            self._large.dispose()
             return
         self._large = LargeRoom(self.theme, self, self.stage, self._room_tools(size=26))
         self._large.closed.connect(self._give_back)
@@ -319,7 +319,7 @@ class RobotPanel(OneRobotPanel):
     def fill_screen(self) -> None:
         """Toggle the room in full screen mode, with the run bar above it."""
         if self._large is not None and self._large.filled:
-            self._large.shut()
+            self._large.dispose()
             return
         if self._large is None:
             self.enlarge()
@@ -338,19 +338,19 @@ class RobotPanel(OneRobotPanel):
             with suppress(RobotUnknownError):
                 self.session.fleet.world(robot or self._robot, change)
 
-    def looks(self) -> Iterable[Suspendable | None]:
-        return (*super().looks(), *self._looks.values())
+    def suspendables(self) -> Iterable[Suspendable | None]:
+        return (*super().suspendables(), *self._looks.values())
 
-    def shut(self) -> None:
-        super().shut()
+    def dispose(self) -> None:
+        super().dispose()
         for watch in self._looks.values():
             watch.close()
         self._looks.clear()
 
-    def wake(self) -> None:
+    def resume(self) -> None:
         if self._watch is not None and self._watch.resting:
             self._told_s = time.monotonic()  # the watch was suspended, so the state is not stale
-        super().wake()
+        super().resume()
 
 
 def _where_to_look(link: RobotLink) -> str:

@@ -198,7 +198,7 @@ class ActionForm(QWidget):
         given = {name: control.value() for name, control in self.controls.items()}
         return input_words(self.action, given, texts=False)
 
-    def shut(self) -> None:
+    def dispose(self) -> None:
         """Release the resources of all controls."""
         for control in self.controls.values():
             control.close()

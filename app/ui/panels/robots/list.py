@@ -156,7 +156,7 @@ class RobotList(QWidget):
         self._show(links, [robot for name, robot in self._known.items() if name not in names])
         return names
 
-    def seen(self, name: str) -> str:
+    def last_seen_text(self, name: str) -> str:
         """Return when a real robot was last seen, or ""."""
         return seen_words(self._known[name].seen_s) if name in self._known else ""
 

@@ -176,14 +176,14 @@ class RobotsPanel(OneRobotPanel):
         fleet, names = self.session.fleet, self._names
         if self._robot in names:
             return fleet.link(self._robot)
-        shown = fleet.shown
+        shown = fleet.current
         return shown if shown is not None and shown.name in names else fleet.link(names[0]) if names else None
 
     def refresh_robot(self, link: RobotLink | None) -> None:
         for name, item in self.items.items():
             its = self.session.fleet.link(name)
             if its is not None and self._new(name, its.state):
-                item.show_link(its, self.list.seen(name))
+                item.show_link(its, self.list.last_seen_text(name))
         if link is not None:
             self._show_link(link)
         else:
@@ -255,7 +255,7 @@ class RobotsPanel(OneRobotPanel):
 
     def _drop_cards(self) -> None:
         for card in self.cards.values():
-            card.form.shut()
+            card.form.dispose()
             self._card_column.removeWidget(card)
             card.deleteLater()
         self.cards = {}
@@ -345,13 +345,13 @@ class RobotsPanel(OneRobotPanel):
         self.finder.setFocus(Qt.FocusReason.ShortcutFocusReason)
         return True
 
-    def looks(self) -> Iterable[Suspendable | None]:
+    def suspendables(self) -> Iterable[Suspendable | None]:
         return (self._watch, *self._pictures.streams)
 
-    def shut(self) -> None:
-        super().shut()
+    def dispose(self) -> None:
+        super().dispose()
         for card in self.cards.values():
-            card.form.shut()
+            card.form.dispose()
 
 
 PANEL = Panel("robots", lazy("Robots"), "bot", (), RobotsPanel)

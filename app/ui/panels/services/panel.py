@@ -438,7 +438,7 @@ class ServicesPanel(PanelWidget):
         self._wanted = str(state.get("service", ""))
         self._rebuild()
 
-    def shut(self) -> None:
+    def dispose(self) -> None:
         self.acting.disarm()
 
 

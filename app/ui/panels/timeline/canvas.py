@@ -390,7 +390,7 @@ class TimelineCanvas(QAbstractScrollArea):
             QRectF(plot.left(), top, plot.width(), self._row()), Qt.ClipOperation.IntersectClip
         )
         about = [span for span in replay.densities.spans.alarms if span.topic == topic]
-        for span in EventLanes(self._theme, painter, plot, self._places(plot)).seen(about):
+        for span in EventLanes(self._theme, painter, plot, self._places(plot)).visible_spans(about):
             left, right = self.x_of(span.start_ns), self.x_of(span.end_ns)
             box = QRectF(
                 left, top + (self._row() - DENSITY_HEIGHT) / 2 - 2, max(4.0, right - left), DENSITY_HEIGHT + 4

@@ -71,13 +71,13 @@ class EventLanes:
         elif spans is None:
             made = []
         elif lane == RUNS:
-            made = [self._run(span, box, replay.start_ns) for span in self.seen(spans.runs)]
+            made = [self._run(span, box, replay.start_ns) for span in self.visible_spans(spans.runs)]
         else:
-            made = self._alarms(list(self.seen(spans.alarms)), box, replay.start_ns)
+            made = self._alarms(list(self.visible_spans(spans.alarms)), box, replay.start_ns)
         self._painter.restore()
         return made
 
-    def seen(self, spans: Iterable[RecordedSpan]) -> Iterator[RecordedSpan]:
+    def visible_spans(self, spans: Iterable[RecordedSpan]) -> Iterator[RecordedSpan]:
         """Yield the spans in the visible range, without those that would be hidden by the previous one."""
         plot, free = self._plot, -1.0
         for span in spans:

@@ -231,7 +231,7 @@ class TimelinePanel(PanelWidget):
         place = self.strip.switch if self.strip.isVisibleTo(self) else self.transport.armed
         place.setFocus(Qt.FocusReason.OtherFocusReason)
 
-    def shut(self) -> None:
+    def dispose(self) -> None:
         if self.session.is_replaying:
             self.session.acting.disarm()
 

@@ -56,7 +56,7 @@ class ReplayStrip(ArmedStrip):
         if not going:
             return ""
         count, skipped = sum(each.count for each in going), sum(each.skipped for each in going)
-        heard = max(each.heard for each in going)
+        heard = max(each.subscriber_count for each in going)
         sent = ngettext("{count} sent", "{count} sent", count).format(count=grouped(count))
         late = [late_words(skipped)] if skipped else []
         ears = ngettext("received by {count}", "received by {count}", heard).format(count=heard)

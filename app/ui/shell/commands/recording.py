@@ -93,7 +93,7 @@ class RecordCommands:
                 self._switch_on,
             )
             return
-        why_not = recordings.keep()
+        why_not = recordings.save_last()
         if why_not:
             self._shell.show_toast(why_not)
 

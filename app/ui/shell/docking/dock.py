@@ -203,8 +203,8 @@ class Dock(QDockWidget):
             return None
         if self.shown():
             self._seen_s = now
-            return self._try(self.panel.wake)
-        return self._try(self.panel.rest) if now - self._seen_s >= RESTS_AFTER_S else None
+            return self._try(self.panel.resume)
+        return self._try(self.panel.suspend) if now - self._seen_s >= RESTS_AFTER_S else None
 
     def refresh(self) -> str | None:
         """Refresh the panel if it is visible; return the error message if it has just failed."""
@@ -226,7 +226,7 @@ class Dock(QDockWidget):
         except CAUGHT_ERRORS as error:  # no exception of a panel may close the window
             self.failed = True
             with suppress(*CAUGHT_ERRORS):  # a failed panel needs no subscriptions
-                self.panel.rest()
+                self.panel.suspend()
             sentence = error_words(error)[:MAX_SENTENCE_LENGTH]
             said = ("the panel '%s' stopped: %s", self.description.name, sentence)
             _log.error(*said, exc_info=error, extra=IN_CONSOLE)
@@ -264,7 +264,7 @@ class Dock(QDockWidget):
     def shut(self) -> None:
         """Dispose of the panel when the window closes; an error is logged."""
         try:
-            self.panel.shut()
+            self.panel.dispose()
         except CAUGHT_ERRORS:
             _log.exception("closing panel '%s' failed", self.description.name)
 

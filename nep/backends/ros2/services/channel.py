@@ -223,7 +223,7 @@ class ServiceChannel:
     # ---- matched endpoints; call with the participant's lock held
 
     @property
-    def known(self) -> list[DdsEndpoint]:
+    def discovered(self) -> list[DdsEndpoint]:
         """Discovered endpoints of the other side."""
         (out_topic, out_type), (in_topic, in_type) = self._topics
         found = [(each, out_type) for each in self.participant.endpoints("reader", out_topic)] + [

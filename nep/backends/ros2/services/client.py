@@ -76,7 +76,7 @@ class Ros2Client(ClientCalls[_Call]):
             with contextlib.suppress(NepError):  # reported by calls: another server may appear meanwhile
                 channel = self._open_channel()
             if channel is not None:
-                wait_for_matches(participant, channel.known, lambda: channel.entities)
+                wait_for_matches(participant, channel.discovered, lambda: channel.entities)
         except BaseException:  # also Ctrl+C: the caller would have nothing to close
             self.close()
             raise
@@ -236,7 +236,7 @@ class Ros2Client(ClientCalls[_Call]):
             ]
         return min(dues, default=math.inf)
 
-    def known(self, timeout_s: float) -> tuple[str, ...]:  # noqa: ARG002 - immediate
+    def service_names(self, timeout_s: float) -> tuple[str, ...]:  # noqa: ARG002 - immediate
         """Return the names of services that have a server."""
         found = (ros_service(each.topic) for each in self._participant.endpoints("reader"))
         return tuple(sorted({each for each in found if each is not None}))

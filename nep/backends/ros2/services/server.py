@@ -45,7 +45,7 @@ class Ros2Server:
             participant, node_id, spec.service, self._type, spec.id, on_part=self._handle_request
         )
         try:
-            wait_for_matches(participant, self._channel.known, lambda: self._channel.entities)
+            wait_for_matches(participant, self._channel.discovered, lambda: self._channel.entities)
         except BaseException:  # also Ctrl+C: the caller would have nothing to close
             self._channel.close()
             raise

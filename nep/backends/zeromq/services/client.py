@@ -208,7 +208,7 @@ class SocketClient:
         with self._lock:
             self._remove_locked(call.number)
 
-    def known(self, timeout_s: float) -> tuple[str, ...]:
+    def service_names(self, timeout_s: float) -> tuple[str, ...]:
         """Return the names of services that have a server; empty without a master."""
         if self._known_services is None:
             return ()

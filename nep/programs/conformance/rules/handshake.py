@@ -7,7 +7,7 @@ from nep.programs.conformance.bench import Bench
 from nep.programs.conformance.peers import ScriptedPublisher
 from nep.programs.conformance.rule import rule
 from nep.programs.conformance.rules.messages import connected_subscriber
-from nep.programs.conformance.verdict import at_most, broken, expect, shown
+from nep.programs.conformance.verdict import at_most, broken, expect, printable
 from nep.protocol.wire import LATCHED, hello_part, topic_part
 
 _SECTION = "the-handshake"
@@ -36,7 +36,7 @@ def _hello_after_topic(bench: Bench) -> None:
     if topic_part(topic) not in filters:
         raise broken(
             _("its subscriptions are {seen}, without {wanted}").format(
-                seen=shown(filters), wanted=shown(topic_part(topic))
+                seen=printable(filters), wanted=printable(topic_part(topic))
             )
         )
     hello = next(iter(publisher.hellos))
@@ -94,7 +94,7 @@ def _foreign_hello(bench: Bench) -> None:
     subscriber.socket.subscribe(hello_part(7, topic))
     bench.need(lambda: any(parts[0] == hello_part(7, topic) for parts in subscriber.received), "echo")
     if any(parts[0] == other for parts in subscriber.received):
-        raise broken(_("it answered the hello {hello}").format(hello=shown(other)))
+        raise broken(_("it answered the hello {hello}").format(hello=printable(other)))
 
 
 @rule(

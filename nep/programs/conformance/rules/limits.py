@@ -12,7 +12,7 @@ from nep.programs.conformance.malformed import malformed_parts
 from nep.programs.conformance.peers import ScriptedPublisher
 from nep.programs.conformance.rule import rule
 from nep.programs.conformance.rules.messages import connected_publisher, connected_subscriber, messages_of
-from nep.programs.conformance.verdict import broken, expect, shown
+from nep.programs.conformance.verdict import broken, expect, printable
 from nep.protocol.wire import Header, topic_part
 
 _DEEP = 100_000
@@ -24,7 +24,7 @@ def _expect_working(bench: Bench, publisher: ScriptedPublisher, sub: int) -> Non
     bench.need(lambda: any(_seq(each) == 1 for each in bench.events(sub)), "message")
     others = [each for each in bench.events(sub) if each.get("publisher") != str(publisher.id)]
     if others:
-        raise broken(_("it delivered {seen}").format(seen=shown(others[0])))
+        raise broken(_("it delivered {seen}").format(seen=printable(others[0])))
 
 
 def _seq(event: object) -> int:

@@ -15,7 +15,7 @@ from nep.messages.codecs import codec_for
 from nep.programs.conformance.bench import Bench
 from nep.programs.conformance.peers import ScriptedSubscriber
 from nep.programs.conformance.rule import rule
-from nep.programs.conformance.verdict import broken, expect, shown
+from nep.programs.conformance.verdict import broken, expect, printable
 from nep.protocol.batch import read_parts
 from nep.protocol.wire import BATCH, Parts, topic_part, unpack_at
 
@@ -118,10 +118,10 @@ def _forms(bench: Bench) -> None:
         bench.need(lambda: len(messages_of(subscriber)) >= _BURST, "message")  # noqa: B023 - called immediately
         seqs = [each.header.seq for each in messages_of(subscriber)]
         if seqs != list(range(1, _BURST + 1)):
-            raise broken(_("the seqs are {seen}").format(seen=shown(seqs)))
+            raise broken(_("the seqs are {seen}").format(seen=printable(seqs)))
         numbers = [json.loads(bytes(each.payload)).get("n") for each in messages_of(subscriber)]
         if numbers != list(range(1, _BURST + 1)):
-            raise broken(_("the messages are not in order: {seen}").format(seen=shown(numbers)))
+            raise broken(_("the messages are not in order: {seen}").format(seen=printable(numbers)))
 
 
 @rule(
@@ -161,7 +161,9 @@ def _payload(bench: Bench) -> None:
                 expect("payload", data, wanted)
         except ValueError as error:
             raise broken(
-                _("the payload {seen} is not valid {msg_type}").format(seen=shown(data), msg_type=msg_type)
+                _("the payload {seen} is not valid {msg_type}").format(
+                    seen=printable(data), msg_type=msg_type
+                )
             ) from error
 
 
@@ -194,4 +196,4 @@ def _stamp(bench: Bench) -> None:
     if any(abs(now - each) > _STAMP_NS for each in stamps):
         raise broken(_("the stamp is {seen}; the time is {now}").format(seen=stamps[0], now=now))
     if stamps != sorted(stamps):
-        raise broken(_("the stamps are {seen}").format(seen=shown(stamps)))
+        raise broken(_("the stamps are {seen}").format(seen=printable(stamps)))

@@ -10,7 +10,7 @@ import msgpack  # type: ignore[import-untyped]
 from nep.i18n import _, lazy
 from nep.programs.conformance.bench import Bench
 from nep.programs.conformance.rule import rule
-from nep.programs.conformance.verdict import broken, expect, shown
+from nep.programs.conformance.verdict import broken, expect, printable
 from nep.protocol.wire import LATCHED, parse_read
 
 _SENT: Mapping[str, tuple[bytes, object]] = {
@@ -142,4 +142,4 @@ def _receives_in_order(bench: Bench) -> None:
     bench.need(lambda: len(bench.events(sub)) >= 500, "message")
     seqs = [each.get("seq") for each in bench.events(sub)]
     if seqs != [str(number) for number in range(1, 501)]:
-        raise broken(_("the seqs are {seen}").format(seen=shown(seqs)))
+        raise broken(_("the seqs are {seen}").format(seen=printable(seqs)))

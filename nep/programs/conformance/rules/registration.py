@@ -10,7 +10,7 @@ from nep.i18n import _, lazy
 from nep.messages.codecs import codec_for
 from nep.programs.conformance.bench import Bench
 from nep.programs.conformance.rule import rule
-from nep.programs.conformance.verdict import broken, expect, shown
+from nep.programs.conformance.verdict import broken, expect, printable
 from nep.protocol.requests import COUNT_MAX, id_from, node_id_from
 
 _NODE_ID = re.compile(r"[0-9a-f]{16}")
@@ -23,7 +23,7 @@ def _text(what: str, record: Mapping[str, Any], name: str) -> str:
     if not isinstance(value, str):
         raise broken(
             _("{what} is {seen}, expected {wanted}").format(
-                what=f"{what}.{name}", seen=shown(value), wanted="text"
+                what=f"{what}.{name}", seen=printable(value), wanted="text"
             )
         )
     return value
@@ -33,7 +33,7 @@ def _integer(what: str, value: object, least: int, most: int) -> int:
     if type(value) is not int or not least <= value <= most:
         raise broken(
             _("{what} is {seen}, expected an integer from {least} to {most}").format(
-                what=what, seen=shown(value), least=least, most=most
+                what=what, seen=printable(value), least=least, most=most
             )
         )
     return value
@@ -54,7 +54,9 @@ def _node_record(bench: Bench) -> None:
         return
     if not _NODE_ID.fullmatch(_text("node", node, "id")):
         raise broken(
-            _("node.id is {seen}, expected 16 lowercase hexadecimal digits").format(seen=shown(node["id"]))
+            _("node.id is {seen}, expected 16 lowercase hexadecimal digits").format(
+                seen=printable(node["id"])
+            )
         )
     expect("node.name", node.get("name"), bench.node_name)
     _text("node", node, "host")
@@ -117,7 +119,7 @@ def _publisher_port(bench: Bench) -> None:
     for endpoint in bench.record("publisher", topic).get("endpoints", ()):
         found = _ENDPOINT.fullmatch(str(endpoint))
         if found is not None and int(found.group(2)) in _ORIGINAL_PORTS:
-            raise broken(_("its endpoint is {endpoint}").format(endpoint=shown(endpoint)))
+            raise broken(_("its endpoint is {endpoint}").format(endpoint=printable(endpoint)))
 
 
 @rule(

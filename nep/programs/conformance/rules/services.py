@@ -16,7 +16,7 @@ from nep.programs.conformance.bench import Bench
 from nep.programs.conformance.peers import new_node
 from nep.programs.conformance.ports import bind_again, closed_port
 from nep.programs.conformance.rule import rule
-from nep.programs.conformance.verdict import broken, expect, shown
+from nep.programs.conformance.verdict import broken, expect, printable
 from nep.protocol.requests import AddPublisher, Leave, PublisherRecord
 from nep.protocol.service_wire import NATIVE, SERVICE_TYPE, CallKind, Reply, failure, topic_of
 from nep.protocol.wire import topic_part
@@ -129,7 +129,7 @@ def _called(bench: Bench, socket: zmq.Socket[bytes], number: int, reply: Reply) 
     call = NATIVE.read_call(parts)
     expect("call.codec", call.codec in {1, 4}, True)
     if call.timeout_s is None or not 0 < call.timeout_s <= 2 * _CALL_S:
-        raise broken(_("the call's timeout is {seen}").format(seen=shown(call.timeout_s)))
+        raise broken(_("the call's timeout is {seen}").format(seen=printable(call.timeout_s)))
     data = reply.data if reply.kind != CallKind.ANSWER else call.data
     answer = Reply(reply.kind, data, call.codec if reply.kind == CallKind.ANSWER else _JSON)
     socket.send_multipart([sender, *NATIVE.answer(call.number, answer)])
@@ -184,7 +184,7 @@ def _service_error(bench: Bench) -> None:
                 value = _called(bench, socket, number, failure(kind, error, "rejected by the tester"))
             except AdapterError:
                 continue
-            raise broken(_("it returned {seen} as the answer").format(seen=shown(value)))
+            raise broken(_("it returned {seen} as the answer").format(seen=printable(value)))
 
 
 @rule(

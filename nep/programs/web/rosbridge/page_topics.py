@@ -100,7 +100,7 @@ class PageTopics:
         if not is_compatible(operation.ros_type, known):
             raise _another_type(operation.topic, operation.ros_type, known, operation.id)
         msg_type = known or nep_type_of(operation.ros_type)
-        self._context.guard.settle(_SETTLE_S)
+        self._context.guard.wait_for_descriptions(_SETTLE_S)
         self._check_motion(operation.topic, msg_type, operation.id)
         return self._context.node.new_pub(operation.topic, msg_type, latched=operation.is_latched)
 

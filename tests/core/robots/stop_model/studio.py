@@ -15,7 +15,7 @@ from app.core.robots.stop.stopper import RobotStopper
 from app.core.run.acting.arming import Target
 from app.core.run.acting.shelf import KeptMessage
 from app.core.run.runner import RunnerEvent
-from app.core.run.wanted import Wanted
+from app.core.run.wanted import RequestedRun
 from app.core.session import Session
 from app.core.storage.settings import Settings
 from app.errors import AppError
@@ -117,7 +117,7 @@ class SimulatedRunner:
         pass
 
 
-class _Driving(Wanted):
+class _Driving(RequestedRun):
     """A behaviour that drives robots."""
 
     __slots__ = ("robots",)
@@ -151,7 +151,7 @@ class SimulatedStudio:
         source.node, self._source = self.node, source
         fleet, runs = self.session.fleet, self.session.runs
         fleet._heartbeat = cast("Any", SimulatedHeartbeat(clock, "studio"))
-        fleet._tries._rest = fleet._heartbeat.rest
+        fleet._tries._rest = fleet._heartbeat.stop
         runs._make_runner = cast("Any", lambda post: SimulatedRunner(clock, network, post))
         self.session.stopper = stopper = RobotStopper(cast("Any", self.node), clock.now)
         stopper._changed = clock.condition()

@@ -41,7 +41,7 @@ def panel(qtbot, window) -> Iterator[PlotPanel]:
     qtbot.addWidget(made)
     assert isinstance(made, PlotPanel)
     yield made
-    made.shut()
+    made.dispose()
 
 
 def message(session: Session, topic: str, time_s: float, payload: object, seq: int | None = None) -> Message:
@@ -312,14 +312,14 @@ def test_drag_pans_the_plot_and_pauses_following(panel) -> None:
 def test_zoom_stays_within_the_range_of_floats() -> None:
     view = TimeView()
     for factor in (1e-30, 1e30, 1e30, 1e-5):
-        view.zoom(factor, 5.0, view.shown(0.0, 10.0))
-        begin, end = view.shown(0.0, 10.0)
+        view.zoom(factor, 5.0, view.visible_range(0.0, 10.0))
+        begin, end = view.visible_range(0.0, 10.0)
         assert 0 < end - begin <= 1e9
     view.hold((1.0, 3.0))
     view.zoom(2.0, 2.0, (1.0, 3.0))
-    assert view.shown(0.0, 99.0) == pytest.approx((0.0, 4.0)), "what is under the mouse stays there"
+    assert view.visible_range(0.0, 99.0) == pytest.approx((0.0, 4.0)), "what is under the mouse stays there"
     view.choose(0.0)
-    assert view.shown(-7.0, 99.0) == (-7.0, 4.0)
+    assert view.visible_range(-7.0, 99.0) == (-7.0, 4.0)
 
 
 # -- A and B -----------------------------------------------------------------------------------------------
@@ -570,7 +570,7 @@ def test_layout_restores_the_plot_even_if_topics_are_missing(qtbot, panel, windo
     assert other.span.value == "300"
     assert sorted(other.session.series.topics) == ["/cmd", "/odom"]
     assert other.save_state() == panel.save_state()
-    other.shut()
+    other.dispose()
     assert other.session.series.topics == ()
 
 
