@@ -70,7 +70,7 @@ class PlainPanel(PanelWidget):
     def restore_state(self, state: Mapping[str, object]) -> None:
         self.state = dict(state)
 
-    def shut(self) -> None:
+    def dispose(self) -> None:
         self.closed = True
 
     def undo(self) -> None:

@@ -51,7 +51,7 @@ def bench() -> Bench:
 def test_pause_stops_continuous_motion_and_resume_restarts_it(bench) -> None:
     bench.do("drive", speed=0.2, turn=0)
     bench.do("light")
-    assert bench.going.rest() == ("Turtle",)
+    assert bench.going.stop_all() == ("Turtle",)
     assert bench.stopped == ["Turtle"]
     bench.going.go_on()
     assert bench.invoked == [("Turtle", "drive", {"speed": 0.2, "turn": 0})]
@@ -62,19 +62,19 @@ def test_pause_stops_continuous_motion_and_resume_restarts_it(bench) -> None:
 @pytest.mark.parametrize("state", ["failed", "canceled"])
 def test_motion_that_never_started_is_not_resumed(bench, state) -> None:
     bench.do("drive", state, speed=0.2)
-    assert bench.going.rest() == ()
+    assert bench.going.stop_all() == ()
 
 
 def test_replaced_motion_is_not_resumed(bench) -> None:
     bench.do("drive", speed=0.2)
     bench.do("move", distance=0.1)
-    assert bench.going.rest() == ()
+    assert bench.going.stop_all() == ()
     bench.going.go_on()
     assert bench.invoked == []
 
 
 def test_motion_started_by_single_step_is_paused_at_once(bench) -> None:
-    bench.going.rest()
+    bench.going.stop_all()
     bench.do("drive", speed=0.2)
     assert bench.stopped == ["Turtle"]
     bench.going.go_on()
@@ -104,7 +104,7 @@ def test_slow_motion_delay_of_another_script_does_not_suspend_motion(bench) -> N
 @pytest.mark.parametrize("state", ["succeeded", "canceled"])
 def test_motion_accepted_during_slow_motion_delay_is_suspended_and_resumed(bench, state) -> None:
     call = RobotCall("c", "Turtle", "drive")
-    bench.going.asked(call, TURTLE, {"speed": 0.2})
+    bench.going.note_command(call, TURTLE, {"speed": 0.2})
     with bench.going.slow():
         assert bench.stood == ["Turtle"]
         call.state = state
@@ -116,12 +116,12 @@ def test_motion_accepted_during_slow_motion_delay_is_suspended_and_resumed(bench
 def test_resume_during_slow_motion_delay_does_not_restart_motion_early(bench) -> None:
     bench.do("drive", speed=0.2)
     with bench.going.slow():
-        bench.going.rest()
+        bench.going.stop_all()
         bench.going.go_on()
         assert bench.invoked == []
     assert len(bench.invoked) == 1
     with bench.going.slow():
-        bench.going.rest()
+        bench.going.stop_all()
     assert len(bench.invoked) == 1, "it is paused"
     bench.going.go_on()
     assert len(bench.invoked) == 2
@@ -129,7 +129,7 @@ def test_resume_during_slow_motion_delay_does_not_restart_motion_early(bench) ->
 
 def test_resumed_motion_still_belongs_to_its_script(bench) -> None:
     bench.do("drive", speed=0.2)
-    bench.going.rest()
+    bench.going.stop_all()
     there = threading.Thread(target=bench.going.go_on)
     bench.answers = True
     there.start()

@@ -300,7 +300,7 @@ def test_suspended_stream_decodes_nothing_and_keeps_its_picture(images: Images, 
     until(lambda: stream.picture is not None and stream.picture.seq == 3)
     assert not stream.awaits_picture
     stream.close()
-    stream.wake()
+    stream.resume()
     assert watched == [], "a stream that was closed stays closed"
 
 

@@ -70,7 +70,7 @@ def test_recorder_process_starts_only_when_needed(made):
     made.client.stop()
     made.client.note("x")
     made.client.check()
-    assert not made.client.keep(Path("a.mcap"), 60.0)
+    assert not made.client.save_last(Path("a.mcap"), 60.0)
     made.client.close()
     assert not made.lines
 
@@ -168,8 +168,8 @@ def test_flight_recorder_saves_last_seconds_and_is_restarted(made):
     made.say("ring")
     made.say("figures", recording=None, ring={"seconds": 41.0, "size_bytes": 7}, free_bytes=None)
     assert (client.state.ring_s, client.state.ring_bytes) == (41.0, 7)
-    assert client.keep(Path("a.mcap"), 60.0, "it fell")
-    assert client.keep(Path("b.mcap"), 60.0)
+    assert client.save_last(Path("a.mcap"), 60.0, "it fell")
+    assert client.save_last(Path("b.mcap"), 60.0)
     made.say("kept", path="a.mcap")
     made.say("problem", op="keep", path="b.mcap", sentence="the disk is full")
     assert (client.state.keeping, client.state.last) == ((), Path("a.mcap"))
@@ -195,7 +195,7 @@ def test_flight_recorder_saves_last_seconds_and_is_restarted(made):
     client.follow_ring(None)
     assert [each["op"] for each in made.lines[-1].orders][-2:] == ["ring", "end_ring"]
     made.say("ring_ended", status={"problem": ""})
-    assert not client.keep(Path("c.mcap"), 60.0)
+    assert not client.save_last(Path("c.mcap"), 60.0)
 
 
 def test_unresponsive_recorder_and_invalid_events_are_harmless(made):

@@ -100,7 +100,7 @@ def test_one_time_choice_is_not_saved(made):
 def test_impossible_recording_gives_reason_and_starts_nothing(made):
     made.recordings.choose(RecordingChoice("chosen"))
     assert made.recordings.record() == "No topic is selected."
-    assert made.recordings.keep() == "The flight recorder is off."
+    assert made.recordings.save_last() == "The flight recorder is off."
     assert made.lines == []
 
 

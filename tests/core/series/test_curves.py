@@ -31,7 +31,7 @@ class Watching:
         self.topic, self.open_ones = topic, open_ones
         open_ones.append(topic)
 
-    def rest(self) -> None:
+    def suspend(self) -> None:
         raise AssertionError("a plot never rests")
 
     wake = rest

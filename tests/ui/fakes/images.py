@@ -19,8 +19,8 @@ class ImageStream(images_module.ImageStream):
 
     painted: list[Picture] = field(default_factory=list)
 
-    def shown(self) -> None:
-        super().shown()
+    def count_painted(self) -> None:
+        super().count_painted()
         if self.picture is not None:
             self.painted.append(self.picture)
 

@@ -337,7 +337,7 @@ def test_panels_report_that_they_are_paused(qtbot, window) -> None:
         assert "paused" in hindrance.sentence
         hindrance.run()
         assert not made.freeze.isChecked()
-        made.shut()
+        made.dispose()
 
 
 def test_console_reports_its_filters(qtbot, window) -> None:
@@ -359,7 +359,7 @@ def test_empty_plot_opens_the_doctor(qtbot, window) -> None:
     assert made.advice.topic == "/odom"
     press(made.advice.why)
     assert window.asked_why == [(made, "/odom")]
-    made.shut()
+    made.dispose()
 
 
 def test_doctor_shows_that_it_is_checking_before_the_first_result(qtbot, qapp) -> None:

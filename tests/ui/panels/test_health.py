@@ -92,7 +92,7 @@ def test_panel_follows_the_shown_robot_and_names_it_when_there_are_two(panel, as
     panel.refresh()
     assert asked.session.looked_at == ["Turtle"]
     assert panel.subtitle() == "Turtle"
-    panel.shut()
+    panel.dispose()
     assert asked.session.looked_at == []
 
 

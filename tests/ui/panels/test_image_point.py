@@ -249,7 +249,7 @@ def test_arming_elsewhere_does_not_arm_the_image_and_closing_disarms(qtbot, wind
     assert heard.listen(timeout_s=20.0) == (True, {"x": 16.0, "y": 8.0, "z": 0.0})
     kept = panel.save_state()
     assert kept["point"] == {"on": True, "topic": POINTS, "type": TYPES[1]}
-    panel.shut()
+    panel.dispose()
     assert acting.arming.targets == (Target("topic", "/other"),)
     assert acting.arming.is_on
     panel.restore_state(kept)

@@ -61,7 +61,7 @@ def test_inspector_watches_exactly_the_shown_topic(panel, window) -> None:
     panel.show_topic("/odom")
     assert window.session.watched == ["/odom"]
     assert (panel.title(), panel.subtitle()) == ("Inspector", "/odom")
-    panel.shut()
+    panel.dispose()
     assert window.session.watched == []
 
 

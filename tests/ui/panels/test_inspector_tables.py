@@ -242,14 +242,14 @@ def test_earlier_message_is_compared_with_its_predecessor(panel, window) -> None
 def test_history_is_kept_per_topic_and_hidden_panel_records_none(panel, window) -> None:
     send(window, panel, seen(1, stamp=1))
     send(window, panel, seen(2, stamp=2))
-    panel.rest()
+    panel.suspend()
     send(window, panel, seen(3, stamp=3))
     assert len(panel.history.kept) == 2
-    panel.wake()
+    panel.resume()
     send(window, panel, seen(4, stamp=4))
     assert len(panel.history.kept) == 3
     panel.show_topic("/odom")
     assert len(panel.history.kept) == 0
     assert not panel.history.isVisible()
-    panel.shut()
+    panel.dispose()
     assert window.session.series.topics == ()

@@ -94,4 +94,4 @@ def test_newly_opened_panel_shows_the_robot_at_once(qtbot, panel) -> None:
         widget.setParent(made)
     made.show()  # the next tick is not waited for
     assert not made.empty.isVisible(), "for a moment it would say that no robot is connected"
-    made.shut()
+    made.dispose()

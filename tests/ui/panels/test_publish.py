@@ -117,7 +117,7 @@ def test_sending_arms_only_this_topic_and_the_switch_disarms_it(window, panel) -
 
 def test_stop_source_change_and_closing_disarm(window, panel) -> None:
     acting = acting_of(window)
-    for end in (window.session.runs.stop, panel.shut):
+    for end in (window.session.runs.stop, panel.dispose):
         assert acting.arm() == ""
         end()
         assert not acting.arming.is_on

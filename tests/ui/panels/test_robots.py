@@ -150,7 +150,7 @@ def test_another_robot_can_be_selected_and_only_that_one_is_watched(panel, windo
     assert window.session.looked_at == ["Turtle"]
     panel.refresh()
     assert panel.items["Turtle"].chip.text == "busy"
-    panel.shut()
+    panel.dispose()
     assert window.session.looked_at == []
 
 

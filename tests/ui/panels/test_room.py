@@ -79,7 +79,7 @@ def test_both_robots_are_in_one_drawing(panel, window) -> None:
     panel.refresh()
     assert panel.view.grab().toImage() != both
     assert window.session.looked_at == ["Pepper", "Turtle"]
-    panel.shut()
+    panel.dispose()
     assert window.session.looked_at == []
 
 

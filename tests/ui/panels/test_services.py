@@ -186,7 +186,7 @@ def test_rejected_timed_out_and_cancelled_calls_are_reported(window, panel, qtbo
 
 def test_closing_disarms_and_empty_panel_explains_what_to_do(window, panel) -> None:
     window.session.acting.arm()
-    panel.shut()
+    panel.dispose()
     assert not window.session.acting.arming.is_on
     offer(window.session)
     ticks(window, panel)

@@ -50,7 +50,7 @@ class SimulatedHeartbeat:
             self._is_due = True
             self._clock.call_at(self._clock.now() + ALIVE_S, self._tell)
 
-    def rest(self, robot: str) -> None:
+    def stop(self, robot: str) -> None:
         self._robots.pop(robot, None)
 
     def close(self) -> None:

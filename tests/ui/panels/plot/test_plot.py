@@ -486,7 +486,7 @@ def test_image_topics_are_not_subscribed_to_find_numeric_fields(adding, window) 
         window.session.topics[name].codec for name in window.session.watched if name in window.session.topics
     }
     assert "image" not in codecs
-    adding.add.shut()
+    adding.add.dispose()
     assert window.session.watched == []
 
 
