@@ -34,7 +34,7 @@ class Watching:
     def suspend(self) -> None:
         raise AssertionError("a plot never rests")
 
-    wake = rest
+    resume = suspend
 
     def close(self) -> None:
         self.open_ones.remove(self.topic)
