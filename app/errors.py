@@ -29,7 +29,7 @@ from typing import NamedTuple
 from nep.i18n import _
 from nep.text import escaped, shortened
 
-LONGEST_NAME, LONGEST_PROBLEM = 40, 300
+MAX_NAME_LENGTH, MAX_PROBLEM_LENGTH = 40, 300
 
 
 class AppError(Exception):
@@ -105,8 +105,8 @@ class DescriptionError(AppError):
         # The description comes from another program, so its text is escaped and shortened.
         self.name = name
         self.problems = problems
-        shown = shortened(escaped(name), LONGEST_NAME)
-        first = shortened(escaped(problems[0]), LONGEST_PROBLEM) if problems else _("empty")
+        shown = shortened(escaped(name), MAX_NAME_LENGTH)
+        first = shortened(escaped(problems[0]), MAX_PROBLEM_LENGTH) if problems else _("empty")
         words = (
             _("the description of '{name}' can't be used: {problem} (and {count} more)")
             if len(problems) > 1

@@ -35,7 +35,7 @@ from app.ui.startup.single_instance import OK, place
 ROOT = Path(__file__).resolve().parents[1]
 DROP = Path("/proc/sys/vm/drop_caches")
 GOAL, TRUSTED = 1.5, 0.1
-LONGEST_S, LOOK_S = 60.0, 0.002
+MAX_S, LOOK_S = 60.0, 0.002
 MASTER_END_S = 10.0
 PAUSE = threading.Event()
 
@@ -81,13 +81,13 @@ def until_answered(name: str, process: subprocess.Popen[bytes], until: float) ->
     """Ask the window for nothing again and again, until it says that it has done it."""
     while process.poll() is None and time.monotonic() < until:
         with contextlib.suppress(OSError), socket.socket(socket.AF_UNIX) as line:
-            line.settimeout(LONGEST_S)
+            line.settimeout(MAX_S)
             line.connect(name)
             line.sendall(json.dumps({"files": [], "demo": False}).encode() + b"\n")
             if line.recv(len(OK)) == OK:
                 return
         PAUSE.wait(LOOK_S)
-    raise SystemExit(f"no window answered within {LONGEST_S:g} s: {process.args!r}")
+    raise SystemExit(f"no window answered within {MAX_S:g} s: {process.args!r}")
 
 
 def once(command: Sequence[str], *, cold: bool) -> Start:
@@ -101,12 +101,12 @@ def once(command: Sequence[str], *, cold: bool) -> Start:
         process = subprocess.Popen(command, cwd=ROOT, env=environ, stdout=subprocess.DEVNULL)
         family: list[psutil.Process] = []
         try:
-            until_answered(name, process, began + LONGEST_S)
+            until_answered(name, process, began + MAX_S)
             seconds = time.monotonic() - began
             used = psutil.Process(process.pid).cpu_times()
             family = psutil.Process(process.pid).children(recursive=True)
             process.send_signal(signal.SIGTERM)
-            process.wait(LONGEST_S)
+            process.wait(MAX_S)
         finally:
             process.kill()
             process.wait()

@@ -23,7 +23,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 ROOT = Path(__file__).resolve().parent.parent
-MOST_WORKERS = 6
+MAX_WORKERS = 6
 
 
 class Check(NamedTuple):
@@ -68,7 +68,7 @@ def side_by_side() -> tuple[str, ...]:
     Many tests wait for processes and windows: on two cores, one worker more leaves a fifth of the time idle.
     With two more, some tests would wait too long for a robot or a page, so the last worker opens no windows.
     """
-    workers = min(MOST_WORKERS, (os.cpu_count() or 1) + 2)
+    workers = min(MAX_WORKERS, (os.cpu_count() or 1) + 2)
     return ("-n", str(workers), "--dist", "loadfile")
 
 

@@ -25,7 +25,7 @@ from tools.versions import environment
 FOLDER = ROOT / "build" / "fuzz"
 HARNESS = "tests/fuzz/harness.py"
 MINUTES = 15.0
-LEAST_S = 1
+MIN_S = 1
 """Minimum time for a target."""
 
 
@@ -33,7 +33,7 @@ def seconds_each(weights: Mapping[str, int], minutes: float) -> dict[str, int]:
     """Return the time in seconds for each target; slow ones get twice as long."""
     shares = {name: 2 if weight > 1 else 1 for name, weight in weights.items()}
     one = minutes * 60 / max(1, sum(shares.values()))
-    return {name: max(LEAST_S, round(one * share)) for name, share in shares.items()}
+    return {name: max(MIN_S, round(one * share)) for name, share in shares.items()}
 
 
 def findings_in(folder: Path) -> list[Path]:

@@ -33,7 +33,7 @@ from nep.programs.alarms.alarms import Carrier, Done
 from nep.programs.alarms.commands import AlarmCommands
 from nep.programs.alarms.history import AlarmHistory
 from nep.programs.alarms.rule import EVENT_KINDS, Scalar, new_id, problem_of
-from nep.programs.alarms.rule_file import MOST_ALARMS, NewerAlarmsError, alarms_text, read_text
+from nep.programs.alarms.rule_file import MAX_ALARMS, NewerAlarmsError, alarms_text, read_text
 from nep.programs.alarms.sentences import subject_words, time_words, what_words
 from nep.protocol.graph_view import GraphView
 
@@ -159,9 +159,9 @@ class SessionAlarms:
             self._follow_rules()
 
     def _has_room(self) -> bool:
-        if len(self.rules) < MOST_ALARMS:
+        if len(self.rules) < MAX_ALARMS:
             return True
-        text = _("You have {count} alarms, the maximum.").format(count=MOST_ALARMS)
+        text = _("You have {count} alarms, the maximum.").format(count=MAX_ALARMS)
         hint = _("Delete one you don't need.")
         self._session.alerts.put(
             "alarms:most", "warn", text, hint, button=_("Show the alarms"), action=SHOW, count=0

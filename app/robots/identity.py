@@ -25,7 +25,7 @@ from nep.text import bounded_str, harmless
 GATEWAY = "gateway"
 SHARED = frozenset({RIZE_COMMANDS, "action_state"})
 """Topics shared by all RIZE robots (`app.robots.rize`)."""
-MOST_SENDERS = 20_000
+MAX_SENDERS = 20_000
 WORDS_MOST = 200
 MAY_MOVE = lazy("{robot} may still move: {why}")
 ERROR_MOST = 1000
@@ -182,7 +182,7 @@ class Senders:
                 for publisher in info.publishers if info is not None else ():
                     if self._nodes.get(publisher.id) not in view.nodes:
                         self._nodes[publisher.id] = publisher.node_id
-            while len(self._nodes) > MOST_SENDERS:
+            while len(self._nodes) > MAX_SENDERS:
                 del self._nodes[next(iter(self._nodes))]
 
     def node_of(self, message: Message) -> str | None:

@@ -13,7 +13,7 @@ __all__ = ["Slice", "read"]
 _THIN = {0xFEEDFACF: ">", 0xCFFAEDFE: "<", 0xFEEDFACE: ">", 0xCEFAEDFE: "<"}
 _WIDE = {0xFEEDFACF, 0xCFFAEDFE}
 _FAT, _FAT_64 = 0xCAFEBABE, 0xCAFEBABF
-_MOST_SLICES = 8
+_MAX_SLICES = 8
 """Java classes have the same magic number as fat files, followed by their version: 45 or more."""
 _MACHINES = {0x01000007: "x86_64", 0x0100000C: "arm64"}
 _PROGRAM = 2
@@ -51,7 +51,7 @@ def _slices(file: BinaryIO) -> Iterator[Slice]:
     elif magic in {_FAT, _FAT_64}:
         (count,) = struct.unpack(">I", file.read(4))
         layout, size = (">5I", 20) if magic == _FAT else (">2I2Q2I", 32)
-        if count <= _MOST_SLICES:
+        if count <= _MAX_SLICES:
             entries = [struct.unpack(layout, file.read(size)) for _each in range(count)]
             for entry in entries:
                 yield _slice(file, entry[2])

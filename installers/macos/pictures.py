@@ -31,7 +31,7 @@ SIDES: Mapping[bytes, int] = {
 """Icon types with sizes in pixels: 16, 32, 128, 256 and 512 points, each also at Retina resolution."""
 _RAW = frozenset({b"ic04", b"ic05"})
 """Types that contain four channels in sequence instead of PNG, as written by Apple's iconutil."""
-_LONGEST_RUN = 128
+_MAX_RUN = 128
 
 Paint = Callable[[QPainter, float, Theme], None]
 
@@ -80,8 +80,8 @@ def _argb(image: QImage) -> bytes:
     pixels = bytes(converted.constBits())
     made = bytearray(b"ARGB")
     for channel in (pixels[3::4], pixels[0::4], pixels[1::4], pixels[2::4]):
-        for start in range(0, len(channel), _LONGEST_RUN):
-            run = channel[start : start + _LONGEST_RUN]
+        for start in range(0, len(channel), _MAX_RUN):
+            run = channel[start : start + _MAX_RUN]
             made.append(len(run) - 1)
             made += run
     return bytes(made)

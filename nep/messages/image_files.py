@@ -14,11 +14,11 @@ from typing import Literal
 from nep.errors import DecodeError
 from nep.i18n import _, number
 
-__all__ = ["MOST_BYTES", "MOST_PIXELS", "ImageFile", "check_size", "examine"]
+__all__ = ["MAX_BYTES", "MAX_PIXELS", "ImageFile", "check_size", "examine"]
 
-MOST_PIXELS = 120_000_000
+MAX_PIXELS = 120_000_000
 """Maximum number of pixels, beyond any camera of a robot."""
-MOST_BYTES = 750_000_000
+MAX_BYTES = 750_000_000
 """Maximum memory for the pixels and the decoder's buffers."""
 _DECODER_COPIES = 2
 """Copies of the pixels that OpenCV holds while decoding (measured with 4.14, JPEG and PNG)."""
@@ -114,15 +114,15 @@ def check_size(width: int, height: int, pixel_bytes: float, size_bytes: int) -> 
             size_bytes,
             _("an image can't have {width} × {height} pixels").format(width=width, height=height),  # noqa: RUF001
         )
-    if width * height > MOST_PIXELS:
+    if width * height > MAX_PIXELS:
         reason = _("{width} × {height} pixels are too many; the limit is {most} million").format(  # noqa: RUF001
-            width=width, height=height, most=MOST_PIXELS // 10**6
+            width=width, height=height, most=MAX_PIXELS // 10**6
         )
         raise DecodeError("image", size_bytes, reason)
     needed = width * height * pixel_bytes
-    if needed > MOST_BYTES:
+    if needed > MAX_BYTES:
         reason = _("{width} × {height} pixels need {needed} MB; the limit is {most} MB").format(  # noqa: RUF001
-            width=width, height=height, needed=number(needed / 1000000.0, ".0f"), most=MOST_BYTES // 10**6
+            width=width, height=height, needed=number(needed / 1000000.0, ".0f"), most=MAX_BYTES // 10**6
         )
         raise DecodeError("image", size_bytes, reason)
 

@@ -19,7 +19,7 @@ from nep.system.replace_file import replace_file
 
 __all__ = ["Container", "Film", "available_container", "frame_of"]
 
-LONGEST_S = 86_400.0
+MAX_S = 86_400.0
 """Maximum duration: an image of another day would lead to millions of frames."""
 _TRIAL_SIZE_PX = (64, 48)
 
@@ -100,7 +100,7 @@ class Film:
             if not self._film.isOpened():
                 raise RecordingError(str(self._path), _("OpenCV can't write videos on this computer"))
             self._start_ns = log_ns
-        if log_ns - self._start_ns > LONGEST_S * 1e9:
+        if log_ns - self._start_ns > MAX_S * 1e9:
             raise RecordingError(str(self._path), _("its images span more than a day; choose a shorter part"))
         until = int((log_ns - self._start_ns) * self._fps / 1e9)
         while self._last is not None and self._frames < until:

@@ -31,7 +31,7 @@ from nep.recordings.formats.channels import (
     own_channel,
 )
 from nep.recordings.formats.destination import USUAL_LIMITS, Destination, OneFile, WriterLimits, disk_error
-from nep.recordings.formats.figures import MOST_TOPICS, TopicCounter, TopicFigures, changed
+from nep.recordings.formats.figures import MAX_TOPICS, TopicCounter, TopicFigures, changed
 from nep.recordings.formats.mcap_file import CHUNK_BYTES, FileWriter
 
 if TYPE_CHECKING:
@@ -249,7 +249,7 @@ class RecordingWriter:
                 self._queued_messages += 1
                 continue
             key = (message.topic, message.publisher)
-            if key not in self._dropped_counts and len(self._dropped_counts) >= MOST_TOPICS:
+            if key not in self._dropped_counts and len(self._dropped_counts) >= MAX_TOPICS:
                 key = (_OTHER_TOPICS, None)
             count = self._dropped_counts.setdefault(key, [0, 0])
             count[0] += 1
@@ -440,7 +440,7 @@ class RecordingWriter:
         return known
 
     def _counter(self, topic: str) -> TopicCounter:
-        if topic not in self._counters and len(self._counters) >= MOST_TOPICS:
+        if topic not in self._counters and len(self._counters) >= MAX_TOPICS:
             topic = _OTHER_TOPICS
         return self._counters.setdefault(topic, TopicCounter())
 

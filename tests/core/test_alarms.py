@@ -136,7 +136,7 @@ def test_alarms_and_their_history_survive_a_restart(tmp_path: Path) -> None:
 
 
 def test_number_of_alarms_is_limited_to_the_file_capacity(tmp_path: Path, monkeypatch) -> None:
-    monkeypatch.setattr("app.core.alarms.MOST_ALARMS", 5)
+    monkeypatch.setattr("app.core.alarms.MAX_ALARMS", 5)
     session = at_rest(tmp_path)
     for _ in range(5):
         session.alarms.new(BELOW)

@@ -35,7 +35,7 @@ from tests.e2e.waiting import until
 from tests.e2e.x11 import RIGHT
 
 pytestmark = pytest.mark.timeout(900)
-MOST_CLICKS, MOST_DRAGS = 4, 2  # from the start to the first motion
+MAX_CLICKS, MAX_DRAGS = 4, 2  # from the start to the first motion
 HEAD = 150  # how high Pepper's head is above the floor, in the units of its drawing
 FIGHT = "both move Pepper at the same time"
 WHY = "document.querySelector('.nepWhy')?.textContent ?? ''"
@@ -127,8 +127,8 @@ def move_the_robot(hour: Hour) -> str:
     with film.step("Run: the robot moves after four clicks and two drags"):
         studio.click("Run", kind="RunButton")
         until(lambda: abs(hour.room.state("Pepper")["theta_deg"] - before) > 2, "the robot turns", 40)
-        assert mouse.clicks <= MOST_CLICKS, mouse.clicks
-        assert mouse.drags <= MOST_DRAGS, mouse.drags
+        assert mouse.clicks <= MAX_CLICKS, mouse.clicks
+        assert mouse.drags <= MAX_DRAGS, mouse.drags
     return turn
 
 

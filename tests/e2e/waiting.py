@@ -8,7 +8,7 @@ from collections.abc import Callable
 from typing import TypeVar
 
 T = TypeVar("T")
-LOOK_S, MOST_LOOK_S = 0.05, 0.2
+LOOK_S, MAX_CHECK_S = 0.05, 0.2
 """How often somebody asks: what is soon is seen soon, and what takes long is not disturbed by the asking."""
 
 
@@ -20,5 +20,5 @@ def until(true: Callable[[], T], what: str | Callable[[], str], within_s: float 
         if time.monotonic() >= end:
             raise AssertionError(f"not within {within_s:g} s: {what if isinstance(what, str) else what()}")
         pause.wait(look_s)
-        look_s = min(look_s * 1.2, MOST_LOOK_S)
+        look_s = min(look_s * 1.2, MAX_CHECK_S)
     return found

@@ -28,7 +28,7 @@ ROOT = Path(__file__).resolve().parents[2]
 sys.path.insert(0, str(ROOT))
 SLOW_S = 5.0
 """Of processor time, and counting where the program goes makes all of it slower."""
-LONGEST = 8192
+MAX_LENGTH = 8192
 HANG_S = 25
 MEMORY_MB = 3000
 
@@ -119,7 +119,7 @@ def fuzz(target: Target, seconds: int, folder: Path) -> None:
 
     options = {
         "max_total_time": seconds,
-        "max_len": LONGEST,
+        "max_len": MAX_LENGTH,
         "timeout": HANG_S,
         "rss_limit_mb": MEMORY_MB,
         "artifact_prefix": f"{folder / 'findings'}/{name}-",

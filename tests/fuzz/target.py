@@ -61,7 +61,7 @@ class Targets:
         return made
 
 
-MOST_LETTERS = 20_000
+MAX_LETTERS = 20_000
 """A sentence for a person, however much somebody sent, is no longer than what was sent and this."""
 
 
@@ -69,7 +69,7 @@ def check_sentence(error: Exception) -> None:
     """What is raised says something, and can be shown."""
     said = str(error)
     assert said, f"{type(error).__name__} says nothing"
-    assert len(said) < MOST_LETTERS, f"a sentence of {len(said)} letters"
+    assert len(said) < MAX_LETTERS, f"a sentence of {len(said)} letters"
     said.encode()
 
 

@@ -13,7 +13,7 @@ from typing import IO
 
 import pytest
 
-_LONGEST_WAIT_S = 900.0
+_MAX_WAIT_S = 900.0
 _held: list[IO[bytes]] = []
 """The lock's file, once for each who holds it in this process: a second lock would wait for the first."""
 
@@ -34,7 +34,7 @@ def one_run_at_a_time() -> Iterator[None]:
 
 
 def _wait_for(stream: IO[bytes]) -> None:
-    deadline = time.monotonic() + _LONGEST_WAIT_S
+    deadline = time.monotonic() + _MAX_WAIT_S
     while not _try_lock(stream.fileno()):
         if time.monotonic() > deadline:
             stream.close()

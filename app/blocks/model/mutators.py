@@ -11,10 +11,10 @@ from dataclasses import dataclass, replace
 from app.blocks.model.fields import Argument, Check, Say, StatementInput, ValueInput, VariableField
 from app.blocks.model.workspace import Placed
 
-MOST_ITEMS = 50
-MOST_INPUTS = 12
-MOST_ELSE_IFS = 20
-LONGEST_NAME = 60
+MAX_ITEMS = 50
+MAX_INPUTS = 12
+MAX_ELSE_IFS = 20
+MAX_NAME_LENGTH = 60
 
 
 @dataclass(frozen=True)
@@ -43,7 +43,7 @@ class Items(Argument):
         """Return the gaps of a block."""
         count = extra.get("items")
         sound = isinstance(count, int) and not isinstance(count, bool)
-        many = min(max(int(count), 0), MOST_ITEMS) if sound and isinstance(count, int) else self.count
+        many = min(max(int(count), 0), MAX_ITEMS) if sound and isinstance(count, int) else self.count
         return tuple(ValueInput(f"{self.name}{number}") for number in range(many))
 
 
@@ -77,7 +77,7 @@ class Branches:
         """Read a block's saved state; the default is no “else if”, and an “else” as its type has."""
         count, told = extra.get("elseIfs"), extra.get("else")
         sound = isinstance(count, int) and not isinstance(count, bool)
-        many = min(max(int(count), 0), MOST_ELSE_IFS) if sound and isinstance(count, int) else 0
+        many = min(max(int(count), 0), MAX_ELSE_IFS) if sound and isinstance(count, int) else 0
         return cls(many, told if isinstance(told, bool) else has_else)
 
     def arguments(self) -> tuple[Argument, ...]:
@@ -102,9 +102,9 @@ def inputs_of(extra: Mapping[str, object]) -> tuple[FunctionInput, ...]:
     found: dict[str, FunctionInput] = {}
     for each in saved if isinstance(saved, list) else ():
         if isinstance(each, Mapping) and isinstance(each.get("id"), str) and each["id"]:
-            name = str(each.get("name") or "input")[:LONGEST_NAME]
+            name = str(each.get("name") or "input")[:MAX_NAME_LENGTH]
             found.setdefault(str(each["id"]), FunctionInput(str(each["id"]), name))
-    return tuple(found.values())[:MOST_INPUTS]
+    return tuple(found.values())[:MAX_INPUTS]
 
 
 @dataclass(frozen=True)
@@ -139,4 +139,4 @@ class InputField(VariableField):
 def name_of(placed: Placed) -> str:
     """Return the function name of a definition or call."""
     saved = placed.fields.get("NAME", placed.extra.get("name"))
-    return " ".join(str(saved or "function").split())[:LONGEST_NAME] or "function"
+    return " ".join(str(saved or "function").split())[:MAX_NAME_LENGTH] or "function"

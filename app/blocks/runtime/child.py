@@ -45,8 +45,8 @@ VARIABLES_EVERY = 3
 """Samples between two reads of the variables: ten reads a second."""
 STOP_ANSWER_S = 1.0
 FLUSH_S = 0.03
-LONGEST_LINE = 2000
-MOST_LINES = 10_000
+MAX_LINE_LENGTH = 2000
+MAX_LINES = 10_000
 LINES_PER_SAMPLE = 50
 
 
@@ -57,7 +57,7 @@ class Out:
         self._stream = stream
         self._lock = threading.Lock()
         self._printed: queue.Queue[str] = queue.Queue(LINES_PER_SAMPLE)
-        self._left = MOST_LINES
+        self._left = MAX_LINES
         self.told: Callable[[str], object] = lambda _line: None
         """Callback for each line that the program prints."""
         self._dropped = 0
@@ -74,12 +74,12 @@ class Out:
 
     def print(self, text: str) -> None:
         """Queue a printed line until the next sample."""
-        for line in text[: LONGEST_LINE * 4].splitlines() or [""]:
+        for line in text[: MAX_LINE_LENGTH * 4].splitlines() or [""]:
             try:
-                self._printed.put_nowait(line[:LONGEST_LINE])
+                self._printed.put_nowait(line[:MAX_LINE_LENGTH])
             except queue.Full:
                 self._dropped += 1
-            self.told(line[:LONGEST_LINE])
+            self.told(line[:MAX_LINE_LENGTH])
 
     def send_printed(self) -> None:
         """Send the queued lines."""
@@ -93,7 +93,7 @@ class Out:
                 self.send(
                     "print",
                     text=_("no more lines are shown: the limit of {count} is reached").format(
-                        count=MOST_LINES
+                        count=MAX_LINES
                     ),
                 )
         if self._dropped:

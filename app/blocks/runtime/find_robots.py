@@ -26,8 +26,8 @@ from nep.protocol.graph_view import GraphView
 
 RIZE = "rize"
 SLICE_S = 0.1
-MOST_ROBOTS = 200
-MOST_TOLD = 8
+MAX_ROBOTS = 200
+MAX_REPORTED = 8
 
 
 class Subscription(Protocol):
@@ -130,7 +130,7 @@ def find_robots(
 def _update_topics(node: GraphNode, view: GraphView, asked: dict[str, _Topic]) -> None:
     for topic, info in view.topics.items():
         nodes = publishing(view, topic) if info.msg_type == DESCRIPTION_TYPE else ()
-        if not nodes or (topic not in asked and len(asked) >= MOST_ROBOTS):
+        if not nodes or (topic not in asked and len(asked) >= MAX_ROBOTS):
             continue
         if topic not in asked:
             asked[topic] = _Topic(node.new_sub(topic, DESCRIPTION_TYPE), identity_of(view, nodes[0]))
@@ -143,7 +143,7 @@ def _update_topics(node: GraphNode, view: GraphView, asked: dict[str, _Topic]) -
 def _read_descriptions(each: _Topic, topic: str, senders: Senders) -> None:
     message = each.subscription.receive(SLICE_S if each.robot is None else 0.0)
     while message is not None:
-        each.told = [*each.told[1 - MOST_TOLD :], message]
+        each.told = [*each.told[1 - MAX_REPORTED :], message]
         message = each.subscription.receive(0.0)
     its_own = (told for told in reversed(each.told) if senders.node_of(told) == each.owner.node_id)
     newest = next(its_own, None)

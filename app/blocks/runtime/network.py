@@ -27,7 +27,7 @@ from nep.text import bounded_str
 
 LOOKUP_INTERVAL_S = 0.2
 """Minimum interval of graph queries for unknown publishers."""
-MOST_UNKNOWN = 32
+MAX_UNKNOWN = 32
 
 Callback = Callable[[object], None]
 _log = logging.getLogger(__name__)
@@ -112,7 +112,7 @@ class Network:
         self._senders = Senders()
         self._view = GraphView(0, 0)
         self._answers_lock = threading.Lock()  # serializes the handling of answers
-        self._unknown = HeldMessages(per_publisher=MOST_UNKNOWN)
+        self._unknown = HeldMessages(per_publisher=MAX_UNKNOWN)
         self._lookup_requested = threading.Event()
         self._lookup_thread: threading.Thread | None = None
         self._stop_errors: dict[str, str] = {}

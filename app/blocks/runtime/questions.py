@@ -13,10 +13,10 @@ from app.blocks.runtime.scheduler import Scheduler
 from app.blocks.runtime.values import text
 from nep.i18n import _
 
-LONGEST_QUESTION = 500
-LONGEST_ANSWER = 10_000
-LONGEST_CHOICE = 200
-MOST_CHOICES = 12
+MAX_QUESTION_LENGTH = 500
+MAX_ANSWER_LENGTH = 10_000
+MAX_CHOICE_LENGTH = 200
+MAX_CHOICES = 12
 _NUMBER = re.compile(r"-?(?:0|[1-9]\d{0,14})(?:[.,]\d{1,9})?", re.ASCII)
 
 
@@ -64,7 +64,7 @@ class Questions:
         self.answer = as_value(value) if isinstance(value, str) else value
 
     def _answer_to(self, words: str, choices: tuple[str, ...] = ()) -> str:
-        question = ProgramQuestion(next(self._ids), words[:LONGEST_QUESTION], choices=choices)
+        question = ProgramQuestion(next(self._ids), words[:MAX_QUESTION_LENGTH], choices=choices)
         self._update_queue(self._waiting.append, question)
         try:
             self._scheduler.wait_until(lambda: question.answer is not None, None)
@@ -77,7 +77,7 @@ class Questions:
         with self._lock:
             for question in self._waiting:
                 if question.id == id:
-                    question.answer = words[:LONGEST_ANSWER]
+                    question.answer = words[:MAX_ANSWER_LENGTH]
 
     def _update_queue(self, change: Callable[[ProgramQuestion], None], question: ProgramQuestion) -> None:
         with self._lock:
@@ -95,12 +95,12 @@ def offers(choices: object) -> dict[str, object]:
         )
     found: dict[str, object] = {}
     for item in choices:
-        if words := " ".join(text(item).split())[:LONGEST_CHOICE]:
+        if words := " ".join(text(item).split())[:MAX_CHOICE_LENGTH]:
             found.setdefault(words, item)
-        if len(found) > MOST_CHOICES:
+        if len(found) > MAX_CHOICES:
             raise BehaviourError(
                 _("A question can have at most {most} choices; this list has {count}.").format(
-                    most=MOST_CHOICES, count=len(choices)
+                    most=MAX_CHOICES, count=len(choices)
                 )
             )
     if not found:

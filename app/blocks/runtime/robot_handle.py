@@ -26,14 +26,14 @@ from nep.i18n import _, listed
 
 FIRST_ANSWER_S = 3.0
 FIRST_VALUE_S = 2.0
-LONGEST_S = 60.0
+MAX_S = 60.0
 MARGIN_S = 2.0
 COMMAND_CHECK_S = 0.25
 """Interval at which a pending command is checked: whether its robot is silent, whether it has started."""
-BEATS_MISSED, SHORTEST_SILENCE_S = 4, 2.0
+BEATS_MISSED, MIN_SILENCE_S = 4, 2.0
 HOLD_S = 3.0
 """Time a robot has to end an action canceled by a pause; the kit answers within about a second."""
-MOST_KEPT = 64
+MAX_KEPT_COMMANDS = 64
 """Number of remembered commands: a robot answers a replaced one soon after."""
 REPLACES = "replace"
 _PLACE = re.compile(r"%([A-Za-z_][A-Za-z0-9_]*)")
@@ -109,7 +109,7 @@ class Replacements:
     """
 
     def __init__(self) -> None:
-        self._commands: deque[_Command] = deque(maxlen=MOST_KEPT)
+        self._commands: deque[_Command] = deque(maxlen=MAX_KEPT_COMMANDS)
         self._lock = threading.Lock()
         self._counts: dict[tuple[str, str], int] = {}
         self._news: dict[tuple[str, str], Replacement] = {}
@@ -325,7 +325,7 @@ class RobotHandle:
                 _("{name} is not responding. {check}").format(name=self._name, check=_check_hint(robot))
             )
         can_hold = action.cancellable and robot.dialect == "native"
-        limit = action.timeout_s or LONGEST_S
+        limit = action.timeout_s or MAX_S
         until = time.monotonic() + limit + MARGIN_S
         waits = bool(call.waits_for) and call.state == "accepted"
         if waits:
@@ -354,7 +354,7 @@ class RobotHandle:
         if robot.beat_s is None:
             return None
         silence = time.monotonic() - call.heard_s
-        if silence <= max(SHORTEST_SILENCE_S, BEATS_MISSED * robot.beat_s):
+        if silence <= max(MIN_SILENCE_S, BEATS_MISSED * robot.beat_s):
             return None
         return _("{name} stopped responding. {check}").format(name=self._name, check=_check_hint(robot))
 

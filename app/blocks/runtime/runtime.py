@@ -42,7 +42,7 @@ Decorator = Callable[[Script], Script]
 
 MESSAGES_WAITING = 16
 EVENTS_WAITING = 1
-MOST_DEEP = 200
+MAX_DEPTH = 200
 """Maximum depth of function calls."""
 _RECURSION_LIMIT = 6000  # recursion limit: one function call takes up to a dozen Python frames
 
@@ -66,9 +66,9 @@ class Calls:
     def run(self, block: str, name: str, call: Callable[[], object]) -> object:
         """Call a function. Raises BehaviourError if the calls are nested too deeply."""
         depth = int(getattr(self._local, "depth", 0))
-        if depth >= MOST_DEEP:
+        if depth >= MAX_DEPTH:
             raise BehaviourError(
-                _("“{name}” calls itself more than {count} times.").format(name=name, count=MOST_DEEP),
+                _("“{name}” calls itself more than {count} times.").format(name=name, count=MAX_DEPTH),
                 block,
             )
         self._local.depth = depth + 1

@@ -12,8 +12,8 @@ from decimal import Decimal
 from app.blocks.runtime.errors import BehaviourError, kind
 from nep.i18n import _, lazy
 
-LONGEST_TEXT = 1_000_000
-MOST_BITS = 14_000
+MAX_TEXT_LENGTH = 1_000_000
+MAX_BITS = 14_000
 """Python refuses to print integers of more than 4300 digits; larger ones are shown as 1.2e+4932."""
 _MAX_ROUNDS = 10**9
 _JOINER = "\u200d"
@@ -32,13 +32,13 @@ def text(value: object) -> str:
             return json.dumps(value, ensure_ascii=False, default=str)
         except ValueError:  # an integer with too many digits, or a list that contains itself
             return json.dumps(_writable(value, ()), ensure_ascii=False, default=str)
-    if isinstance(value, int) and value.bit_length() > MOST_BITS:
+    if isinstance(value, int) and value.bit_length() > MAX_BITS:
         return f"{Decimal(value):.16e}"
     return str(value)
 
 
 def _writable(value: object, around: tuple[int, ...]) -> object:
-    if isinstance(value, int) and value.bit_length() > MOST_BITS:
+    if isinstance(value, int) and value.bit_length() > MAX_BITS:
         return text(value)
     if not isinstance(value, (Mapping, list, tuple)):
         return value
@@ -58,9 +58,9 @@ def is_known(value: object) -> bool:
 def join(first: object, second: object) -> str:
     """Join two values as text."""
     one, other = text(first), text(second)
-    if len(one) + len(other) > LONGEST_TEXT:
+    if len(one) + len(other) > MAX_TEXT_LENGTH:
         raise BehaviourError(
-            _("This text is too long. Use at most {most} characters.").format(most=LONGEST_TEXT)
+            _("This text is too long. Use at most {most} characters.").format(most=MAX_TEXT_LENGTH)
         )
     return one + other
 

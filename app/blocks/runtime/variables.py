@@ -12,12 +12,12 @@ from nep.i18n import _
 
 ValueKind = Literal["number", "text", "boolean", "list", "unknown", "other"]
 
-LONGEST_TEXT = 200
-LONGEST_ITEM = 80
-MOST_ITEMS = 100
-MOST_INSIDE = 20
+MAX_TEXT_LENGTH = 200
+MAX_ITEM_LENGTH = 80
+MAX_ITEMS = 100
+MAX_INSIDE = 20
 """Maximum nesting depth that is shown."""
-MOST_CHARACTERS = 200_000
+MAX_CHARACTERS = 200_000
 """Maximum amount of text sent at once; the rest follows with the next read."""
 _MAX_PRINTED_BITS = 600
 """Integers with more bits are described by their number of digits: printing them could take seconds."""
@@ -53,10 +53,10 @@ class VariableValue:
         kind = str(told.get("kind"))
         known = kind in ("number", "text", "boolean", "list", "unknown", "other")
         return cls(
-            str(told.get("id"))[:LONGEST_TEXT],
+            str(told.get("id"))[:MAX_TEXT_LENGTH],
             cast("ValueKind", kind) if known else "other",
-            str(told.get("text", ""))[: LONGEST_TEXT + 1],
-            tuple(str(each)[: LONGEST_ITEM + 1] for each in items[:MOST_ITEMS])
+            str(told.get("text", ""))[: MAX_TEXT_LENGTH + 1],
+            tuple(str(each)[: MAX_ITEM_LENGTH + 1] for each in items[:MAX_ITEMS])
             if isinstance(items, list)
             else (),
             length if isinstance(length, int) else 0,
@@ -76,7 +76,7 @@ class VariableWatch:
         """Return the variables whose display has changed since the last call, at first all."""
         found, characters = [], 0
         for python, variable in self._variables.items():
-            if characters > MOST_CHARACTERS:
+            if characters > MAX_CHARACTERS:
                 break
             value = self._names.get(python)
             if python in self._told and self._is_same(python, value):
@@ -105,7 +105,7 @@ class VariableWatch:
 
 
 def _comparable(value: object) -> object:
-    return (len(value), tuple(value[:MOST_ITEMS])) if isinstance(value, list) else value
+    return (len(value), tuple(value[:MAX_ITEMS])) if isinstance(value, list) else value
 
 
 def _is_plain(value: object) -> bool:
@@ -117,8 +117,8 @@ def brief(id: str, value: object) -> VariableValue:
     if value is None:
         return VariableValue(id, "unknown", _("unknown"))
     if isinstance(value, (list, tuple)):
-        items = tuple(words(each, LONGEST_ITEM) for each in value[:MOST_ITEMS])
-        return VariableValue(id, "list", words(value, LONGEST_TEXT), items, len(value))
+        items = tuple(words(each, MAX_ITEM_LENGTH) for each in value[:MAX_ITEMS])
+        return VariableValue(id, "list", words(value, MAX_TEXT_LENGTH), items, len(value))
     kind: ValueKind = "other"
     if isinstance(value, bool):
         kind = "boolean"
@@ -126,12 +126,12 @@ def brief(id: str, value: object) -> VariableValue:
         kind = "number"
     elif isinstance(value, str):
         kind = "text"
-    return VariableValue(id, kind, words(value, LONGEST_TEXT))
+    return VariableValue(id, kind, words(value, MAX_TEXT_LENGTH))
 
 
 def brief_words(value: object) -> str:
     """Return a value as short text for people."""
-    return words(value, LONGEST_TEXT)
+    return words(value, MAX_TEXT_LENGTH)
 
 
 def words(value: object, most: int) -> str:
@@ -159,17 +159,17 @@ def _parts(value: object, depth: int) -> Iterator[str]:
     elif isinstance(value, (list, tuple)):
         yield from _inside("[", "]", (("", each) for each in value), depth)
     else:
-        yield words(value, LONGEST_ITEM)
+        yield words(value, MAX_ITEM_LENGTH)
 
 
 def _inside(begin: str, end: str, parts: Iterator[tuple[str, object]], depth: int) -> Iterator[str]:
-    if depth >= MOST_INSIDE:
+    if depth >= MAX_INSIDE:
         yield _CUT
         return
     yield begin
     for place, (name, each) in enumerate(parts):
-        yield (", " if place else "") + name[:LONGEST_ITEM]
-        if place >= MOST_ITEMS:
+        yield (", " if place else "") + name[:MAX_ITEM_LENGTH]
+        if place >= MAX_ITEMS:
             yield _CUT
             break
         yield from _parts(each, depth + 1)

@@ -11,7 +11,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from app.core.storage import deep_json
-from app.core.storage.atomic_file import LARGEST_BYTES, read_whole, write_atomically
+from app.core.storage.atomic_file import MAX_BYTES, read_whole, write_atomically
 from app.errors import DocumentError
 from nep.i18n import _, lazy, number
 
@@ -109,8 +109,8 @@ def write_file(path: Path, behaviour: BehaviourFile) -> None:
     """
     try:
         data = file_bytes(behaviour)
-        if len(data) > LARGEST_BYTES:
-            size, most = len(data) / 1e6, LARGEST_BYTES / 1e6
+        if len(data) > MAX_BYTES:
+            size, most = len(data) / 1e6, MAX_BYTES / 1e6
             template = _("{file} would be {size} MB").format(file=path.name, size=number(size, ".1f"))
             advice = _("at most {most} MB can be read; use smaller images").format(most=number(most, ".0f"))
             raise DocumentError(path, template, advice)

@@ -15,7 +15,7 @@ MAX_ENTRIES = 5000
 REFUSED = re.compile(r'[/\\:*?"<>|\x00-\x1f]')
 RESERVED = re.compile(r"(con|prn|aux|nul|com\d|lpt\d)(\..*)?", re.IGNORECASE)
 """Names that one of the systems rejects: a file should be usable on all of them."""
-LONGEST_NAME = 120
+MAX_NAME_LENGTH = 120
 
 
 @dataclass(frozen=True)
@@ -56,7 +56,7 @@ def name_refusal(name: str) -> str:
         return _("A name that begins with a full stop hides the file.")
     if RESERVED.fullmatch(name) or name.endswith((".", " ")):
         return _("Some computers don't support this file name. Choose another one.")
-    if len(name) > LONGEST_NAME:
+    if len(name) > MAX_NAME_LENGTH:
         return _("This name is too long.")
     return ""
 

@@ -29,7 +29,7 @@ else:
 
 FORMAT = 1
 """Format version; increased when older versions can't read newer journals."""
-LARGEST_JOURNAL_BYTES = 64_000_000
+MAX_JOURNAL_BYTES = 64_000_000
 """Maximum journal size; larger than that of a behaviour file, so that oversized work can be restored and
 reduced."""
 
@@ -117,7 +117,7 @@ def of_newer(folder: Path | None = None) -> list[str]:
 def _entry(file: Path) -> dict[str, object] | None:
     # None for a malformed journal, or one that is still in use.
     try:
-        entry = deep_json.loads(read_whole(file, LARGEST_JOURNAL_BYTES).decode("utf-8", "surrogatepass"))
+        entry = deep_json.loads(read_whole(file, MAX_JOURNAL_BYTES).decode("utf-8", "surrogatepass"))
         if not isinstance(entry, dict) or _alive(int(entry["pid"]), float(entry["born_s"])):
             return None
     except (OSError, ValueError, KeyError, TypeError, RecursionError):

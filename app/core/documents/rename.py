@@ -12,7 +12,7 @@ from nep.i18n import _
 from nep.system.replace_file import replace_file
 
 NOT_IN_NAMES = '/\\:*?"<>|'
-LONGEST_BYTES = 200
+MAX_BYTES = 200
 DEVICES = frozenset(
     {"con", "prn", "aux", "nul", *(f"{port}{digit}" for port in ("com", "lpt") for digit in range(1, 10))}
 )
@@ -41,7 +41,7 @@ def why_not(name: str, path: Path | None) -> str:
         return _("A file's name can't begin or end with a full stop.")
     if wanted.partition(".")[0].lower() in DEVICES:
         return _("Windows reserves the name “{name}”.").format(name=wanted)
-    if len(wanted.encode("utf-8", "surrogatepass")) > LONGEST_BYTES:
+    if len(wanted.encode("utf-8", "surrogatepass")) > MAX_BYTES:
         return _("The name is too long for a file.")
     new = path_named(path, wanted)
     if new != path and os.path.lexists(new) and not _same(new, path):

@@ -34,7 +34,7 @@ ALONE_COLUMNS = 4
 """Number of columns for nodes without lines within their group."""
 MANY = 60
 """Number of boxes from which the library uses less effort."""
-MOST_LED = 400
+MAX_LED = 400
 """Maximum number of routes around nodes, which would take many seconds beyond: then they are straight."""
 WIDEST, ASPECT = 3.0, 1.6
 """Maximum ratio of width to height of a row of groups; a wider one is broken into rows of about this shape.
@@ -260,7 +260,7 @@ def _route_lines(
     places: Mapping[str, Place], ways: Sequence[RouteKey], sizes: LayoutSizes
 ) -> dict[RouteKey, tuple[Place, ...]]:
     # Routes around the boxes; {} when the library fails: then they are straight.
-    if not ways or len(ways) > MOST_LED:
+    if not ways or len(ways) > MAX_LED:
         return {}
     index = {key: number for number, key in enumerate(places)}
     request = [

@@ -14,7 +14,7 @@ from nep.text import shortened
 
 MAX_SHAPES = 2000
 MAX_POINTS = 20_000
-LONGEST_TEXT = 200
+MAX_TEXT_LENGTH = 200
 MAX_PIXELS = 1e6
 """Limit of coordinates and sizes: larger ones are not drawn, as no painter supports them."""
 FACE_FRAME = (640, 480)
@@ -125,7 +125,7 @@ def _text(item: Mapping[str, object], frame: _Frame) -> Iterator[Drawn]:
         return
     size = (0.0, (height if height is not None and height > 0 else 12.0) / frame.height)
     ink, ground = _colour(item.get("text_color")) or YELLOW, _colour(item.get("background_color"))
-    yield Drawn("text", (at,), ink, ground, 1.0, size, shortened(" ".join(words.split()), LONGEST_TEXT))
+    yield Drawn("text", (at,), ink, ground, 1.0, size, shortened(" ".join(words.split()), MAX_TEXT_LENGTH))
 
 
 def _face_of(payload: Mapping[str, object]) -> tuple[Drawn, ...] | None:

@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     Places = NDArray[np.int64]
 
 CHUNK = 1 << 20
-DEEPEST = 1000
+MAX_DEPTH = 1000
 MANY = 256  # separators
 KEPT = 1000  # containers
 OPEN, CLOSE = b"{[", b"}]"
@@ -61,8 +61,8 @@ class JsonIndex:
         if not len(after) or after[-1] != 0 or after.min() < 0:
             raise ValueError(_("its brackets do not match"))
         level = after + closes
-        if level.max() > DEEPEST:
-            raise ValueError(_("it is nested deeper than {most} levels").format(most=DEEPEST))
+        if level.max() > MAX_DEPTH:
+            raise ValueError(_("it is nested deeper than {most} levels").format(most=MAX_DEPTH))
         order = np.argsort(level.astype(np.int16), kind="stable")
         bounds = np.searchsorted(np.take(level, order), np.arange(1, int(level.max()) + 2))
         self._levels = [  # `take` releases the GIL, unlike indexing with brackets

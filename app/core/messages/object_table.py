@@ -17,8 +17,8 @@ from app.core.storage.csv_text import csv_text, harmless
 from nep.messages.fields import path_text
 
 Steps: TypeAlias = tuple[str | int, ...]
-MOST_ROWS = 2000
-MOST_COLUMNS = 40
+MAX_ROWS = 2000
+MAX_COLUMNS = 40
 LOOKED_AT = 50
 """Number of rows from which the columns are taken."""
 MAX_LISTS = 20
@@ -90,7 +90,7 @@ def value_at(value: object, steps: Steps) -> object:
     return value
 
 
-def rows_of(value: object, most: int = MOST_ROWS) -> list[ObjectRow]:
+def rows_of(value: object, most: int = MAX_ROWS) -> list[ObjectRow]:
     """Return the first objects of an array; other elements are skipped."""
     if not is_list(value):
         return []
@@ -101,7 +101,7 @@ def rows_of(value: object, most: int = MOST_ROWS) -> list[ObjectRow]:
     ]
 
 
-def rows_found(found: Iterable[tuple[str, object]], most: int = MOST_ROWS) -> list[ObjectRow]:
+def rows_found(found: Iterable[tuple[str, object]], most: int = MAX_ROWS) -> list[ObjectRow]:
     """Return the objects in a query result, by path; of a single array of objects its elements."""
     pairs = list(found)
     if len(pairs) == 1 and is_list_of_objects(pairs[0][1]):
@@ -114,7 +114,7 @@ def rows_found(found: Iterable[tuple[str, object]], most: int = MOST_ROWS) -> li
     return list(islice(every, most))
 
 
-def columns_of(rows: Sequence[ObjectRow], most: int = MOST_COLUMNS) -> tuple[Steps, ...]:
+def columns_of(rows: Sequence[ObjectRow], most: int = MAX_COLUMNS) -> tuple[Steps, ...]:
     """Return the keys of the first rows in order; keys of small nested objects get their own columns."""
     columns: dict[Steps, None] = {}
     for row in rows[:LOOKED_AT]:

@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 
 COLOUR_MAPS = ("grey", "viridis", "turbo", "inferno", "jet")
 """Usual names; "" is the default: grey for bytes, viridis for other types."""
-MIN_CONTRAST, MOST_CONTRAST = 0.1, 10.0
+MIN_CONTRAST, MAX_CONTRAST = 0.1, 10.0
 STRIP_ROWS = 64
 SPREAD = "viridis"
 
@@ -57,7 +57,7 @@ def restored(saved: object) -> PictureLook:
     colours = saved.get("colours")
     look = PictureLook(
         min(max(brightness, -1.0), 1.0) if brightness is not None else 0.0,
-        min(max(contrast, MIN_CONTRAST), MOST_CONTRAST) if contrast is not None else 1.0,
+        min(max(contrast, MIN_CONTRAST), MAX_CONTRAST) if contrast is not None else 1.0,
         colours if isinstance(colours, str) and colours in COLOUR_MAPS else "",
     )
     return replace(look, low=low, high=high) if low is None or high is None or low < high else look

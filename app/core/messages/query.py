@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 else:
     jsonpath = lazy_module("jsonpath")  # takes 30 ms to import, needed only for queries
 
-LONGEST = 500
+MAX_LENGTH = 500
 """Maximum length of a query."""
 MAX_STEPS = 50_000
 """Maximum number of visited values."""
@@ -58,8 +58,8 @@ class JsonQuery:
     def __init__(self, text: str) -> None:
         # Raises `QueryError` with the reason and its position.
         self.text = text.strip()
-        if len(self.text) > LONGEST:
-            raise QueryError(_("a query can have at most {most} characters").format(most=LONGEST))
+        if len(self.text) > MAX_LENGTH:
+            raise QueryError(_("a query can have at most {most} characters").format(most=MAX_LENGTH))
         try:
             self._path = _environment().compile(self.text)
         except jsonpath.JSONPathError as error:

@@ -11,17 +11,17 @@ from typing import TypeVar
 from app.core.network.topics import Topic, key_of
 
 Number = TypeVar("Number", int, float)
-DEEPEST = 12
+MAX_DEPTH = 12
 """Maximum depth of folders; deeper levels stay in the name, because no window is wide enough to indent them.
 """
 
 
 def parts_of_name(name: str) -> tuple[str, ...]:
-    """Split a topic's name at its slashes into at most `DEEPEST` folders and a name; never empty."""
+    """Split a topic's name at its slashes into at most `MAX_DEPTH` folders and a name; never empty."""
     parts = [part for part in name.split("/") if part]
     if not parts:
         return (name,)
-    return (*parts[:DEEPEST], "/".join(parts[DEEPEST:])) if len(parts) > DEEPEST else tuple(parts)
+    return (*parts[:MAX_DEPTH], "/".join(parts[MAX_DEPTH:])) if len(parts) > MAX_DEPTH else tuple(parts)
 
 
 def folder_key(network: str, path: str) -> str:

@@ -18,9 +18,9 @@ else:
     recorder = lazy_module("nep.recordings.recorder")  # loaded lazily, so that no start waits for it
 
 MODES = ("all", "chosen", "pattern")
-LEAST_S, MOST_S, USUAL_S = 5, 3_600, 60
-LEAST_GB, MOST_GB, USUAL_GB = 0.1, 1_000.0, 2.0
-LEAST_MIN, MOST_MIN = 0.1, 10_080.0
+MIN_S, MAX_S, USUAL_S = 5, 3_600, 60
+MIN_GB, MAX_GB, USUAL_GB = 0.1, 1_000.0, 2.0
+MIN_MINUTES, MAX_MINUTES = 0.1, 10_080.0
 """Limits of the recording's duration in minutes; its size limits are those of the flight recorder."""
 MAX_NAMES = 1_000
 MAX_NAME_LENGTH = 80
@@ -87,8 +87,8 @@ def read_choice(told: object) -> RecordingChoice:
         _names(told.get("topics")),
         _names(told.get("patterns")),
         _names(told.get("left_out")),
-        _number(told.get("ends_min"), LEAST_MIN, MOST_MIN),
-        _number(told.get("ends_gb"), LEAST_GB, MOST_GB),
+        _number(told.get("ends_min"), MIN_MINUTES, MAX_MINUTES),
+        _number(told.get("ends_gb"), MIN_GB, MAX_GB),
     )
 
 
@@ -134,8 +134,8 @@ def read_wish(told: object) -> RingWish:
     seconds, size_gb = told.get("seconds"), told.get("size_gb")
     return RingWish(
         told.get("is_on") is True,
-        int(seconds) if _within(seconds, LEAST_S, MOST_S) else USUAL_S,  # type: ignore[arg-type]
-        float(size_gb) if _within(size_gb, LEAST_GB, MOST_GB) else USUAL_GB,  # type: ignore[arg-type]
+        int(seconds) if _within(seconds, MIN_S, MAX_S) else USUAL_S,  # type: ignore[arg-type]
+        float(size_gb) if _within(size_gb, MIN_GB, MAX_GB) else USUAL_GB,  # type: ignore[arg-type]
         _names(told.get("patterns")),
         _names(told.get("left_out")),
     )

@@ -15,7 +15,7 @@ from app.core.faults import IN_CONSOLE, RepeatFilter, log_folder
 from app.core.reports.crash import PARTS, Crash, Part
 from app.core.reports.privacy import without_home
 from app.core.reports.studio_versions import PLAIN
-from app.core.storage.atomic_file import LARGEST_BYTES, read_whole, write_atomically
+from app.core.storage.atomic_file import MAX_BYTES, read_whole, write_atomically
 from nep.i18n import _, lazy
 from nep.system.replace_file import replace_file
 from nep.version import __version__
@@ -143,14 +143,14 @@ def texts(reports: Sequence[CrashReport]) -> list[tuple[str, bytes]]:
     found = []
     for each in reports:
         with suppress(OSError):
-            found.append((each.path.name.replace(".new.txt", ".txt"), read_whole(each.path, LARGEST_BYTES)))
+            found.append((each.path.name.replace(".new.txt", ".txt"), read_whole(each.path, MAX_BYTES)))
     return found
 
 
 def _version_of(report: CrashReport) -> str:
     # From the report's first line; "" if it has none.
     try:
-        first = read_whole(report.path, LARGEST_BYTES).partition(b"\n")[0].decode("utf-8", "replace")
+        first = read_whole(report.path, MAX_BYTES).partition(b"\n")[0].decode("utf-8", "replace")
     except OSError:
         return ""
     found = first.removeprefix(HEADING).strip()

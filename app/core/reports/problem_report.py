@@ -49,7 +49,7 @@ READ_ME = (
     "crashes/           reports of crashes\n"
     "work/              behaviours, only if the person wanted that\n"
 )
-LONGEST_NAME = 60
+MAX_NAME_LENGTH = 60
 
 _log = logging.getLogger("studio.report")
 
@@ -190,7 +190,7 @@ def _named(work: Sequence[ReportedWork]) -> list[tuple[str, bytes]]:
     # Each with a unique name that is valid on every system.
     found: dict[str, bytes] = {}
     for each in work:
-        plain = "".join(c if c.isalnum() or c in " -_," else "_" for c in each.name)[:LONGEST_NAME].strip()
+        plain = "".join(c if c.isalnum() or c in " -_," else "_" for c in each.name)[:MAX_NAME_LENGTH].strip()
         stem, again = plain or "behaviour", 2
         name = f"work/{stem}{SUFFIX}"
         while name in found:

@@ -23,7 +23,7 @@ ENDED = 0.9
 MAX_WAITING = 4
 PATIENCE_S, PATIENCE_PER_LETTER_S = 10.0, 0.2
 """Timeout of a voice (base, and per letter), after which its engine counts as hung."""
-MAX_NOTES, LONGEST_S = 32, 10.0
+MAX_NOTES, MAX_S = 32, 10.0
 LOWEST_HZ, HIGHEST_HZ = 20.0, 20_000.0
 
 Notes: TypeAlias = Sequence[tuple[float, float]]
@@ -239,7 +239,7 @@ def _notes(value: object) -> Notes:
     if not isinstance(value, list):
         return ()
     notes: list[tuple[float, float]] = []
-    left_s = LONGEST_S
+    left_s = MAX_S
     for each in value[:MAX_NOTES]:
         if not (isinstance(each, list) and len(each) == 2):
             return ()

@@ -7,14 +7,14 @@ import time
 from collections.abc import Callable, Iterator, Mapping
 from typing import IO
 
-LONGEST_LINE = 1_000_000
+MAX_LINE_LENGTH = 1_000_000
 CHUNK = 65_536
 MARK = b'{"is"'
 """First bytes of each protocol line; everything else is counted, not parsed."""
 LINES_PER_S = 1_000
 BYTES_PER_S = 20_000_000
 PAUSE_S = 0.02
-LONGEST_TEXT = 2_000
+MAX_TEXT_LENGTH = 2_000
 
 
 class Output:
@@ -35,7 +35,7 @@ class Output:
         while chunk := self._read():
             whole, end, held = (held + chunk).rpartition(b"\n")
             yield from self._protocol(whole + end)
-            if len(held) > LONGEST_LINE:  # a line that is too long isn't a protocol line
+            if len(held) > MAX_LINE_LENGTH:  # a line that is too long isn't a protocol line
                 self.strange_bytes += len(held) - 1
                 held = b"-"  # placeholder, so that the rest of the line isn't parsed either
             self._throttle(read=len(chunk))
@@ -48,7 +48,7 @@ class Output:
         while at < len(whole):
             if whole.startswith(MARK, at):
                 end = whole.index(b"\n", at)
-                if end - at <= LONGEST_LINE:
+                if end - at <= MAX_LINE_LENGTH:
                     self._throttle(lines=1)
                     yield whole[at:end]
                 else:
@@ -114,4 +114,4 @@ def texts(said: object) -> tuple[str, ...]:
 
 def text_of(said: Mapping[str, object], name: str) -> str:
     """Return a string field, shortened for display."""
-    return str(said.get(name, ""))[:LONGEST_TEXT]
+    return str(said.get(name, ""))[:MAX_TEXT_LENGTH]

@@ -43,7 +43,7 @@ EVENTS_PER_S = 300
 MAX_BLOCKS = 100
 MAX_CHOICES, MAX_CHOICE_LENGTH = 12, 200
 WORTH_TELLING = 10_000
-LONGEST_ERROR = 100_000
+MAX_ERROR_LENGTH = 100_000
 ERRORS_KEPT = 200
 """Number of lines, which include the stack of each thread at a crash in native code."""
 
@@ -326,7 +326,7 @@ class Runner:
         if stream is None:
             return
         try:
-            for line in iter(lambda: stream.readline(LONGEST_ERROR), b""):
+            for line in iter(lambda: stream.readline(MAX_ERROR_LENGTH), b""):
                 self._errors.append(line.decode("utf-8", "replace")[:500].rstrip())
         finally:
             stream.close()

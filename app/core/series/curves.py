@@ -28,7 +28,7 @@ from app.core.series.states import States
 from app.errors import CurveError
 from nep.i18n import _
 
-MOST_CURVES = 64
+MAX_CURVES = 64
 MAX_SAMPLES_TOGETHER = 8 * MAX_SAMPLES
 """Maximum number of samples of all curves of a plot (about 150 MB); more curves keep fewer samples each."""
 MIN_SAMPLES = 8192
@@ -122,8 +122,8 @@ class Curves:
         new = [each for each in sources if str(each) not in there]
         if not sources:
             raise CurveError(_("{text} is empty now").format(text=text))
-        if len(self.all) + len(new) > MOST_CURVES:
-            raise CurveError(_("a plot has at most {count} curves").format(count=MOST_CURVES))
+        if len(self.all) + len(new) > MAX_CURVES:
+            raise CurveError(_("a plot has at most {count} curves").format(count=MAX_CURVES))
         curves = []
         for source in new:
             shared = self._acquire(source)

@@ -21,7 +21,7 @@ from nep.i18n import _
 EVERY: Final = "*"
 """Step for every element of an array; as a key it would be quoted in brackets."""
 MAX_STEPS, MAX_EVERY, MAX_FIELDS = 32, 65, 2000
-LONGEST = 400
+MAX_LENGTH = 400
 ALONE = "value"
 _STEP = re.compile(
     r"""\.?(?P<name>[^.\[\]"\s]+)|\[(?P<index>-?\d{1,9})\]"""
@@ -74,7 +74,7 @@ class FieldPath:
         while at < len(text):
             found = _STEP.match(text, at)
             bare = found is not None and found["name"] is not None and bool(steps) and text[at] != "."
-            if found is None or bare or len(steps) >= MAX_STEPS or len(text) > LONGEST:
+            if found is None or bare or len(steps) >= MAX_STEPS or len(text) > MAX_LENGTH:
                 raise CurveError(_("'{path}' is not a field path").format(path=text[:80]))
             steps.append(_step_of(found))
             at = found.end()

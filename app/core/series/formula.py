@@ -26,8 +26,8 @@ from nep.errors import nearest
 from nep.i18n import _
 from nep.system.syntax import parse_expression
 
-LONGEST, MAX_NODES = 400, 120
-LONGEST_WINDOW_S = 600.0
+MAX_LENGTH, MAX_NODES = 400, 120
+MAX_WINDOW_S = 600.0
 Windowed = Literal["difference", "derivative", "integral", "mean"]
 WINDOWED: tuple[Windowed, ...] = ("difference", "derivative", "integral", "mean")
 Calculation = Callable[[Sequence[Floats]], Floats]
@@ -110,7 +110,7 @@ def parse(text: str, topics: Sequence[str]) -> Source:
     Raises `CurveError` with the correction.
     """
     text = text.strip()
-    if not text or len(text) > LONGEST:
+    if not text or len(text) > MAX_LENGTH:
         raise CurveError(_("enter a field, such as /odom.speed, or a formula with fields"))
     found = address(text, topics)
     return found if found is not None else _Parser(text, topics).read()
@@ -209,7 +209,7 @@ class _Parser:
             window = node.args[1]
             if isinstance(window, ast.Constant) and type(window.value) in {int, float}:
                 window_s = float(window.value)  # type: ignore[arg-type]
-            if not 0 < window_s <= LONGEST_WINDOW_S:
+            if not 0 < window_s <= MAX_WINDOW_S:
                 raise CurveError(_("a mean needs a duration above 0 and up to 600 s"))
         return WindowSource(next(each for each in WINDOWED if each == kind), of, window_s)
 

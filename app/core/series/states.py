@@ -10,7 +10,7 @@ from itertools import pairwise
 from app.core.series.samples import MAX_LATENESS_S
 
 MAX_RUNS = 10_000
-LONGEST_STATE = 200
+MAX_STATE_LENGTH = 200
 
 
 @dataclass(frozen=True, slots=True)
@@ -45,7 +45,7 @@ class States:
                 return
             self._truncate(time_s)
             gap = True
-        word = word if word is None else word[:LONGEST_STATE]
+        word = word if word is None else word[:MAX_STATE_LENGTH]
         if gap and self._words and self._words[-1] is not None and self.last_s is not None:
             self._begin(self.last_s, None)
         if not self._words or self._words[-1] != word:

@@ -19,12 +19,12 @@ from nep.i18n import _, number
 from nep.system.replace_file import replace_file
 
 LEFT_AFTER_S = 60.0
-LARGEST_BYTES = 10_000_000
+MAX_BYTES = 10_000_000
 """Maximum size of a file that is read into memory."""
 _PRIVATE_FOLDER, _OTHERS = 0o700, 0o077
 
 
-def read_whole(path: Path, most_bytes: int = LARGEST_BYTES) -> bytes:
+def read_whole(path: Path, most_bytes: int = MAX_BYTES) -> bytes:
     """Return the content of a regular file. Raises OSError otherwise, with the reason in ``strerror``.
 
     Never blocks on a pipe, a device, a folder, or a link to one.

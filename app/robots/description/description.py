@@ -24,7 +24,7 @@ __all__ = [
     "announced", "parse", "pretty_unit", "td_for", "topic_of", "validate",
 ]  # fmt: skip
 
-LARGEST_BYTES = 1_000_000
+MAX_BYTES = 1_000_000
 """Size limit of a description; larger ones are rejected before decoding."""
 _NOT_IN_TOPICS = re.compile(r"[^\w.-]")
 
@@ -52,9 +52,9 @@ def announced(message: Message) -> Robot:
         NepError: The message can't be decoded.
     """
     size = len(message.data)
-    if size > LARGEST_BYTES:
-        said = _("it has {size} MB; the limit is {LARGEST_BYTES} MB").format(
-            size=number(size / 1000000.0, ".1f"), LARGEST_BYTES=number(LARGEST_BYTES / 1000000.0, ".0f")
+    if size > MAX_BYTES:
+        said = _("it has {size} MB; the limit is {MAX_BYTES} MB").format(
+            size=number(size / 1000000.0, ".1f"), MAX_BYTES=number(MAX_BYTES / 1000000.0, ".0f")
         )
         raise DescriptionError(message.topic, (said,))
     payload = message.payload

@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 PLACEHOLDER = re.compile(r"%([A-Za-z_][A-Za-z0-9_-]*)")
 _MAX_PROBLEMS = 20
 _MAX_DEPTH = 40
-MOST_VALUES = 20_000
+MAX_VALUES = 20_000
 """Limit of values in a description; each takes some 0.05 ms to check. Pepper has 900."""
 _BLOCK = "rb:block"
 _TEXT_MEMBERS = frozenset({"title", "description", "unit", "vendor", _BLOCK})
@@ -93,11 +93,11 @@ def cleaned(document: Mapping[str, object]) -> dict[str, object]:
 
 
 def _not_json(value: object, seen: Iterator[int], path: str = "", depth: int = 0) -> str | None:
-    # Also rejects `$ref`, unusable numbers, and more than `MOST_VALUES` values, counted by `seen`.
-    if next(seen) > MOST_VALUES or depth > _MAX_DEPTH:
+    # Also rejects `$ref`, unusable numbers, and more than `MAX_VALUES` values, counted by `seen`.
+    if next(seen) > MAX_VALUES or depth > _MAX_DEPTH:
         if depth > _MAX_DEPTH:
             return _("{place} is nested too deeply").format(place=path)
-        return _("the description has more than {count} values").format(count=MOST_VALUES)
+        return _("the description has more than {count} values").format(count=MAX_VALUES)
     if isinstance(value, dict):
         for key, item in value.items():
             found = _bad_key(key, path or _(WHOLE)) or _not_json(

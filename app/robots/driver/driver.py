@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING
 
 import nep
 from app.errors import DescriptionError, RobotValueError
-from app.robots.description.description import LARGEST_BYTES, parse, td_for, topic_of
+from app.robots.description.description import MAX_BYTES, parse, td_for, topic_of
 from app.robots.description.inputs import problems_of
 from app.robots.description.json_access import as_part
 from app.robots.driver.call import Call, Canceled, Clock, MonotonicClock
@@ -61,12 +61,12 @@ class Driver:
         self.kind = kind
         self.description = td_for(kind.thing_model, name)
         self.robot = parse(self.description)
-        if len(json.dumps(self.description)) > LARGEST_BYTES:
+        if len(json.dumps(self.description)) > MAX_BYTES:
             raise DescriptionError(
                 name,
                 (
-                    _("it is larger than {LARGEST_BYTES} MB, the limit").format(
-                        LARGEST_BYTES=number(LARGEST_BYTES / 1000000.0, ".0f")
+                    _("it is larger than {MAX_BYTES} MB, the limit").format(
+                        MAX_BYTES=number(MAX_BYTES / 1000000.0, ".0f")
                     ),
                 ),
             )

@@ -13,7 +13,7 @@ GONE_AFTER_S = 1.5
 """Silence after which a robot counts as gone."""
 CALM_S = 0.2
 """Interval of a standing robot's position messages."""
-MOST = 12
+MAX_COUNT = 12
 
 
 class Neighbours:
@@ -31,7 +31,7 @@ class Neighbours:
         other = _parsed(message)
         if other is None or other.name == self._name:
             return
-        if other.name not in self._seen and len(self._seen) >= MOST:
+        if other.name not in self._seen and len(self._seen) >= MAX_COUNT:
             return
         began = message.get("began_ns")
         self._seen[other.name] = (other, self._clock.now(), began if isinstance(began, int) else 0)

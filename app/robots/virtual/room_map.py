@@ -17,9 +17,9 @@ from app.robots.virtual.room import Ball, Box, Marker, Person, Room, Thing
 TOPIC = "/room"
 ROBOTS_TOPIC = "/room/robots"
 KINDS = ("ball", "person", "marker", "table", "shelf")
-MOST = 60
-MOST_OF_A_KIND = 8
-LONGEST_NAME = 40
+MAX_COUNT = 60
+MAX_OF_A_KIND = 8
+MAX_NAME_LENGTH = 40
 COLOURS = ("#e0474c", "#e2b33c", "#4f8fd0", "#4aa564")
 PEOPLE = ("Aiko", "Ben", "Chloe", "Dario", "Emma", "Femi", "Gita", "Hugo")
 FIRST_MARKER = 7
@@ -128,7 +128,7 @@ class RoomMap:
         changed = False
         for thing in _parsed(told if isinstance(told, Sequence) and not isinstance(told, str) else ()):
             known = self._things.get(thing.name)
-            if known is None and len(self._things) >= MOST:
+            if known is None and len(self._things) >= MAX_COUNT:
                 continue
             if known is None or (thing.kind == known.kind and thing.order > known.order):
                 self._things[thing.name] = thing
@@ -198,19 +198,19 @@ def _names(kind: str) -> Sequence[str]:
     if kind == "person":
         return PEOPLE
     if kind == "marker":
-        return [f"marker {number}" for number in range(FIRST_MARKER, FIRST_MARKER + MOST_OF_A_KIND)]
-    return [kind, *(f"{kind} {number}" for number in range(2, MOST_OF_A_KIND + 1))] if kind in KINDS else []
+        return [f"marker {number}" for number in range(FIRST_MARKER, FIRST_MARKER + MAX_OF_A_KIND)]
+    return [kind, *(f"{kind} {number}" for number in range(2, MAX_OF_A_KIND + 1))] if kind in KINDS else []
 
 
 def _parsed(told: Sequence[object]) -> Iterator[ThingPlace]:
-    for one in told[:MOST]:
+    for one in told[:MAX_COUNT]:
         if not isinstance(one, Mapping):
             continue
         name, kind, x, y = (one.get(key) for key in ("name", "kind", "x", "y"))
         changed_ns = one.get("changed_ns")
         if (
             isinstance(name, str)
-            and 0 < len(name) <= LONGEST_NAME
+            and 0 < len(name) <= MAX_NAME_LENGTH
             and isinstance(kind, str)
             and kind in KINDS
             and _is_place(x)

@@ -22,7 +22,7 @@ _MIN_BALL_AREA_PX = 24  # pixels of area
 _MIN_FACE_WIDTH_PX = 8  # pixels across
 _MIN_VISIBLE_FACE = 0.6
 
-LEAST_AREA = 0.004
+MIN_AREA = 0.004
 _HUES: dict[str, tuple[tuple[int, int], ...]] = {
     "red": ((0, 8), (172, 180)),
     "green": ((45, 85),),
@@ -159,7 +159,7 @@ def colours_in(picture: Picture) -> dict[str, ColourPatch]:
             continue
         largest = 1 + int(np.argmax(parts[1:, cv2.CC_STAT_AREA]))
         area = float(parts[largest, cv2.CC_STAT_AREA]) / (width * height)
-        if area >= LEAST_AREA:
+        if area >= MIN_AREA:
             x = float(middles[largest][0]) / width * 2 - 1
             found[name] = ColourPatch(name, round(x, 3), round(area, 4))
     return found

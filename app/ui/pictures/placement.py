@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from PySide6.QtCore import QPointF, QRectF, QSizeF
 from PySide6.QtGui import QTransform
 
-SMALLEST, LARGEST = 0.02, 64.0
+SMALLEST, MAX_SIZE = 0.02, 64.0
 FILL_LIMIT = 1.34
 
 
@@ -88,7 +88,7 @@ class PicturePlace:
         area = self.area(view, picture)
         before = area.width() / max(1.0, self.seen_size(picture).width())
         smallest = min(SMALLEST, self.fitting(view, picture))
-        after = min(LARGEST, max(smallest, before * factor))
+        after = min(MAX_SIZE, max(smallest, before * factor))
         share_x = (at.x() - area.x()) / max(1e-9, area.width())
         share_y = (at.y() - area.y()) / max(1e-9, area.height())
         seen = self.seen_size(picture) * after
@@ -112,7 +112,7 @@ class PicturePlace:
 
     def set_zoom(self, zoom: float | None) -> None:
         """Set the zoom in logical pixels per image pixel, or fit."""
-        self.zoom = zoom if zoom is None else min(LARGEST, max(SMALLEST, zoom))
+        self.zoom = zoom if zoom is None else min(MAX_SIZE, max(SMALLEST, zoom))
         if zoom is None:
             self.centre = (0.5, 0.5)
 

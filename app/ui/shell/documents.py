@@ -21,7 +21,7 @@ from app.errors import AppError, DocumentError, SettingsError
 from app.ui.widgets.file_dialogs import FileDialogs
 from nep.i18n import _, ngettext
 
-LONGEST_FLUSH_MS = 500
+MAX_FLUSH_MS = 500
 RECORDING, LAYOUT = OTHERS = (".mcap", ".nep-layout")
 
 
@@ -394,7 +394,7 @@ class FlushBeforeClose(QObject):
                 self._ready = True
             self._waits = not self._ready
             if self._waits:
-                QTimer.singleShot(LONGEST_FLUSH_MS, self, self._go_on)
+                QTimer.singleShot(MAX_FLUSH_MS, self, self._go_on)
         return self._ready
 
     def stay(self) -> None:

@@ -12,7 +12,7 @@ from pathlib import Path
 THEME, CHOICE = "xdgdesktopportal", "QT_QPA_PLATFORMTHEME"
 NAME, OBJECT = "org.freedesktop.portal.Desktop", "/org/freedesktop/portal/desktop"
 CHOOSER = "org.freedesktop.portal.FileChooser"
-LONGEST_MS = 300
+MAX_MS = 300
 
 
 def has_bus(environ: MutableMapping[str, str]) -> bool:
@@ -33,7 +33,7 @@ def chooser_answers() -> bool:
             return False
         ask = QDBusMessage.createMethodCall(NAME, OBJECT, "org.freedesktop.DBus.Properties", "Get")
         ask.setArguments([CHOOSER, "version"])
-        return bus.call(ask, timeout=LONGEST_MS).type() == QDBusMessage.MessageType.ReplyMessage
+        return bus.call(ask, timeout=MAX_MS).type() == QDBusMessage.MessageType.ReplyMessage
     finally:
         QDBusConnection.disconnectFromBus("studio-portal")
 

@@ -23,7 +23,7 @@ OFF = "QTWEBENGINE_DISABLE_SANDBOX"
 NEW_USER, NEW_PROCESSES = 0x10000000, 0x20000000
 NOWHERE = b"/proc/self/fdinfo"
 """Root folder of Chromium's isolated processes, which is empty once its process has ended."""
-LONGEST_S = 2.0
+MAX_S = 2.0
 
 _log = logging.getLogger("studio.editor")
 
@@ -51,7 +51,7 @@ class SandboxTrial:
         """Return whether it succeeded; call it once. False also when unknown. Waits at most 2 s."""
         if self._process < 0:
             return False
-        if not select.select([self._ended], [], [], LONGEST_S)[0]:
+        if not select.select([self._ended], [], [], MAX_S)[0]:
             os.kill(self._process, signal.SIGKILL)
         os.close(self._ended)
         return os.waitpid(self._process, 0)[1] == 0

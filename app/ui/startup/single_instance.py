@@ -37,8 +37,8 @@ else:
 CONNECT_MS = 300
 ANSWER_MS = 3000
 START_S, POLL_S = 20.0, 0.05
-LONGEST = 1_000_000
-LONGEST_PATH = 100  # the path of a Unix socket has at most 108 bytes
+MAX_LENGTH = 1_000_000
+MAX_PATH_LENGTH = 100  # the path of a Unix socket has at most 108 bytes
 OK = b"ok\n"
 
 
@@ -63,7 +63,7 @@ def place(folder: Path) -> str:
     own = [Path(runtime) / "nep-studio"] if Path(runtime).is_absolute() and is_private(Path(runtime)) else []
     for each in (*own, folder.resolve(), Path(tempfile.gettempdir()) / f"nep-studio-{os.geteuid()}"):
         path = each / f"window-{mark}.socket"
-        if len(os.fsencode(path)) >= LONGEST_PATH:
+        if len(os.fsencode(path)) >= MAX_PATH_LENGTH:
             continue
         with contextlib.suppress(OSError):
             private_folder(each)
@@ -208,7 +208,7 @@ class SingleInstanceServer(QObject):
             return
         self._received[socket] += socket.readAll().data()
         data = self._received[socket]
-        if len(data) > LONGEST:
+        if len(data) > MAX_LENGTH:
             socket.abort()
         elif data.endswith(b"\n"):
             self._received[socket] = b""

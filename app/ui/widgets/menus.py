@@ -34,7 +34,7 @@ from app.ui.widgets.letters import key_of, letters_of, plain_words
 from app.ui.widgets.paint import RIGHT, box, width_of, words
 
 CUT_ON = frozenset({"xcb"})
-MARK, LARGEST_MARK, TEXT_LEFT = 15, 22, 33
+MARK, MAX_MARK, TEXT_LEFT = 15, 22, 33
 SCROLLER = 22  # px, as in the style sheet
 GUESSED = QAction.MenuRole.TextHeuristicRole
 MIN_WIDTH = 160  # px; a narrower menu is unreadable, and is better placed over Stop
@@ -226,7 +226,7 @@ class Menu(QMenu):
             return
         if action is self.activeAction() and action.isEnabled():
             box(painter, place, theme.radius("small"), theme.colour("hover"))
-        side = min(theme.scaled(MARK), LARGEST_MARK)
+        side = min(theme.scaled(MARK), MAX_MARK)
         mark = QRectF(place.left() + 9 - (side - MARK) / 4, place.center().y() - side / 2, side, side)
         if action.isChecked():
             paint_icon(painter, mark, "check", theme.colour("accentText"))

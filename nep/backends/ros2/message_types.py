@@ -28,8 +28,8 @@ from nep.i18n import _
 
 FOLDERS = "NEP_ROS_MSG_PATH"
 """Environment variable with folders of .msg files."""
-_LARGEST_FILE = 2**20
-_MOST_FILES = 10_000
+_MAX_FILE_BYTES = 2**20
+_MAX_FILES = 10_000
 _WIDE = "wstring"
 _GID = "rmw_dds_common/msg/Gid"
 
@@ -168,7 +168,7 @@ class MessageTypes:
         texts: dict[str, str] = {}
         for path in sorted(folder.rglob("*.msg")):
             package = path.parent.parent.name if path.parent.name == "msg" else path.parent.name
-            if len(texts) >= _MOST_FILES or path.stat().st_size > _LARGEST_FILE:
+            if len(texts) >= _MAX_FILES or path.stat().st_size > _MAX_FILE_BYTES:
                 raise NepError(
                     _(
                         "'{path}' is too large, or there are too many files; choose a folder with .msg "

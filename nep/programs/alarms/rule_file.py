@@ -40,7 +40,7 @@ from nep.text import escaped, quotable
 
 __all__ = [
     "EXAMPLE",
-    "MOST_ALARMS",
+    "MAX_ALARMS",
     "AlarmFile",
     "NewerAlarmsError",
     "alarms_text",
@@ -49,7 +49,7 @@ __all__ = [
 ]
 
 FORMAT = 1
-MOST_ALARMS = 200
+MAX_ALARMS = 200
 _MAX_BYTES = 4_000_000
 _MAX_TIME_S = 3e10  # the year 2920: some systems have no later dates
 
@@ -251,8 +251,8 @@ class _Reader:
         alarms = value.get("alarms")
         if not isinstance(alarms, list):
             self._fail("alarms", _('the list of alarms is missing; write "alarms": [...]'))
-        if len(alarms) > MOST_ALARMS:
-            self._fail("alarms", _("there are more than {most} alarms").format(most=MOST_ALARMS))
+        if len(alarms) > MAX_ALARMS:
+            self._fail("alarms", _("there are more than {most} alarms").format(most=MAX_ALARMS))
         return alarms
 
     def _history(self, value: object) -> AlarmHistory:

@@ -11,11 +11,11 @@ from dataclasses import dataclass, field
 
 import orjson
 
-__all__ = ["MAX_LOST", "MOST_PUBLISHERS", "MOST_TOPICS", "TopicCounter", "TopicFigures", "read_figures"]
+__all__ = ["MAX_LOST", "MAX_PUBLISHERS", "MAX_TOPICS", "TopicCounter", "TopicFigures", "read_figures"]
 
-MOST_TOPICS = 10_000
+MAX_TOPICS = 10_000
 """Maximum number of topics counted separately; the others are counted together."""
-MOST_PUBLISHERS = 1_000
+MAX_PUBLISHERS = 1_000
 """Maximum number of publishers per topic whose sequence numbers are tracked; losses of others are unknown."""
 MAX_LOST = 2**63 - 1
 """Limit of the count: random sequence numbers would lead to values that JSON can't represent."""
@@ -117,7 +117,7 @@ class TopicCounter:
             return
         numbers = self._publishers.get(publisher)
         if numbers is None:
-            if len(self._publishers) < MOST_PUBLISHERS:
+            if len(self._publishers) < MAX_PUBLISHERS:
                 self._publishers[publisher] = _SequenceRange(seq, seq, 1)
             return
         numbers.came += 1

@@ -22,7 +22,7 @@ __all__ = ["ANY_OBJECT", "json_schema", "schema_of"]
 
 ANY_OBJECT = b'{"type":"object"}'
 _SCALARS: Mapping[object, str] = {str: "string", bool: "boolean", int: "integer", float: "number"}
-_DEEPEST = 10
+_MAX_DEPTH = 10
 
 
 @cache
@@ -55,7 +55,7 @@ def _of(hint: Any, depth: int) -> dict[str, object] | None:  # noqa: ANN401 - an
     if origin in {list, Sequence} or (origin is tuple and arguments[1:] == (...,)):
         items = _of(arguments[0], depth)
         return None if items is None or items["type"] == "array" else {"type": "array", "items": items}
-    if not (dataclasses.is_dataclass(hint) or hasattr(hint, "__required_keys__")) or depth >= _DEEPEST:
+    if not (dataclasses.is_dataclass(hint) or hasattr(hint, "__required_keys__")) or depth >= _MAX_DEPTH:
         return None
     properties = {
         name: field_schema

@@ -234,7 +234,7 @@ def test_output_is_bounded(running, master):
     lines = [str(said["text"]) for said in running.said if said["is"] == "print"]
     assert len(lines) < 3000
     assert any("were dropped: too many at once" in line for line in lines)
-    assert max(map(len, lines)) <= child.LONGEST_LINE
+    assert max(map(len, lines)) <= child.MAX_LINE_LENGTH
 
 
 @pytest.mark.parametrize(

@@ -6,9 +6,9 @@ import pytest
 
 from app.blocks.compiler.compiler import compile_behaviour
 from app.blocks.runtime.questions import (
-    LONGEST_CHOICE,
-    LONGEST_QUESTION,
-    MOST_CHOICES,
+    MAX_CHOICE_LENGTH,
+    MAX_CHOICES,
+    MAX_QUESTION_LENGTH,
     ProgramQuestion,
     as_value,
 )
@@ -132,7 +132,7 @@ def test_question_without_anyone_to_answer_is_an_error():
         (number(2**64 - 1), "1.8446744073709552e+19"),
         (boolean(True), "yes"),
         (block("lists_empty"), "[]"),
-        (text("x" * 9999), "x" * LONGEST_QUESTION),
+        (text("x" * 9999), "x" * MAX_QUESTION_LENGTH),
     ],
 )
 def test_any_value_can_be_asked_as_question(asked, shown):
@@ -195,7 +195,7 @@ def test_chosen_option_is_the_answer_and_next_question_has_no_choices():
         (text("2"), "2", number(2)),
         (boolean(True), "yes", boolean(True)),
         (text(" two\n words "), "two words", text(" two\n words ")),
-        (text("x" * 9999), "x" * LONGEST_CHOICE, text("x" * 9999)),
+        (text("x" * 9999), "x" * MAX_CHOICE_LENGTH, text("x" * 9999)),
     ],
 )
 def test_chosen_answer_is_the_list_item_itself(item, shown, same_as):
@@ -233,7 +233,7 @@ def test_text_and_choice_questions_wait_for_each_other():
         (block("lists_empty"), "The list of choices is empty."),
         (list_of(text(""), text(" ")), "The list of choices is empty."),
         (
-            list_of(*(number(each) for each in range(MOST_CHOICES + 1))),
+            list_of(*(number(each) for each in range(MAX_CHOICES + 1))),
             "A question can have at most 12 choices; this list has 13.",
         ),
         (get("pets"), "A question with choices needs a list of them, not a number."),

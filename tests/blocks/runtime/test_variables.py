@@ -10,9 +10,9 @@ import pytest
 from app.blocks.compiler.compiler import compile_behaviour
 from app.blocks.model.program import Program, Variable
 from app.blocks.runtime.variables import (
-    LONGEST_TEXT,
-    MOST_CHARACTERS,
-    MOST_ITEMS,
+    MAX_CHARACTERS,
+    MAX_ITEMS,
+    MAX_TEXT_LENGTH,
     VariableValue,
     VariableWatch,
     brief,
@@ -56,9 +56,9 @@ def test_summary_reads_only_what_is_shown() -> None:
                 yield pair
 
     message = Counted({str(each): each for each in range(100_000)})
-    assert len(brief("v", message).text) == LONGEST_TEXT
-    assert Counted.asked < LONGEST_TEXT
-    assert len(brief("v", "x" * 10**6).text) == LONGEST_TEXT
+    assert len(brief("v", message).text) == MAX_TEXT_LENGTH
+    assert Counted.asked < MAX_TEXT_LENGTH
+    assert len(brief("v", "x" * 10**6).text) == MAX_TEXT_LENGTH
 
 
 def test_self_containing_and_deeply_nested_lists_are_truncated() -> None:
@@ -73,7 +73,7 @@ def test_self_containing_and_deeply_nested_lists_are_truncated() -> None:
 
 def test_long_list_reports_first_items_and_length() -> None:
     told = brief("v", list(range(5000)))
-    assert (len(told.items), told.length, told.items[-1]) == (MOST_ITEMS, 5000, "99")
+    assert (len(told.items), told.length, told.items[-1]) == (MAX_ITEMS, 5000, "99")
 
 
 def watch(**names: object) -> tuple[VariableWatch, dict[str, object]]:
@@ -104,7 +104,7 @@ def test_large_changes_are_reported_in_parts_without_loss() -> None:
     while more := watched.changes():
         rest += more
     assert 0 < len(first) < 60
-    assert sum(len("".join(each.items)) for each in first) < 2 * MOST_CHARACTERS
+    assert sum(len("".join(each.items)) for each in first) < 2 * MAX_CHARACTERS
     assert {each.id for each in (*first, *rest)} == {f"id v{each}" for each in range(60)}
 
 
@@ -143,7 +143,7 @@ def test_invalid_variable_line_is_not_a_value() -> None:
     told = VariableValue.from_json(
         {"id": 5, "kind": "dance", "items": "x", "length": "y", "text": "z" * 10**6}
     )
-    assert told == VariableValue("5", "other", "z" * (LONGEST_TEXT + 1))
+    assert told == VariableValue("5", "other", "z" * (MAX_TEXT_LENGTH + 1))
 
 
 def test_program_lists_all_behaviour_variables_including_unused() -> None:

@@ -44,7 +44,7 @@ def test_queued_action_shows_awaited_action_then_its_activity(monkeypatch) -> No
 
 
 def test_robot_without_heartbeat_is_an_error_at_the_block(monkeypatch) -> None:
-    monkeypatch.setattr("app.blocks.runtime.robot_handle.SHORTEST_SILENCE_S", 0.3)
+    monkeypatch.setattr("app.blocks.runtime.robot_handle.MIN_SILENCE_S", 0.3)
     link = FakeLink()
     link.held = {"say"}
     run = begin(link, beat_s=0.05)

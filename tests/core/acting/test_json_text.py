@@ -6,7 +6,7 @@ import json
 
 import pytest
 
-from app.core.run.acting.json_text import MOST_LETTERS, JsonText, pretty, value_typed
+from app.core.run.acting.json_text import MAX_LETTERS, JsonText, pretty, value_typed
 from nep.errors import NepError
 
 LINES = """{
@@ -33,7 +33,7 @@ def test_json_error_is_reported_with_its_position() -> None:
     assert fault is not None
     assert (fault.line, fault.column) == (4, 17)
     assert fault.sentence.startswith("Line 4, column 17: ")
-    assert JsonText("x" * (MOST_LETTERS + 1)).fault is not None
+    assert JsonText("x" * (MAX_LETTERS + 1)).fault is not None
 
 
 @pytest.mark.parametrize(

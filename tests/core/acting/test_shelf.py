@@ -6,10 +6,10 @@ import json
 
 import pytest
 
-from app.core.run.acting.sending import MOST_HZ
+from app.core.run.acting.sending import MAX_HZ
 from app.core.run.acting.shelf import (
+    MAX_MESSAGES,
     MAX_REQUESTS,
-    MOST_MESSAGES,
     KeptMessage,
     NewerShelfError,
     Shelf,
@@ -55,8 +55,8 @@ def test_copies_are_inserted_below_and_deleted_message_is_restored() -> None:
 
 def test_shelf_is_bounded() -> None:
     shelf = Shelf()
-    kept = [shelf.put(KeptMessage(str(number), "", "/t")) for number in range(MOST_MESSAGES + 1)]
-    assert kept == [True] * MOST_MESSAGES + [False]
+    kept = [shelf.put(KeptMessage(str(number), "", "/t")) for number in range(MAX_MESSAGES + 1)]
+    assert kept == [True] * MAX_MESSAGES + [False]
     assert shelf.copy("0") is None
     assert shelf.put(KeptMessage("0", "other", "/t"))
     for number in range(MAX_REQUESTS + 5):
@@ -83,5 +83,5 @@ def test_damaged_messages_are_skipped_and_counted() -> None:
     assert [each.id for each in shelf.messages] == ["a", "b"]
     assert unread == 5
     assert shelf.messages[0].values == ()
-    assert [each.rate_hz for each in shelf.messages] == [1.0, MOST_HZ]
+    assert [each.rate_hz for each in shelf.messages] == [1.0, MAX_HZ]
     assert dict(shelf.requests) == {}

@@ -15,7 +15,7 @@ from app.core.documents import file_format
 from app.core.documents.background_worker import BackgroundWorker
 from app.core.documents.document import Compiled, Document, read
 from app.core.documents.journal import Journal, left_behind
-from app.core.storage.atomic_file import LARGEST_BYTES
+from app.core.storage.atomic_file import MAX_BYTES
 from app.errors import DocumentError
 from app.robots import rize
 from tests.blocks.fakes import until
@@ -225,14 +225,14 @@ def test_truncated_file_opens_completely_or_not_at_all(document: Document, tmp_p
 def test_oversized_file_is_rejected_without_reading(document: Document, tmp_path: Path) -> None:
     path = tmp_path / "huge.nepb"
     with path.open("wb") as file:
-        file.truncate(LARGEST_BYTES + 1)
+        file.truncate(MAX_BYTES + 1)
     with pytest.raises(DocumentError, match="the limit is 10 MB"):
         document.open(path)
 
 
 def test_behaviour_too_large_to_reopen_is_not_saved(document: Document, tmp_path: Path) -> None:
     path = tmp_path / "large.nepb"
-    document.edited({"blocks": {"x": "y" * LARGEST_BYTES}})
+    document.edited({"blocks": {"x": "y" * MAX_BYTES}})
     with pytest.raises(DocumentError, match="at most 10 MB can be read; use smaller images"):
         document.save(path)
     assert not path.exists()

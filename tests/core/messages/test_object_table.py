@@ -7,9 +7,9 @@ import csv
 import pytest
 
 from app.core.messages.object_table import (
+    MAX_COLUMNS,
     MAX_LISTS,
     MISSING,
-    MOST_COLUMNS,
     column_name,
     columns_of,
     is_list_of_objects,
@@ -56,7 +56,7 @@ def test_keys_and_nested_keys_become_columns() -> None:
 
 def test_table_size_is_limited_and_unusual_keys_are_quoted() -> None:
     wide = rows_of([{f"k{number}": number for number in range(1000)}] * 3)
-    assert len(columns_of(wide)) == MOST_COLUMNS
+    assert len(columns_of(wide)) == MAX_COLUMNS
     assert len(rows_of([{"a": 1}] * 100_000, 10)) == 10
     numbers = rows_of([{1: "one", "a.b": 2}])
     assert [column_name(column) for column in columns_of(numbers)] == ["1", '["a.b"]']

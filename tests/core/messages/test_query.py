@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from app.core.messages.query import LONGEST, FoundPath, JsonQuery, QueryAnswer
+from app.core.messages.query import MAX_LENGTH, FoundPath, JsonQuery, QueryAnswer
 from app.core.messages.reader import LARGE_BYTES, read
 from app.errors import QueryError
 from nep.messages.message import Message
@@ -76,7 +76,7 @@ def test_bytes_are_a_single_value_and_numeric_keys_are_supported() -> None:
         ("$[?match(@.name, '(a+)+$')]", "the query is not valid from match(@.name, '(a+)+"),
         ("$[?search(@.name, 'a')]", "the query is not valid from search("),
         ("$[99999999999999999999999]", "the query is not valid from 9999"),
-        ("$." + "x" * LONGEST, f"a query can have at most {LONGEST} characters"),
+        ("$." + "x" * MAX_LENGTH, f"a query can have at most {MAX_LENGTH} characters"),
         ("$[?" + "(" * 400, "the query "),
         ("$\x00", "the query "),
         ("$[?@.x > 1e9999]", "a number in the query is too large"),

@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from app.core.network.topic_tree import (
-    DEEPEST,
+    MAX_DEPTH,
     TopicFolder,
     TopicTree,
     TreeRow,
@@ -79,9 +79,9 @@ def test_unusual_topic_names_are_rows(name, parts) -> None:
 
 def test_tree_depth_is_limited() -> None:
     name = "/x" * 10_000
-    assert len(parts_of_name(name)) == DEEPEST + 1
-    assert len(folders_above(name)) == DEEPEST
-    assert max(folder.deep for folder in TopicTree([Topic(name)])) == DEEPEST - 1
+    assert len(parts_of_name(name)) == MAX_DEPTH + 1
+    assert len(folders_above(name)) == MAX_DEPTH
+    assert max(folder.deep for folder in TopicTree([Topic(name)])) == MAX_DEPTH - 1
 
 
 def test_folders_above_a_topic() -> None:

@@ -205,7 +205,7 @@ def test_malformed_replies_are_ignored(session: Session, liar: Liar, tried: Invo
     tick_until(session, lambda: tried.state == "succeeded")
 
 
-MOST_CALLS_A_TICK = 64 * MESSAGES_PER_TOPIC
+MAX_CALLS_A_TICK = 64 * MESSAGES_PER_TOPIC
 """Limit of function calls for the answers of a full topic, about 48 each; independent of the load."""
 
 
@@ -250,7 +250,7 @@ def test_feedback_flood_is_handled(session: Session, liar: Liar, tried: Invocati
     finally:
         ended.set()
         thread.join()
-    assert most < MOST_CALLS_A_TICK
+    assert most < MAX_CALLS_A_TICK
     liar.say(tried, "succeeded")
     tick_until(session, lambda: not tried.running)
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from app.core.robots.stop.report import StopReport
-from app.core.robots.voices import LONGEST_S, MAX_WAITING, SOUND, Heard, Notes, RobotVoices, Speaker
+from app.core.robots.voices import MAX_S, MAX_WAITING, SOUND, Heard, Notes, RobotVoices, Speaker
 from app.core.storage.settings import Settings
 from app.robots.description.description import parse, td_for
 from app.robots.simulated import ROBOT as PEPPER
@@ -194,7 +194,7 @@ def test_invalid_sound_is_silent(wrong) -> None:
 
 def test_sound_duration_is_limited() -> None:
     notes = Heard.parse({"sound": {"number": 1, "notes": [[440, 0.9]] * 40}}).notes
-    assert sum(seconds for _hz, seconds in notes) <= LONGEST_S
+    assert sum(seconds for _hz, seconds in notes) <= MAX_S
 
 
 def test_no_speech_without_a_speaker() -> None:

@@ -9,7 +9,7 @@ from collections.abc import Callable, Iterable
 
 import pytest
 
-from app.core.run.child_output import BYTES_PER_S, CHUNK, LINES_PER_S, LONGEST_LINE, PAUSE_S, Gate, Output
+from app.core.run.child_output import BYTES_PER_S, CHUNK, LINES_PER_S, MAX_LINE_LENGTH, PAUSE_S, Gate, Output
 
 LINE = b'{"is": "print", "text": "x"}\n'
 
@@ -46,7 +46,7 @@ def test_protocol_lines_are_assembled_and_other_bytes_counted() -> None:
 
 
 def test_oversized_line_is_discarded_to_its_end() -> None:
-    long = b'{"is"' + b"x" * LONGEST_LINE
+    long = b'{"is"' + b"x" * MAX_LINE_LENGTH
     assert list(output(long, b"x", b'{"is": 2}\n{"is": 3}\n')) == [b'{"is": 3}']
     assert list(output(long + b'\n{"is": 3}\n')) == [b'{"is": 3}']
 
@@ -72,7 +72,7 @@ def test_output_flood_is_counted_exactly_in_constant_memory(
         tracemalloc.stop()
     assert lines == lines_in_it * count
     assert read.strange_bytes == (0 if lines_in_it else count * len(chunk))
-    assert peak < 5 * LONGEST_LINE
+    assert peak < 5 * MAX_LINE_LENGTH
 
 
 def rested(chunks: Iterable[bytes], clock: Callable[[], float]) -> Rests:

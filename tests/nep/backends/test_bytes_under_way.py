@@ -21,7 +21,7 @@ pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="Windows cannot 
 HUGE = 6_220_800
 """A picture of 1920 x 1080."""
 MB = 2**20
-MOST = WINDOW_BYTES + 64 * MB
+MAX_COUNT = WINDOW_BYTES + 64 * MB
 """What a process may grow by; the second part is for one batch of a sink, or what Python does beside."""
 
 SUBSCRIBER = """
@@ -90,7 +90,7 @@ def test_stopped_subscriber_does_not_grow_publisher_memory_and_counts_its_losses
         for _ in range(1000):
             publisher.publish(b"small")
         stopped.stop()
-        assert publish_huge(publisher, 80) < MOST
+        assert publish_huge(publisher, 80) < MAX_COUNT
         stopped.signal(signal.SIGCONT)
         eventually(lambda: is_all_counted(stopped, 1080))
 
@@ -109,11 +109,11 @@ def test_busy_sink_does_not_grow_the_memory_of_its_program(publisher: nep.Publis
 
         publish_huge(publisher, 80)
         eventually(has_settled)
-        assert 100 * MB < max(grown) < MOST
+        assert 100 * MB < max(grown) < MAX_COUNT
         busy.say("on")
         busy.line()
         eventually(lambda: is_all_counted(busy, 180))
-        assert rss(busy.process.pid) - before < MOST
+        assert rss(busy.process.pid) - before < MAX_COUNT
 
 
 def test_stopped_subscriber_does_not_affect_others(publisher: nep.Publisher, master: Master) -> None:
@@ -168,6 +168,6 @@ def test_subscriber_without_hello_that_reads_nothing_does_not_affect_others(
             publish_huge(publisher, 10)
             grown = max(grown, rss(os.getpid()) - before)
             eventually(lambda: is_all_counted(quick, publisher.count))
-        assert grown < MOST
+        assert grown < MAX_COUNT
         assert told(quick)[1] == 0
     context.term()

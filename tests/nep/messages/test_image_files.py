@@ -18,7 +18,7 @@ from hypothesis import strategies as st
 from nep.errors import DecodeError, EncodeError
 from nep.messages import image_codec
 from nep.messages.codecs import codec
-from nep.messages.image_files import MOST_PIXELS, check_size, examine
+from nep.messages.image_files import MAX_PIXELS, check_size, examine
 from tests.nep import bad_pictures as bad
 
 REPOSITORY = Path(__file__).resolve().parents[3]
@@ -97,9 +97,9 @@ def test_rejected_image_error_states_the_reason(name: str, words: str) -> None:
 
 
 def test_pixel_limit_applies_to_decoding_and_encoding() -> None:
-    check_size(MOST_PIXELS // 1000, 1000, 3, 0)
+    check_size(MAX_PIXELS // 1000, 1000, 3, 0)
     with pytest.raises(DecodeError):
-        check_size(MOST_PIXELS // 1000 + 1, 1000, 3, 0)
+        check_size(MAX_PIXELS // 1000 + 1, 1000, 3, 0)
     with pytest.raises(EncodeError, match="too many"):
         codec("image").encode(np.broadcast_to(np.uint8(0), (12_000, 12_000)))
 
@@ -170,4 +170,4 @@ def test_decoded_image_has_the_examined_size_for_any_corruption(
     except DecodeError:
         return
     assert read.shape[:2] == (file.height, file.width)
-    assert read.size <= 3 * MOST_PIXELS
+    assert read.size <= 3 * MAX_PIXELS

@@ -190,7 +190,7 @@ def test_failed_video_export_raises_and_leaves_no_file(tmp_path, monkeypatch):
     record(tmp_path / "a.mcap", [[picture(seq) for seq in range(1, 4)]])
     with Recording(tmp_path / "a.mcap") as recording:
         with monkeypatch.context() as patched:
-            patched.setattr("nep.recordings.film.LONGEST_S", 0.015)
+            patched.setattr("nep.recordings.film.MAX_S", 0.015)
             with pytest.raises(RecordingError, match="more than a day"):
                 export(recording, "mp4", tmp_path / "out")
         monkeypatch.setattr("nep.recordings.film.Film.close", truncate)

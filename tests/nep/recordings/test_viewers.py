@@ -29,7 +29,7 @@ from nep.recordings.ring import FlightRecorder
 from tests.nep.recordings.messages import START_NS, TestClock, json_message, limits, odd_messages, record
 
 PLAIN = {"boolean", "string", "number", "integer"}
-MOST_SECONDS = 2**53 - 1
+MAX_SECONDS = 2**53 - 1
 Made = Callable[[Path], Path]
 
 
@@ -106,7 +106,7 @@ def look_at_protobuf(name: str, described: bytes, data: bytes) -> None:
             bytes(value).decode()
         if kind == 11:
             stamp = dict(fields(value))
-            demand(0 <= stamp.get(1, 0) <= MOST_SECONDS, f"{name}.{field}: too late")
+            demand(0 <= stamp.get(1, 0) <= MAX_SECONDS, f"{name}.{field}: too late")
             demand(0 <= stamp.get(2, 0) < 10**9, f"{name}.{field}: no nanoseconds")
 
 

@@ -9,7 +9,7 @@ import random
 import pytest
 
 from app.robots.virtual.room import Room
-from app.robots.virtual.room_map import KINDS, MOST, MOST_OF_A_KIND, RoomMap
+from app.robots.virtual.room_map import KINDS, MAX_COUNT, MAX_OF_A_KIND, RoomMap
 
 
 def clock(start: int = 1000):
@@ -69,7 +69,7 @@ def test_objects_stay_inside_and_their_number_per_kind_is_limited() -> None:
     assert made.move("table", 99.0, -99.0)
     table = made.room().thing("table")
     assert (table.x, table.y) == (3.0 - table.width / 2, -2.5 + table.depth / 2)
-    names = [made.add("ball", 0.0, 0.0) for _ in range(MOST_OF_A_KIND + 2)]
+    names = [made.add("ball", 0.0, 0.0) for _ in range(MAX_OF_A_KIND + 2)]
     assert names[-3:] == [None, None, None]
     assert made.add("piano", 0.0, 0.0) is None
     assert not made.move("piano", 1.0, 1.0)
@@ -105,4 +105,4 @@ def test_number_of_merged_objects_is_limited() -> None:
             for n in range(start, start + 9)
         ]
         made.merge({"things": flood})
-    assert len(made.message()["things"]) == MOST
+    assert len(made.message()["things"]) == MAX_COUNT

@@ -21,7 +21,7 @@ from app.robots.description.model import Action
 from app.ui.panels.robots.controls.angle import AngleDial
 from app.ui.panels.robots.controls.colour import ColourChoice, ColourSwatches, HueStrip
 from app.ui.panels.robots.controls.picture import NoPictures, PictureChoice
-from app.ui.panels.robots.controls.picture_file import MOST_FILE_BYTES, encoded, read_picture
+from app.ui.panels.robots.controls.picture_file import MAX_FILE_BYTES, encoded, read_picture
 from app.ui.panels.robots.form import ActionForm
 from app.ui.theme.theme import Theme
 from app.ui.widgets import SliderWithUnit
@@ -322,7 +322,7 @@ def test_file_that_is_no_image_is_reported_and_not_sent(qtbot, theme, tmp_path) 
     assert choice.thumbnail.image is None
     assert read_picture(tmp_path / "none.png")[1] == "“none.png” can't be read: no such file or directory."
     with (tmp_path / "big.png").open("wb") as big:
-        big.truncate(MOST_FILE_BYTES + 1)
+        big.truncate(MAX_FILE_BYTES + 1)
     assert "too large" in read_picture(tmp_path / "big.png")[1]
 
 

@@ -435,7 +435,7 @@ def test_idle_nodes_are_hidden_after_a_minute_and_shown_by_a_button(
 def test_large_scene_is_built_in_one_tick_and_painted_in_the_next(
     panel: GraphPanel, window: Window, qtbot, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("app.ui.panels.graph.panel.MOST_AT_ONCE", 0)
+    monkeypatch.setattr("app.ui.panels.graph.panel.MAX_AT_ONCE", 0)
     before = panel.canvas.scene
     show(window, graph(revision=2, nodes=NODES[:-1]))
 

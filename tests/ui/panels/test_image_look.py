@@ -11,7 +11,7 @@ from PySide6.QtGui import QColor, QImage, QPainter, QTransform
 
 from app.core.messages.annotations import MAX_PIXELS, drawn_by
 from app.core.messages.picture_look import ColourScale
-from app.ui.panels.image.overlays import MOST_OVERLAYS
+from app.ui.panels.image.overlays import MAX_OVERLAYS
 from app.ui.panels.image.panel import PANEL, ImagePanel
 from app.ui.pictures.annotations import bar_image, paint_colour_bar, paint_drawn
 from app.ui.theme.theme import Theme
@@ -139,9 +139,9 @@ def test_annotation_topics_are_offered_watched_while_selected_and_drawn(panel, w
     assert panel.view.drawn == ()
     panel.overlays.choose(MARKS, shown=False)
     assert MARKS not in window.session.watched
-    for number in range(MOST_OVERLAYS + 3):
+    for number in range(MAX_OVERLAYS + 3):
         panel.overlays.choose(f"/m{number}", shown=True)
-    assert len(panel.overlays.chosen) == MOST_OVERLAYS
+    assert len(panel.overlays.chosen) == MAX_OVERLAYS
 
 
 def painted(payload: object, turned: int = 0) -> QImage:

@@ -14,7 +14,7 @@ from PySide6.QtWidgets import QLineEdit
 from app.core.run.acting.arming import Target
 from app.ui.panels.row_actions import service_actions
 from app.ui.panels.services import PANEL
-from app.ui.panels.services.answer import MOST_ROWS, TEXT_LETTERS, answer_rows
+from app.ui.panels.services.answer import MAX_ROWS, TEXT_LETTERS, answer_rows
 from app.ui.panels.services.panel import ServicesPanel
 from app.ui.widgets import Switch
 from nep.protocol.graph_view import ServerInfo, ServiceInfo
@@ -206,7 +206,7 @@ def test_service_from_a_menu_command_is_selected(window, panel) -> None:
 def test_replies_of_any_shape_are_shown_in_a_bounded_number_of_rows() -> None:
     assert [row.words for row in answer_rows(None)] == ["null"]
     assert all(len(row.words) < 2 * TEXT_LETTERS for row in answer_rows("x" * 1000))
-    assert len(answer_rows(list(range(10_000)))) == MOST_ROWS + 1
+    assert len(answer_rows(list(range(10_000)))) == MAX_ROWS + 1
     deep: object = 1
     for _each in range(2000):
         deep = [deep]

@@ -33,15 +33,15 @@ def test_window_closes_at_once_without_an_editor(qapp) -> None:
 
 
 def test_slow_editor_is_waited_for_and_flushed_once(qtbot, qapp, monkeypatch) -> None:
-    monkeypatch.setattr(documents, "LONGEST_FLUSH_MS", 2000)
+    monkeypatch.setattr(documents, "MAX_FLUSH_MS", 2000)
     editor, closed, parent = Late(), [], QObject()
     waits = FlushBeforeClose(parent, lambda: editor, lambda: closed.append(waits.ready()))
     assert not waits.ready()
     assert not waits.ready()
     assert len(editor.done) == 1
     editor.done[0]()
-    qtbot.waitUntil(lambda: closed == [True], timeout=documents.LONGEST_FLUSH_MS - 100)
-    qtbot.wait(documents.LONGEST_FLUSH_MS)  # its own end of waiting comes, too, and closes nothing twice
+    qtbot.waitUntil(lambda: closed == [True], timeout=documents.MAX_FLUSH_MS - 100)
+    qtbot.wait(documents.MAX_FLUSH_MS)  # its own end of waiting comes, too, and closes nothing twice
     assert closed == [True]
 
 

@@ -25,8 +25,8 @@ pytest_plugins = ["tests.ui.shell_fixtures"]
 FOLDER = resources.path("guide")
 PAGES = sorted(path.name for path in (FOLDER / "en").glob("*.md"))
 LANGUAGES = sorted(folder.name for folder in FOLDER.iterdir())
-LARGEST, PICTURES_OF_A_LANGUAGE = 110_000, 750_000  # bytes: they are part of the download
-MOST_LETTERS_OF_A_NAME = 40
+MAX_SIZE, PICTURES_OF_A_LANGUAGE = 110_000, 750_000  # bytes: they are part of the download
+MAX_NAME_LENGTH = 40
 TITLES = ["The window", "Blocks", "Robots", "The virtual room", "When something is wrong", "Keys", "Saving"]
 
 
@@ -90,14 +90,14 @@ def named_pictures(page: str) -> list[tuple[str, str, str]]:
 @pytest.mark.parametrize("page", PAGES)
 def test_every_image_exists_in_every_language_and_theme(page: str) -> None:
     for language, name, words in named_pictures(page):
-        assert len(words) > MOST_LETTERS_OF_A_NAME, f"{name}: say what can be seen"
+        assert len(words) > MAX_NAME_LENGTH, f"{name}: say what can be seen"
         found = []
         for theme in ("light", "dark"):
             path = FOLDER / language / theme / f"{name}.png"
             image = QImage(str(path))
             assert not image.isNull(), path
             assert round(300 * PICTURE_RATIO) <= image.width() <= round(640 * PICTURE_RATIO), path
-            assert path.stat().st_size < LARGEST, path
+            assert path.stat().st_size < MAX_SIZE, path
             found.append((image.size(), image.pixelColor(4, 4).lightness()))
         (light_size, light), (dark_size, dark) = found
         assert light_size == dark_size, f"{name}: the page would jump with the theme"

@@ -16,7 +16,7 @@ from app.ui.panels.base import PanelContext
 from app.ui.shell.dialogs.command_palette import TITLES, Palette
 from app.ui.shell.docking.dock import Dock, key_of, kind_of
 from app.ui.shell.docking.layouts import layout_named
-from app.ui.shell.docking.workbench import MOST_OF_A_KIND, Workbench
+from app.ui.shell.docking.workbench import MAX_OF_A_KIND, Workbench
 from app.ui.shell.main_window import MainWindow
 from app.ui.theme.theme import Theme
 from app.ui.widgets.lists.entry_list import Heading
@@ -136,9 +136,9 @@ def test_single_instance_panel_does_not_offer_another(bench) -> None:
 
 
 def test_number_of_panels_of_a_kind_is_limited(bench, window) -> None:
-    opened = [bench.open_another("image") for _ in range(MOST_OF_A_KIND)]
-    assert len([dock for dock in opened if dock is not None]) == MOST_OF_A_KIND - 1
-    assert window.toast.text == f"{MOST_OF_A_KIND} are already open, the maximum"
+    opened = [bench.open_another("image") for _ in range(MAX_OF_A_KIND)]
+    assert len([dock for dock in opened if dock is not None]) == MAX_OF_A_KIND - 1
+    assert window.toast.text == f"{MAX_OF_A_KIND} are already open, the maximum"
 
 
 def test_panels_are_restored_with_their_topics_after_restart(qtbot, bench, window) -> None:

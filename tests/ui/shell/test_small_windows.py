@@ -40,7 +40,7 @@ SIZES = (
 )
 TEXT = (100, 150, 200)
 TILES, NAMES, NARROW = 52, 196, 760  # px: the toolbox of a narrow page, of a wide one, and which is narrow
-LEAST_CANVAS = 420
+MIN_CANVAS = 420
 SETTLE_MS, RESTS = 15, 3  # a turn, and in how many of them nothing moves when all has its place
 # The blocks without their web view, which has tests of its own.
 BLOCKS = Panel("behaviour", "Behaviour", "blocks", (), lambda context: PanelWidget(context, "Behaviour"))
@@ -138,7 +138,7 @@ def test_nothing_is_clipped_or_overlaps_at_any_window_and_text_size(
             if layout == "behaviour":
                 page = window.benches[layout].docks["behaviour"].width()
                 tools = (TILES if page < NARROW * percent / 100 else NAMES) * percent / 100
-                if page - tools < LEAST_CANVAS:
+                if page - tools < MIN_CANVAS:
                     found.append(f"the canvas has {page - tools:.0f} px")
             faults += [f"{size}, {percent} %, {layout}: {fault}" for fault in found]
     assert not faults, "\n".join(["", *faults])

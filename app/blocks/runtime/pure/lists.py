@@ -1,6 +1,6 @@
 """Functions of the category "Lists".
 
-Items are numbered from 1. A list holds at most `MOST_ITEMS` items, including those of nested lists; inserted
+Items are numbered from 1. A list holds at most `MAX_ITEMS` items, including those of nested lists; inserted
 lists are copied, so no list contains itself.
 """
 
@@ -12,7 +12,7 @@ import statistics
 from collections.abc import Sequence
 
 from app.blocks.runtime.errors import BehaviourError, kind
-from app.blocks.runtime.values import LONGEST_TEXT, letters, number, text
+from app.blocks.runtime.values import MAX_TEXT_LENGTH, letters, number, text
 from nep.i18n import _, lazy, ngettext
 
 __all__ = [
@@ -21,7 +21,7 @@ __all__ = [
     "set_item", "shuffled", "smallest_of", "sorted_down", "sorted_up", "split_text", "sum_of", "turned_round",
 ]  # fmt: skip
 
-MOST_ITEMS = 10_000
+MAX_ITEMS = 10_000
 FIRST, LAST, RANDOM = "first", "last", "random"
 
 
@@ -90,9 +90,9 @@ def join_items(of: object, between: object) -> str:
     for one in _as_list(of):
         pieces.append(text(one))
         size += len(pieces[-1]) + len(joint)
-        if size > LONGEST_TEXT:
+        if size > MAX_TEXT_LENGTH:
             raise BehaviourError(
-                _("This text is too long. Use at most {most} characters.").format(most=LONGEST_TEXT)
+                _("This text is too long. Use at most {most} characters.").format(most=MAX_TEXT_LENGTH)
             )
     return joint.join(pieces)
 
@@ -101,7 +101,7 @@ def split_text(words: object, at: object) -> list[object]:
     """Split a text at a separator; into single characters if it is empty."""
     whole, joint = text(words), text(at)
     pieces = whole.split(joint) if joint else letters(whole)
-    if len(pieces) > MOST_ITEMS:
+    if len(pieces) > MAX_ITEMS:
         raise _full_error()
     return [*pieces]
 
@@ -236,20 +236,20 @@ def _same(one: object, other: object) -> bool:
 
 
 def _checked_value(items: list[object], value: object) -> object:
-    if len(items) >= MOST_ITEMS:
+    if len(items) >= MAX_ITEMS:
         raise _full_error()
     if not isinstance(value, (list, tuple)):
         return value
-    room = MOST_ITEMS - _size(items, MOST_ITEMS)
+    room = MAX_ITEMS - _size(items, MAX_ITEMS)
     if room <= 0 or _size(value, room) > room:
         raise _full_error()
     return _copied(value)
 
 
 def _copied_list(items: Sequence[object]) -> list[object]:
-    room = MOST_ITEMS - len(items)
+    room = MAX_ITEMS - len(items)
     for one in items:
-        room -= _size(one, MOST_ITEMS)
+        room -= _size(one, MAX_ITEMS)
         if room < 0:
             raise _full_error()
     return [_copied(one) for one in items]
@@ -273,4 +273,4 @@ def _size(value: object, enough: int) -> int:
 
 
 def _full_error() -> BehaviourError:
-    return BehaviourError(_("The list is full: it can have at most {most} items.").format(most=MOST_ITEMS))
+    return BehaviourError(_("The list is full: it can have at most {most} items.").format(most=MAX_ITEMS))

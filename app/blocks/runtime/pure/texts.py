@@ -11,7 +11,7 @@ import re
 import unicodedata
 
 from app.blocks.runtime.errors import BehaviourError
-from app.blocks.runtime.values import LONGEST_TEXT, letters, number, text
+from app.blocks.runtime.values import MAX_TEXT_LENGTH, letters, number, text
 from nep.i18n import _, lazy, ngettext
 
 __all__ = [
@@ -115,9 +115,9 @@ def replaced(of: object, old: object, new: object) -> str:
     whole, before, after = text(of), text(old), text(new)
     if not before:
         return whole
-    if len(whole) + whole.count(before) * (len(after) - len(before)) > LONGEST_TEXT:
+    if len(whole) + whole.count(before) * (len(after) - len(before)) > MAX_TEXT_LENGTH:
         raise BehaviourError(
-            _("This text is too long. Use at most {most} characters.").format(most=LONGEST_TEXT)
+            _("This text is too long. Use at most {most} characters.").format(most=MAX_TEXT_LENGTH)
         )
     return whole.replace(before, after)
 

@@ -21,7 +21,7 @@ from nep.nodes.node import Node
 from nep.patterns.services.client import Client
 
 TIMEOUT_S = 2.0
-LEAST_S, MOST_S = 0.1, 120.0
+MIN_S, MAX_S = 0.1, 120.0
 HISTORY_KEPT = 200
 ANSWERS_KEPT = 20
 """Number of newest calls whose replies are kept; of older ones only the fact and time."""
@@ -121,7 +121,7 @@ class ServiceCalls:
         """
         if self.waiting is not None:
             raise NepError(_("Wait for the reply of {service} first.").format(service=self.waiting.service))
-        timeout_s = min(MOST_S, max(LEAST_S, timeout_s))
+        timeout_s = min(MAX_S, max(MIN_S, timeout_s))
         record = CallRecord(next(self._numbers), service, words, self._clock_s(), timeout_s)
         now = _CallInFlight(record.number, self._arming.turn, self._clock())
         self._in_flight = now

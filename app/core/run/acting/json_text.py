@@ -18,7 +18,7 @@ from nep.errors import NepError
 from nep.i18n import _
 from nep.messages.json_fault import JsonFault, find_json_fault
 
-MOST_LETTERS = 256 * 1024
+MAX_LETTERS = 256 * 1024
 """Maximum length of an editable text; longer ones are not parsed while typing."""
 NEW_ID, NOW = "new id", "now"
 AUTOMATIC: Mapping[str, Callable[[], object]] = {
@@ -37,9 +37,9 @@ class JsonText:
         self.places: tuple[str, ...] = ()
         self.fault: JsonFault | None = None
         self._spans: list[tuple[int, int, str]] = []
-        if len(text) > MOST_LETTERS:
+        if len(text) > MAX_LETTERS:
             reason = _("the text has more than {count} characters; send it with nep topic pub")
-            self.fault = JsonFault(1, 1, reason.format(count=MOST_LETTERS))
+            self.fault = JsonFault(1, 1, reason.format(count=MAX_LETTERS))
             return
         for found in _PLACE.finditer(text):
             if found["name"] is not None:

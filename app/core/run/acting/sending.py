@@ -23,7 +23,7 @@ from nep.messages.codecs import codec_for
 from nep.nodes.node import Node
 from nep.nodes.publisher import Publisher
 
-LEAST_HZ, MOST_HZ = 0.1, 50.0
+MIN_HZ, MAX_HZ = 0.1, 50.0
 MAX_AGE_S = 10.0
 """Maximum age of a message that waits for a master; older ones are discarded."""
 MAX_CONCURRENT = 10
@@ -164,7 +164,7 @@ class Outbox:
 
     def begin(self, order: SendOrder, rate_hz: float) -> bool:
         """Send a message repeatedly; return False when `MAX_CONCURRENT` is reached."""
-        rate_hz = min(MOST_HZ, max(LEAST_HZ, rate_hz))
+        rate_hz = min(MAX_HZ, max(MIN_HZ, rate_hz))
         turn, asked_s, token = self._arming.turn, self._clock(), object()
         with self._changed:
             if len(self._repeated.keys() | self._starting.keys() | {order.id}) > MAX_CONCURRENT:

@@ -8,14 +8,14 @@ import secrets
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
 
-from app.core.run.acting.json_text import MOST_LETTERS, read_json, value_typed
-from app.core.run.acting.sending import LEAST_HZ, MOST_HZ
+from app.core.run.acting.json_text import MAX_LETTERS, read_json, value_typed
+from app.core.run.acting.sending import MAX_HZ, MIN_HZ
 from app.core.run.acting.templates import is_plain
 from nep.errors import NepError
 from nep.i18n import _
 
 FORMAT = 1
-MOST_MESSAGES = 200
+MAX_MESSAGES = 200
 MAX_REQUESTS = 100
 MAX_VALUES = 50
 NAME_LETTERS = 80
@@ -69,7 +69,7 @@ class Shelf:
     def __init__(
         self, messages: Iterable[KeptMessage] = (), requests: Mapping[str, str] | None = None
     ) -> None:
-        self._messages = list(messages)[:MOST_MESSAGES]
+        self._messages = list(messages)[:MAX_MESSAGES]
         self._requests = dict(list((requests or {}).items())[-MAX_REQUESTS:])
         self._removed: tuple[KeptMessage, int] | None = None
         self.revision = 0
@@ -92,7 +92,7 @@ class Shelf:
         """Add a message or replace the one with this id; return False when the shelf is full."""
         place = self._index(message.id)
         if place is None:
-            if len(self._messages) >= MOST_MESSAGES:
+            if len(self._messages) >= MAX_MESSAGES:
                 return False
             self._messages.append(message)
         elif self._messages[place] == message:
@@ -105,7 +105,7 @@ class Shelf:
     def copy(self, id: str) -> KeptMessage | None:
         """Insert a copy below a message; return None if it doesn't exist or the shelf is full."""
         place = self._index(id)
-        if place is None or len(self._messages) >= MOST_MESSAGES:
+        if place is None or len(self._messages) >= MAX_MESSAGES:
             return None
         old = self._messages[place]
         copied = replace(old, id=new_message_id(), name=self.free_name(old.name))
@@ -134,7 +134,7 @@ class Shelf:
 
     def put_back(self) -> KeptMessage | None:
         """Restore the last removed message at its position."""
-        if self._removed is None or len(self._messages) >= MOST_MESSAGES:
+        if self._removed is None or len(self._messages) >= MAX_MESSAGES:
             return None
         (message, place), self._removed = self._removed, None
         self._messages.insert(place, message)
@@ -143,7 +143,7 @@ class Shelf:
 
     def remember(self, service: str, request: str) -> None:
         """Store the last request of a service."""
-        if self._requests.get(service) != request and len(request) <= MOST_LETTERS:
+        if self._requests.get(service) != request and len(request) <= MAX_LETTERS:
             self._requests.pop(service, None)
             self._requests[service] = request
             while len(self._requests) > MAX_REQUESTS:
@@ -192,13 +192,13 @@ def read_shelf(data: bytes) -> tuple[Shelf, int]:
         raise NepError(_("it has no list of messages"))
     if isinstance(number := value.get("format"), int) and number > FORMAT:
         raise NewerShelfError(_("it was saved by a newer Studio"))
-    messages = [_message(each) for each in listed[:MOST_MESSAGES]]
+    messages = [_message(each) for each in listed[:MAX_MESSAGES]]
     good = {each.id: each for each in messages if each is not None}
     requests = value.get("requests")
     asked = {
         name: text
         for name, text in (requests.items() if isinstance(requests, dict) else ())
-        if isinstance(text, str) and len(text) <= MOST_LETTERS
+        if isinstance(text, str) and len(text) <= MAX_LETTERS
     }
     return Shelf(good.values(), asked), len(listed) - len(good)
 
@@ -209,7 +209,7 @@ def _message(told: object) -> KeptMessage | None:
     id, name, topic, kind, text = (told.get(key) for key in ("id", "name", "topic", "type", "text"))
     if not (isinstance(id, str) and id and isinstance(name, str) and isinstance(topic, str)):
         return None
-    if not (isinstance(kind, str) and isinstance(text, str)) or len(text) > MOST_LETTERS + 1:
+    if not (isinstance(kind, str) and isinstance(text, str)) or len(text) > MAX_LETTERS + 1:
         return None
     values, rate_hz = told.get("values"), told.get("rate_hz")
     typed = tuple(
@@ -219,5 +219,5 @@ def _message(told: object) -> KeptMessage | None:
     )
     hertz = 1.0
     if isinstance(rate_hz, (int, float)) and not isinstance(rate_hz, bool) and math.isfinite(rate_hz):
-        hertz = float(min(MOST_HZ, max(LEAST_HZ, rate_hz)))
+        hertz = float(min(MAX_HZ, max(MIN_HZ, rate_hz)))
     return KeptMessage(id, name[:NAME_LETTERS], topic, kind, text, typed[:MAX_VALUES], hertz)

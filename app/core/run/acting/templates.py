@@ -6,7 +6,7 @@ from collections.abc import Mapping
 
 import orjson
 
-from app.core.run.acting.json_text import MOST_LETTERS, pretty
+from app.core.run.acting.json_text import MAX_LETTERS, pretty
 from nep.errors import NepError
 from nep.i18n import _
 from nep.messages.codecs import codec_for
@@ -31,7 +31,7 @@ def is_plain(msg_type: str) -> bool:
 
 def text_of_message(message: Message) -> str:
     """Return a message as editable text. Raises `NepError` if it can't be written as text."""
-    if message.size_bytes > MOST_LETTERS:
+    if message.size_bytes > MAX_LETTERS:
         raise NepError(_("The last message is too large to edit by hand."))
     if not is_written(message.msg_type):
         raise NepError(_("Messages of type {type} can't be edited by hand.").format(type=message.msg_type))

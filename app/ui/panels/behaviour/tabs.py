@@ -193,7 +193,7 @@ class BehaviourTabs(QWidget):
         self._place(bring=True)
 
     def _widths(self) -> list[int]:
-        # The active tab keeps its full width up to the available room; the others shrink down to SHORTEST.
+        # The active tab keeps its full width up to the available room; the others shrink down to MIN_LENGTH.
         wanted = [self.tabs[each.key].sizeHint().width() for each in self._facts]
         room = self._room_width(scrolls=False) - GAP * len(wanted)
         least = round(self._theme.scaled(MIN_TAB_WIDTH))

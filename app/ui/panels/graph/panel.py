@@ -18,7 +18,7 @@ from app.core.graph.dot import dot_of
 from app.core.graph.layout import GraphLayout, LayoutSizes
 from app.core.graph.layout_thread import LayoutThread
 from app.core.graph.node_graph import (
-    MOST_OPEN,
+    MAX_OPEN,
     DrawnNode,
     GraphChoices,
     GraphFacts,
@@ -67,7 +67,7 @@ from nep.i18n import _, lazy, ngettext
 
 SVG = FileKind(lazy("An image that stays sharp at any size"), ".svg")
 DOT = FileKind(lazy("Graph for other programs"), ".dot")
-MOST_AT_ONCE = 500
+MAX_AT_ONCE = 500
 """Lines above which building and first painting of a scene are spread over two ticks."""
 CARD_BESIDE_WIDTH = 700
 """Minimum width in px (at 100 % text size) for the card at the side; below it, the card is at the bottom."""
@@ -225,7 +225,7 @@ class GraphPanel(PanelWidget):
     def _rebuild(self) -> None:
         facts = self._graph_facts()
         choices = self._choices
-        if len(facts.nodes) > MOST_OPEN and not (choices.starts_closed or choices.toggled):
+        if len(facts.nodes) > MAX_OPEN and not (choices.starts_closed or choices.toggled):
             self._layout = None
             self._choose(starts_closed=True)
         graph = node_graph(facts, self._choices)
@@ -246,7 +246,7 @@ class GraphPanel(PanelWidget):
         if made is not None:
             graph, self._layout = made
             scene = GraphScene(self.theme, graph, self._layout, self._sizes_asked, self._host)
-            if len(scene.lines) > MOST_AT_ONCE:
+            if len(scene.lines) > MAX_AT_ONCE:
                 self._coming = scene
                 return
         if scene is not None:

@@ -14,7 +14,7 @@ from dataclasses import dataclass, field
 from PySide6.QtCore import QPointF, QRectF, QSizeF, Qt
 from PySide6.QtGui import QFont, QFontMetricsF, QPainterPath, QPolygonF
 
-from app.core.graph.layout import MOST_LED, GraphLayout, LayoutSizes, Place
+from app.core.graph.layout import MAX_LED, GraphLayout, LayoutSizes, Place
 from app.core.graph.node_graph import DrawnNode, GraphGroup, GraphLine, NodeGraph
 from app.ui.panels.graph.words import (
     LineFigures,
@@ -138,7 +138,7 @@ class GraphScene:
         heads = (
             QRectF(item.rect.topLeft(), QSizeF(item.rect.width(), sizes.head - 8)) for item in self.groups
         )
-        led = self.lines if len(layout.routes) <= MOST_LED else []
+        led = self.lines if len(layout.routes) <= MAX_LED else []
         self._crossed = _TakenRoom(_thin(*part) for item in led for part in _parts(item))
         self._taken = _TakenRoom([*(item.rect for item in self.nodes.values()), *heads])
 

@@ -10,7 +10,7 @@ from PySide6.QtCore import Signal
 from PySide6.QtWidgets import QWidget
 
 from app.core.messages.picture import Picture
-from app.core.messages.picture_look import COLOUR_MAPS, MOST_CONTRAST, PLAIN, PictureLook
+from app.core.messages.picture_look import COLOUR_MAPS, MAX_CONTRAST, PLAIN, PictureLook
 from app.robots.description.typed_number import parse_number
 from app.ui.theme.theme import Theme
 from app.ui.widgets import Button, ComboBox, NumberEdit, ToggleButton, label
@@ -89,7 +89,7 @@ class LookBar(QWidget):
         self.look = look
         wanted = (
             (self.brightness, round(SLIDER_STEPS * (1 + look.brightness))),
-            (self.contrast, round(SLIDER_STEPS * (1 + log(look.contrast) / log(MOST_CONTRAST)))),
+            (self.contrast, round(SLIDER_STEPS * (1 + log(look.contrast) / log(MAX_CONTRAST)))),
         )
         for slider, value in wanted:
             slider.blockSignals(True)
@@ -126,7 +126,7 @@ class LookBar(QWidget):
         self._set(replace(self.look, brightness=value / SLIDER_STEPS - 1))
 
     def _set_contrast(self, value: int) -> None:
-        self._set(replace(self.look, contrast=exp((value / SLIDER_STEPS - 1) * log(MOST_CONTRAST))))
+        self._set(replace(self.look, contrast=exp((value / SLIDER_STEPS - 1) * log(MAX_CONTRAST))))
 
     def _set_own_range(self, on: bool) -> None:
         picture = self._picture()

@@ -14,7 +14,7 @@ from nep.messages.message import Message
 
 ANNOTATION_TYPES = ("foxglove.ImageAnnotations", "ImageAnnotations", "image_annotations")
 FACES_NAME = "face_positions"
-MOST_OVERLAYS = 8
+MAX_OVERLAYS = 8
 
 
 def may_draw(topic: Topic) -> bool:
@@ -46,8 +46,8 @@ class Overlays:
         return [*there, *(key for key in self._watches if key not in there)]
 
     def choose(self, topic: str, shown: bool) -> None:
-        """Show or hide the annotations of a topic; at most `MOST_OVERLAYS` are shown."""
-        if shown and topic not in self._watches and len(self._watches) < MOST_OVERLAYS:
+        """Show or hide the annotations of a topic; at most `MAX_OVERLAYS` are shown."""
+        if shown and topic not in self._watches and len(self._watches) < MAX_OVERLAYS:
             self._watches[topic] = self._session.watch_shown(topic)
         elif not shown and topic in self._watches:
             self._watches.pop(topic).close()

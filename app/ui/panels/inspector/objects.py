@@ -9,9 +9,9 @@ from PySide6.QtGui import QGuiApplication
 from PySide6.QtWidgets import QHBoxLayout, QStackedWidget, QVBoxLayout, QWidget
 
 from app.core.messages.object_table import (
+    MAX_COLUMNS,
+    MAX_ROWS,
     MISSING,
-    MOST_COLUMNS,
-    MOST_ROWS,
     ObjectRow,
     Steps,
     column_name,
@@ -141,12 +141,12 @@ class ObjectsView(QWidget):
         self._set_status(len(rows), total, path)
 
     def _set_status(self, shown: int, total: int, path: str) -> None:
-        if shown < total and shown >= MOST_ROWS:
+        if shown < total and shown >= MAX_ROWS:
             words = _("the first {shown} of {count} rows").format(shown=grouped(shown), count=grouped(total))
         else:
             words = ngettext("{count} row", "{count} rows", shown).format(count=grouped(shown))
-        if len(self._columns) >= MOST_COLUMNS:
-            words = _("{rows}, the first {count} columns").format(rows=words, count=MOST_COLUMNS)
+        if len(self._columns) >= MAX_COLUMNS:
+            words = _("{rows}, the first {count} columns").format(rows=words, count=MAX_COLUMNS)
         self.words.setText(f"{path}   {words}" if path else words)
 
     def _put(self, rows: list[ObjectRow], now: float) -> None:

@@ -16,7 +16,7 @@ from PySide6.QtGui import (
 )
 from PySide6.QtWidgets import QHBoxLayout, QSizePolicy, QStackedWidget, QVBoxLayout, QWidget
 
-from app.core.series.curves import MOST_CURVES, Curve, Curves, topics_of
+from app.core.series.curves import MAX_CURVES, Curve, Curves, topics_of
 from app.core.series.field_path import FieldPath
 from app.errors import CurveError
 from app.ui.panels.base import Hindrance, PanelContext, PanelWidget, paused_hindrance
@@ -549,7 +549,7 @@ class PlotPanel(PanelWidget):
 
     def restore_state(self, state: Mapping[str, object]) -> None:
         kept = state.get("curves")
-        for each in kept[:MOST_CURVES] if isinstance(kept, list) else ():
+        for each in kept[:MAX_CURVES] if isinstance(kept, list) else ():
             if isinstance(each, Mapping):
                 self._restore_curve(each)
         span = state.get("span")

@@ -18,8 +18,8 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
-from app.core.run.acting.json_text import MOST_LETTERS, pretty, read_json
-from app.core.run.acting.sending import LEAST_HZ, MOST_HZ
+from app.core.run.acting.json_text import MAX_LETTERS, pretty, read_json
+from app.core.run.acting.sending import MAX_HZ, MIN_HZ
 from app.core.run.acting.shelf import NAME_LETTERS, KeptMessage
 from app.core.run.acting.templates import is_plain
 from app.ui.panels.publish.value_fields import ValueFields
@@ -134,7 +134,7 @@ class MessageForm(QWidget):
         self.send.setToolTip(plain.tip(tip_with_key(_("Sends the message once"), "Ctrl+Enter")))
         self.last = ElidedLabel("small", "textSecondary")
         self.repeat = Button(theme, _("Start sending"), "repeat")
-        self.rate = NumberEdit(theme, LEAST_HZ, MOST_HZ, _("/s"), 1)
+        self.rate = NumberEdit(theme, MIN_HZ, MAX_HZ, _("/s"), 1)
         self.rate.setAccessibleName(_("Messages per second"))
         self.rate.setFixedWidth(round(theme.scaled(RATE_WIDTH_PX)))
         self.rate.number.connect(lambda value: self._edit(rate_hz=value))
@@ -275,7 +275,7 @@ class MessageForm(QWidget):
     def _text_typed(self) -> None:
         text = self.edit.text()
         if self.message is not None and text != self.message.text:
-            self._edit(text=text[: MOST_LETTERS + 1])
+            self._edit(text=text[: MAX_LETTERS + 1])
 
     def set_type(self, msg_type: str) -> None:
         """Set the message type."""

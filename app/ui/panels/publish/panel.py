@@ -13,7 +13,7 @@ from app.core.network.topics import split_key
 from app.core.network.watches import Suspendable, Watch
 from app.core.run.acting.acting import result_words
 from app.core.run.acting.arming import Target
-from app.core.run.acting.shelf import MOST_MESSAGES, KeptMessage
+from app.core.run.acting.shelf import MAX_MESSAGES, KeptMessage
 from app.core.run.acting.templates import text_of_message, text_of_type
 from app.ui.panels.armed_strip import ArmedMinutes, ArmedStrip
 from app.ui.panels.base import Panel, PanelContext, PanelWidget
@@ -215,7 +215,7 @@ class PublishPanel(PanelWidget):
         made = kept[-1] if kept else self.acting.new_message(topic, msg_type, text_of_type(msg_type))
         if made is None:
             said = _("You have {count} saved messages, the maximum. Delete one first.")
-            self.context.toast(said.format(count=MOST_MESSAGES))
+            self.context.toast(said.format(count=MAX_MESSAGES))
             return
         self._wanted = made.id
         self.filter.clear()

@@ -23,7 +23,7 @@ from app.ui.widgets.table.view import TableView
 from nep.i18n import _, lazy
 from nep.text import shortened
 
-MOST_ROWS = 500
+MAX_ROWS = 500
 MAX_DEPTH = 12
 TEXT_LETTERS = 200
 INDENT_PX = 14
@@ -42,12 +42,12 @@ class AnswerRow:
 
 
 def answer_rows(answer: object) -> list[AnswerRow]:
-    """Return a reply as rows, children below their parents; at most `MOST_ROWS`."""
+    """Return a reply as rows, children below their parents; at most `MAX_ROWS`."""
     found: list[AnswerRow] = []
     for row in (
         _rows("", 0, "", answer) if _has_parts(answer) else [AnswerRow("", 0, _("reply"), _words(answer))]
     ):
-        if len(found) == MOST_ROWS:
+        if len(found) == MAX_ROWS:
             found.append(AnswerRow("…", 0, "…", _("there is more; see the JSON")))
             break
         found.append(row)

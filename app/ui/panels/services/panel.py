@@ -9,7 +9,7 @@ from PySide6.QtGui import QAction, QGuiApplication
 from PySide6.QtWidgets import QHBoxLayout, QStackedWidget, QVBoxLayout, QWidget
 
 from app.core.run.acting.arming import Target
-from app.core.run.acting.calling import LEAST_S, MOST_S, TIMEOUT_S, CallRecord
+from app.core.run.acting.calling import MAX_S, MIN_S, TIMEOUT_S, CallRecord
 from app.core.run.acting.json_text import JsonText, pretty, read_json
 from app.ui.panels.armed_strip import ArmedMinutes, ArmedStrip
 from app.ui.panels.base import Panel, PanelContext, PanelWidget
@@ -88,7 +88,7 @@ class ServicesPanel(PanelWidget):
         self.call_button = Button(theme, _("Call"), "play", kind="primary")
         self.call_button.setToolTip(plain.tip(tip_with_key(_("Calls the service"), "Ctrl+Enter")))
         self.give_up = Button(theme, _("Cancel"), "x")
-        self.seconds = NumberEdit(theme, LEAST_S, MOST_S, _("s"), 1)
+        self.seconds = NumberEdit(theme, MIN_S, MAX_S, _("s"), 1)
         self.seconds.setAccessibleName(_("Time limit in seconds"))
         self.seconds.setFixedWidth(round(theme.scaled(SECONDS_WIDTH_PX)))
         self.seconds.show_number(TIMEOUT_S)

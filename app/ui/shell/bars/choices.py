@@ -17,7 +17,7 @@ from app.ui.widgets.keyboard import is_plain, is_pressed_key
 
 GAP = 8
 PADDING = 14
-LEAST_HEIGHT = 52
+MIN_HEIGHT = 52
 MAX_COLUMNS = 3
 NUMBER_KEYS = 9
 _WRAPPED = int(Qt.TextFlag.TextWordWrap | Qt.AlignmentFlag.AlignLeft | Qt.AlignmentFlag.AlignVCenter)
@@ -47,7 +47,7 @@ class ChoiceButton(PaintedButton):
         """Return the height in px for a width."""
         room = QRectF(0, 0, max(1.0, width - self._before_words() - PADDING), 1e6)
         needed = QFontMetricsF(self._font()).boundingRect(room, _WRAPPED, self._shown).height()
-        return max(round(self._theme.scaled(LEAST_HEIGHT)), math.ceil(needed) + 2 * PADDING)
+        return max(round(self._theme.scaled(MIN_HEIGHT)), math.ceil(needed) + 2 * PADDING)
 
     def sizeHint(self) -> QSize:
         wide = self.one_line_width()

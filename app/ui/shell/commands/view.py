@@ -26,7 +26,7 @@ from app.ui.shell.commands.freeze import freeze_or_go_on
 from app.ui.shell.commands.palette_entries import PaletteEntries
 from app.ui.shell.commands.shell import START, Shell
 from app.ui.shell.dialogs.about import AboutSheet
-from app.ui.shell.docking.layout_file import MOST_BYTES, LayoutFileError, layout_bytes, read_layout
+from app.ui.shell.docking.layout_file import MAX_BYTES, LayoutFileError, layout_bytes, read_layout
 from app.ui.shell.docking.layouts import layout_named
 from app.ui.shell.documents import DocumentController
 from app.ui.shell.hint_ring import HintRing
@@ -59,7 +59,7 @@ else:
     )
 
 TEXT_STEP = 25
-MOST_NAMED = 4
+MAX_NAMED = 4
 
 
 @runtime_checkable
@@ -360,7 +360,7 @@ class ViewCommands:
         """Import a layout file and show it; errors are shown as a toast."""
         shell = self._shell
         try:
-            found = read_layout(read_whole(path, MOST_BYTES), path.stem, shell.panels)
+            found = read_layout(read_whole(path, MAX_BYTES), path.stem, shell.panels)
         except (OSError, LayoutFileError) as error:
             reason = (error.strerror or str(error)) if isinstance(error, OSError) else str(error)
             reason = f"{reason[:1].lower()}{reason[1:]}"
@@ -383,7 +383,7 @@ class ViewCommands:
 
         words = _("Opened the layout “{name}”").format(name=name)
         if found.unknown:
-            left_out = listed(list(found.unknown[:MOST_NAMED]))
+            left_out = listed(list(found.unknown[:MAX_NAMED]))
             words = _("{opened}. Missing panels were left out: {panels}").format(
                 opened=words, panels=left_out
             )

@@ -26,7 +26,7 @@ from PySide6.QtWidgets import (
 
 from app.core.documents.file_format import SUFFIX
 from app.core.documents.folder import (
-    LONGEST_NAME,
+    MAX_NAME_LENGTH,
     REFUSED,
     FolderEntry,
     entries_of,
@@ -275,7 +275,7 @@ class FileSheet(Overlay):
 
     def _ask_name(self, question: FileQuestion, suggestion: Path, take: Callable[[Path], object]) -> None:
         name = suggestion.name.removesuffix(SUFFIX)
-        self.name.setText(REFUSED.sub(" ", name).strip(". ")[:LONGEST_NAME])
+        self.name.setText(REFUSED.sub(" ", name).strip(". ")[:MAX_NAME_LENGTH])
         self.kind.blockSignals(True)
         self.kind.clear()
         for kind in question.kinds:

@@ -11,12 +11,12 @@ from PySide6.QtWidgets import QGridLayout, QHBoxLayout, QLineEdit, QScrollArea, 
 
 from app.core.network.topics import Topic
 from app.core.recording.choice import (
-    LEAST_GB,
-    LEAST_MIN,
-    LEAST_S,
-    MOST_GB,
-    MOST_MIN,
-    MOST_S,
+    MAX_GB,
+    MAX_MINUTES,
+    MAX_S,
+    MIN_GB,
+    MIN_MINUTES,
+    MIN_S,
     RecordingChoice,
 )
 from app.core.recording.client import LOW_DISK_BYTES
@@ -154,9 +154,9 @@ class RecordSheet(Overlay):
             wrap=True,
         )  # fmt: skip
 
-        self.ends_min = NumberEdit(theme, LEAST_MIN, MOST_MIN, _("min"), 1, empty=True)
+        self.ends_min = NumberEdit(theme, MIN_MINUTES, MAX_MINUTES, _("min"), 1, empty=True)
         self.ends_min.setAccessibleName(_("Stop after (minutes)"))
-        self.ends_gb = NumberEdit(theme, LEAST_GB, MOST_GB, "GB", 1, empty=True)
+        self.ends_gb = NumberEdit(theme, MIN_GB, MAX_GB, "GB", 1, empty=True)
         self.ends_gb.setAccessibleName(_("Stop at (GB)"))
         for field, name in ((self.ends_min, "ends_min"), (self.ends_gb, "ends_gb")):
             field.setFixedWidth(round(theme.scaled(NUMBER_WIDE)))
@@ -178,10 +178,10 @@ class RecordSheet(Overlay):
         theme = self.theme
         self.ring = Switch(theme, _("Flight recorder"))
         self.ring.clicked.connect(self._switch_ring)
-        self.seconds = NumberEdit(theme, LEAST_S, MOST_S, _("s"))
+        self.seconds = NumberEdit(theme, MIN_S, MAX_S, _("s"))
         self.seconds.setAccessibleName(_("Seconds to keep"))
         self.seconds.number.connect(lambda value: self._wish(seconds=round(value)))
-        self.size_gb = NumberEdit(theme, LEAST_GB, MOST_GB, "GB", 1)
+        self.size_gb = NumberEdit(theme, MIN_GB, MAX_GB, "GB", 1)
         self.size_gb.setAccessibleName(_("Maximum size on disk (GB)"))
         self.size_gb.number.connect(lambda value: self._wish(size_gb=value))
         for field in (self.seconds, self.size_gb):

@@ -12,12 +12,12 @@ from app.core.storage import deep_json
 from app.errors import AppError
 from app.ui.shell.docking.dock import kind_of
 from app.ui.shell.docking.layouts import LAYOUTS
-from app.ui.shell.docking.saved_layouts import LONGEST
+from app.ui.shell.docking.saved_layouts import MAX_LENGTH
 from nep.i18n import _
 from nep.version import __version__
 
 FORMAT, VERSION = "nep-studio layout", 1
-MOST_BYTES = 1_000_000
+MAX_BYTES = 1_000_000
 
 
 class LayoutFileError(AppError):
@@ -102,7 +102,7 @@ def _name(told: object, stem: str) -> str:
         letters = (
             letter if letter.isprintable() else " " for letter in (each if isinstance(each, str) else "")
         )
-        plain = " ".join("".join(letters).split())[:LONGEST].strip()
+        plain = " ".join("".join(letters).split())[:MAX_LENGTH].strip()
         if plain:
             return plain
     return _("Layout")

@@ -15,7 +15,7 @@ from app.ui.shell.window_state import WindowState
 from nep.i18n import _
 
 OWN_PREFIX = "own:"
-LONGEST = 40
+MAX_LENGTH = 40
 
 
 @dataclass(frozen=True, slots=True)
@@ -60,8 +60,8 @@ class SavedLayouts:
         name = name.strip()
         if not name:
             return _("A layout needs a name.")
-        if len(name) > LONGEST:
-            return _("The name is too long. Use at most {count} characters.").format(count=LONGEST)
+        if len(name) > MAX_LENGTH:
+            return _("The name is too long. Use at most {count} characters.").format(count=MAX_LENGTH)
         taken = {_(layout.title).lower() for layout in LAYOUTS} | {own.name.lower() for own in self.all()}
         is_taken = name.lower() in taken - {but.lower()}
         return _("“{name}” already exists.").format(name=name) if is_taken else ""
@@ -121,11 +121,11 @@ class SavedLayouts:
 
         A number is appended if the name is taken or invalid.
         """
-        name = name.strip()[:LONGEST].strip()
+        name = name.strip()[:MAX_LENGTH].strip()
         free, number = name, 2
         while self.refusal(free):
             ending = f" {number}"
-            free, number = f"{name[: LONGEST - len(ending)]}{ending}", number + 1
+            free, number = f"{name[: MAX_LENGTH - len(ending)]}{ending}", number + 1
         return free, self._state.keep_layouts({OWN_PREFIX + free: {**saved, "base": base}})
 
     def rename(self, old: str, new: str) -> None:

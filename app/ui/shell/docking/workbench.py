@@ -24,7 +24,7 @@ BELOW = Qt.DockWidgetArea.BottomDockWidgetArea
 MAX_BELOW_SHARE = 0.42
 """Share of the window's height."""
 STATE_VERSION = 1  # when it changes, app.core.storage.settings.FORMAT must change, too
-MOST_OF_A_KIND = 8
+MAX_OF_A_KIND = 8
 
 
 class Workbench(QMainWindow):
@@ -175,7 +175,7 @@ class Workbench(QMainWindow):
             return self.docks[key]
         name, number = kind_of(key)
         description = self._panels.get(name)
-        if description is None or number > (MOST_OF_A_KIND if description.several else 1):
+        if description is None or number > (MAX_OF_A_KIND if description.several else 1):
             return None
         dock = self._ahead.pop(key, None)
         dock = dock or make_dock(description, self._context, self._layout.density, number)
@@ -221,11 +221,11 @@ class Workbench(QMainWindow):
     def open_another(self, key: str) -> Dock | None:
         """Open an additional panel of a kind next to an existing one; return None at the limit."""
         name = kind_of(key)[0]
-        free = (number for number in range(1, MOST_OF_A_KIND + 1) if not self._is_open(key_of(name, number)))
+        free = (number for number in range(1, MAX_OF_A_KIND + 1) if not self._is_open(key_of(name, number)))
         number = next(free, 0)
         if not number:
             said = _("{count} are already open, the maximum")
-            self._context.toast(said.format(count=MOST_OF_A_KIND))
+            self._context.toast(said.format(count=MAX_OF_A_KIND))
             return None
         if number == 1:
             return self.open(name)

@@ -10,7 +10,7 @@ from app.ui.theme.theme import Theme
 from app.ui.widgets import paint
 from app.ui.widgets.buttons import PaintedButton
 
-SIDE, GAP, LEAST_HEIGHT = 18, 8, 26
+SIDE, GAP, MIN_HEIGHT = 18, 8, 26
 
 
 class CheckBox(PaintedButton):
@@ -25,7 +25,7 @@ class CheckBox(PaintedButton):
     def sizeHint(self) -> QSize:
         font = self._theme.font("body")
         width = self._theme.scaled(SIDE) + GAP + paint.width_of(font, self.text()) + 4
-        return QSize(round(width) + 1, max(LEAST_HEIGHT, round(paint.height_of(font)) + 6))
+        return QSize(round(width) + 1, max(MIN_HEIGHT, round(paint.height_of(font)) + 6))
 
     def minimumSizeHint(self) -> QSize:
         wanted = self.sizeHint()

@@ -18,8 +18,8 @@ from app.ui.widgets.keyboard import is_plain
 from app.ui.widgets.menus import EditMenu
 from nep.i18n import _
 
-HIGH, PAD, GAP, CROSS, LEAST = 22, 7, 5, 10, 40
-MOST_LETTERS = 400
+HIGH, PAD, GAP, CROSS, MIN_VALUE = 22, 7, 5, 10, 40
+MAX_LETTERS = 400
 
 
 class Token(PaintedButton):
@@ -77,10 +77,10 @@ class _Typed(QLineEdit):
     def sizeHint(self) -> QSize:
         words = self.text() or self.placeholderText()
         wide = self.fontMetrics().horizontalAdvance(words) + 2 * PAD
-        return QSize(max(LEAST, wide), super().sizeHint().height())
+        return QSize(max(MIN_VALUE, wide), super().sizeHint().height())
 
     def minimumSizeHint(self) -> QSize:
-        return QSize(LEAST, super().minimumSizeHint().height())
+        return QSize(MIN_VALUE, super().minimumSizeHint().height())
 
     def keyPressEvent(self, event: QKeyEvent) -> None:
         plain = is_plain(event)
@@ -120,7 +120,7 @@ class TokenField(QWidget):
         self.edit = _Typed(self)
         self.edit.setAccessibleName(name)
         self.edit.setPlaceholderText(example)
-        self.edit.setMaxLength(MOST_LETTERS)
+        self.edit.setMaxLength(MAX_LETTERS)
         self.edit.setProperty("bare", "true")
         self.edit.setProperty("ownFocus", True)
         EditMenu(theme, self.edit)

@@ -39,7 +39,7 @@ _COMMON = {
     "rcl_interfaces/srv/DescribeParameters": ("string[] names", "ParameterDescriptor[] descriptors"),
     "rcl_interfaces/srv/GetParameterTypes": ("string[] names", "uint8[] types"),
 }
-_LARGEST_FILE = 2**20
+_MAX_FILE_BYTES = 2**20
 
 
 def request_of(service_type: str) -> str:
@@ -96,7 +96,7 @@ def _in_folders(name: str) -> tuple[str, str] | None:
             own = path.parent.parent.name if path.parent.name == "srv" else path.parent.name
             if own != package:
                 continue
-            if path.stat().st_size > _LARGEST_FILE:
+            if path.stat().st_size > _MAX_FILE_BYTES:
                 raise NepError(
                     _("'{path}' is too large; choose a folder with .srv files only").format(path=path)
                 )

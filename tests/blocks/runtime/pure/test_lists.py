@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 from app.blocks.runtime.errors import BehaviourError
 from app.blocks.runtime.pure import lists
-from app.blocks.runtime.values import LONGEST_TEXT
+from app.blocks.runtime.values import MAX_TEXT_LENGTH
 from tests.blocks.fakes import play
 from tests.blocks.samples import block, get, list_of, number, started, text, workspace, write
 
@@ -55,12 +55,12 @@ def test_list_items_are_counted_from_1_and_described_in_words() -> None:
         (lambda: lists.item(None, 1), "This list has no value yet."),
         (lambda: lists.add_item((1, 2), 3), "This list can't be changed."),
         (
-            lambda: lists.add_item([0] * lists.MOST_ITEMS, 1),
+            lambda: lists.add_item([0] * lists.MAX_ITEMS, 1),
             "The list is full: it can have at most 10000 items.",
         ),
         (lambda: lists.split_text("a" * 20_000, ""), "The list is full: it can have at most 10000 items."),
         (
-            lambda: lists.join_items(["a" * LONGEST_TEXT], "b"),
+            lambda: lists.join_items(["a" * MAX_TEXT_LENGTH], "b"),
             "This text is too long. Use at most 1000000 characters.",
         ),
     ],

@@ -14,7 +14,7 @@ from dataclasses import dataclass, field
 SETTLE_LIMIT_S = 30.0
 """Real seconds after which a history is given up as deadlocked."""
 _END = float("inf")
-_SHORTEST_S = 1e-6
+_MIN_S = 1e-6
 _LOOK_S = 0.0005  # real seconds between two looks whether all threads rest
 _AFTER_END_S = 0.05  # real seconds, so that threads that are being closed do not spin
 
@@ -109,7 +109,7 @@ class SimulatedClock:
         is_held: bool = False,
     ) -> bool:
         # Rounded up: a rest of a span that is too small to add would never pass.
-        deadline = _END if timeout_s is None else self._now + max(_SHORTEST_S, timeout_s)
+        deadline = _END if timeout_s is None else self._now + max(_MIN_S, timeout_s)
         me = threading.current_thread()
         waiter = _Waiter(me, deadline, is_ready, wake, is_frozen)
         if not is_held:

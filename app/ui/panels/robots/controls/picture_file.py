@@ -16,10 +16,10 @@ from PySide6.QtGui import QImage, QImageReader, QTransform
 
 from nep.errors import DecodeError
 from nep.i18n import _
-from nep.messages.image_files import MOST_BYTES, ImageFile, examine
+from nep.messages.image_files import MAX_BYTES, ImageFile, examine
 
 MAX_SIDE_PX, QUALITY = 1280, 85
-MOST_FILE_BYTES = 40_000_000
+MAX_FILE_BYTES = 40_000_000
 
 
 def read_picture(path: Path) -> tuple[QImage | None, str]:
@@ -28,13 +28,13 @@ def read_picture(path: Path) -> tuple[QImage | None, str]:
         if not path.is_file() and path.exists():
             return None, _("“{file}” is not a file.").format(file=path.name)
         with path.open("rb") as file:
-            data = file.read(MOST_FILE_BYTES + 1)
+            data = file.read(MAX_FILE_BYTES + 1)
     except OSError as error:
         reason = (error.strerror or _("unknown")).lower()
         return None, _("“{file}” can't be read: {reason}.").format(file=path.name, reason=reason)
-    if len(data) > MOST_FILE_BYTES:
+    if len(data) > MAX_FILE_BYTES:
         said = _("“{file}” is too large. Choose a file below {size} MB.")
-        return None, said.format(file=path.name, size=MOST_FILE_BYTES // 1_000_000)
+        return None, said.format(file=path.name, size=MAX_FILE_BYTES // 1_000_000)
     try:
         return image_of(data), ""
     except DecodeError as error:
@@ -49,7 +49,7 @@ def image_of(data: bytes) -> QImage:
     """
     file = examine(data)
     # Qt's default of 256 MB is less than the limit checked before
-    QImageReader.setAllocationLimit(MOST_BYTES // 1_000_000)
+    QImageReader.setAllocationLimit(MAX_BYTES // 1_000_000)
     buffer = QBuffer()
     buffer.setData(bytes(file.data))
     buffer.open(QIODevice.OpenModeFlag.ReadOnly)
