@@ -234,7 +234,7 @@ def _run(
     stopper = reach.stopper
     events = _RunEvents(say)
     runner = Runner(events)
-    say(_("“{name}” runs").format(name=program.name))
+    say(_("Running “{name}”").format(name=program.name))
     if interrupted.is_set():
         return FAILED if say.is_lost else INTERRUPTED
     owners = {name: owner.node_id for name, owner in found.owners.items()}
@@ -308,7 +308,7 @@ class _RunEvents:
 def stop_lines(report: StopReport) -> list[str]:
     """Return the result of a stop as lines: "all 2 robots stopped (41 ms)", and each robot that did not."""
     strange = [
-        _("“{program}” answered Stop in the name of {robot}; that does not count.").format(
+        _("“{program}” replied to Stop on behalf of {robot}; the reply was ignored.").format(
             program=program, robot=name
         )
         for name, program in report.strangers

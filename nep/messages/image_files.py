@@ -200,7 +200,7 @@ class _Jpeg(_Reader):
             raise DecodeError(
                 "image",
                 self.size,
-                _("a JPEG image with {bits} bits per colour is not supported; use PNG").format(bits=bits),
+                _("JPEG images with {bits} bits per channel are not supported; use PNG").format(bits=bits),
             )
         sampling = [self.number(at + 9 + 3 * each, 1) for each in range(components)]
         factors = [(each >> 4, each & 15) for each in sampling]

@@ -36,7 +36,7 @@ def codec_with(codec: Codec, image: ImageFormat | None) -> Codec:
         return codec
     if not isinstance(image, ImageFormat):
         raise WrongTypeError(
-            _("image is a '{kind}'; give a 'nep.ImageFormat'").format(kind=type(image).__name__)
+            _("image must be a 'nep.ImageFormat', not '{kind}'").format(kind=type(image).__name__)
         )
     if codec is not CODECS["image"]:
         raise ValueError(_("image applies only to images; publish them as 'image'"))

@@ -25,7 +25,7 @@ def test_start_page_examples_are_complete():
         ("Greeting", "Waves when it sees a face"),
         ("Reaction to touch", "Laughs when its head is touched"),
         ("Tour guide", "Walks to three stations and speaks"),
-        ("A quiz", "Asks; a touch on its head is “yes”"),
+        ("A quiz", "Asks questions; touch its head to answer “yes”"),
         ("A dance", "Sways and blinks, by functions"),
         ("A careful walk", "Walks while nothing is in its way"),
         ("The finder", "Looks for the ball and for a face"),

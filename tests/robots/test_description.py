@@ -138,7 +138,7 @@ def broken(change) -> tuple[str, ...]:
         (lambda d: d["rb:safeStop"].update(action="halt"),
          "rb:safeStop.action names 'halt', which is not an action"),
         (lambda d: d["rb:safeStop"].update(action="say"),
-         "'say' is the safe stop, so its input must not require anything"),
+         "'say' is the safe stop, so its input must not have required fields"),
         (lambda d: d["actions"]["turn"]["input"].update({"$ref": "http://example.org"}),
          "actions.turn.input uses $ref, which is not supported; write the definition in place"),
         (lambda d: d.update({"rb:profile": 2}), "rb:profile must be 1"),

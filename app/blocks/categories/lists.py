@@ -131,7 +131,7 @@ _READING = (
         "lists_is_empty",
         "%LIST is empty",
         icon="circle-dashed",
-        tooltip="Whether nothing is in the list.",
+        tooltip="True if the list is empty.",
         python="is_empty_list(%LIST)",
         arguments=(_LIST,),
         check="Boolean",

@@ -244,7 +244,7 @@ def _value(gap: ValueInput) -> str:
         words = _("{kind}; {value} by default").format(kind=words, value=f"{gap.default:g}")
     if gap.only is None:
         return words
-    return _("{kind}; used to access an item by its number").format(kind=words)
+    return _("{kind}; only if you choose an item by its number").format(kind=words)
 
 
 def _choice(field: ChoiceField) -> str:

@@ -40,7 +40,7 @@ class StopNews:
     def tell_person(self, report: StopReport, origin: str) -> None:
         """Report in the Console, for ``origin``, and by an alert while a robot may still move."""
         for name, program in report.strangers:
-            sentence = _("“{program}” answered Stop in the name of {robot}; that does not count").format(
+            sentence = _("“{program}” replied to Stop on behalf of {robot}; the reply was ignored").format(
                 program=program, robot=name
             )
             self._console.add("error", origin, sentence)

@@ -53,8 +53,8 @@ def announced(message: Message) -> Robot:
     """
     size = len(message.data)
     if size > MAX_BYTES:
-        said = _("it has {size} MB; the limit is {MAX_BYTES} MB").format(
-            size=number(size / 1000000.0, ".1f"), MAX_BYTES=number(MAX_BYTES / 1000000.0, ".0f")
+        said = _("it has {size} MB; the limit is {limit} MB").format(
+            size=number(size / 1000000.0, ".1f"), limit=number(MAX_BYTES / 1000000.0, ".0f")
         )
         raise DescriptionError(message.topic, (said,))
     payload = message.payload

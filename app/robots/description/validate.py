@@ -196,7 +196,7 @@ def _contradictions(model: Mapping[str, object]) -> Iterator[str]:
     if stop not in actions:
         yield _("rb:safeStop.action names '{stop}', which is not an action").format(stop=stop)
     elif part(part(actions, stop), "input").get("required"):
-        yield _("'{stop}' is the safe stop, so its input must not require anything").format(stop=stop)
+        yield _("'{stop}' is the safe stop, so its input must not have required fields").format(stop=stop)
     resources_named = set(names(model.get("rb:resources")))
     for name in (set(properties) | _RESERVED) & set(part(model, "events")) | set(properties) & _RESERVED:
         yield _("'{name}' is used for two things of one robot; their topics would be the same").format(

@@ -65,8 +65,8 @@ class Driver:
             raise DescriptionError(
                 name,
                 (
-                    _("it is larger than {MAX_BYTES} MB, the limit").format(
-                        MAX_BYTES=number(MAX_BYTES / 1000000.0, ".0f")
+                    _("it is larger than {limit} MB, the limit").format(
+                        limit=number(MAX_BYTES / 1000000.0, ".0f")
                     ),
                 ),
             )

@@ -244,7 +244,7 @@ class DocumentController:
         if earlier is None:
             self._say(_("Saved {name}").format(name=document.name))
             return
-        then = _("{name}, before").format(name=document.name)
+        then = _("{name} (previous version)").format(name=document.name)
         said = words.format(name=document.name)
         self._say(said, _("Open"), lambda: self.copy(earlier.copy, then))
 
@@ -317,7 +317,7 @@ class DocumentController:
             if each.earlier is None:
                 continue
             if stamp_of(each.earlier.path) != each.stamp:
-                name = _("{name}, before").format(name=each.earlier.path.stem)
+                name = _("{name} (previous version)").format(name=each.earlier.path.stem)
                 self._documents.copy(each.earlier.copy, name)  # the file was changed since then
                 continue
             there = self._documents.with_path(each.earlier.path)  # reopened before "Undo" was pressed

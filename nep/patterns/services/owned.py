@@ -101,7 +101,7 @@ class ServiceRegistry:
             plain_function("callback", callback)
         at_least("threads", threads, 0)
         if threads and callback is None:
-            raise ValueError(_("threads need a callback; give a callback"))
+            raise ValueError(_("'threads' requires a callback"))
         transport = self._service_transport()
         id_, number = self._new_id()
         spec = ServerSpec(id_, service, configuration, self._wait_s, number, msg_type)

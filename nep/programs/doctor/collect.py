@@ -48,7 +48,7 @@ else:
 __all__ = ["PORTS", "collect_facts", "collect_in_steps", "loopback_problem", "start_obstacle"]
 
 PORTS: Mapping[int, str] = {
-    7000: lazy("which programs of nep up to 0.5.4.5, nep-js and C# connect to"),
+    7000: lazy("used by programs of nep up to 0.5.4.5, nep-js and C#"),
     50000: lazy("which programs of nep 0.5.4.8 connect to"),
     7777: lazy("from which tools of the original NEP read the topics"),
     12345: lazy("which shuts down programs of the original NEP"),

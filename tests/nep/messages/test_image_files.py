@@ -85,7 +85,7 @@ def test_decompression_bombs_use_little_memory_in_library_and_studio() -> None:
         ("jpeg of many passes", "4000 × 4000 pixels in 90 passes take too long to decode"),  # noqa: RUF001
         ("png of a chunk of gigabytes", "the PNG image is damaged: it is truncated"),
         ("png with two heads", "the PNG image is damaged: it has two header chunks"),
-        ("jpeg of 12 bits", "a JPEG image with 12 bits per colour is not supported"),
+        ("jpeg of 12 bits", "JPEG images with 12 bits per channel are not supported"),
         ("nothing", "the image is empty"),
         ("a word", "it is neither a JPEG nor a PNG image"),
     ],

@@ -585,7 +585,7 @@ def test_invalid_server_arguments_are_rejected(make: Make) -> None:
     for wrong in ({"threads": -1}, {"threads": 1.5}, {"threads": True}):
         with pytest.raises(ValueError, match="threads"):
             node.new_server("/x", doubled, **wrong)
-    with pytest.raises(ValueError, match="threads need a callback"):
+    with pytest.raises(ValueError, match="'threads' requires a callback"):
         node.new_server("/x", threads=1)
     with pytest.raises(ValueError, match="callback"):
         node.new_server("/x", "no function")

@@ -129,7 +129,7 @@ def test_previous_content_of_an_overwritten_file_is_kept_as_a_copy(
     commands.files.open(path)
     window.session.document.edited(changed("z"))
     commands.run("tab.close")
-    copies = list((home / "earlier").glob("Mine, before *.nepb"))
+    copies = list((home / "earlier").glob("Mine (previous version) *.nepb"))
     assert [copy.read_bytes() for copy in copies] == [before]
 
 
@@ -170,7 +170,7 @@ def test_undo_does_not_overwrite_changes_of_another_program(commands, window, tm
     path.write_bytes(before + b"\n")
     press_toast(window)
     assert path.read_bytes() == before + b"\n"
-    assert names(window) == ["Mine, before"]
+    assert names(window) == ["Mine (previous version)"]
     assert window.session.document.path is None  # a copy: saving it writes over neither of them
     assert window.session.document.workspace == BLOCKS
 
@@ -204,7 +204,7 @@ def test_saving_over_changes_of_another_program_backs_them_up(commands, window, 
     press_toast(window)
     document = window.session.document
     assert document.workspace["blocks"]["blocks"][0]["id"] == "theirs"
-    assert (document.name, document.path) == ("Mine, before", None)
+    assert (document.name, document.path) == ("Mine (previous version)", None)
 
 
 def test_saving_twice_is_not_detected_as_an_external_change(commands, window, home: Path, tmp_path) -> None:
@@ -242,7 +242,7 @@ def test_save_as_backs_up_the_file_it_overwrites(commands, window, answers, home
     assert b'"z"' in answers.path.read_bytes()
     assert [copy.read_bytes() for copy in (home / "earlier").iterdir()] == [before]
     press_toast(window)
-    assert (names(window), window.session.document.path) == (["Theirs", "Theirs, before"], None)
+    assert (names(window), window.session.document.path) == (["Theirs", "Theirs (previous version)"], None)
     assert window.session.document.workspace == BLOCKS
 
 

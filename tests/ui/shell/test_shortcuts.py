@@ -320,7 +320,7 @@ def test_shortcuts_are_removed_and_reset(sheet: ShortcutSheet, commands: Command
     assert sheet.said.text() == "Stop now has only F12."
     assert keys.of("run.stop") == ("F12",)
     sheet._take_away()
-    assert sheet.said.text() == "F12 always remains a shortcut of Stop."
+    assert sheet.said.text() == "F12 can't be removed: it always triggers Stop."
 
 
 def test_ctrl_enter_in_the_palette_opens_the_shortcut_sheet(

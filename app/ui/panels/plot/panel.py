@@ -328,7 +328,7 @@ class PlotPanel(PanelWidget):
         self.about.setText(foot_words(self.curves, has_cursors=both is not None, distance=distance))
         count, whole = self._points
         points = ngettext("{count} point", "{count} points", count).format(count=grouped(count))
-        words = _("{points}, all shown") if whole else _("{points}, 2 per px")
+        words = _("{points}, all shown") if whole else _("{points}, downsampled to 2 per pixel")
         self.points.setText(words.format(points=points))
         self.advice.show_for(self.curves, self.shown)
 

@@ -197,7 +197,9 @@ class RecordSheet(Overlay):
 
     def _make_foot(self) -> None:
         theme = self.theme
-        self.foot = label(_("A power failure loses 1 s at most"), "small", role="textTertiary", wrap=True)
+        self.foot = label(
+            _("At most 1 s is lost in a power failure"), "small", role="textTertiary", wrap=True
+        )
         self.bookmark = Button(theme, _("Bookmark"), "bookmark", size="form")
         self.bookmark.clicked.connect(self._bookmark)
         self.record = Button(theme, _("Record"), "circle-dot", kind="primary", size="form")
@@ -409,7 +411,7 @@ class RecordSheet(Overlay):
         self.foot.setText(
             _("Waiting for a master; recording starts when one appears")
             if no_master
-            else _("A power failure loses 1 s at most")
+            else _("At most 1 s is lost in a power failure")
         )
 
     def _show_meters(self) -> None:

@@ -237,7 +237,7 @@ class ShortcutSheet(Overlay):
         if entry is None or entry.kind != "command" or not self._shortcuts.of(entry.name):
             return
         if entry.name == STOP and len(self._shortcuts.of(STOP)) == 1:
-            self._set_status(_("F12 always remains a shortcut of Stop."))
+            self._set_status(_("F12 can't be removed: it always triggers Stop."))
             return
         said = _("“{command}” no longer has a shortcut.").format(command=entry.words)
         self._stop_waiting(_("Stop now has only F12.") if entry.name == STOP else said)

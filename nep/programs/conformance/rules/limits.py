@@ -53,7 +53,7 @@ def _malformed(bench: Bench) -> None:
 
 @rule(
     "malformed-named",
-    lazy("A renewal describes a message that a subscriber could not parse as its 'problem'."),
+    lazy("If a subscriber can't parse a message, its next renewal describes it in 'problem'."),
     "bounds",
     "statistics",
 )

@@ -143,7 +143,7 @@ def test_million_points_are_reduced_to_two_per_pixel(panel) -> None:
     samples.extend(times, np.sin(times), np.zeros(len(times), dtype=bool))
     panel._choose_span("all")
     look(panel)
-    assert panel.points.text() == "1\u2009000\u2009000 points, 2 per px"
+    assert panel.points.text() == "1\u2009000\u2009000 points, downsampled to 2 per pixel"
     (item,) = panel.canvas._lines.values()
     assert len(item.xData) < 3 * panel.canvas.columns
     assert len(drawn(panel, panel.theme.series(0))) > 0.9 * panel.canvas.area.width()

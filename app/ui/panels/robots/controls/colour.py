@@ -207,7 +207,7 @@ class ColourChoice(QWidget):
         self.other.setCheckable(True)
         self.strip = HueStrip(theme, _("{value}, all colours").format(value=parameter.title))
         self.field = line_field(theme, parameter)
-        self.field.setAccessibleName(_("{value}, as a number like #33aaff").format(value=parameter.title))
+        self.field.setAccessibleName(_("{value}, hex code such as #33aaff").format(value=parameter.title))
         self.field.setPlaceholderText("#33aaff")
         self.field.setFixedWidth(round(theme.scaled(96)))
         self.sentence = ""
