@@ -35,34 +35,6 @@ LAYERS = (
 )
 PLUG_INS = {"PANEL", "CATEGORY", "ROBOT", "BACKEND"}
 QT = {"PySide6", "shiboken6", "PyQt6", "PyQt5"}
-SMALL_LINES = 60
-# Small modules that one other module alone imports, and what each earns its file by (docs/adr/0020-rooms.md).
-EARNED = {
-    "app.core.graph.dot": "pure, and tested alone",
-    "app.core.robots.awaited": "pure, and tested alone",
-    "app.core.robots.motion.bridged_commands": "pure, and tested alone",
-    "nep.programs.alarms.losses": "pure, and tested alone",
-    "nep.programs.blackboard.ages": "pure, and tested alone",
-    "nep.programs.web.kept_out": "state with a lock of its own",
-    "nep.cli.doctor": "one of a list: the commands of nep",
-    "nep.programs.doctor.diagnose": "joins collecting and judging, which know nothing of each other",
-    "app.ui.panels.inspector.pace": "pure, and tested alone",
-    "app.ui.panels.plot.pace": "pure, and tested alone",
-    "app.ui.panels.plot.advice": "a line of its own: the plot panel is as long as may be",
-    "app.core.run.edits_since_run": "pure, and tested alone",
-    "app.core.run.run_warnings": "pure, and tested alone",
-    "app.core.networks.live_network": "elsewhere it would close a cycle of imports",
-    "app.core.run.stop_job": "runs in threads without shared state, and is tested alone",
-    "app.core.run.stop_news": "a line of its own: the run is as long as may be",
-    "app.core.run.trial": "pure, and tested alone",
-    "app.ui.shell.stop_keys": "hears keys before all else, and is tested alone",
-    "app.ui.blockly.held_keys": "is tested without a page",
-    "app.ui.blockly.page_json": "is tested without a page",
-    "app.ui.panels.registry": "a seam: panels, ours and those of plug-ins, are found through it",
-    "app.ui.widgets.inputs.check_box": "a widget as the others beside it are",
-    "app.ui.widgets.inputs.switch": "one of a list: the widgets; two use it through their face",
-}
-
 NAMED_BY_ROS = {"nep.geometry", "nep.sensor"}
 """Their classes have the names that ROS gives them: `Header`, `Range`."""
 
@@ -143,25 +115,6 @@ def sleeps(tree: ast.AST) -> list[int]:
     ]
 
 
-def small_with_one_importer(found: Iterable[Module]) -> set[str]:
-    """Modules of less than `SMALL_LINES` that one other imports; plug-ins are found by their folder."""
-    known = {module.name: module for module in found}
-    importers: dict[str, set[str]] = {name: set() for name in known}
-    for module in known.values():
-        for item in imports(module.tree):
-            target = item.target if item.target in known else item.target.rpartition(".")[0]
-            if target in known and target != module.name:
-                importers[target].add(module.name)
-    return {
-        name
-        for name, module in known.items()
-        if len(importers[name]) == 1
-        and module.path.name != "__init__.py"
-        and not bound_plug_ins(module.tree)
-        and len(module.path.read_text(encoding="utf-8").splitlines()) < SMALL_LINES
-    }
-
-
 def bound_plug_ins(tree: ast.Module) -> set[str]:
     """Which of the plug-in names a module binds."""
     targets = [
@@ -238,27 +191,6 @@ def test_plug_ins_do_not_import_each_other() -> None:
         if item.target in plug_ins or item.target.rpartition(".")[0] in plug_ins
     ]
     assert faults == []
-
-
-def test_small_modules_with_one_importer_are_justified() -> None:
-    assert small_with_one_importer(modules()) == EARNED.keys()
-
-
-def test_small_module_with_one_importer_is_detected(tmp_path: Path) -> None:
-    def module(name: str, source: str) -> Module:
-        path = tmp_path / f"{name}.py"
-        path.write_text(source, encoding="utf-8")
-        return Module(name, path, ast.parse(source))
-
-    long = "x = 1\n" * SMALL_LINES
-    made = [
-        module("a", "import b, d\ndef f():\n    from c import x\n    from plug import y\n"),
-        module("b", "x = 1\n"),
-        module("c", long),
-        module("d", "import b\n"),
-        module("plug", "PANEL = 1\n"),
-    ]
-    assert small_with_one_importer(made) == {"d"}
 
 
 def classes_with_two_meanings(found: Iterable[Module]) -> dict[str, list[str]]:

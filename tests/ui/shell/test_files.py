@@ -129,7 +129,7 @@ def test_previous_content_of_an_overwritten_file_is_kept_as_a_copy(
     commands.files.open(path)
     window.session.document.edited(changed("z"))
     commands.run("tab.close")
-    copies = list((home / "earlier").glob("Mine (previous version) *.nepb"))
+    copies = list((home / "earlier").glob("Mine, before *.nepb"))
     assert [copy.read_bytes() for copy in copies] == [before]
 
 
