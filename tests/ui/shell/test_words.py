@@ -121,7 +121,20 @@ def settle(qtbot) -> None:
 
 
 @pytest.fixture
-def whole(qtbot, pseudo, session: Session, theme: Theme, tmp_path: Path) -> Iterator[MainWindow]:
+def language(request: pytest.FixtureRequest) -> Iterator[str]:
+    """Install the language of the window: the pseudo-language unless a test names another one."""
+    code = getattr(request, "param", i18n.PSEUDO)
+    if code == i18n.PSEUDO:
+        request.getfixturevalue("pseudo")
+    else:
+        i18n.install(code)
+    yield code
+    if code != i18n.PSEUDO:
+        i18n.install(i18n.ENGLISH)
+
+
+@pytest.fixture
+def whole(qtbot, language: str, session: Session, theme: Theme, tmp_path: Path) -> Iterator[MainWindow]:
     """The window with an example of everything that it can show around the panels."""
     session.settings.add_recent(saved(tmp_path / "Mine.nepb"))
     window = MainWindow(session, theme, PANELS, EXAMPLES, asks=Answers())
@@ -177,6 +190,21 @@ def test_all_texts_of_the_window_are_translated(qtbot, whole: MainWindow, tmp_pa
 @pytest.mark.parametrize("size", [(1440, 900), (1100, 700)])
 def test_window_has_room_for_longer_translations(qtbot, whole: MainWindow, size: tuple[int, int]) -> None:
     whole.resize(*size)
+    faults: list[str] = []
+
+    def look(what: str, root: QWidget) -> None:
+        settle(qtbot)
+        faults.extend(f"{what}: {fault}" for fault in clipped(root))
+
+    everything(qtbot, whole, look)
+    assert "\n".join(faults) == ""
+
+
+@pytest.mark.parametrize(
+    "language", [code for code, _name in i18n.offered() if code != i18n.ENGLISH], indirect=True
+)
+def test_window_clips_no_text_in_any_language(qtbot, whole: MainWindow) -> None:
+    whole.resize(1100, 700)
     faults: list[str] = []
 
     def look(what: str, root: QWidget) -> None:
