@@ -310,7 +310,7 @@ def test_doctor_findings_are_translated() -> None:
     ):
         for finding in findings(facts):
             if finding.id != "versions":
-                said(finding.sentence, finding.mend, data=("ip link", "py", "AirDrop", "Handoff"))
+                said(finding.sentence, finding.fix, data=("ip link", "py", "AirDrop", "Handoff"))
 
 
 def test_remote_access_alerts_are_translated() -> None:

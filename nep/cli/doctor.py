@@ -51,7 +51,7 @@ def _show(found: tuple[doctors.Finding, ...]) -> None:
     signs, arrow = (_SIGNS, "→") if is_unicode else (_PLAIN_SIGNS, "->")
     for each in found:
         out.print(Text.assemble((f"{signs[each.severity]} ", _STYLES[each.severity]), escaped(each.sentence)))
-        if each.mend:
-            out.print(Text.assemble(f"  {arrow} ", escaped(each.mend)))
+        if each.fix:
+            out.print(Text.assemble(f"  {arrow} ", escaped(each.fix)))
         if each.command:
             out.print(Text.assemble("    ", (escaped(each.command), "cyan")))

@@ -158,7 +158,7 @@ def greet(hour: Hour) -> None:
         (hat,) = kind_of(studio, "events_started")
         condition = hand.below(hat, "Control", "control_if")
         has_problem(studio, "if needs a condition")
-    with film.step("“sees a face” goes into the gap: nothing to mend"):
+    with film.step("“sees a face” goes into the gap: nothing to fix"):
         hand.fill(condition, "Sensors", "robot_pepper_get_sees_face")
         has_no_problem(studio)
     with film.step("“wave” goes into it"):
@@ -190,7 +190,7 @@ def react_to_touch(hour: Hour) -> str:
     with film.step("A list, which nothing has set yet: Problems says so"):
         add = hand.below(change, "Lists", "lists_add")
         has_problem(studio, "“list” is used but never set")
-    with film.step("One click mends it"):
+    with film.step("One click fixes it"):
         studio.click("Set it to an empty list at the start")
         has_no_problem(studio)
     with film.step("Run, and two touches: the Variables panel shows both values"):
@@ -247,7 +247,7 @@ def make_mistakes(hour: Hour) -> None:
     with film.step("The value goes to the toolbox, which deletes it"):
         hand.delete(face)
         has_no_problem(studio, "sees a face")
-    with film.step("The loose block goes to its place: nothing to mend"):
+    with film.step("The loose block goes to its place: nothing to fix"):
         (wave,) = kind_of(studio, "robot_pepper_do_wave")
         hand.move(walk, hand.end(wave))
         until(lambda: holds(studio, wave, walk), "it hangs there")

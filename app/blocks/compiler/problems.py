@@ -60,7 +60,7 @@ class ProblemCollector:
         self._add(
             "warning", None, None, subject,
             _("These blocks have no start. Put “{start}” above them.").format(start=subject),
-            mend=_("Add “when started”"), mend_action=f"add:{_STARTER}",
+            fix=_("Add “when started”"), fix_action=f"add:{_STARTER}",
         )  # fmt: skip
 
     def unattached(self, placed: Placed, block: Block) -> None:
@@ -109,7 +109,7 @@ class ProblemCollector:
         """Report a call of an undefined function."""
         self._add(
             "error", placed, block, self.label(placed, block), block.undefined,
-            mend=_("Define it"), mend_action=f"define:{placed.id}",
+            fix=_("Define it"), fix_action=f"define:{placed.id}",
         )  # fmt: skip
 
     def never_set(self, placed: Placed, block: Block, id: str, name: str, *, is_list: bool) -> None:
@@ -117,8 +117,8 @@ class ProblemCollector:
         subject = f"“{name}”"
         self._add(
             "warning", placed, block, subject, _("{name} is used but never set.").format(name=subject),
-            mend=_("Set it to an empty list at the start") if is_list else _("Set it to 0 at the start"),
-            mend_action=f"begin:{'list' if is_list else 'number'}:{id}",
+            fix=_("Set it to an empty list at the start") if is_list else _("Set it to 0 at the start"),
+            fix_action=f"begin:{'list' if is_list else 'number'}:{id}",
         )  # fmt: skip
 
     def never_received(self, placed: Placed, block: Block, name: str) -> None:
@@ -126,7 +126,7 @@ class ProblemCollector:
         subject = f"“{name}”"
         self._add(
             "warning", placed, block, subject, _("Nothing receives {name}.").format(name=subject),
-            mend=_("Add “when I receive”"), mend_action=f"receive:{name}",
+            fix=_("Add “when I receive”"), fix_action=f"receive:{name}",
         )  # fmt: skip
 
     def never_sent(self, placed: Placed, block: Block, name: str) -> None:
@@ -151,8 +151,8 @@ class ProblemCollector:
         )  # fmt: skip
         self._add(
             "warning", placed, self._catalogue.blocks.get(placed.type), name, sentence,
-            mend=_("Run one after the other") if found.put else None,
-            mend_action=f"after:{':'.join(found.put)}" if found.put else None,
+            fix=_("Run one after the other") if found.put else None,
+            fix_action=f"after:{':'.join(found.put)}" if found.put else None,
         )  # fmt: skip
 
     def wrong_field(self, placed: Placed, block: Block, error: FieldError) -> None:
@@ -177,7 +177,7 @@ class ProblemCollector:
             sentence = _("{robot} is not connected, so {block} will be skipped.")
             self._add(
                 "warning", placed, block, name, sentence.format(robot=robot, block=skipped),
-                mend=_("Show the robots"), mend_action=f"connect:{robot}", style="robot",
+                fix=_("Show the robots"), fix_action=f"connect:{robot}", style="robot",
             )  # fmt: skip
             return True
         if block is None:
@@ -205,7 +205,7 @@ class ProblemCollector:
             )
             self._add(
                 "warning", placed, None, name, sentence.format(block=name, own_block=words),
-                mend=_("Show “{block}”").format(block=words), mend_action=f"point.block:{own.type}",
+                fix=_("Show “{block}”").format(block=words), fix_action=f"point.block:{own.type}",
             )  # fmt: skip
         elif placed.type.partition("_")[0] in prefixes:
             sentence = _("“{block}” is not known to this version of NEP Studio. It is kept but skipped.")
@@ -247,7 +247,7 @@ class ProblemCollector:
                         "The variable in “{block}” has no name in this file. Name it, or choose another "
                         "variable in the block."
                     ).format(block=name),
-                    mend=_("Name it"), mend_action=f"variable.rename:{id}",
+                    fix=_("Name it"), fix_action=f"variable.rename:{id}",
                 )  # fmt: skip
 
     def absent_blocks(self) -> tuple[str, ...]:
@@ -295,7 +295,7 @@ class ProblemCollector:
         if block.type == "control_wait_until" and not _is_literal(placed, "CONDITION"):
             self._add(
                 "info", placed, block, self.label(placed, block), self._wait_forever_sentence(placed, block),
-                mend=_("Add a time limit"), mend_action=f"limit:{placed.id}",
+                fix=_("Add a time limit"), fix_action=f"limit:{placed.id}",
             )  # fmt: skip
         robot = self._catalogue.connected.get(str(placed.fields.get("ROBOT")))
         action = robot.action(block.robot.name) if robot and block.robot else None
@@ -339,8 +339,8 @@ class ProblemCollector:
         subject: str,
         sentence: str,
         *,
-        mend: str | None = None,
-        mend_action: str | None = None,
+        fix: str | None = None,
+        fix_action: str | None = None,
         style: str | None = None,
     ) -> None:
         id = None if placed is None else placed.id
@@ -352,8 +352,8 @@ class ProblemCollector:
                 category=block.style if block is not None else style,
                 subject=subject,
                 sentence=sentence,
-                mend=mend,
-                mend_action=mend_action,
+                fix=fix,
+                fix_action=fix_action,
                 icon=block.icon if block is not None else "circle-help",
             ),
         )

@@ -16,8 +16,8 @@ ASIDE = 420
 """Horizontal distance of a new script from the others; most are not wider."""
 
 
-def mend(workspace: Mapping[str, object], action: str) -> dict[str, object] | None:
-    """Return the workspace after a problem's ``mend_action``; None for an action that isn't about blocks.
+def fix(workspace: Mapping[str, object], action: str) -> dict[str, object] | None:
+    """Return the workspace after a problem's ``fix_action``; None for an action that isn't about blocks.
 
     ``limit:<id>`` gives a "wait until" a time limit, ``add:<type>`` puts a block above the first script
     without a start, ``define:<id>`` creates the function that a block calls, ``begin:list:<id>`` and

@@ -14,7 +14,7 @@ class Problem:
     """Problem shown before Run.
 
     ``sentence`` contains ``subject``, which is shown bold. ``category`` is the style of the block's colour,
-    ``icon`` its icon. ``mend`` is a button's text, ``mend_action`` its effect (`app.blocks.fixes.fixes`, or
+    ``icon`` its icon. ``fix`` is a button's text, ``fix_action`` its effect (`app.blocks.fixes.fixes`, or
     ``connect:<robot>``). An error means that the program would stop with this sentence at that block.
     """
 
@@ -23,8 +23,8 @@ class Problem:
     category: str | None
     subject: str
     sentence: str
-    mend: str | None = None
-    mend_action: str | None = None
+    fix: str | None = None
+    fix_action: str | None = None
     icon: str = ""
 
 

@@ -12,7 +12,7 @@ from pathlib import Path
 
 from app.blocks import Problem, Program, compile_behaviour, editor_definitions
 from app.blocks.compiler.stack import Stack
-from app.blocks.fixes.fixes import mend
+from app.blocks.fixes.fixes import fix
 from app.blocks.fixes.replace_robot import blocks_of, use_robot
 from app.core.documents.background_worker import BackgroundWorker
 from app.core.documents.examples import translated
@@ -57,7 +57,7 @@ class Document:
     """One behaviour.
 
     ``key`` identifies it among the open ones. ``revision`` increases when it is replaced from outside the
-    editor, ``mends`` when Studio changed its blocks in a way that can be undone, ``edits`` with every edit.
+    editor, ``fixes`` when Studio changed its blocks in a way that can be undone, ``edits`` with every edit.
     """
 
     def __init__(
@@ -79,7 +79,7 @@ class Document:
         self.saved_at: float | None = None
         self._stamp: Stamp | None = None  # of the file, as last read or written
         self.revision = 0
-        self.mends = 0
+        self.fixes = 0
         self.edits = 0
         self.definitions_revision = 0
         self._connected: tuple[Robot, ...] = ()
@@ -193,16 +193,16 @@ class Document:
         if self.dirty:
             self._write_journal()
 
-    def mend(self, action: str) -> bool:
+    def fix(self, action: str) -> bool:
         """Apply the action of a problem's button to the blocks.
 
         Return False when it doesn't concern blocks.
         """
-        mended = deep_json.deeply(lambda: mend(self.workspace, action))
-        if mended is None:
+        fixed = deep_json.deeply(lambda: fix(self.workspace, action))
+        if fixed is None:
             return False
-        self.edited(mended)
-        self.mends += 1
+        self.edited(fixed)
+        self.fixes += 1
         return True
 
     def use_robot(self, missing: str, robot: Robot) -> bool:
@@ -212,7 +212,7 @@ class Document:
             return False
         workspace = deep_json.deeply(lambda: use_robot(self.workspace, missing, known.model, robot))
         self.edited(workspace)
-        self.mends += 1
+        self.fixes += 1
         return True
 
     def lose_file(self) -> None:

@@ -27,7 +27,7 @@ class Listed:
     """One line: the problem, its fixes (best first), and the number of blocks concerned."""
 
     problem: Problem
-    mends: tuple[Mend, ...]
+    fixes: tuple[Mend, ...]
     blocks: int = 1
 
     @property
@@ -58,7 +58,7 @@ def listed(
     for problem in problems:
         name = _missing(problem)
         if name is None:
-            own = (Mend(problem.mend, problem.mend_action),) if problem.mend and problem.mend_action else ()
+            own = (Mend(problem.fix, problem.fix_action),) if problem.fix and problem.fix_action else ()
             found.append(Listed(problem, own))
         elif name not in place:
             place[name] = len(found)
@@ -67,12 +67,12 @@ def listed(
             if robot is not None:
                 blocks = asked.get(name, frozenset())
                 able = [each for each in connected if can_do(blocks, robot.model, each, types[each.name])]
-            mends = robot_mends(name, robot, able, virtual_models)
-            found.append(Listed(problem, mends, max(1, grey.get(name, 0))))
+            fixes = robot_fixes(name, robot, able, virtual_models)
+            found.append(Listed(problem, fixes, max(1, grey.get(name, 0))))
     return tuple(_counted(each) for each in found)
 
 
-def robot_mends(
+def robot_fixes(
     name: str,
     robot: Robot | None,
     able: Sequence[Robot],
@@ -82,13 +82,13 @@ def robot_mends(
     if robot is None:
         return (_show_robots(name),)
     alike = [other for other in able if other.model == robot.model] or able
-    mends = [
+    fixes = [
         Mend(_("Use {robot}").format(robot=other.name), f"robot.use:{name}:{other.name}")
         for other in alike[:MAX_FIXES]
     ]
-    if robot.model in virtual_models and len(mends) < MAX_FIXES:
-        mends.append(Mend(_("Start a virtual {robot}").format(robot=name), f"robot.virtual:{name}"))
-    return tuple(mends) or (_show_robots(name),)
+    if robot.model in virtual_models and len(fixes) < MAX_FIXES:
+        fixes.append(Mend(_("Start a virtual {robot}").format(robot=name), f"robot.virtual:{name}"))
+    return tuple(fixes) or (_show_robots(name),)
 
 
 def _show_robots(name: str) -> Mend:
@@ -97,7 +97,7 @@ def _show_robots(name: str) -> Mend:
 
 
 def _missing(problem: Problem) -> str | None:
-    action = problem.mend_action or ""
+    action = problem.fix_action or ""
     return action.removeprefix(CONNECT) if action.startswith(CONNECT) else None
 
 

@@ -117,7 +117,7 @@ class MasterStart:
             return ""
         hindered = doctor.start_obstacle(self._address)
         if hindered is not None:
-            return f"{hindered.sentence} {hindered.mend}"
+            return f"{hindered.sentence} {hindered.fix}"
         self.first = True
         self._log_crash()
         try:

@@ -80,8 +80,8 @@ def _absent(program: Program, stack: Stack) -> dict[str, str]:
     # A block whose robot is missing would do nothing.
     if stack.id not in program.absent:
         return {}
-    mends = (each.mend_action or "" for each in program.problems if each.block_id == stack.id)
-    robot = next((mend.removeprefix(CONNECT) for mend in mends if mend.startswith(CONNECT)), "")
+    fixes = (each.fix_action or "" for each in program.problems if each.block_id == stack.id)
+    robot = next((fix.removeprefix(CONNECT) for fix in fixes if fix.startswith(CONNECT)), "")
     if not robot:
         return {stack.id: _("Its robot is not connected, so it can't be tried.")}
     return {stack.id: _("{robot} is not connected, so it can't be tried.").format(robot=robot)}

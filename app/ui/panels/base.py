@@ -79,13 +79,13 @@ class Hindrance:
 
     Attributes:
         sentence: The reason.
-        mend: What to do; may be empty.
+        fix: What to do; may be empty.
         button: Text of the button, such as "Resume".
         run: Action of the button.
     """
 
     sentence: str
-    mend: str
+    fix: str
     button: str
     run: Callable[[], object]
 

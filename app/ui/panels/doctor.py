@@ -39,7 +39,7 @@ class NextStep:
 
     words: str
     run: Callable[[], object]
-    mends: bool = True
+    fixes: bool = True
     """True: the step fixes the problem, so the doctor checks again afterwards."""
 
 
@@ -148,7 +148,7 @@ class DoctorPanel(PanelWidget):
     @staticmethod
     def _all(own: Sequence[Hindrance], found: Sequence[Finding]) -> list[Finding]:
         here = [
-            Finding(f"studio:{place}", "error", each.sentence, each.mend) for place, each in enumerate(own)
+            Finding(f"studio:{place}", "error", each.sentence, each.fix) for place, each in enumerate(own)
         ]
         return list(in_order([*here, *found]))
 
@@ -191,9 +191,9 @@ class DoctorPanel(PanelWidget):
         near = self._near[topic]
         if near is None:
             return Hindrance(sentence, "", *ask)
-        mend, use = _("Did you mean {topic}?"), _("Use {topic}")
+        fix, use = _("Did you mean {topic}?"), _("Use {topic}")
         return Hindrance(
-            sentence, mend.format(topic=near), use.format(topic=near), lambda: panel.show_topic(near)
+            sentence, fix.format(topic=near), use.format(topic=near), lambda: panel.show_topic(near)
         )
 
     def _replay_hides(self, topic: str) -> Hindrance:
@@ -201,16 +201,16 @@ class DoctorPanel(PanelWidget):
         sentence = _("A recording is open, so panels show recorded data instead of live data.")
         if not recorded:
             sentence = _("A recording is open and {topic} is not in it.").format(topic=topic_words(topic))
-        mend = _("The checks below are about the live network.")
-        return Hindrance(sentence, mend, _("Back to live"), lambda: self.context.run("replay.live"))
+        fix = _("The checks below are about the live network.")
+        return Hindrance(sentence, fix, _("Back to live"), lambda: self.context.run("replay.live"))
 
     def _network_hides(self, topic: str, lost: str) -> Iterator[Hindrance]:
         # Topics of another network: the doctor can't check them.
         unread = self.session.live.networks.unread(topic)
         words = lost or (f"{topic_words(topic)}: {unread}." if unread else "")
         if words:
-            mend = _("Check its address, and its password or key if it needs one.")
-            yield Hindrance(words, mend, _("Other networks"), lambda: self.context.run(LOOK_COMMAND))
+            fix = _("Check its address, and its password or key if it needs one.")
+            yield Hindrance(words, fix, _("Other networks"), lambda: self.context.run(LOOK_COMMAND))
 
     def _offer_topics(self) -> None:
         live, missed = self.session.live, self.session.doctor.missed
@@ -243,10 +243,10 @@ class DoctorPanel(PanelWidget):
             self.pages.drop(row)
         self.shown = list(found)
         steps = [self._step(finding) for finding in found]
-        mends = [place for place, step in enumerate(steps) if step is not None and step.mends]
+        fixes = [place for place, step in enumerate(steps) if step is not None and step.fixes]
         self.rows = [self._row(finding, step) for finding, step in zip(found, steps, strict=True)]
         for place, row in enumerate(self.rows):
-            row.button.set_kind("primary" if place in mends[:1] else "plain")
+            row.button.set_kind("primary" if place in fixes[:1] else "plain")
             self.pages.put(place, row)
 
     def _show_chip(self, *, is_done: bool) -> None:
@@ -263,7 +263,7 @@ class DoctorPanel(PanelWidget):
         row.set_texts(
             STATUS[finding.severity],
             finding.sentence,
-            finding.mend,
+            finding.fix,
             command=finding.command,
             button=step.words if step is not None else "",
         )
@@ -293,12 +293,12 @@ class DoctorPanel(PanelWidget):
         }.get(finding.id)
         if run is not None:
             return NextStep(
-                run[0], lambda: self.context.run(run[1]), mends=finding.severity in BAD_SEVERITIES
+                run[0], lambda: self.context.run(run[1]), fixes=finding.severity in BAD_SEVERITIES
             )
         if finding.id == "master:none":
             return NextStep(_("Start the master"), self._start_master)
         if finding.command:
-            return NextStep(_("Copy the command"), lambda: self._copy_command(finding.command), mends=False)
+            return NextStep(_("Copy the command"), lambda: self._copy_command(finding.command), fixes=False)
         return None
 
     def _do(self, finding: Finding, step: NextStep | None) -> None:

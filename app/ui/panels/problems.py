@@ -43,7 +43,7 @@ class ProblemRow(QWidget):
     """Row of a problem: icon, block, sentence with its subject in bold, and buttons that fix it."""
 
     pressed = Signal(str)
-    mend = Signal(str)
+    fix = Signal(str)
     stepped = Signal(int)
 
     def __init__(self, theme: Theme, line: Listed, *, large: bool) -> None:
@@ -70,13 +70,13 @@ class ProblemRow(QWidget):
             row.addWidget(Tile(theme, icon, category, 22))
         kind = "bodyLarge" if large else "body"
         row.addWidget(BoldInLine(theme, problem.sentence, problem.subject, kind), 1)
-        self.buttons = [self._mend(mend) for mend in line.mends]
+        self.buttons = [self._fix(fix) for fix in line.fixes]
         for button in self.buttons:
             row.addWidget(button)
 
-    def _mend(self, mend: Mend) -> Button:
-        button = Button(self._theme, mend.words, size="small")
-        button.clicked.connect(lambda: self.mend.emit(mend.action))
+    def _fix(self, fix: Mend) -> Button:
+        button = Button(self._theme, fix.words, size="small")
+        button.clicked.connect(lambda: self.fix.emit(fix.action))
         return button
 
     def holds_focus(self) -> bool:
@@ -192,7 +192,7 @@ class ProblemsPanel(PanelWidget):
     def _row(self, line: Listed) -> ProblemRow:
         row = ProblemRow(self.theme, line, large=self.density == "comfortable")
         row.pressed.connect(lambda block: self.context.run(f"block:{block}"))
-        row.mend.connect(self.context.run)
+        row.fix.connect(self.context.run)
         row.stepped.connect(lambda step: self._step(row, step))
         return row
 

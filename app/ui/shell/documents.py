@@ -9,7 +9,7 @@ from typing import NamedTuple, Protocol, runtime_checkable
 
 from PySide6.QtCore import QObject, QTimer
 
-from app.blocks.fixes.fixes import mend
+from app.blocks.fixes.fixes import fix
 from app.core.documents.document import Document
 from app.core.documents.file_format import SUFFIX, what_behaviours_are
 from app.core.documents.journal import Unsaved
@@ -208,14 +208,14 @@ class DocumentController:
         suggestion = str(folder / f"{document.name}{SUFFIX}")
         self.asks.save(suggestion, lambda path: self.with_newest(lambda: self._save(path)))
 
-    def mend(self, action: str) -> bool:
+    def fix(self, action: str) -> bool:
         """Apply a problem's fix to the blocks; return False if the action isn't a fix."""
         document = self._session.document
-        if deep_json.deeply(lambda: mend(document.workspace, action)) is None:
+        if deep_json.deeply(lambda: fix(document.workspace, action)) is None:
             return False
 
         def change() -> None:
-            document.mend(action)
+            document.fix(action)
 
         self.with_newest(change)
         return True

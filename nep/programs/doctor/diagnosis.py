@@ -46,7 +46,7 @@ def report(found: Sequence[Finding]) -> str:
     lines = []
     for finding in found:
         lines.append(f"{_SIGNS[finding.severity]} {finding.sentence}")
-        lines += [f"    {line}" for line in (finding.mend, finding.command) if line]
+        lines += [f"    {line}" for line in (finding.fix, finding.command) if line]
     return "\n".join(lines) + "\n"
 
 

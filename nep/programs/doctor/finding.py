@@ -23,7 +23,7 @@ class Finding:
     id: str
     severity: Severity
     sentence: str
-    mend: str = ""
+    fix: str = ""
     command: str = ""
     instead: str = ""
 
@@ -31,7 +31,7 @@ class Finding:
     def as_error(self) -> str:
         """Finding formatted as an error: lower case, no full stop, the next step after a semicolon."""
         first = self.sentence.rstrip(".")
-        step = self.mend.rstrip(".")
+        step = self.fix.rstrip(".")
         words = f"{first}; {step[:1].lower()}{step[1:]}" if step else first
         return words[:1].lower() + words[1:]
 

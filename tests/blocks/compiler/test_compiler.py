@@ -115,10 +115,10 @@ def test_absent_robot_and_missing_time_limit_are_reported_as_problems():
     first, second = program.problems
     assert (first.severity, first.block_id, first.category, first.icon) == ("warning", "n", "robot", "hand")
     assert (first.subject, first.sentence) == ("wave", "NAO is not connected, so wave will be skipped.")
-    assert (first.mend, first.mend_action) == ("Show the robots", "connect:NAO")
+    assert (first.fix, first.fix_action) == ("Show the robots", "connect:NAO")
     assert (second.severity, second.block_id, second.category) == ("info", "w", "control")
     assert second.sentence == "wait until waits forever if no one appears."
-    assert (second.subject, second.mend, second.mend_action) == ("wait until", "Add a time limit", "limit:w")
+    assert (second.subject, second.fix, second.fix_action) == ("wait until", "Add a time limit", "limit:w")
 
 
 def sentences(saved, robots=None) -> list[tuple[str, str]]:

@@ -1,11 +1,11 @@
-"""Started scripts that surely fight for a part of a robot are told before Run, with a mend; no others are."""
+"""Started scripts that surely fight for a part of a robot are told before Run, with a fix; no others are."""
 
 from __future__ import annotations
 
 import pytest
 
 from app.blocks.compiler.compiler import compile_behaviour
-from app.blocks.fixes.fixes import mend
+from app.blocks.fixes.fixes import fix
 from app.blocks.model.program import Problem
 from tests.blocks.fighting import fighter, home, look, turn
 from tests.blocks.samples import block, boolean, call, define, number, say, started, workspace
@@ -34,7 +34,7 @@ def when(*body: Saved) -> Saved:
 
 def test_two_started_scripts_that_move_the_base_conflict() -> None:
     (problem,) = conflicts(started(turn("t")), started(home("h")))
-    assert (problem.block_id, problem.subject, problem.mend) == ("h", "go home", "Run one after the other")
+    assert (problem.block_id, problem.subject, problem.fix) == ("h", "go home", "Run one after the other")
     assert problem.sentence == (
         "“turn” and “go home” both move Pepper at the same time: one replaces the other."
     )
@@ -115,10 +115,10 @@ def ids(saved: object) -> list[str]:
     return found
 
 
-def mended(*scripts: Saved) -> list[list[str]]:
+def fixed(*scripts: Saved) -> list[list[str]]:
     (problem,) = conflicts(*scripts)
-    assert problem.mend_action is not None
-    made = mend(workspace(*scripts), problem.mend_action)
+    assert problem.fix_action is not None
+    made = fix(workspace(*scripts), problem.fix_action)
     assert made is not None
     tops = made["blocks"]
     assert isinstance(tops, dict)
@@ -131,22 +131,22 @@ def named(script: Saved, id: str) -> Saved:
 
 def test_conflict_fix_appends_second_script_to_the_first() -> None:
     first, second = named(started(turn("a"), say("x") | {"id": "x"}), "s1"), named(started(home("b")), "s2")
-    assert mended(first, second) == [["s1", "a", "x", "b"]]
+    assert fixed(first, second) == [["s1", "a", "x", "b"]]
     assert conflicts(named(started(turn("a"), home("b")), "s1")) == []
 
 
 def test_conflict_fix_handles_event_block_ids_with_colons() -> None:
     first, second = named(started(turn("a")), ":s:1"), named(started(home("b")), "s::2:")
-    assert mended(first, second) == [[":s:1", "a", "b"]]
+    assert fixed(first, second) == [[":s:1", "a", "b"]]
 
 
 def test_conflict_fix_does_not_append_below_forever_loop() -> None:
     first, second = named(started(forever(turn("a")) | {"id": "e"}), "s1"), named(started(home("b")), "s2")
-    assert mended(first, second) == [["s2", "b", "e"]]
+    assert fixed(first, second) == [["s2", "b", "e"]]
     (problem,) = conflicts(started(forever(turn("a"))), started(forever(turn("b"))))
-    assert (problem.mend, problem.mend_action) == (None, None)
+    assert (problem.fix, problem.fix_action) == (None, None)
 
 
 def test_conflict_fix_for_missing_script_does_nothing() -> None:
-    assert mend(workspace(named(started(turn("a")), "s1")), "after:s2:s1") is None
-    assert mend(workspace(named(started(turn("a")), "s1")), "after:s1:s1") is None
+    assert fix(workspace(named(started(turn("a")), "s1")), "after:s2:s1") is None
+    assert fix(workspace(named(started(turn("a")), "s1")), "after:s1:s1") is None

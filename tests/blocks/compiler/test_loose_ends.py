@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from app.blocks.compiler.compiler import compile_behaviour
-from app.blocks.fixes.fixes import mend
+from app.blocks.fixes.fixes import fix
 from tests.blocks.fakes import play
 from tests.blocks.samples import block, get, list_of, number, stack, started, text, workspace, write
 
@@ -40,31 +40,31 @@ def test_list_never_set_is_reported_and_fix_sets_it_at_program_start():
     (problem,) = compile_behaviour(saved, []).problems
     assert (problem.severity, problem.sentence) == ("warning", NEVER)
     assert problem.subject in problem.sentence
-    assert problem.mend == "Set it to an empty list at the start"
-    mended = mend(saved, problem.mend_action or "")
-    assert mended is not None
-    program = compile_behaviour(mended, [])
+    assert problem.fix == "Set it to an empty list at the start"
+    fixed = fix(saved, problem.fix_action or "")
+    assert fixed is not None
+    program = compile_behaviour(fixed, [])
     assert program.problems == ()
-    first = mended["blocks"]["blocks"][0]["next"]["block"]
+    first = fixed["blocks"]["blocks"][0]["next"]["block"]
     assert (first["type"], first["next"]["block"]["id"]) == ("variables_set", "add")
 
 
 def test_fixed_program_runs():
     saved = workspace(started(add(), write(block("lists_length", LIST=get("scores")))), variables=("scores",))
     assert play(saved).runtime.error is not None
-    mended = mend(saved, compile_behaviour(saved, []).problems[0].mend_action or "")
-    assert mended is not None
-    assert play(mended).lines == ["1"]
+    fixed = fix(saved, compile_behaviour(saved, []).problems[0].fix_action or "")
+    assert fixed is not None
+    assert play(fixed).lines == ["1"]
 
 
 def test_number_never_set_is_reported():
     saved = workspace(stack(block("events_message", TOPIC="/x"), write(get("n"))), variables=("n",))
     (problem,) = compile_behaviour(saved, []).problems
-    assert (problem.sentence, problem.mend) == ("“n” is used but never set.", "Set it to 0 at the start")
-    mended = mend(saved, problem.mend_action or "")  # nothing is started yet: it gets a script of its own
-    assert mended is not None
-    assert compile_behaviour(mended, []).problems == ()
-    assert compile_behaviour(mended, []).starts == 2
+    assert (problem.sentence, problem.fix) == ("“n” is used but never set.", "Set it to 0 at the start")
+    fixed = fix(saved, problem.fix_action or "")  # nothing is started yet: it gets a script of its own
+    assert fixed is not None
+    assert compile_behaviour(fixed, []).problems == ()
+    assert compile_behaviour(fixed, []).starts == 2
 
 
 @pytest.mark.parametrize(
@@ -105,5 +105,5 @@ def test_unset_variable_with_any_name_is_reported(name):
     "blocks", [None, 7, {}, {"blocks": None}, {"blocks": [None, {"type": "events_started", "next": 3}]}]
 )
 def test_fixes_on_invalid_workspace_do_not_raise(blocks):
-    assert mend({"blocks": blocks}, "begin:list:v") is not None
-    assert mend({"blocks": blocks}, "receive:x") is not None
+    assert fix({"blocks": blocks}, "begin:list:v") is not None
+    assert fix({"blocks": blocks}, "receive:x") is not None

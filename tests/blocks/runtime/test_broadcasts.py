@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from app.blocks.compiler.compiler import compile_behaviour
-from app.blocks.fixes.fixes import mend
+from app.blocks.fixes.fixes import fix
 from tests.blocks.fakes import FakeLink, Play, play, until
 from tests.blocks.samples import (
     block,
@@ -218,10 +218,10 @@ def test_broadcast_without_receiver_is_reported_with_fix():
     assert (problem.severity, problem.block_id) == ("warning", "b")
     assert problem.sentence == "Nothing receives “start quiz”."
     assert problem.subject in problem.sentence
-    mended = mend(saved, problem.mend_action or "")
-    assert mended is not None
-    assert compile_behaviour(mended, []).problems == ()
-    assert mended["blocks"]["blocks"][1]["x"] > 400
+    fixed = fix(saved, problem.fix_action or "")
+    assert fixed is not None
+    assert compile_behaviour(fixed, []).problems == ()
+    assert fixed["blocks"]["blocks"][1]["x"] > 400
 
 
 def test_receiver_without_broadcast_is_reported():

@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from app.blocks.compiler.compiler import compile_behaviour
-from app.blocks.fixes.fixes import mend
+from app.blocks.fixes.fixes import fix
 from tests.blocks.fakes import Play, play, until
 from tests.blocks.samples import (
     block,
@@ -172,12 +172,12 @@ def test_call_of_missing_function_is_an_error_with_fix() -> None:
     run = play(saved)
     (problem,) = run.program.errors
     sentence = "The function “greet” is missing. Define it, or delete this block."
-    assert (problem.sentence, problem.block_id, problem.mend) == (sentence, "c", "Define it")
+    assert (problem.sentence, problem.block_id, problem.fix) == (sentence, "c", "Define it")
     assert run.runtime.error is not None
     assert (run.runtime.error.sentence, run.runtime.error.block) == (sentence, "c")
-    mended = mend(saved, str(problem.mend_action))
-    assert mended is not None
-    again = compile_behaviour(mended, [])
+    fixed = fix(saved, str(problem.fix_action))
+    assert fixed is not None
+    again = compile_behaviour(fixed, [])
     assert not again.problems
     assert "def greet(who):\n    pass" in again.source
 

@@ -1,4 +1,4 @@
-"""JSON as it is typed: where it is wrong, what mends it, and what its places are filled with."""
+"""JSON as it is typed: where it is wrong, what fixes it, and what its places are filled with."""
 
 from __future__ import annotations
 
@@ -18,8 +18,8 @@ LINES = """{
 }"""
 
 
-def mended(text: str) -> str:
-    """The text after all that can be mended was, one after the other."""
+def fixed(text: str) -> str:
+    """The text after all that can be fixed was, one after the other."""
     for _each in range(5):
         fault = JsonText(text).fault
         if fault is None or fault.fix is None:
@@ -47,7 +47,7 @@ def test_json_error_is_reported_with_its_position() -> None:
     ],
 )
 def test_repaired_text_is_valid_json(text, value) -> None:
-    assert JsonText(mended(text)).filled({"yaw": 2}) == value
+    assert JsonText(fixed(text)).filled({"yaw": 2}) == value
 
 
 def test_placeholders_are_filled_only_outside_strings() -> None:
@@ -98,4 +98,4 @@ def test_truncated_json_is_reported_with_line_and_column() -> None:
         assert 1 <= fault.line <= len(lines)
         assert 1 <= fault.column <= len(lines[fault.line - 1]) + 1
         assert fault.sentence
-        JsonText(mended(cut))
+        JsonText(fixed(cut))

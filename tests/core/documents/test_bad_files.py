@@ -130,7 +130,7 @@ def test_unknown_file_content_is_preserved_on_save(tmp_path: Path) -> None:
     document = Document(lambda: Journal(tmp_path / "journal"))
     document.open(path)
     assert "s" in {each.block_id for each in document.problems()}, "it is told that it will be skipped"
-    assert document.mend("limit:w")
+    assert document.fix("limit:w")
     document.save()
     after = json.loads(path.read_bytes().decode("utf-8", "surrogatepass"))
     assert json.dumps(after["workspace"]["blocks"]["blocks"][0]) == json.dumps(start), "to the byte"

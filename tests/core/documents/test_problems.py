@@ -34,7 +34,7 @@ def test_all_blocks_of_missing_robot_are_one_problem() -> None:
     assert line.problem.sentence == "Pepper is not connected, so 3 blocks will be skipped."
     assert line.problem.subject == "3 blocks"
     assert line.problem.block_id, "a press leads to the first"
-    assert line.mends == (Mend("Start a virtual Pepper", "robot.virtual:Pepper"),)
+    assert line.fixes == (Mend("Start a virtual Pepper", "robot.virtual:Pepper"),)
 
 
 def test_missing_robot_problem_counts_nested_and_unstarted_blocks() -> None:
@@ -53,9 +53,9 @@ def test_missing_robot_problem_counts_nested_and_unstarted_blocks() -> None:
 def test_problem_button_describes_its_action() -> None:
     """Nobody is told that a real robot is connected when a virtual one starts."""
     (line,) = lines(speaks("Nao 3"), [pepper("Nao 3")], [])
-    assert line.mends == (Mend("Start a virtual Nao 3", "robot.virtual:Nao 3"),)
+    assert line.fixes == (Mend("Start a virtual Nao 3", "robot.virtual:Nao 3"),)
     (line,) = lines(speaks("Nao 3"), [], [])
-    assert line.mends == (Mend("Show the robots", "connect:Nao 3"),)
+    assert line.fixes == (Mend("Show the robots", "connect:Nao 3"),)
 
 
 def test_problem_with_one_block_names_it() -> None:
@@ -65,13 +65,13 @@ def test_problem_with_one_block_names_it() -> None:
 
 def test_connected_robot_with_same_abilities_is_suggested_first() -> None:
     (line,) = lines(speaks("Pepper"), [pepper("Pepper")], [pepper("Pepper 2")])
-    assert [mend.words for mend in line.mends] == ["Use Pepper 2", "Start a virtual Pepper"]
-    assert line.mends[0].action == "robot.use:Pepper:Pepper 2"
+    assert [fix.words for fix in line.fixes] == ["Use Pepper 2", "Start a virtual Pepper"]
+    assert line.fixes[0].action == "robot.use:Pepper:Pepper 2"
 
 
 def test_robot_of_unknown_model_can_only_be_connected() -> None:
     (line,) = lines(workspace(started(say("Hi"))), [sample("Pepper")], [])
-    assert [mend.words for mend in line.mends] in (["Show the robots"], ["Start a virtual Pepper"])
+    assert [fix.words for fix in line.fixes] in (["Show the robots"], ["Start a virtual Pepper"])
 
 
 def test_two_missing_robots_are_two_problems() -> None:
@@ -79,7 +79,7 @@ def test_two_missing_robots_are_two_problems() -> None:
         started(*(block("robot_pepper_do_say", ROBOT=name, TEXT=text("x")) for name in ("A", "B", "A")))
     )
     found = lines(both, [pepper("A"), pepper("B")], [])
-    assert [(line.blocks, line.mends[0].action) for line in found] == [
+    assert [(line.blocks, line.fixes[0].action) for line in found] == [
         (2, "robot.virtual:A"),
         (1, "robot.virtual:B"),
     ]
@@ -90,12 +90,12 @@ def test_using_another_robot_fixes_the_problem_and_can_be_undone(tmp_path) -> No
     document.set_connected([pepper("Pepper")])
     document.edited(speaks("Pepper"))
     document.set_connected([pepper("Pepper 2")])
-    before, mends = document.workspace, document.mends
+    before, fixes = document.workspace, document.fixes
     assert document.problems()
     assert document.use_robot("Pepper", pepper("Pepper 2"))
     assert document.problems() == ()
     assert document.program().robots == ("Pepper 2",)
-    assert (document.mends, document.dirty) == (mends + 1, True)
+    assert (document.fixes, document.dirty) == (fixes + 1, True)
     assert before == speaks_again(before), "the blocks of before are as they were: undo shows them"
     assert not document.use_robot("Nobody", pepper("Pepper 2"))
 

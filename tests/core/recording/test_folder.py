@@ -39,18 +39,18 @@ def test_each_file_is_listed_with_its_contents(folder, tmp_path, monkeypatch):
     assert look(folder) == FolderScan()
     record(tmp_path / "a.mcap", [[json_message(seq, topic="/odom") for seq in range(5)]])
     (tmp_path / "cut.MCAP").write_bytes((tmp_path / "a.mcap").read_bytes()[:-100])
-    repair(tmp_path / "cut.MCAP", tmp_path / "mended.mcap")
+    repair(tmp_path / "cut.MCAP", tmp_path / "fixed.mcap")
     (tmp_path / "none.mcap").write_bytes(b"nothing of the kind")
     (tmp_path / "notes.txt").write_bytes(b"")
     (tmp_path / "folder.mcap").mkdir()
     found = {each.path.name: each for each in look(folder).files}
-    assert sorted(found) == ["a.mcap", "cut.MCAP", "mended.mcap", "none.mcap"]
+    assert sorted(found) == ["a.mcap", "cut.MCAP", "fixed.mcap", "none.mcap"]
     whole = found["a.mcap"]
     assert (whole.message_count, whole.topics, whole.is_complete, whole.problem) == (5, ("/odom",), True, "")
     assert whole.size_bytes == whole.path.stat().st_size
     assert not found["cut.MCAP"].is_complete
     assert found["cut.MCAP"].message_count == 5
-    assert found["mended.mcap"].is_repaired
+    assert found["fixed.mcap"].is_repaired
     assert "not an MCAP file" in found["none.mcap"].problem
     monkeypatch.setattr(folder_module, "read_facts", pytest.fail)
     assert {each.path.name: each for each in look(folder).files} == found  # nothing is opened again

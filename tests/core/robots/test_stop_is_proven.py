@@ -168,7 +168,7 @@ def test_robot_that_stop_was_not_sent_to_is_named() -> None:
 
 
 class Broken:
-    """A node that has no room for publishers of some topics until it is mended."""
+    """A node that has no room for publishers of some topics until it is fixed."""
 
     def __init__(self, node: nep.Node) -> None:
         self._node = node

@@ -66,7 +66,7 @@ def link(path: Path, target: str) -> None:
 
 
 def framework(folder: Path, name: str) -> Path:
-    """As PyInstaller mends those of PySide6's wheels."""
+    """As PyInstaller fixes those of PySide6's wheels."""
     root = folder / f"{name}.framework"
     put(root / "Versions" / "A" / name, fat(header(), header(machine="x86_64")), 0o755)
     put(root / "Versions" / "A" / "Resources" / "Info.plist", plistlib.dumps({"CFBundleIdentifier": name}))

@@ -418,7 +418,7 @@ class ForgetsSubscribers(Client):
 
 @breaks("other-socket-at-master")
 class ConnectsToTheMasterOnce(Client):
-    def mend_master(self) -> None:
+    def reconnect_master(self) -> None:
         pass
 
 
@@ -526,7 +526,7 @@ class ConnectsOnce(Client):
 
 @breaks("other-socket-at-publisher")
 class LeavesConnectingToLibzmq(Client):
-    def mend(self, sub: Sub, failed: set[str]) -> None:
+    def fix(self, sub: Sub, failed: set[str]) -> None:
         pass
 
 
@@ -579,7 +579,7 @@ class CallsForEver(Client):
 
 @breaks("other-socket-at-server")
 class ConnectsToTheServerOnce(Client):
-    def mend_call(self, socket: zmq.Socket[bytes], endpoint: str, call: Sequence[bytes]) -> None:
+    def repeat_call(self, socket: zmq.Socket[bytes], endpoint: str, call: Sequence[bytes]) -> None:
         pass
 
 

@@ -546,7 +546,7 @@ class Client(Connections, Services):
         while self.master.poll(0):
             self.follow(self.master.recv())
         if self.master_handshakes.failed():
-            self.mend_master()
+            self.reconnect_master()
         for server in self.servers:
             while server.poll(0):
                 self.serve(server)
@@ -562,7 +562,7 @@ class Client(Connections, Services):
             except WireError as error:
                 self.refuse(sub, error)
         if failed := sub.handshakes.failed():
-            self.mend(sub, failed)
+            self.fix(sub, failed)
         for each, source in list(sub.sources.items()):
             if source.ends_at is not None and now >= source.ends_at:
                 self.leave_source(sub, each)

@@ -60,10 +60,10 @@ class Connections:
         source.endpoint = endpoint
         sub.socket.connect(endpoint)
 
-    def mend_master(self) -> None:
+    def reconnect_master(self) -> None:
         self.connect_again(self.master, self.master_endpoint)
 
-    def mend(self, sub: Sub, failed: set[str]) -> None:
+    def fix(self, sub: Sub, failed: set[str]) -> None:
         # An event of an endpoint that was disconnected meanwhile must not end the connection to the new one.
         for source in sub.sources.values():
             if source.endpoint in failed and not source.has_echoed:

@@ -74,7 +74,7 @@ class Services:
 
             def is_answered() -> bool:
                 if handshakes.failed():
-                    self.mend_call(socket, found["publisher"]["endpoints"][0], call)
+                    self.repeat_call(socket, found["publisher"]["endpoints"][0], call)
                 return bool(socket.poll(0))
 
             self.until(is_answered, timeout_s)
@@ -88,7 +88,7 @@ class Services:
         socket.connect(endpoint)
         socket.send_multipart(call)
 
-    def mend_call(self, socket: zmq.Socket[bytes], endpoint: str, call: Sequence[bytes]) -> None:
+    def repeat_call(self, socket: zmq.Socket[bytes], endpoint: str, call: Sequence[bytes]) -> None:
         socket.disconnect(endpoint)
         self.call_at(socket, endpoint, call)
 

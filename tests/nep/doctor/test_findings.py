@@ -81,7 +81,7 @@ def test_master_of_another_version_is_reported_with_a_fix():
         "0.2.0. New features and fixes may not work with it."
     )
     assert (one.severity, one.command) == ("warning", "kill 41")
-    assert one.mend.startswith("Stop it. If Studio is open, it starts a new master")
+    assert one.fix.startswith("Stop it. If Studio is open, it starts a new master")
     there = found(versions=versions, master_install=older, platform="win32")["master:version"]
     assert there.command == "taskkill /F /PID 41"
 
@@ -111,12 +111,12 @@ def test_missing_master_is_reported_with_the_start_command():
 def test_no_start_command_is_suggested_for_a_network_address():
     made = found(view=None, address="10.0.0.5:7780", master_port=PortFact(7780, "", False))
     assert made["master:network"].command == ""
-    assert "127.0.0.1:7780" in made["master:network"].mend
+    assert "127.0.0.1:7780" in made["master:network"].fix
     assert "master:none" not in made
 
 
 @pytest.mark.parametrize(
-    ("reach", "sentence", "mend"),
+    ("reach", "sentence", "fix"),
     [
         (
             "timeout",
@@ -132,12 +132,12 @@ def test_no_start_command_is_suggested_for_a_network_address():
         ("", "10.0.0.5 responds at port 7780, but the master does not.", "another program uses that port"),
     ],
 )
-def test_unreachable_remote_master_is_reported_with_the_kind_of_failure(reach, sentence, mend):
+def test_unreachable_remote_master_is_reported_with_the_kind_of_failure(reach, sentence, fix):
     made = found(view=None, address="10.0.0.5:7780", master_port=None, reach=reach)
     one = made["master:unreached"]
     assert (one.severity, one.command) == ("error", "")  # it can't be started from here
     assert one.sentence.startswith(sentence)
-    assert mend in one.mend
+    assert fix in one.fix
     assert "master:none" not in made
 
 
@@ -147,14 +147,14 @@ def test_no_start_command_is_suggested_for_an_unknown_host():
         made["master:unknown"].sentence
         == "Can't find a computer named “lap.top”, so the master can't be reached."
     )
-    assert "Check the spelling" in made["master:unknown"].mend
+    assert "Check the spelling" in made["master:unknown"].fix
     assert "master:none" not in made
 
 
 def test_foreign_program_on_the_master_port_is_named_with_a_workaround():
     one = found(view=None, master_port=PortFact(7780, "", True, OTHER))["master:foreign"]
     assert one.sentence == "“python3 server.py” (process 77) uses port 7780 but is not a master."
-    assert "7781" in one.mend
+    assert "7781" in one.fix
     assert one.command == "nep master --port 7781"
     unknown = found(view=None, master_port=PortFact(7780, "", True))["master:foreign"]
     assert "unknown program uses port 7780" in unknown.sentence
@@ -221,7 +221,7 @@ def test_port_of_an_unknown_process_counts_as_the_masters_unless_it_has_an_alert
 def test_airplay_is_named_on_macos(holder):
     made = found(platform="darwin", ports=(PortFact(7000, "where old programs ask", True, holder),))
     assert "AirPlay Receiver" in made["ports:airplay"].sentence
-    assert "AirDrop & Handoff" in made["ports:airplay"].mend
+    assert "AirDrop & Handoff" in made["ports:airplay"].fix
 
 
 def test_other_program_on_port_7000_of_a_mac_is_not_called_airplay():
@@ -231,7 +231,7 @@ def test_other_program_on_port_7000_of_a_mac_is_not_called_airplay():
 
 def test_disabled_gateway_is_not_a_warning():
     one = found(ports=(PortFact(7000, "where old programs ask", False),))["ports:free"]
-    assert (one.severity, one.mend) == ("info", "The master was started without its gateway.")
+    assert (one.severity, one.fix) == ("info", "The master was started without its gateway.")
     assert list(about_ports(joins_originals=False)) == ["ports"]
 
 
@@ -246,7 +246,7 @@ def test_installed_original_package_is_an_error_with_a_command():
     assert one.command.startswith("pip uninstall -y nep")
     assert "package" not in found(packages=(PackageFact("nep", "0.5.4.8", "/somewhere"),))
     both = found(packages=(PackageFact("nep", "0.5.4.8", "/somewhere"),), strange_files=("publisher.py",))
-    assert "package:files" not in both, "the first mend cures both"
+    assert "package:files" not in both, "the first fix cures both"
     left = found(strange_files=("publisher.py", "master.py"))["package:files"]
     assert "publisher.py, master.py" in left.sentence
     assert found(shadow="/home/me/nep.py")["package:shadow"].severity == "warning"
@@ -305,7 +305,7 @@ def test_originals_are_named_and_unsupported_versions_are_errors():
     )
     assert made["original:bad"].severity == "error"
     assert "0.5.4.7" in made["original:bad"].sentence
-    assert "0.5.4.8 or 0.5.4.5" in made["original:bad"].mend
+    assert "0.5.4.8 or 0.5.4.5" in made["original:bad"].fix
 
 
 def test_alerts_of_the_master_are_reported_once():
@@ -314,7 +314,7 @@ def test_alerts_of_the_master_are_reported_once():
         Alert("port:7000", "taken"),
     ]
     made = found(view=view(alerts=alerts))
-    assert made["name:x"].mend == "Give each a name."
+    assert made["name:x"].fix == "Give each a name."
     assert "port:7000" not in made  # the doctor looks who holds it
 
 

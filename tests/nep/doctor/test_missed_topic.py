@@ -40,23 +40,23 @@ def test_silent_publisher_is_reported_with_its_duration_and_alternatives():
     at = time.strftime("%H:%M:%S", time.localtime(NOW - 4))
     assert (one.id, one.severity, one.instead) == ("topic:silent:camera_driver", "error", "")
     assert one.sentence == "“camera_driver” is connected but has sent nothing on /robot/camera for 4 s."
-    assert one.mend.startswith(f"Its last message was number 18204, at {at}.")
+    assert one.fix.startswith(f"Its last message was number 18204, at {at}.")
     (one,) = found(**publisher(remedies=("restart_camera",))).values()
     assert one.instead == "restart_camera"
-    assert one.mend.endswith("It has the service “restart_camera”.")
+    assert one.fix.endswith("It has the service “restart_camera”.")
     (one,) = found(**publisher(sent=0, last_s=None)).values()
     assert one.sentence == "“camera_driver” is connected but has sent nothing on /robot/camera yet."
     (one,) = found(**publisher(sent=None, generation="B")).values()  # nobody numbers what it sends
-    assert "number" not in one.mend
-    assert at in one.mend
+    assert "number" not in one.fix
+    assert at in one.fix
 
 
 def test_unpublished_topic_is_reported_with_the_intended_name():
     one = found(topic="/robot/deph", publishers=())["topic:near"]
     assert one.sentence == "/robot/deph has no publisher."
-    assert one.mend == "Did you mean /robot/depth? Its publishers send 60 messages per second."
+    assert one.fix == "Did you mean /robot/depth? Its publishers send 60 messages per second."
     assert one.instead == "/robot/depth"
-    assert found(topic="/onc", publishers=())["topic:near"].mend == "Did you mean /once?"
+    assert found(topic="/onc", publishers=())["topic:near"].fix == "Did you mean /once?"
 
 
 @pytest.mark.parametrize(
@@ -82,27 +82,25 @@ def test_topic_with_the_same_ending_is_suggested_only_if_unique():
 
 def test_missing_publisher_is_reported_with_the_published_topics():
     nobody = found(topic="/speech", publishers=(), is_shared=False, address="127.0.0.1:7780")
-    assert nobody["topic:nobody"].mend.endswith(
-        "Topics published now: /once, /robot/camera and /robot/depth."
-    )
+    assert nobody["topic:nobody"].fix.endswith("Topics published now: /once, /robot/camera and /robot/depth.")
     assert nobody["topic:closed"].severity == "info"
     many = {f"/t{number}": None for number in range(40)} | {"/nep/log": None}
-    assert found(topic="/x", publishers=(), others=many)["topic:nobody"].mend.endswith("/t12 and 35 more.")
+    assert found(topic="/x", publishers=(), others=many)["topic:nobody"].fix.endswith("/t12 and 35 more.")
     alone = found(topic="/speech", publishers=(), others={})
     assert (
-        alone["topic:nobody"].mend
+        alone["topic:nobody"].fix
         == "Start the program that publishes it. No other topics are published either."
     )
     assert "topic:closed" not in alone  # it serves other computers
     assert alone["topic:shared"].severity == "info"
-    assert "firewall" in alone["topic:shared"].mend
+    assert "firewall" in alone["topic:shared"].fix
     assert "topic:shared" not in nobody
     service = found(topic="/restart", publishers=(), services=("/restart",))["topic:service"]
     assert service.instead == "/restart"
 
 
 @pytest.mark.parametrize(
-    ("reach", "sentence", "mend"),
+    ("reach", "sentence", "fix"),
     [
         ("elsewhere", "“camera_driver” can be reached only from its own computer, lab.", "NEP_MASTER"),
         (
@@ -125,10 +123,10 @@ def test_missing_publisher_is_reported_with_the_published_topics():
         ),
     ],
 )
-def test_unreachable_publisher_address_is_reported(reach, sentence, mend):
+def test_unreachable_publisher_address_is_reported(reach, sentence, fix):
     (one,) = found(**publisher(endpoint="tcp://10.0.0.7:41000", reach=reach)).values()
     assert (one.id, one.severity, one.sentence) == ("topic:address:camera_driver", "error", sentence)
-    assert mend in one.mend
+    assert fix in one.fix
 
 
 def test_incompatible_versions_are_reported():
@@ -138,7 +136,7 @@ def test_incompatible_versions_are_reported():
     assert (
         wire.sentence == "Messages on /robot/camera come from a version of NEP that this version can't read."
     )
-    assert "camera_driver (lab)" in wire.mend
+    assert "camera_driver (lab)" in wire.fix
 
 
 def test_received_messages_are_reported_as_readable_or_unreadable():
@@ -154,7 +152,7 @@ def test_received_messages_are_reported_as_readable_or_unreadable():
 def test_alert_of_the_master_about_the_topic_is_an_error():
     alert = Alert("type:/robot/camera", "The topic “/robot/camera” has 2 types", "Use the same type.")
     one = found(received=1, alerts=(alert,))["type:/robot/camera"]
-    assert (one.severity, one.sentence[-1], one.mend) == ("error", ".", "Use the same type.")
+    assert (one.severity, one.sentence[-1], one.fix) == ("error", ".", "Use the same type.")
 
 
 def test_invalid_topic_name_is_reported(master):
@@ -204,7 +202,7 @@ def test_undecodable_topic_is_reported(master):
     assert facts is not None
     (one,) = [each for each in topic_findings(facts) if each.id == "topic:unreadable"]
     assert (facts.received, one.severity) == (1, "error")
-    assert "arm (" in one.mend
+    assert "arm (" in one.fix
 
 
 def test_topic_is_not_diagnosed_without_a_master():
@@ -223,4 +221,4 @@ def test_command_accepts_a_topic(master, capsys):
     told = json.loads(capsys.readouterr().out)
     assert ended.value.exit_code == 2
     assert told[0]["id"] == "topic:nobody"
-    assert {"id", "severity", "sentence", "mend", "command", "instead"} == set(told[0])
+    assert {"id", "severity", "sentence", "fix", "command", "instead"} == set(told[0])

@@ -108,7 +108,7 @@ def test_no_master_can_be_started_at_a_network_address(master: Master, own: str)
     assert nobody is not None
     assert (nobody.id, nobody.command) == ("master:network", "")
     assert f"start at 127.0.0.1:{free}" in nobody.sentence
-    assert f"127.0.0.1:{free}" in nobody.mend
+    assert f"127.0.0.1:{free}" in nobody.fix
 
 
 def test_progress_reports_lead_to_the_same_final_result(master: Master) -> None:

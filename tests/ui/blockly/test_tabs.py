@@ -212,10 +212,10 @@ def test_external_change_is_one_undo_step(qtbot, two, view) -> None:
     view.changed.connect(lambda key, program: told.append((key, program)))
     here = f"[...{SHOWN}.querySelectorAll('.blocklyBlockCanvas .blocklyDraggable')].map(e => e.dataset.id)"
     before = two.ask(here)
-    mended = workspace({**START, "next": {"block": {"type": "control_wait", "id": "added"}}})
-    view.change(mended)
+    fixed = workspace({**START, "next": {"block": {"type": "control_wait", "id": "added"}}})
+    view.change(fixed)
     two.wait_for(f"({here}).includes('added')")
-    assert view.workspace == mended
+    assert view.workspace == fixed
     view.undo()
     two.wait_for(f"!({here}).includes('added')")
     assert two.ask(here) == before

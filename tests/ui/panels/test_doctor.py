@@ -378,5 +378,5 @@ def test_missing_system_libraries_of_the_block_editor_are_a_finding(panel, windo
     panel.refresh()
     (found,) = [each for each in panel.shown if "libnss3.so" in each.sentence]
     assert found.severity == "error"
-    assert "sudo apt install libnss3" in found.mend
+    assert "sudo apt install libnss3" in found.fix
     assert not panel.rows[panel.shown.index(found)].button.isVisibleTo(panel)

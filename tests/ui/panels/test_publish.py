@@ -59,7 +59,7 @@ def test_syntax_error_is_located_and_fixed_by_a_button(window, panel) -> None:
     assert form.edit.wrong_line == 3
     assert not form.send.isEnabled()
     assert states(panel) == ["line 3", "not armed"]
-    press(form.mend)
+    press(form.fix)
     assert form.edit.wrong_line == 0
     assert form.sentence.text() == "Fill in “yaw” first. It can't be sent yet."
     QTest.keyClicks(form.values.fields["yaw"], "-12.5")

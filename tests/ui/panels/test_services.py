@@ -116,7 +116,7 @@ def test_invalid_field_is_reported_and_disables_the_call(panel) -> None:
     panel._turn("json")
     panel.edit.set_text("{'name': 1}")
     assert panel.sentence.text().startswith("Line 1, column 2: ")
-    press(panel.mend)
+    press(panel.fix)
     assert panel.edit.text() == '{"name": 1}'
     panel.edit.set_text("[1]")
     panel._turn("form")

@@ -152,13 +152,13 @@ def data_of(session: Session) -> Iterator[str]:
     for alert in session.alerts.active:
         yield from (alert.title, alert.detail, alert.button or "")
     for finding in session.doctor.findings:
-        yield from (finding.sentence, finding.mend, finding.command)
+        yield from (finding.sentence, finding.fix, finding.command)
     yield "nep doctor"  # what is typed into a terminal
     yield from named_in(session.alarms.rules)
     for document in session.documents:
         yield from (document.name, "NAO")
         for problem in document.program().problems:
-            yield from (problem.sentence, problem.subject, problem.mend or "")
+            yield from (problem.sentence, problem.subject, problem.fix or "")
 
 
 @pytest.fixture

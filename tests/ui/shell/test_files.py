@@ -368,10 +368,10 @@ def test_unwritable_folder_raises_an_alert(commands: Commands, window, document,
 def test_fix_changes_the_blocks_and_updates_the_editor(commands: Commands, document: Document) -> None:
     wait = {"type": "control_wait_until", "id": "w"}
     document.edited({"blocks": {"languageVersion": 0, "blocks": [wait]}})
-    before = document.mends
+    before = document.fixes
     assert commands.run("limit:w")
     assert document.workspace["blocks"]["blocks"][0]["type"] == "control_wait_until_at_most"
-    assert document.mends > before
+    assert document.fixes > before
     assert document.dirty
 
 

@@ -210,7 +210,7 @@ class BehaviourPanel(PanelWidget):
 
     def _show_blocks(self, editor: Editor) -> None:
         document = self.session.document
-        now = (document.revision, document.mends)
+        now = (document.revision, document.fixes)
         known = self._given.get(document.key)
         if self._new("tab", document.key):
             editor.show_tab(document.key, document.workspace)

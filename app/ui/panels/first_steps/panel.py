@@ -178,7 +178,7 @@ class FirstStepsPanel(PanelWidget):
     def _now(self) -> Now:
         runs, document = self.session.runs, self.session.document
         mine = runs.document is document
-        edition = (document.key, document.revision, document.edits, document.mends)
+        edition = (document.key, document.revision, document.edits, document.fixes)
         if self._built[0] != edition:
             self._built = (edition, built_in(document.workspace, example_block_ids()))
             for row in self.rows:

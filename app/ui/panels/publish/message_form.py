@@ -121,10 +121,10 @@ class MessageForm(QWidget):
         self.fault_icon = StatusIcon(theme, "error", height=20)
         self.sentence = label("", "small", role="error", wrap=True)
         self.sentence.setMinimumWidth(0)
-        self.mend = Button(theme, _("Fix it"), "wrench", size="small")
+        self.fix = Button(theme, _("Fix it"), "wrench", size="small")
         self.template.clicked.connect(self.template_wanted)
         self.tidy.clicked.connect(self.make_tidy)
-        self.mend.clicked.connect(self.put_right)
+        self.fix.clicked.connect(self.put_right)
         self.edit.changed.connect(self._text_typed)
         self.edit.sent.connect(self.send_wanted)
 
@@ -173,7 +173,7 @@ class MessageForm(QWidget):
         fault.setSpacing(6)
         fault.addWidget(self.fault_icon, 0, Qt.AlignmentFlag.AlignTop)
         fault.addWidget(self.sentence, 1)
-        fault.addWidget(self.mend, 0, Qt.AlignmentFlag.AlignTop)
+        fault.addWidget(self.fix, 0, Qt.AlignmentFlag.AlignTop)
         column = QVBoxLayout(self)
         column.setContentsMargins(12, 10, 12, 10)
         column.setSpacing(8)
@@ -244,7 +244,7 @@ class MessageForm(QWidget):
             self.sentence.setText(words)
         self.fault_icon.setVisible(bool(problem))
         self.sentence.setVisible(bool(problem))
-        self.mend.setVisible(fault is not None and fault.fix is not None)
+        self.fix.setVisible(fault is not None and fault.fix is not None)
 
     # -- user actions -------------------------------------------------------------------------------------
 

@@ -84,7 +84,7 @@ class ServicesPanel(PanelWidget):
         self.requests.addWidget(self.edit)
         self.sentence = label("", "small", role="error", wrap=True)
         self.sentence.setMinimumWidth(0)
-        self.mend = Button(theme, _("Fix it"), "wrench", size="small")
+        self.fix = Button(theme, _("Fix it"), "wrench", size="small")
         self.call_button = Button(theme, _("Call"), "play", kind="primary")
         self.call_button.setToolTip(plain.tip(tip_with_key(_("Calls the service"), "Ctrl+Enter")))
         self.give_up = Button(theme, _("Cancel"), "x")
@@ -127,7 +127,7 @@ class ServicesPanel(PanelWidget):
         self.form.typed.connect(self._form_typed)
         self.edit.changed.connect(self._text_typed)
         self.edit.sent.connect(self.call)
-        self.mend.clicked.connect(self._put_right)
+        self.fix.clicked.connect(self._put_right)
         self.call_button.clicked.connect(self.call)
         self.give_up.clicked.connect(self._give_up)
         self.seconds.number.connect(lambda value: setattr(self, "timeout_s", value))
@@ -156,7 +156,7 @@ class ServicesPanel(PanelWidget):
         head.addWidget(self.name, 1)
         head.addWidget(self.way)
         fault.addWidget(self.sentence, 1)
-        fault.addWidget(self.mend, 0, Qt.AlignmentFlag.AlignTop)
+        fault.addWidget(self.fix, 0, Qt.AlignmentFlag.AlignTop)
         for button in (self.call_button, self.give_up):
             buttons.addWidget(button)
         limit = QWidget()
@@ -298,7 +298,7 @@ class ServicesPanel(PanelWidget):
         said = fault.sentence if fault is not None else self._problem()
         self.sentence.setText(said)
         self.sentence.setVisible(bool(said))
-        self.mend.setVisible(fault is not None and fault.fix is not None)
+        self.fix.setVisible(fault is not None and fault.fix is not None)
         self._say_call()
 
     def _read(self) -> JsonText:

@@ -365,7 +365,7 @@ def _about(
 
 
 def _fix_blocks(verb: str) -> ArgumentCommand[Handlers]:
-    return _about(verb, str, lambda do, what: do.files.mend(f"{verb}:{what}"))
+    return _about(verb, str, lambda do, what: do.files.fix(f"{verb}:{what}"))
 
 
 ARGUMENT_COMMANDS: tuple[ArgumentCommand[Handlers], ...] = (

@@ -5,7 +5,7 @@ import copy
 import pytest
 
 from app.blocks.compiler.compiler import compile_behaviour
-from app.blocks.fixes.fixes import mend
+from app.blocks.fixes.fixes import fix
 from app.blocks.fixes.replace_robot import asked_of, blocks_of, can_do
 from tests.blocks.samples import block, robot, say, started, workspace
 
@@ -19,42 +19,42 @@ def test_fix_adds_time_limit_to_wait_until():
     saved = workspace(started(block("control_forever", BODY=[say("a"), inner])))
     before = copy.deepcopy(saved)
     (problem,) = problems(saved)
-    assert problem.mend_action is not None
-    mended = mend(saved, problem.mend_action)
-    assert mended is not None
+    assert problem.fix_action is not None
+    fixed = fix(saved, problem.fix_action)
+    assert fixed is not None
     assert saved == before
-    assert problems(mended) == ()
-    assert "at_most_s=10" in compile_behaviour(mended, [robot()]).source
+    assert problems(fixed) == ()
+    assert "at_most_s=10" in compile_behaviour(fixed, [robot()]).source
 
 
 def test_fix_adds_start_block_above_blocks_without_one():
     saved = workspace(say("Hi") | {"x": 100, "y": 50})
-    mended = mend(saved, problems(saved)[0].mend_action or "")
-    assert mended is not None
-    assert problems(mended) == ()
-    top = mended["blocks"]["blocks"][0]
+    fixed = fix(saved, problems(saved)[0].fix_action or "")
+    assert fixed is not None
+    assert problems(fixed) == ()
+    top = fixed["blocks"]["blocks"][0]
     assert (top["type"], top["x"], top["y"]) == ("events_started", 100, 50)
 
 
 def test_fix_adds_no_start_block_above_value_block():
     saved = workspace(block("robot_pepper_get_battery", ROBOT="Pepper"), say("Hi"))
-    mended = mend(saved, "add:events_started")
-    assert mended is not None
-    assert [top["type"] for top in mended["blocks"]["blocks"]] == [
+    fixed = fix(saved, "add:events_started")
+    assert fixed is not None
+    assert [top["type"] for top in fixed["blocks"]["blocks"]] == [
         "robot_pepper_get_battery",
         "events_started",
     ]
 
 
 def test_fix_adds_start_block_to_empty_workspace():
-    mended = mend({}, "add:events_started")
-    assert mended is not None
-    assert compile_behaviour(mended, []).starts == 1
+    fixed = fix({}, "add:events_started")
+    assert fixed is not None
+    assert compile_behaviour(fixed, []).starts == 1
 
 
 def test_action_that_is_not_a_block_fix_changes_nothing():
-    assert mend(workspace(), "connect:NAO") is None
-    assert mend(workspace(), "limit:nobody") is None
+    assert fix(workspace(), "connect:NAO") is None
+    assert fix(workspace(), "limit:nobody") is None
 
 
 @pytest.mark.parametrize(
@@ -63,7 +63,7 @@ def test_action_that_is_not_a_block_fix_changes_nothing():
 )
 def test_fix_on_invalid_workspace_changes_nothing_and_does_not_raise(blocks):
     saved = {"blocks": blocks}
-    assert mend(saved, "limit:w") is None
-    assert mend(saved, "define:w") is None
+    assert fix(saved, "limit:w") is None
+    assert fix(saved, "define:w") is None
     assert blocks_of(saved, "Pepper") == ()
     assert not can_do(asked_of(saved).get("Pepper", ()), "pepper", robot())
