@@ -74,7 +74,7 @@ class RepeatFilter:
         Never raises, so that logging can't fail because of a record's arguments.
         """
         record = _formattable(record)
-        key = (record.name, record.levelno, _place(record) or record.getMessage())
+        key = (record.name, record.levelno, _raise_location(record) or record.getMessage())
         count = self._counts.pop(key, 0) + 1
         while len(self._counts) >= FAULTS_KEPT:
             del self._counts[next(iter(self._counts))]
@@ -104,7 +104,7 @@ def _formattable(record: logging.LogRecord) -> logging.LogRecord:
         return record
 
 
-def _place(record: logging.LogRecord) -> tuple[object, ...] | None:
+def _raise_location(record: logging.LogRecord) -> tuple[object, ...] | None:
     if not record.exc_info or record.exc_info[0] is None:
         return None
     kind, _error, trace = record.exc_info

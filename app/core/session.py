@@ -114,7 +114,7 @@ class Session:
         self.alerts, self.console = Alerts(), Console()
         self._faults = FaultAlerts(self.alerts, clock)
         self._mailbox, self._checks = Mailbox(), Checks()
-        self._watches = Watches(self._begin_watch, self._end_watch, self._forget_watch)
+        self._watches = Watches(self._begin_watch, self._end_watch, self._on_unwatched)
         self._add_network(source if source is not None else partial(LiveSource, always=LOGS))
         self._add_robots()
         self._add_programs(journal_folder)
@@ -415,7 +415,7 @@ class Session:
         self.live.topics.unwatch(topic)
         self.fleet.unwatched(topic)
 
-    def _forget_watch(self, topic: str) -> None:
+    def _on_unwatched(self, topic: str) -> None:
         self._health.forget(topic)  # only now: the problem doesn't depend on whether its panel is shown
 
     def _make_stopper(self, node: Node) -> None:

@@ -159,10 +159,10 @@ def _encode_default(frame: NDArray[Any], quality: int) -> Encoded:
     # See the module docstring.
     if frame.dtype.name == "uint8" and _channels(frame) in (1, 3):
         return _as_jpeg(frame, quality)
-    return _as_png(frame) if _has_png(frame) else _raw(frame)
+    return _as_png(frame) if _can_encode_png(frame) else _raw(frame)
 
 
-def _has_png(frame: NDArray[Any]) -> bool:
+def _can_encode_png(frame: NDArray[Any]) -> bool:
     return frame.dtype.name in ("uint8", "uint16") and _channels(frame) in (1, 3, 4)
 
 
@@ -174,7 +174,7 @@ def _as_jpeg(frame: NDArray[Any], quality: int) -> Encoded:
 
 
 def _as_png(frame: NDArray[Any]) -> Encoded:
-    if not _has_png(frame):
+    if not _can_encode_png(frame):
         reason = _(
             "a PNG image needs 'uint8' or 'uint16' and one, three or four channels; choose 'raw' or 'auto'"
         )

@@ -24,7 +24,7 @@ LineKind = Literal["topic", "service"]
 
 OWN = "/nep/"
 """Prefix of nep's own topics and services, such as the log's, which every node has."""
-MAX_OPEN = 200
+MAX_EXPANDED_NODES = 200
 """Number of nodes above which all groups are collapsed at first."""
 BRIDGE_TO = "-to-"
 """Infix of bridge node names: "bridge-NAME-to-BACKEND"."""

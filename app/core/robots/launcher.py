@@ -31,7 +31,7 @@ FIRST_GRAPH_TIMEOUT_S = 3.0
 """Time that a start waits for the first graph, which may contain a robot of that name."""
 STARTING_S = 30.0
 """Time during which a started robot counts as starting: slow computers need that long."""
-REQUEST_KEPT_S = 4.0
+REQUEST_LIFETIME_S = 4.0
 """Time that a request is kept although the robot is listed: its end is noticed only within 3.3 s."""
 
 RUNS_MODULE = ("-m", "--module")
@@ -169,7 +169,7 @@ class Launcher:
         now = self._clock()
         self.wanted[name] = model
         self._starting[name] = now + STARTING_S
-        self._requests[name] = _StartRequest(model, now + FIRST_GRAPH_TIMEOUT_S, now + REQUEST_KEPT_S)
+        self._requests[name] = _StartRequest(model, now + FIRST_GRAPH_TIMEOUT_S, now + REQUEST_LIFETIME_S)
         self.follow()
 
     def follow(self) -> None:

@@ -26,7 +26,7 @@ from nep.programs.bridges.pacer import Pacer
 from nep.programs.bridges.route import Route, RouteEnd
 from nep.programs.bridges.side import BridgeSide
 from nep.programs.bridges.topic_types import type_in
-from nep.programs.bridges.trail import Echoes
+from nep.programs.bridges.trail import LoopGuard
 from nep.protocol.graph_view import GraphView
 
 if TYPE_CHECKING:
@@ -62,7 +62,7 @@ class Bridge:
         self.configuration = configuration
         self.id = secrets.token_hex(8)
         self._own: set[int] = set()
-        self._echoes: dict[tuple[SideName, str], Echoes] = {}
+        self._echoes: dict[tuple[SideName, str], LoopGuard] = {}
         self._lock = threading.Lock()
         self._pacer = Pacer(f"bridge-{configuration.name}-pace")
         self._routes: tuple[Route, ...] = ()
@@ -179,7 +179,7 @@ class Bridge:
 
     def _end(self, topic: BridgeTopic, side: SideName, name: str) -> RouteEnd:
         side_configuration, end = self.configuration.side(side), topic.end(side)
-        echoes = self._echoes.setdefault((side, name), Echoes())
+        echoes = self._echoes.setdefault((side, name), LoopGuard())
         guard = self.sides[side].guard
         return RouteEnd(
             side,

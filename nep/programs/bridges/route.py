@@ -18,7 +18,7 @@ from nep.nodes.subscriber import Subscriber
 from nep.programs.bridges.configuration import SideName
 from nep.programs.bridges.pacer import Limit, Pacer
 from nep.programs.bridges.topic_types import Form, default_type, type_for, type_in
-from nep.programs.bridges.trail import TRAIL_KEY, Echoes, Trail, read_trail
+from nep.programs.bridges.trail import TRAIL_KEY, LoopGuard, Trail, read_trail
 from nep.programs.robots.guard import MotionGuard
 from nep.protocol.graph_view import GraphView
 from nep.text import escaped, shortened
@@ -45,7 +45,7 @@ class RouteEnd:
     topic: str
     msg_type: str = ""
     qos: str = ""
-    echoes: Echoes = field(default_factory=Echoes)
+    echoes: LoopGuard = field(default_factory=LoopGuard)
     guard: MotionGuard | None = field(default=None, compare=False)
     """Guard of robots on this side; None publishes everything there."""
 

@@ -1,7 +1,7 @@
 """Trails: the networks that a message has passed, so that no bridge sends it back.
 
 A bridge stores the trail in the message's extension under the key "bridge": `{"networks": [...], "bridges":
-[...]}`, the networks passed in order, and the ids of all bridges. For back ends without extensions, `Echoes`
+[...]}`, the networks passed in order, and the ids of all bridges. For back ends without extensions, `LoopGuard`
 remembers recently sent messages.
 """
 
@@ -13,7 +13,7 @@ from collections.abc import Mapping
 from hashlib import blake2b
 from typing import NamedTuple
 
-__all__ = ["TRAIL_KEY", "Echoes", "Trail", "read_trail"]
+__all__ = ["TRAIL_KEY", "LoopGuard", "Trail", "read_trail"]
 
 TRAIL_KEY = "bridge"
 MAX_HOPS = 16
@@ -60,7 +60,7 @@ def _words(found: object) -> tuple[str, ...]:
     )
 
 
-class Echoes:
+class LoopGuard:
     """Recently sent messages of a topic in a network that doesn't identify publishers.
 
     A message that comes back has no sign of its origin. It is recognized by its bytes, once per time sent,

@@ -11,7 +11,7 @@ import pytest
 import nep
 from app.core.network.watches import Watches
 from app.core.robots.fleet import Fleet
-from app.core.robots.launcher import FIRST_GRAPH_TIMEOUT_S, REQUEST_KEPT_S, STARTING_S, Launcher
+from app.core.robots.launcher import FIRST_GRAPH_TIMEOUT_S, REQUEST_LIFETIME_S, STARTING_S, Launcher
 from app.core.session import Session
 from app.core.storage.settings import Settings
 from app.robots import simulated
@@ -63,7 +63,7 @@ def test_missing_virtual_robot_is_started_at_once(world: World) -> None:
 def test_virtual_robot_is_started_when_the_existing_one_has_ended(world: World) -> None:
     world.there = True
     world.launcher.start_virtual_robot()
-    world.after(REQUEST_KEPT_S - 1)
+    world.after(REQUEST_LIFETIME_S - 1)
     assert not world.started
     world.there = False
     world.after(0.03)
@@ -75,7 +75,7 @@ def test_virtual_robot_is_started_when_the_existing_one_has_ended(world: World) 
 def test_start_request_expires_while_existing_robot_stays(world: World) -> None:
     world.there = True
     world.launcher.start_virtual_robot()
-    world.after(REQUEST_KEPT_S)
+    world.after(REQUEST_LIFETIME_S)
     world.there = False
     world.after(0.03)
     assert not world.started

@@ -24,8 +24,8 @@ class Pipe:
         return next(self.chunks, b"")
 
 
-class Rests(threading.Event):
-    """Counts how often somebody rests, and takes no time for it."""
+class CountedWaits(threading.Event):
+    """Event that counts its waits and their seconds, and returns at once."""
 
     count, seconds = 0, 0.0
 
@@ -36,7 +36,7 @@ class Rests(threading.Event):
 
 
 def output(*chunks: bytes) -> Output:
-    return Output(Pipe(chunks), Rests())  # type: ignore[arg-type]
+    return Output(Pipe(chunks), CountedWaits())  # type: ignore[arg-type]
 
 
 def test_protocol_lines_are_assembled_and_other_bytes_counted() -> None:
@@ -75,8 +75,8 @@ def test_output_flood_is_counted_exactly_in_constant_memory(
     assert peak < 5 * MAX_LINE_LENGTH
 
 
-def rested(chunks: Iterable[bytes], clock: Callable[[], float]) -> Rests:
-    rests = Rests()
+def rested(chunks: Iterable[bytes], clock: Callable[[], float]) -> CountedWaits:
+    rests = CountedWaits()
     for _ in Output(Pipe(chunks), rests, clock):  # type: ignore[arg-type]
         pass
     return rests

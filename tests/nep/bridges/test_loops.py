@@ -13,7 +13,7 @@ from nep.errors import WireError
 from nep.messages.message import arrived
 from nep.programs.bridges import Bridge, BridgeConfiguration, SideConfiguration, side_of
 from nep.programs.bridges.other_bridges import OtherBridge, OtherBridges
-from nep.programs.bridges.trail import ECHO_S, MAX_HOPS, TRAIL_KEY, Echoes, Trail, read_trail
+from nep.programs.bridges.trail import ECHO_S, MAX_HOPS, TRAIL_KEY, LoopGuard, Trail, read_trail
 from nep.protocol.graph_view import BRIDGES_TOPIC
 from tests.nep.bridges.joined import bridged, nets, route, settled, silent, taken, topic
 from tests.nep.programs import eventually
@@ -403,7 +403,7 @@ def test_message_with_an_invalid_trail_is_forwarded():
 
 
 def test_echo_is_recognised_once_per_sent_message_until_it_expires():
-    echoes = Echoes()
+    echoes = LoopGuard()
     echoes.sent(b"x", 0.0)
     echoes.sent(b"x", 1.0)
     echoes.sent(memoryview(b"y"), 1.0)
@@ -418,7 +418,7 @@ def test_echo_is_recognised_once_per_sent_message_until_it_expires():
 
 
 def test_echo_memory_is_bounded():
-    echoes = Echoes()
+    echoes = LoopGuard()
     for number in range(10_000):
         echoes.sent(str(number).encode(), 0.0)
     assert not echoes.is_echo(b"0", 0.0)

@@ -19,7 +19,7 @@ from app.ui.panels.image.panel import ImagePanel
 from app.ui.panels.inspector.panel import InspectorPanel
 from app.ui.panels.registry import PanelRegistry
 from app.ui.panels.robot.panel import RobotPanel
-from app.ui.shell.docking.dock import RESTS_AFTER_S, Dock, on_screen
+from app.ui.shell.docking.dock import SUSPEND_DELAY_S, Dock, on_screen
 from app.ui.shell.main_window import TICK_MS, MainWindow
 from app.ui.theme.theme import Theme
 from nep.messages.message import Message
@@ -67,7 +67,7 @@ class Case:
     def hide_for_long(self) -> None:
         """What is hidden now is hidden for longer than it stays subscribed."""
         self.tick()
-        self.tick(RESTS_AFTER_S)
+        self.tick(SUSPEND_DELAY_S)
 
     def dock(self, name: str) -> Dock:
         bench = self.window.bench
@@ -104,7 +104,7 @@ def test_closed_panel_watches_nothing_and_resumes_when_reopened(qtbot, case: Cas
     assert {CAMERA, STATE} <= case.source.wanted
     camera.close()
     case.tick()
-    case.tick(RESTS_AFTER_S - 0.1)
+    case.tick(SUSPEND_DELAY_S - 0.1)
     assert CAMERA in case.source.wanted, "a panel that is hidden for a moment stays subscribed"
     case.tick(0.1)
     assert CAMERA not in case.source.wanted
@@ -172,7 +172,7 @@ def test_quick_tab_switch_does_not_resubscribe(qtbot, case: Case) -> None:
         for dock in (image, camera):
             dock.raise_()
             settle(qtbot, case, dock)
-            case.tick(RESTS_AFTER_S / 3)
+            case.tick(SUSPEND_DELAY_S / 3)
     assert len(case.source.asked) == asked
 
 

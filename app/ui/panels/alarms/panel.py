@@ -271,14 +271,14 @@ class AlarmsPanel(PanelWidget):
     def _rule(self, rule_id: str) -> AlarmRule | None:
         return self.alarms.alarms.rule(rule_id)
 
-    def _put(self, rule: AlarmRule) -> None:
+    def _save_rule(self, rule: AlarmRule) -> None:
         self.alarms.put(rule)
         self.refresh()
 
     def _switch(self, rule_id: str, on: bool) -> None:
         rule = self._rule(rule_id)
         if rule is not None:
-            self._put(replace(rule, is_on=on))
+            self._save_rule(replace(rule, is_on=on))
 
     def _pressed(self, row: AlarmRow, part: PhrasePart) -> None:
         rule = self._rule(row.rule_id)
@@ -321,7 +321,7 @@ class AlarmsPanel(PanelWidget):
         if part.role == "limit" and self._fresh == rule.id:
             made, self._fresh = replace(made, is_on=True), ""  # it was disabled until its limit was entered
         if made != rule:
-            self._put(made)
+            self._save_rule(made)
         return True
 
     def _field_ended(self) -> None:
@@ -389,7 +389,7 @@ class AlarmsPanel(PanelWidget):
         if rule is None:
             return
         made = with_kind(rule, kind)
-        self._put(made)
+        self._save_rule(made)
         condition = made.condition
         missing = (
             "subject"
@@ -422,7 +422,7 @@ class AlarmsPanel(PanelWidget):
         rule = self._rule(row.rule_id)
         if rule is None:
             return
-        self._put(with_action(rule, place, action))  # type: ignore[arg-type]
+        self._save_rule(with_action(rule, place, action))  # type: ignore[arg-type]
         name = row.slots.get(f"name:{place}")
         if name is not None:
             self._pressed(row, name.part)
@@ -430,7 +430,7 @@ class AlarmsPanel(PanelWidget):
     def _remove_action(self, rule_id: str, part: PhrasePart, _on: bool = False) -> None:
         rule = self._rule(rule_id)
         if rule is not None and part.place < len(rule.actions):
-            self._put(with_action(rule, part.place, None))
+            self._save_rule(with_action(rule, part.place, None))
 
     def _snooze(self, rule_id: str, seconds: float = SNOOZE_S, _on: bool = False) -> None:
         rule = self._rule(rule_id)
@@ -476,13 +476,13 @@ class AlarmsPanel(PanelWidget):
     def _set_calm(self, rule_id: str, calm_s: float, _on: bool = False) -> None:
         rule = self._rule(rule_id)
         if rule is not None:
-            self._put(replace(rule, calm_s=calm_s))
+            self._save_rule(replace(rule, calm_s=calm_s))
 
     def _duplicate(self, rule_id: str) -> None:
         rule = self._rule(rule_id)
         if rule is not None:
             made = replace(rule, id=new_id(), snoozed_until_s=0.0)
-            self._put(made)
+            self._save_rule(made)
             self.edit(made.id, "")
 
     def _delete(self, rule_id: str) -> None:

@@ -131,7 +131,7 @@ class ConsoleModel(QAbstractListModel):
         if not records or records[-1].number < self._newest or records[0].number > self._newest + 1:
             self.show_all(records, wanted)
             return len(self._records)
-        self._leave(records[0].number)
+        self._evict_older_than(records[0].number)
         came: list[ConsoleRecord] = []
         for record in reversed(records):
             if record.number <= self._newest:
@@ -145,7 +145,7 @@ class ConsoleModel(QAbstractListModel):
             self.endInsertRows()
         return len(came)
 
-    def _leave(self, oldest: int) -> None:
+    def _evict_older_than(self, oldest: int) -> None:
         gone = 0
         for record in self._records:
             if record.number >= oldest:

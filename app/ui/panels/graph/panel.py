@@ -18,7 +18,7 @@ from app.core.graph.dot import dot_of
 from app.core.graph.layout import GraphLayout, LayoutSizes
 from app.core.graph.layout_thread import LayoutThread
 from app.core.graph.node_graph import (
-    MAX_OPEN,
+    MAX_EXPANDED_NODES,
     DrawnNode,
     GraphChoices,
     GraphFacts,
@@ -225,7 +225,7 @@ class GraphPanel(PanelWidget):
     def _rebuild(self) -> None:
         facts = self._graph_facts()
         choices = self._choices
-        if len(facts.nodes) > MAX_OPEN and not (choices.starts_closed or choices.toggled):
+        if len(facts.nodes) > MAX_EXPANDED_NODES and not (choices.starts_closed or choices.toggled):
             self._layout = None
             self._choose(starts_closed=True)
         graph = node_graph(facts, self._choices)

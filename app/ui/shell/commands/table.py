@@ -111,13 +111,13 @@ def _no_recent(do: Handlers) -> str:
     return "" if do.session.settings.recent_known else _("The list is empty")
 
 
-def _no_recording(do: Handlers) -> str:
+def _disabled_without_recording(do: Handlers) -> str:
     return "" if do.session.replay is not None else _("No recording is open")
 
 
 def _not_there_yet(do: Handlers) -> str:
     if do.session.replay is None:
-        return _no_recording(do)
+        return _disabled_without_recording(do)
     return "" if do.session.replay.player is not None else _("The recording is still opening")
 
 
@@ -259,7 +259,8 @@ COMMANDS: tuple[C, ...] = (
       tip=lazy("Freezes the Inspector and images"), check=True, above=True,
       why_not=_nothing_to_freeze),
     C("replay.live", lazy("Back to live"), lambda do: do.replay.back_to_live(), "View", icon="radio-tower",
-      tip=lazy("Closes the recording and returns to the live network"), above=True, why_not=_no_recording),
+      tip=lazy("Closes the recording and returns to the live network"), above=True,
+      why_not=_disabled_without_recording),
     C("replay.play", lazy("Play recording"), lambda do: do.replay.play(), icon="play",
       why_not=_not_there_yet),
     C("replay.bookmark", lazy("Add bookmark"), lambda do: do.replay.bookmark(), icon="bookmark",

@@ -30,7 +30,7 @@ from app.ui.widgets.menus import Menu, drop_below
 from nep.i18n import _
 
 MIN_BODY_SIZE = QSize(160, 60)
-RESTS_AFTER_S = 2.0
+SUSPEND_DELAY_S = 2.0
 """Delay before a hidden panel unsubscribes, so that quick tab changes don't resubscribe."""
 CAUGHT_ERRORS = (Exception, SystemExit)
 """Exceptions of panels that are caught; a plug-in's panel may call `sys.exit`."""
@@ -157,7 +157,7 @@ class Dock(QDockWidget):
         self.number, self.key = number, key_of(description.name, number)
         self.failed = False
         self.front = False
-        self._seen_s = -RESTS_AFTER_S
+        self._seen_s = -SUSPEND_DELAY_S
         self._theme, self._density = theme, density
         self.setObjectName(f"panel.{self.key}")
         self.setAccessibleName(self.windowTitle())
@@ -204,7 +204,7 @@ class Dock(QDockWidget):
         if self.shown():
             self._seen_s = now
             return self._try(self.panel.resume)
-        return self._try(self.panel.suspend) if now - self._seen_s >= RESTS_AFTER_S else None
+        return self._try(self.panel.suspend) if now - self._seen_s >= SUSPEND_DELAY_S else None
 
     def refresh(self) -> str | None:
         """Refresh the panel if it is visible; return the error message if it has just failed."""

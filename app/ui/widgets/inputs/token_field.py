@@ -67,7 +67,7 @@ class Token(PaintedButton):
         painter.end()
 
 
-class _Typed(QLineEdit):
+class _TokenEdit(QLineEdit):
     """Text being typed; Enter finishes it, Backspace at its start removes the last token."""
 
     ended = Signal()
@@ -117,7 +117,7 @@ class TokenField(QWidget):
         self._add_words = add
         self._theme, self._example, self._is_wrong = theme, example, False
         self._tokens: list[Token] = []
-        self.edit = _Typed(self)
+        self.edit = _TokenEdit(self)
         self.edit.setAccessibleName(name)
         self.edit.setPlaceholderText(example)
         self.edit.setMaxLength(MAX_LETTERS)

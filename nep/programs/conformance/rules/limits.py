@@ -15,7 +15,7 @@ from nep.programs.conformance.rules.messages import connected_publisher, connect
 from nep.programs.conformance.verdict import broken, expect, printable
 from nep.protocol.wire import Header, topic_part
 
-_DEEP = 100_000
+_NESTING_DEPTH = 100_000
 
 
 def _expect_working(bench: Bench, publisher: ScriptedPublisher, sub: int) -> None:
@@ -75,8 +75,8 @@ def _malformed_named(bench: Bench) -> None:
 @rule("deep", lazy("Deeply nested JSON and msgpack do not stop a subscriber."), "messages")
 def _deep(bench: Bench) -> None:
     for msg_type, payload, good in (
-        ("json", b"[" * _DEEP + b"]" * _DEEP, b"[1]"),
-        ("msgpack", b"\x91" * _DEEP + b"\xc0", msgpack.packb([1])),
+        ("json", b"[" * _NESTING_DEPTH + b"]" * _NESTING_DEPTH, b"[1]"),
+        ("msgpack", b"\x91" * _NESTING_DEPTH + b"\xc0", msgpack.packb([1])),
     ):
         publisher, sub = bench.subscribed_publisher(bench.new_topic(), msg_type)
         publisher.send(payload)
