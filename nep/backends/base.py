@@ -30,8 +30,7 @@ HANDSHAKE_S = 0.5
 """Maximum time in seconds that a new publisher or subscriber waits for the handshake with its peers."""
 
 Sink = Callable[[Sequence[Message]], None]
-"""Callback for batches of messages. Runs in the transport's sink thread; must return soon and must not raise.
-"""
+"""Callback for batches of messages; called in the transport's sink thread. Must return soon and not raise."""
 
 
 @dataclass(frozen=True)
@@ -106,13 +105,13 @@ class Wakes(Protocol):
 
 
 class QuickPublish(NamedTuple):
-    """Functions that a transport with `PublishesQuickly` needs for its fast path.
+    """Arguments of `PublishesQuickly.quick_publish`.
 
     Attributes:
         owner: Publisher; while it is closed, calls go to `slowly`.
-        kind: Payload type that is sent as is, without encoding.
+        kind: Payload type that is sent as is, without encoding; None if there is none.
         ordinary: Encoder of other payloads. Payloads for which it raises go to `slowly`.
-        look: Called with a payload whose encoding contains ``null``; None to skip the check.
+        look: Called with each payload whose encoding contains ``null``; None to skip the check.
         slowly: Full publish method. Also used with ``strict=True`` and while the topic has no subscribers.
     """
 
@@ -134,7 +133,7 @@ class PublishesQuickly(Protocol):
     """Optional interface of a `PublisherTransport`: a fast path for publishing."""
 
     def quick_publish(self, asked: QuickPublish) -> Callable[..., None]:
-        """Return a publish function with as little call overhead as possible. It never blocks."""
+        """Return a publish function with minimal call overhead. It never blocks."""
 
 
 class PublisherTransport(Protocol):
@@ -160,25 +159,25 @@ class PublisherTransport(Protocol):
         """Count a message that is not sent because the topic has no subscribers."""
 
     def report(self, problem: str) -> None:
-        """Set the problem that prevents payloads from being sent; an empty string clears it."""
+        """Report the reason why payloads can't be encoded, as an alert in the graph; "" clears the alert."""
 
     def lend(self, size_bytes: int) -> memoryview | None:
-        """Return writable shared memory for a payload, or None if the subscribers don't share memory."""
+        """Return writable shared memory for a payload, or None if no subscriber shares memory."""
 
     def send(self, encoded: Encoded) -> None:
-        """Return writable shared memory for a payload, or None if the subscribers share none."""
+        """Send an encoded message to all subscribers. Never blocks: subscribers with a full queue lose it."""
 
     def close(self, timeout_s: float) -> None:
-        """Unregister and flush. Messages not delivered within `timeout_s` seconds are logged."""
+        """Unregister and flush. Messages not delivered within `timeout_s` seconds are logged as a warning."""
 
 
 @runtime_checkable
 class KnowsSubscribers(Protocol):
-    """Optional interface of a `PublisherTransport`: the ids of connected subscribers."""
+    """Optional interface of a `PublisherTransport` that can identify its subscribers."""
 
     @property
     def subscriber_ids(self) -> frozenset[int]:
-        """Ids of the connected subscribers, as in the graph."""
+        """Ids of the connected subscribers, the same as in the graph."""
 
 
 @runtime_checkable
@@ -189,27 +188,28 @@ class GivesPayloads(Protocol):
     """
 
     payloads: deque[Any]
-    """Payloads of the messages that precede those in `ready`. Pop from the left, in any thread."""
+    """Decoded payloads that come before the messages in `ready`. Pop from the left, in any thread."""
     wants_payloads: bool
-    """Set by the reader: True to receive payloads here where that is faster."""
+    """True to receive payloads here whenever that is faster; set by the reader."""
 
     def restore(self) -> None:
-        """Convert the remaining payloads back to messages and put them first into `ready`."""
+        """Convert the remaining payloads back to messages and insert them at the front of `ready`."""
 
 
 class SubscriberTransport(Protocol):
     """Receiving end of a subscriber."""
 
     ready: deque[Message]
-    """Next messages, already read. The reader may pop from the left; other messages may be queued elsewhere
-    while it is empty.
+    """Messages that were already read. Pop from the left, in any thread.
+
+    May be empty while other messages are queued; `poll` returns those.
     """
 
     @property
     def fd(self) -> int:
-        """Optional interface of a `SubscriberTransport`: payloads without `Message` objects.
+        """File descriptor that becomes readable when messages arrive between `enter_wait` and `leave_wait`.
 
-        While `payloads` is not empty, call `restore` before taking from `ready`.
+        -1 if there is none: then only the waker signals messages.
         """
 
     def enter_wait(self, waker: Wakes) -> bool:
@@ -220,7 +220,7 @@ class SubscriberTransport(Protocol):
         """
 
     def leave_wait(self, waker: Wakes) -> None:
-        """End a wait that `enter_wait` began."""
+        """End the wait that `enter_wait` prepared."""
 
     @property
     def received(self) -> int:
@@ -228,40 +228,43 @@ class SubscriberTransport(Protocol):
 
     @property
     def lost(self) -> int | None:
-        """Number of messages that were lost or dropped for lack of room; None if the back end can't know."""
+        """Number of messages lost in transit or dropped from a full queue; None if unknown."""
 
     @property
     def refused(self) -> int:
-        """Number of inputs rejected because they aren't valid messages."""
+        """Number of received frames that were rejected because they are not valid messages."""
 
     @property
     def is_closed(self) -> bool:
         """True after `close`, or after the transport was closed."""
 
     def poll(self) -> Message | None:
-        """Return the next message, or None if none is available. Doesn't wait."""
+        """Return the next message, or None if none is available. Never waits."""
 
     def receive(self, timeout_s: float) -> Message | None:
-        """Return the next message; wait up to `timeout_s` seconds. May return None earlier."""
+        """Wait up to `timeout_s` seconds for the next message and return it. May return None earlier."""
 
     def report(self, problem: str) -> None:
-        """Set the problem that prevents messages from being decoded; an empty string clears it."""
+        """Report the reason why messages can't be decoded, as an alert in the graph; "" clears the alert."""
 
     def close(self) -> None:
         """Unregister and discard unread messages."""
 
     def forked(self) -> None:
-        """Become closed and empty in a forked child, without taking locks or touching sockets."""
+        """Mark the subscriber as closed and discard its messages in a forked child process.
+
+        Takes no lock and touches no socket.
+        """
 
 
 class Transport(Protocol):
     """Connection of one node to the other nodes."""
 
     def publisher(self, spec: PublisherSpec) -> PublisherTransport:
-        """Create a publisher. Existing subscribers receive its first message.
+        """Create a publisher. Its first message reaches every subscriber that is already registered.
 
         Raises:
-            MasterUnreachable: No master answered within `PublisherSpec.wait_s`.
+            MasterUnreachable: No master replied within `PublisherSpec.wait_s`.
             AddressInUseError: The address can't be bound.
             RequestRefusedError: The master rejected the registration.
         """
@@ -283,7 +286,7 @@ class Transport(Protocol):
         """Return the current graph. Raises `MasterUnreachable`."""
 
     def begin_close(self) -> None:
-        """Announce the end to all peers and stop sending. Doesn't wait; `close` must follow."""
+        """Notify all peers that the node is closing, and stop sending. Doesn't wait; `close` must follow."""
 
     def close(self, timeout_s: float) -> None:
         """Close all publishers and subscribers, unregister the node and join the threads."""
@@ -326,8 +329,8 @@ class Backend:
 def backend_named(name: str) -> Backend:
     """Return the back end with this name or alias.
 
-    Third-party entry points are searched only if no built-in back end matches, to keep creating a node below
-    a millisecond.
+    Third-party entry points are searched only if no built-in back end matches, because the search takes
+    longer than the millisecond in which a node is created.
 
     Raises:
         UnknownBackendError: No back end has this name.

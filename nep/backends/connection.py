@@ -16,10 +16,10 @@ _MODES: dict[str, Mode] = {"one2many": "one2many", "many2one": "many2one", "many
 
 @dataclass(frozen=True)
 class Hybrid:
-    """Connection through the master at `master`. Create with `Node.hybrid`.
+    """Connection through the master at `master`. Created by `Node.hybrid`.
 
-    Any number of publishers and subscribers can connect; `mode` is accepted for compatibility with the
-    original NEP.
+    Any number of publishers and subscribers can connect. `mode` is ignored; it exists for compatibility with
+    the original NEP.
     """
 
     master: str
@@ -28,15 +28,16 @@ class Hybrid:
 
 @dataclass(frozen=True)
 class Direct:
-    """Connection to a fixed address without a master. Create with `Node.direct`.
+    """Connection to a fixed address without a master. Created by `Node.direct`.
 
     Attributes:
         ip: IP address or host name.
-        port: Port from 1 to 65535.
-        mode: Side that binds the port. one2many: the publisher. many2one: the subscriber. many2many: neither;
-            publishers connect to `port` and subscribers to `port + 1` of a proxy of the original NEP.
-        generation: Frame format of the "original" wire: "A" (`topic {…}`) or "B" (`{…}`).
-        wire: "original", "native", or "tcp" (calls only).
+        port: Port, 1 to 65535.
+        mode: Side that binds the port: the publisher (one2many), the subscriber (many2one), or neither
+            (many2many). With many2many, publishers connect to `port` and subscribers to `port + 1` of a proxy
+            of the original NEP.
+        generation: Frame format on the "original" wire: "A" (`topic {…}`) or "B" (`{…}`).
+        wire: "original", "native", or "tcp" (service calls only).
     """
 
     ip: str
@@ -51,14 +52,14 @@ Configuration = Hybrid | Direct
 
 
 def for_messages(configuration: Configuration) -> Configuration:
-    """Return `configuration` if it can carry messages. Raises `NepError`."""
+    """Return `configuration` if topics can use it. Raises `NepError` if it only supports calls."""
     if isinstance(configuration, Direct) and configuration.wire == "tcp":
         raise NepError(_("plain TCP supports only service calls; omit wire='tcp' for a topic"))
     return configuration
 
 
 def checked_mode(mode: str) -> Mode:
-    """Validate a mode. Raises `NepError`, which lists the valid modes."""
+    """Validate a mode and return it. Raises `NepError` with the valid modes."""
     try:
         return _MODES[mode]
     except KeyError:

@@ -1,4 +1,4 @@
-"""Timeout thread for calls, for back ends without an event loop of their own."""
+"""Timeout thread for service calls, for back ends without an event loop."""
 
 from __future__ import annotations
 
@@ -9,14 +9,14 @@ from typing import Protocol
 
 
 class Expiring(Protocol):
-    """Client whose pending calls can expire."""
+    """Client whose pending calls have deadlines."""
 
     def expire(self, now: float) -> float:
-        """Fail expired calls; return the next deadline (`time.monotonic`)."""
+        """Fail expired calls and return the next deadline (`time.monotonic`)."""
 
 
 class Deadlines:
-    """Timeout thread: expires pending calls of all clients of a node. Started lazily."""
+    """Thread that expires the pending calls of all clients of a node. Started with the first client."""
 
     def __init__(self, node_name: str) -> None:
         self._name = f"nep-calls-{node_name}"
@@ -27,7 +27,7 @@ class Deadlines:
         self._thread: threading.Thread | None = None
 
     def watch(self, client: Expiring) -> None:
-        """Include the calls of this client."""
+        """Add a client and start the thread if necessary."""
         with self._changed:
             self._clients = (*self._clients, client)
             if self._thread is None:
@@ -40,7 +40,7 @@ class Deadlines:
             self._clients = tuple(each for each in self._clients if each is not client)
 
     def add(self, deadline: float) -> None:
-        """Schedule an expiry check at `deadline` (`time.monotonic`) at the latest."""
+        """Schedule an expiry check no later than `deadline` (`time.monotonic`)."""
         with self._changed:
             if deadline < self._due:
                 self._due = deadline

@@ -1,4 +1,4 @@
-"""Interface of back ends that support services: server, client and survey transports."""
+"""Interface for back ends with services: server, client and survey transports."""
 
 from __future__ import annotations
 
@@ -29,7 +29,13 @@ CALLS_MAX_BYTES = 256 * 2**20
 class ServerSpec:
     """Settings of a new server.
 
-    `number` proves ownership of `id`. `msg_type` is the service type, for back ends with typed services.
+    Attributes:
+        id: Random id of the server.
+        service: Name of the service.
+        configuration: Connection through a master or to a fixed address.
+        wait_s: Seconds to wait for the master; None waits forever.
+        number: Secret that proves ownership of the id, see `nep.protocol.requests.is_proven`.
+        msg_type: Service type, for back ends with typed services.
     """
 
     id: int
@@ -44,8 +50,14 @@ class ServerSpec:
 class ClientSpec:
     """Settings of a new client.
 
-    `codec` encodes requests and replies. `msg_type` is the requested service type, for back ends with typed
-    services. `number` proves ownership of `id`.
+    Attributes:
+        id: Random id of the client.
+        service: Name of the service.
+        codec: Codec of requests and replies.
+        configuration: Connection through a master or to a fixed address.
+        wait_s: Seconds to wait for the master; None waits forever.
+        number: Secret that proves ownership of the id.
+        msg_type: Requested service type, for back ends with typed services.
     """
 
     id: int
@@ -65,7 +77,7 @@ class Tally:
         self.calls = self.errors = self.refused = self.bytes = self.unreadable = 0
 
     def add(self, reply: Reply) -> None:
-        """Count a call and its reply."""
+        """Count a call by its reply."""
         with self._lock:
             if reply.kind == CallKind.REFUSED:
                 self.refused += 1
@@ -82,13 +94,13 @@ class Tally:
 
 @dataclass(frozen=True)
 class IncomingCall:
-    """Request queued in a server.
+    """Request in a server's queue.
 
     Attributes:
         data: Encoded request.
         codec: Number of its codec.
-        deadline: Time (`time.monotonic`) after which the client no longer waits; None if it waits forever.
-        answer: Sends the reply; returns False if it couldn't be sent.
+        deadline: Time (`time.monotonic`) after which the client stops waiting; None if it waits forever.
+        answer: Sends the reply; returns False if sending failed.
     """
 
     data: bytes | memoryview
@@ -98,7 +110,7 @@ class IncomingCall:
 
     @property
     def is_late(self) -> bool:
-        """True if the client no longer waits for the reply."""
+        """True if the client has stopped waiting for the reply."""
         return self.deadline is not None and time.monotonic() >= self.deadline
 
 
@@ -114,7 +126,7 @@ class CallQueue:
 
     @property
     def is_closed(self) -> bool:
-        """True after `close`; new calls are rejected."""
+        """True after `close`; new calls are then rejected."""
         return self._is_closed
 
     def put(self, call: IncomingCall) -> bool:
@@ -143,7 +155,7 @@ class CallQueue:
             return call
 
     def enter_wait(self, wake: Callable[[], None]) -> bool:
-        """Call `wake` for every new call from now on; return False if a call is already queued."""
+        """Register `wake`, which is called for every new call; return False if a call is already queued."""
         with self._changed:
             if self._calls:
                 return False
@@ -151,9 +163,9 @@ class CallQueue:
             return True
 
     def leave_wait(self, wake: Callable[[], None]) -> None:
-        """Stop calling `wake`."""
+        """Unregister a function that `enter_wait` registered."""
         with self._changed:
-            if wake in self._wakes:  # not registered in a forked child
+            if wake in self._wakes:  # not registered if the process was forked in between
                 self._wakes.remove(wake)
 
     def close(self) -> tuple[IncomingCall, ...]:
@@ -167,7 +179,7 @@ class CallQueue:
             return left
 
     def forked(self) -> None:
-        """Become closed and empty in a forked child, without taking a lock."""
+        """Mark the queue as closed and empty in a forked child process, without acquiring a lock."""
         self._changed = threading.Condition(threading.Lock())
         self._calls = deque()
         self._wakes = []
@@ -180,7 +192,7 @@ Outcome = Reply | NepError
 
 @contextmanager
 def woken_by(calls: Sequence[CallQueue], wake: Callable[[], None]) -> Iterator[bool]:
-    """Register `wake` at all of `calls` within the context; yield False if a call is already queued."""
+    """Register `wake` with all `calls` within the context; yield False if a call is already queued."""
     entered: list[CallQueue] = []
     try:
         for queue in calls:
@@ -202,7 +214,7 @@ class OpenCall(Protocol):
 
 
 class CallUnderWay(OpenCall, Protocol):
-    """Call in flight as a client stores it."""
+    """Call in flight, as stored in a client."""
 
     @property
     def then(self) -> Callable[[Outcome], None]:
@@ -217,7 +229,7 @@ C = TypeVar("C", bound=CallUnderWay)
 
 
 class ClientCalls(Generic[C]):
-    """Calls in flight of a client, guarded by `_lock`: base class of the clients of all back ends."""
+    """Calls in flight of a client, guarded by `_lock`. Base class of the clients of several back ends."""
 
     def __init__(self, spec: ClientSpec) -> None:
         self.spec = spec
@@ -251,7 +263,7 @@ class ClientCalls(Generic[C]):
                 self._remove_locked(known)
 
     def forked(self) -> None:
-        """Become closed in a forked child, without taking the lock."""
+        """Mark the client as closed in a forked child process, without acquiring the lock."""
         self.is_closed = True
         self._lock = threading.Lock()
         self._calls = {}
@@ -261,14 +273,14 @@ class ClientCalls(Generic[C]):
 
 
 class ServerTransport(Protocol):
-    """Server of a back end."""
+    """Interface of a back end's server."""
 
     calls: CallQueue
     tally: Tally
 
     @property
     def endpoints(self) -> tuple[str, ...]:
-        """Endpoints at which the server is reached."""
+        """Endpoints at which clients can reach the server."""
 
     @property
     def is_closed(self) -> bool:
@@ -281,11 +293,11 @@ class ServerTransport(Protocol):
         """Unregister and close; replies are flushed within `timeout_s` seconds. Idempotent."""
 
     def forked(self) -> None:
-        """Become closed in a forked child, without taking locks or touching sockets."""
+        """Mark the server as closed in a forked child process. Acquires no lock and touches no socket."""
 
 
 class ClientTransport(Protocol):
-    """Client of a back end."""
+    """Interface of a back end's client."""
 
     @property
     def is_connected(self) -> bool:
@@ -318,17 +330,17 @@ class ClientTransport(Protocol):
         """Cancel a call; `then` isn't called."""
 
     def service_names(self, timeout_s: float) -> tuple[str, ...]:
-        """Return the names of services that have a server; empty if the back end can't know."""
+        """Return the names of services that have a server; empty if the back end doesn't know them."""
 
     def close(self) -> None:
-        """Unregister; calls in flight fail with `ClosedError`."""
+        """Unregister the client; calls in flight fail with `ClosedError`."""
 
     def forked(self) -> None:
-        """Become closed in a forked child, without taking locks or touching sockets."""
+        """Mark the client as closed in a forked child process. Acquires no lock and touches no socket."""
 
 
 class SurveyTransport(Protocol):
-    """Surveyor of a back end."""
+    """Interface of a back end's surveyor."""
 
     @property
     def respondents(self) -> int:
@@ -351,17 +363,17 @@ class SurveyTransport(Protocol):
         """
 
     def forget_all(self, calls: Sequence[OpenCall]) -> None:
-        """Cancel these calls; `then` isn't called."""
+        """Cancel several calls; `then` isn't called for them."""
 
     def close(self) -> None:
-        """Unregister; calls in flight fail with `ClosedError`."""
+        """Unregister the surveyor; calls in flight fail with `ClosedError`."""
 
     def forked(self) -> None:
-        """Become closed in a forked child, without taking locks or touching sockets."""
+        """Mark the surveyor as closed in a forked child process. Acquires no lock and touches no socket."""
 
 
 class ServiceTransport(Protocol):
-    """Transport of a node with services."""
+    """Transport of a node that supports services."""
 
     def server(self, spec: ServerSpec) -> ServerTransport:
         """Create a server. Raises as `Transport.publisher` does."""
@@ -370,11 +382,18 @@ class ServiceTransport(Protocol):
         """Create a client. Raises as `Transport.subscriber` does."""
 
     def survey(self, spec: ClientSpec) -> SurveyTransport:
-        """Create a surveyor whose respondents are the servers of `spec.service`. Raises as `client` does."""
+        """Create a surveyor; all servers of `spec.service` are its respondents. Raises as `client` does."""
 
 
 def check_calls(service: str, count: int, used: int, size: int) -> None:
-    """Raise `NepError` if a client with `count` calls of `used` bytes in flight can't send `size` more."""
+    """Raise `NepError` if a client has too many calls or bytes in flight to send another call.
+
+    Args:
+        service: Name of the service.
+        count: Number of calls in flight.
+        used: Bytes of the calls in flight.
+        size: Bytes of the new call.
+    """
     if size > PAYLOAD_MAX_BYTES:
         raise NepError(_("the call cannot be sent: {reason}").format(reason=too_large(size)))
     if count >= CALLS_MAX or (used and used + size > CALLS_MAX_BYTES):
@@ -386,20 +405,20 @@ def check_calls(service: str, count: int, used: int, size: int) -> None:
 
 
 def fitting(reply: Reply) -> Reply:
-    """Return `reply`, or an error reply if it is too large."""
+    """Return `reply`, or an error reply if it exceeds the size limit."""
     if len(reply.data) <= PAYLOAD_MAX_BYTES:
         return reply
     return failure(CallKind.ERROR, "EncodeError", too_large(len(reply.data)))
 
 
 def refusal(service: str, *, is_closed: bool) -> Reply:
-    """Return the reply that rejects a call."""
+    """Return the reply that rejects a call: the server is closed, or its queue is full."""
     reason = _("'{service}' is closing") if is_closed else _("'{service}' has too many pending calls")
     return failure(CallKind.REFUSED, "", reason.format(service=service))
 
 
 def too_large(size: int) -> str:
-    """Return the error text for a payload of `size` bytes."""
+    """Return the error message for a payload of `size` bytes."""
     return _("it has {size} bytes, but calls allow at most {most}; publish large data on a topic").format(
         size=size, most=PAYLOAD_MAX_BYTES
     )

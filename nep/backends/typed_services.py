@@ -32,7 +32,13 @@ _TIMEOUT_MAX_MS = 2**32 - 1
 
 
 class AskedCall(NamedTuple):
-    """Decoded request for a nep server."""
+    """Decoded request for a nep server.
+
+    Attributes:
+        data: Encoded payload.
+        codec: Number of its codec.
+        timeout_s: Time limit of the client in seconds; None if it waits forever.
+    """
 
     data: bytes | memoryview
     codec: int
@@ -40,7 +46,7 @@ class AskedCall(NamedTuple):
 
 
 class CallBody(Protocol):
-    """Codec of a request or response body: maps to and from bytes."""
+    """Codec for a request or response body: converts between maps and bytes."""
 
     def encode(self, payload: Any) -> bytes:  # noqa: ANN401 - any payload
         """Encode a map. Raises `EncodeError`."""
@@ -51,7 +57,14 @@ class CallBody(Protocol):
 
 @dataclass(frozen=True)
 class TypedService:
-    """Service type with its request and response codecs. `is_nep` is True for the type of this module."""
+    """Service type with its request and response codecs.
+
+    Attributes:
+        name: Name of the service type.
+        request: Codec of request bodies.
+        answer: Codec of response bodies.
+        is_nep: True for the type described in this module, whose fields carry a codec number and data.
+    """
 
     name: str
     request: CallBody
@@ -100,7 +113,9 @@ class TypedService:
     def body_of_reply(self, reply: Reply) -> bytes:
         """Convert a reply to a response body.
 
-        Raises `EncodeError` for an error reply of a ROS type, which has none.
+        Raises:
+            DecodeError: The reply to a call of a ROS type is an error, or its data can't be decoded.
+            EncodeError: The response type can't represent the payload.
         """
         if self.is_nep:
             kind, data = int(reply.kind), bytes(reply.data)

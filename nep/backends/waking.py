@@ -9,7 +9,7 @@ from nep.backends.base import Wakes
 
 
 class WakingSubscriber(ABC):
-    """Subscriber that wakes waiting threads itself; `changed` guards its input."""
+    """Subscriber that wakes its waiting threads itself. The condition `changed` guards its input."""
 
     fd = -1
 
@@ -23,7 +23,7 @@ class WakingSubscriber(ABC):
         """True if input is available or the subscriber is closed. Call with `changed` held."""
 
     def enter_wait(self, waker: Wakes) -> bool:
-        """Register `waker`; return False if input is available."""
+        """Register `waker`; return False if input is available or the subscriber is closed."""
         with self._changed:
             if self.has_input:
                 return False

@@ -1,7 +1,7 @@
 """Back end `memory`: nodes of one process, without sockets. Reference implementation for other back ends.
 
-Nodes with the same master name are connected; no server runs. A message goes directly to the inboxes of the
-subscribers, a call to the queue of its server.
+Nodes with the same master name are connected; there is no master process. A message is appended directly to
+the inboxes of the subscribers, a call to the queue of its server.
 """
 
 from __future__ import annotations
@@ -42,7 +42,7 @@ from nep.system.cpu import CpuLoad
 _logger = logging.getLogger("nep")
 
 _BATCH_BYTES = 64 * 2**20
-"""Maximum size of a sink's batch; the inbox is smaller by this, so that both together stay within the bound.
+"""Maximum size of a sink's batch. The inbox is smaller by this size, so that the sum stays within the bound.
 """
 _BATCH_S = 0.005  # at most 200 calls of a sink per second
 
@@ -55,7 +55,7 @@ class _Hub(ServiceHub):
         self.publishers: dict[str, list[MemoryPublisher]] = {}
         self.subscribers: dict[str, tuple[MemorySubscriber, ...]] = {}
         self.patterns: tuple[MemorySubscriber, ...] = ()
-        """Subscribers with wildcards."""
+        """Subscribers to patterns."""
 
     def hearing(self, topic: str) -> tuple[MemorySubscriber, ...]:
         found = self.subscribers.get(topic, ())
@@ -136,17 +136,17 @@ class MemoryPublisher:
             self.last_stamp_ns = time.time_ns()
 
     def counts(self) -> PublisherCount:
-        """Return the statistics for a renewal."""
+        """Return the statistics that a renewal reports."""
         return PublisherCount(
             self.spec.id, self.count, self.bytes, self.count, self.last_stamp_ns, self.problem
         )
 
     def report(self, problem: str) -> None:
-        """Set the problem of a payload, which the graph shows as an alert."""
+        """Set the reason why payloads can't be encoded, which the graph shows as an alert; "" clears it."""
         self.problem = problem
 
     def send(self, encoded: Encoded) -> None:
-        """Append a message to the inboxes; mutable data is copied.
+        """Append a message to the inboxes. Mutable data is copied.
 
         Raises `WireError` for an extension that can't be encoded, as other back ends do.
         """
@@ -164,7 +164,7 @@ class MemoryPublisher:
                 subscriber.put(message)
 
     def close(self, timeout_s: float) -> None:  # noqa: ARG002 - nothing to flush
-        """Unregister. Messages are delivered when they are sent, so nothing is flushed."""
+        """Unregister. Nothing needs flushing, because messages are delivered when they are sent."""
         with self.hub.lock:
             if not self.is_closed:
                 self.is_closed = True
@@ -217,16 +217,16 @@ class MemorySubscriber(WakingSubscriber):
         return self.poll()
 
     def take_batch(self) -> list[Message]:
-        """Return the messages for one call of the sink."""
+        """Remove and return the messages for one call of the sink."""
         with self._transport.changed:
             return self.inbox.take_all(_BATCH_BYTES)
 
     def report(self, problem: str) -> None:
-        """Set the reader's problem, which the graph shows as an alert."""
+        """Set the reason why messages can't be decoded, which the graph shows as an alert; "" clears it."""
         self.problem = problem
 
     def forked(self) -> None:
-        """Become closed in a forked child."""
+        """Mark the subscriber as closed in a forked child process."""
         self.is_closed = True
 
     def close(self) -> None:
@@ -282,7 +282,7 @@ class MemoryTransport:
         return publisher
 
     def subscriber(self, spec: SubscriberSpec) -> MemorySubscriber:
-        """Register a subscriber, and deliver the history of the topic's publishers."""
+        """Register a subscriber and deliver the histories of the topic's publishers to it."""
         with self._joined(spec.configuration) as hub:
             record = SubscriberRecord(spec.id, spec.topic, spec.msg_type, pattern=spec.is_pattern)
             hub.ask(requests.AddSubscriber(self.node, record))
@@ -301,7 +301,7 @@ class MemoryTransport:
         return subscriber
 
     def forget(self, closed: MemoryPublisher | MemorySubscriber) -> None:
-        """Remove a closed publisher or subscriber. Call with its hub's lock held."""
+        """Remove a closed publisher or subscriber. Call with the lock of its hub held."""
         self._publishers = tuple(each for each in self._publishers if each is not closed)
         self._subscribers = tuple(each for each in self._subscribers if each is not closed)
         with self.changed:
@@ -345,7 +345,7 @@ class MemoryTransport:
         return _hub(configuration).view()
 
     def renewal(self, hub: _Hub) -> requests.Renew:
-        """Return this node's statistics at one hub."""
+        """Return the renewal request with this node's statistics at one hub."""
         outs = [each for each in self._publishers if each.hub is hub and not each.is_closed]
         ins = [each for each in self._subscribers if each.hub is hub and not each.is_closed]
         return requests.Renew(
@@ -361,7 +361,7 @@ class MemoryTransport:
         )
 
     def begin_close(self) -> None:
-        """Reject queued calls. Messages need no flushing."""
+        """Reject queued calls. Messages don't need flushing."""
         self._services.begin_close()
 
     def close(self, timeout_s: float) -> None:
@@ -385,14 +385,14 @@ class MemoryTransport:
     def _joined(self, configuration: Configuration) -> Iterator[_Hub]:
         # Yields the hub with its lock held, after adding this node. Raises `ClosedError`.
         hub = _hub(configuration)
-        with hub.lock:  # closing the node takes the lock once more after setting `_closing`
+        with hub.lock:  # closing the node acquires the lock again after setting `_closing`
             if self._closing.is_set():
                 raise ClosedError(f"node '{self.node.name}'")
             hub.transports[self.node.id] = self
             yield hub
 
     def _add_sink(self, subscriber: MemorySubscriber) -> None:
-        with self.changed:  # closing the node meanwhile finds either no thread or a started one
+        with self.changed:  # a concurrent close finds either no thread or a started one
             self._sinks = [*self._sinks, subscriber]
             if self._thread is None and not self._closing.is_set():
                 name = f"nep-sinks-{self.node.name}"
@@ -407,13 +407,13 @@ class MemoryTransport:
                 if messages and subscriber.spec.sink is not None:
                     try:
                         subscriber.spec.sink(messages)
-                    except BaseException:  # also SystemExit: the sinks' thread continues with the next batch
+                    except BaseException:  # also SystemExit: the sink thread continues with the next batch
                         _logger.exception("the sink of '%s' failed", subscriber.spec.topic)
             self._closing.wait(_BATCH_S)
 
 
 def _name(master: str | None) -> str:
-    # Any name is valid, as no server runs.
+    # Any name is valid because no master process runs.
     return master or "memory"
 
 

@@ -1,4 +1,4 @@
-"""Servers and clients of one process: a call goes directly to the queue of its server."""
+"""Servers and clients of one process: calls are appended directly to the queue of their server."""
 
 from __future__ import annotations
 
@@ -44,7 +44,7 @@ Then = Callable[[Outcome], None]
 
 
 class ServiceHub:
-    """Registry of servers and clients. Its lock guards all of them except call queues."""
+    """Registry of servers and clients. Its lock guards all their state except the call queues."""
 
     def __init__(self) -> None:
         self.lock = threading.RLock()
@@ -53,7 +53,7 @@ class ServiceHub:
         self.clients: dict[str, tuple[MemoryClient, ...]] = {}
 
     def ask(self, request: requests.Request) -> None:
-        """Apply a request to the graph. Raises `RequestRefusedError`."""
+        """Apply a request to the graph. Raises `RequestRefusedError` if it is rejected."""
         with self.lock:
             for each in self.graph.apply(request, 0, time.monotonic(), ""):
                 if isinstance(each.answer, requests.Refused):
@@ -116,12 +116,12 @@ class MemoryServer:
         return is_waited_for
 
     def counts(self) -> PublisherCount:
-        """Return the statistics for a renewal."""
+        """Return the statistics that a renewal reports."""
         tally = self.tally
         return PublisherCount(self.spec.id, tally.calls, tally.bytes, tally.calls, errors=tally.errors)
 
     def begin_close(self) -> None:
-        """Unregister, and reject queued calls."""
+        """Unregister and reject queued calls."""
         with self.hub.lock:
             left = tuple(each for each in self.hub.servers.get(self.spec.service, ()) if each is not self)
             is_listed = self in self.hub.servers.get(self.spec.service, ())
@@ -150,13 +150,13 @@ class MemoryServer:
             call.end(ServerGoneError(self.spec.service))
 
     def forked(self) -> None:
-        """Become closed in a forked child."""
+        """Mark the server as closed in a forked child process."""
         self.is_closed = True
         self.calls.forked()
 
 
 class MemoryClient:
-    """Client with its calls in flight. The statistics are guarded by the hub's lock."""
+    """Client and its calls in flight. Its statistics are guarded by the hub's lock."""
 
     def __init__(self, node_id: str, hub: ServiceHub, spec: ClientSpec, deadlines: Deadlines) -> None:
         self._node_id = node_id
@@ -213,12 +213,12 @@ class MemoryClient:
             return [self._begin(data, timeout_s, then, server) for server in servers]
 
     def forget_all(self, calls: Sequence[OpenCall]) -> None:
-        """Cancel these calls."""
+        """Cancel several calls; their callbacks aren't called."""
         for call in calls:
             self.forget(call)
 
     def remove_locked(self, call: _Call) -> bool:
-        """Remove a call; return False if it was no longer in flight. Call with the hub's lock held."""
+        """Remove a call; return False if it is not in flight any more. Call with the hub's lock held."""
         if self._calls.pop(call.number, None) is None:
             return False
         self._bytes -= len(call.data)
@@ -232,13 +232,13 @@ class MemoryClient:
                 self.remove_locked(known)
 
     def served_by(self, server: MemoryServer) -> None:
-        """Send waiting calls to a new server. Call with the hub's lock held."""
+        """Send the calls that wait for a server to a new one. Call with the hub's lock held."""
         for call in self.calls:
             if call.server is None:
                 server.put(call)
 
     def expire(self, now: float) -> float:
-        """Fail expired calls; return the next deadline."""
+        """Fail expired calls and return the next deadline."""
         with self.hub.lock:
             late = [each for each in self.calls if each.deadline <= now and self.remove_locked(each)]
             self.failed += len(late)
@@ -254,7 +254,7 @@ class MemoryClient:
             return tuple(sorted(self.hub.servers))
 
     def counts(self) -> SubscriberCount:
-        """Return the statistics for a renewal."""
+        """Return the statistics that a renewal reports."""
         return SubscriberCount(self.spec.id, self.answered, self.failed)
 
     def close(self) -> None:
@@ -274,7 +274,7 @@ class MemoryClient:
             call.end(self._closed_error())
 
     def forked(self) -> None:
-        """Become closed in a forked child."""
+        """Mark the client as closed in a forked child process."""
         self.is_closed = True
         self._calls = {}
 
@@ -283,7 +283,7 @@ class MemoryClient:
 
 
 class MemoryServices:
-    """Servers and clients of one node. Part of `MemoryTransport`; `joined` yields the locked hub."""
+    """Servers and clients of one node, as a part of `MemoryTransport`. `joined` yields the locked hub."""
 
     def __init__(
         self, node: NodeRecord, joined: Callable[[Configuration], AbstractContextManager[ServiceHub]]
@@ -295,7 +295,7 @@ class MemoryServices:
         self._clients: tuple[MemoryClient, ...] = ()
 
     def server(self, spec: ServerSpec) -> MemoryServer:
-        """Register a server, and send it waiting calls."""
+        """Register a server and send it the calls that wait for one."""
         with self._joined(spec.configuration) as hub:
             record = PublisherRecord(
                 spec.id, topic_of(spec.service), SERVICE_TYPE, SERVICE_TYPE, ("memory",), number=spec.number
@@ -320,7 +320,7 @@ class MemoryServices:
         return client
 
     def server_counts(self, hub: ServiceHub) -> Iterable[PublisherCount]:
-        """Return the statistics of servers at `hub`. Call with its lock held."""
+        """Return the statistics of the servers at `hub`. Call with its lock held."""
         return [
             each.counts()
             for each in self._servers
@@ -328,7 +328,7 @@ class MemoryServices:
         ]
 
     def client_counts(self, hub: ServiceHub) -> Iterable[SubscriberCount]:
-        """Return the statistics of clients at `hub`. Call with its lock held."""
+        """Return the statistics of the clients at `hub`. Call with its lock held."""
         return [each.counts() for each in self._clients if each.hub is hub and not each.is_closed]
 
     def begin_close(self) -> None:
@@ -337,7 +337,7 @@ class MemoryServices:
             server.begin_close()
 
     def close(self, timeout_s: float) -> None:
-        """Close all servers and clients, and stop the timeout thread."""
+        """Close all servers and clients and stop the timeout thread."""
         for client in self._clients:
             client.close()
         for server in self._servers:

@@ -1,6 +1,6 @@
 """NanomsgServer: replies to calls (REP socket) and surveys (RESPONDENT socket) without a master.
 
-Each call has its own pynng context until its reply is sent, so any number of calls can be queued.
+Each call keeps its own pynng context until its reply is sent, so that any number of calls can be queued.
 """
 
 from __future__ import annotations
@@ -20,35 +20,36 @@ from nep.protocol.service_wire import HEADER_BYTES, NATIVE, Framing, Reply
 
 _logger = logging.getLogger("nep")
 REPLY_TIMEOUT_S = 2.0
-"""Timeout for sending a reply to a client that doesn't read."""
+"""Time limit in seconds for sending a reply to a client that doesn't read."""
 _JOIN_S = 2.0
 _LINGER_S = 0.2
-"""pynng discards its queue when a socket is closed. Time after the last reply to flush it, unless all clients
-have disconnected.
+"""Time in seconds to flush the last reply before closing, unless all clients have disconnected.
+
+pynng discards the queue of a closed socket.
 """
 
 
 def join_parts(framing: Framing, parts: list[bytes | memoryview]) -> bytes:
-    """Return a call or reply as one message: the native header and the payload, or the payload alone."""
+    """Return a call or reply as one message: the native header and payload, or the payload alone."""
     return b"".join(parts) if framing is NATIVE else bytes(parts[-1])
 
 
 def split_parts(framing: Framing, message: bytes) -> list[bytes]:
-    """Split a message into the parts that `framing` reads."""
+    """Split a message into the parts that `framing` parses."""
     return [message[:HEADER_BYTES], message[HEADER_BYTES:]] if framing is NATIVE else [b"", message]
 
 
 def receive(context: Any) -> bytes | None:  # noqa: ANN401 - pynng is not typed
-    """Return the next message, or None on timeout or after closing."""
+    """Return the next message, or None on timeout or if the context is closed."""
     try:
         data: bytes = context.recv()
-    except (library().NNGException, TypeError):  # pynng raises TypeError for a context closed before
+    except (library().NNGException, TypeError):  # pynng raises TypeError for a context that is already closed
         return None
     return data
 
 
 def close_context(context: Any) -> None:  # noqa: ANN401 - pynng is not typed
-    """Close a context (idempotent)."""
+    """Close a context. Idempotent."""
     with contextlib.suppress(library().NNGException, TypeError):
         context.close()
 
@@ -76,7 +77,7 @@ class NanomsgServer:
         self._lock = threading.Lock()
         self._answered_at = 0.0
         self._contexts: set[Any] = set()
-        """Contexts that wait for a call, or whose call has no reply yet."""
+        """Contexts that wait for a call, or whose call is not answered yet."""
         self._disconnected = threading.Event()
         socket.add_post_pipe_remove_cb(self._pipe_removed)
         self._thread = threading.Thread(target=self._receive_calls, name=f"nep-{spec.service}", daemon=True)
@@ -127,7 +128,7 @@ class NanomsgServer:
                 self._answered_at = time.monotonic()
             try:
                 context.send(join_parts(self._framing, self._framing.answer(number, checked)))
-            except (library().NNGException, TypeError) as error:  # the client no longer waits
+            except (library().NNGException, TypeError) as error:  # the client has stopped waiting
                 _logger.debug("can't send a reply of '%s': %s", self.spec.service, error)
                 return False
             finally:
@@ -159,13 +160,13 @@ class NanomsgServer:
             self._disconnected.wait(left)
         with self._lock:
             contexts, self._contexts = tuple(self._contexts), set()
-        for context in contexts:  # before the socket: afterwards pynng can't close them
+        for context in contexts:  # before the socket: pynng can't close contexts of a closed socket
             close_context(context)
         self._socket.close()
         self._thread.join(_JOIN_S)
 
     def forked(self) -> None:
-        """Become closed in a forked child, without touching nng."""
+        """Mark the server as closed in a forked child process, without touching nng."""
         self.is_closed = True
         self._lock = threading.Lock()
         self.calls.forked()

@@ -1,8 +1,7 @@
 """NanomsgClient: calls a server over a REQ socket, without a master.
 
-Each call has its own pynng context, and a thread that waits for the reply. Automatic resending, when no reply
-arrives or the connection ends, is disabled: the call fails instead, because it is unknown whether the server
-has executed it.
+Each call has its own pynng context and a thread that waits for the reply. nng's automatic resending of
+unanswered requests is disabled: the call fails instead, because the server may already have executed it.
 """
 
 from __future__ import annotations
@@ -27,7 +26,7 @@ _logger = logging.getLogger("nep")
 _JSON = 1
 _JOIN_S = 2.0
 _MAX_LATE_CALLS = 100
-"""Maximum number of timed-out calls whose replies are still received."""
+"""Maximum number of timed-out calls whose late replies are still received and counted."""
 
 Then = Callable[[Outcome], None]
 
@@ -68,7 +67,7 @@ class NanomsgClient(ClientCalls[_Call]):
         self._on_close = on_close
         self._pipes: set[int] = set()
         self._late_calls: dict[int, _Call] = {}
-        """Calls that timed out or were cancelled, oldest first; their replies are counted as late."""
+        """Calls that timed out or were cancelled, oldest first, to count their late replies."""
         self._threads: set[threading.Thread] = set()
         socket.add_post_pipe_connect_cb(self._pipe_added)
         socket.add_post_pipe_remove_cb(self._pipe_removed)
@@ -117,13 +116,13 @@ class NanomsgClient(ClientCalls[_Call]):
             self._threads.discard(threading.current_thread())
 
     def _outcome(self, call: _Call) -> Outcome | None:
-        # Returns None if the context was closed; the call has its outcome then.
+        # Returns None if the context was closed; the call already has its outcome then.
         nng = library()
         left_s = None if call.deadline == math.inf else max(0.0, call.deadline - time.monotonic())
         parts = self._framing.call(call.number, self.spec.codec.number, left_s, call.data)
         try:
             call.context.send(join_parts(self._framing, parts))  # blocks until a server is connected
-            call.is_sent, call.data = True, b""  # the context outlives the timeout: free the payload
+            call.is_sent, call.data = True, b""  # the context outlives the timeout: release the payload
             parts.clear()
             data = call.context.recv()
         except nng.ConnectionReset:
@@ -155,7 +154,7 @@ class NanomsgClient(ClientCalls[_Call]):
             self._abandon(known)
 
     def _abandon(self, call: _Call) -> None:
-        # Keeps receiving the reply of a call that is no longer in flight. Call without the lock.
+        # Waits for the late reply of a call that is no longer in flight. Call without the lock.
         with self._lock:
             if call.is_sent:
                 self._late_calls[call.number] = call
@@ -171,7 +170,7 @@ class NanomsgClient(ClientCalls[_Call]):
             close_context(closed.context)
 
     def expire(self, now: float) -> float:
-        """Fail expired calls; return the next deadline."""
+        """Fail expired calls and return the next deadline."""
         with self._lock:
             late = [
                 each
@@ -186,13 +185,13 @@ class NanomsgClient(ClientCalls[_Call]):
         return due
 
     def service_names(self, timeout_s: float) -> tuple[str, ...]:  # noqa: ARG002 - no master to query
-        """Return an empty tuple: without a master the servers are unknown."""
+        """Return an empty tuple: without a master, servers are unknown."""
         return ()
 
     # ---- closing
 
     def close(self) -> None:
-        """Close; calls in flight fail with `ClosedError`. Idempotent."""
+        """Close the client; calls in flight fail with `ClosedError`. Idempotent."""
         with self._lock:
             if self.is_closed:
                 return
@@ -214,7 +213,7 @@ class NanomsgClient(ClientCalls[_Call]):
         self._socket.close()
 
     def forked(self) -> None:
-        """Become closed in a forked child, without touching nng."""
+        """Mark the client as closed in a forked child process, without touching nng."""
         self.is_closed = True
         self._lock = threading.Lock()
         for call in (*self._calls.values(), *self._late_calls.values()):

@@ -26,15 +26,16 @@ from nep.system.addresses import in_numbers
 
 _logger = logging.getLogger("nep")
 _LINGER_S = 0.2
-"""pynng discards its queue when a socket is closed and doesn't report when it is sent. Time after the last
-message to flush it.
+"""Time in seconds to flush the last message before closing.
+
+pynng discards the queue of a closed socket and doesn't report when the queue is empty.
 """
 _LIBNANOMSG_MAX_BYTES = 2**20
 """libnanomsg silently rejects larger messages by default."""
 
 
 def check_direct(direct: Direct) -> None:
-    """Raise `NepError` for a mode or wire that nanomsg doesn't support."""
+    """Raise `NepError` for a mode or wire that this back end doesn't support."""
     if direct.mode == "many2many":
         raise NepError(
             _(
@@ -51,7 +52,7 @@ def check_direct(direct: Direct) -> None:
 
 
 def attach(socket: Any, direct: Direct, *, is_publisher: bool, what: str) -> str:  # noqa: ANN401 - pynng is not typed
-    """Listen or dial according to the mode; return the endpoint. Raises `AddressInUseError`, `NepError`."""
+    """Listen or dial as the mode requires; return the endpoint. Raises `AddressInUseError`, `NepError`."""
     address = f"{direct.ip}:{direct.port}"
     if is_publisher == (direct.mode == "one2many"):
         listen(socket, address, what)
@@ -60,7 +61,7 @@ def attach(socket: Any, direct: Direct, *, is_publisher: bool, what: str) -> str
 
 
 def dial(socket: Any, address: str) -> str:  # noqa: ANN401 - pynng is not typed
-    """Connect to `HOST:PORT`, whether it is bound yet or not; return the endpoint. Raises `NepError`."""
+    """Connect to `HOST:PORT` and return the endpoint; the peer may bind it later. Raises `NepError`."""
     try:
         address = in_numbers(address)
         socket.dial(f"tcp://{address}", block=False)
@@ -74,7 +75,7 @@ def dial(socket: Any, address: str) -> str:  # noqa: ANN401 - pynng is not typed
 
 
 class DirectPublisher:
-    """Publisher on a PUB socket. Subscriptions are unknown, so every connection counts as a subscriber."""
+    """Publisher on a PUB socket. Every connection counts as a subscriber: subscriptions are not visible."""
 
     def __init__(
         self, spec: PublisherSpec, direct: Direct, on_close: Callable[[DirectPublisher, float], None]
@@ -91,7 +92,7 @@ class DirectPublisher:
         self._sent_at = 0.0
         self._changed = threading.Condition(threading.RLock())
         self.fd = -1
-        """-1: there is no input."""
+        """-1, because the socket receives nothing."""
         self._socket: Any = new_socket("Pub0", send_buffer_size=queue_length(spec.codec.name))
         self._socket.add_post_pipe_connect_cb(self._pipe_added)
         self._socket.add_post_pipe_remove_cb(self._pipe_removed)
@@ -110,7 +111,7 @@ class DirectPublisher:
 
     @property
     def is_heard(self) -> bool:
-        """True if there are any connections."""
+        """True if there is any connection."""
         return bool(self._pipes)
 
     def _pipe_added(self, pipe: Any) -> None:  # noqa: ANN401 - pynng is not typed
@@ -124,15 +125,15 @@ class DirectPublisher:
             self._changed.notify_all()
 
     def wait_for_any(self, timeout_s: float) -> None:
-        """Wait for a connection, for up to `timeout_s` seconds."""
+        """Wait up to `timeout_s` seconds for a connection."""
         with self._changed:
             wait_until(self._changed, lambda: bool(self._pipes), timeout_s)
 
     def report(self, problem: str) -> None:
-        """Ignore the problem: a direct connection has no graph."""
+        """Ignore the problem, because a direct connection has no graph to report it in."""
 
     def lend(self, _size_bytes: int) -> memoryview | None:
-        """Return None: nanomsg has no shared memory."""
+        """Return None, because nanomsg has no shared memory."""
         return None
 
     def skip(self) -> None:
@@ -141,7 +142,7 @@ class DirectPublisher:
             self.count += 1
 
     def send(self, encoded: Encoded) -> None:
-        """Publish one frame; drops for full queues can't be detected. Warns once about a large message."""
+        """Publish one frame. Drops in full queues can't be detected. Warns once about a large message."""
         frame = to_frame(
             self.spec.topic, self._generation, self.spec.msg_type, self.spec.codec.name, encoded.data
         )
@@ -162,11 +163,11 @@ class DirectPublisher:
             )
 
     def serve(self, now: float) -> PollState:  # noqa: ARG002 - no input
-        """Do nothing: nothing is received."""
+        """Do nothing, because the socket receives nothing."""
         return PollState(pause_reading=True)
 
     def close(self, timeout_s: float) -> None:
-        """Flush as far as `finish` can, and close. Called once, by the publisher."""
+        """Flush for a limited time (`finish`) and close. Called once, by the publisher."""
         self._on_close(self, timeout_s)
 
     def say_bye(self) -> None:
@@ -175,19 +176,19 @@ class DirectPublisher:
             self._is_closed = True
 
     def finish(self, deadline: float) -> None:
-        """Wait up to `_LINGER_S` for pynng to send its queue, which it doesn't report."""
+        """Wait up to `_LINGER_S` for pynng to send its queue; its progress is not visible."""
         until = min(deadline, self._sent_at + _LINGER_S)
         with self._changed:
             wait_until(self._changed, lambda: not self._pipes, until - time.monotonic())
 
     def release(self) -> None:
-        """Close the socket. Call without the lock, because pynng waits for its callbacks."""
+        """Close the socket. Call without the lock, because pynng waits for its running callbacks."""
         self.say_bye()
         self._socket.close()
 
 
 class DirectSubSocket(UnbatchedReader):
-    """SUB socket for frames of both generations. They have no sequence numbers, so `lost` is unknown."""
+    """SUB socket for frames of both generations. They have no sequence numbers, so losses are unknown."""
 
     def __init__(self, spec: SubscriberSpec, direct: Direct) -> None:
         check_direct(direct)
@@ -214,7 +215,7 @@ class DirectSubSocket(UnbatchedReader):
         return self._sub.has_input
 
     def read(self, rest: MessageBuffer, *, may_wait: bool = False) -> Message | None:  # noqa: ARG002 - never batched
-        """Return the next message of this topic, or None."""
+        """Return the next message of the topic, or None."""
         while (frame := self._sub.recv(may_wait=may_wait)) is not None:
             try:
                 data = from_frame(self._spec.topic, self._spec.msg_type, self._codec, frame)
@@ -227,7 +228,7 @@ class DirectSubSocket(UnbatchedReader):
         return None
 
     def dropped(self, count: int) -> None:
-        """Count messages dropped here for lack of room: the only losses that can be known."""
+        """Count messages dropped from the full queue, the only detectable losses."""
         self.received -= count
         self.lost = (self.lost or 0) + count
 

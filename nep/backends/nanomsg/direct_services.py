@@ -1,6 +1,6 @@
 """DirectServices: servers, clients and surveyors of one node without a master.
 
-Part of `NanomsgTransport`. A server binds its port and clients connect, independent of the mode. A surveyor
+Part of `NanomsgTransport`. Regardless of the mode, a server binds its port and clients connect; a surveyor
 binds and respondents connect.
 """
 
@@ -28,7 +28,7 @@ _MAX_MESSAGE_BYTES = PAYLOAD_MAX_BYTES + HEADER_BYTES
 _ANSWER_MS = round(REPLY_TIMEOUT_S * 1000)
 _NEVER_RESEND = -1
 _RECONNECT_MS = {"reconnect_time_min": 10, "reconnect_time_max": 500}
-"""Reconnection interval in milliseconds: the initial and the largest one."""
+"""Initial and maximum reconnection interval in milliseconds."""
 
 
 class DirectServices:
@@ -44,7 +44,7 @@ class DirectServices:
         self._is_closed = False
 
     def surveyor(self, spec: ClientSpec, direct: Direct, wait_s: float) -> NanomsgSurveyor:
-        """Create a surveyor; waits for a connection."""
+        """Create a surveyor and wait up to `wait_s` seconds for a respondent to connect."""
         self._check_open()
         surveyor = NanomsgSurveyor(spec, direct, self._surveyors.discard)
         with self._lock:
@@ -94,7 +94,7 @@ class DirectServices:
         return server
 
     def client(self, spec: ClientSpec, direct: Direct) -> NanomsgClient:
-        """Create a client and start to connect; the server may start later."""
+        """Create a client and start connecting; the server may start later."""
         self._check_open()
         socket = new_socket(
             "Req0", resend_time=_NEVER_RESEND, recv_max_size=_MAX_MESSAGE_BYTES, **_RECONNECT_MS
@@ -128,7 +128,7 @@ class DirectServices:
             server.begin_close()
 
     def close(self, timeout_s: float) -> None:
-        """Close everything."""
+        """Close all servers, clients and surveyors."""
         with self._lock:
             surveyors, servers, clients = tuple(self._surveyors), tuple(self._servers), tuple(self._clients)
         for surveyor in surveyors:
@@ -141,7 +141,7 @@ class DirectServices:
         self._deadlines.close(max(0.0, deadline - time.monotonic()))
 
     def forked(self) -> None:
-        """Become closed in a forked child, see `nep.system.forks`."""
+        """Mark everything as closed in a forked child process. See `nep.system.forks`."""
         self._is_closed = True
         self._lock = threading.Lock()
         for surveyor in self._surveyors:

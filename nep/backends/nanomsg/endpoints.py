@@ -1,7 +1,7 @@
-"""Endpoints of publishers, `nanomsg://HOST:PORT/PORT` for messages and hellos, and the message format.
+"""Endpoints `nanomsg://HOST:PORT/PORT` (ports for messages and hellos) and the message format.
 
-The scheme keeps subscribers over ZeroMQ from connecting. A nanomsg message is the concatenation of a native
-message's parts; the payload has the size stated in the header, and the extension follows.
+The scheme prevents subscribers over ZeroMQ from connecting. A nanomsg message is the concatenation of a
+native message's parts; the header states the size of the payload, and the extension follows.
 """
 
 from __future__ import annotations
@@ -16,12 +16,18 @@ _ENDPOINT = re.compile(r"nanomsg://([\w.-]{1,253}):(\d{1,5})/(\d{1,5})", re.ASCI
 
 
 def endpoint(host: str, messages: int, hellos: int) -> str:
-    """Return the endpoint with these two ports."""
+    """Return the endpoint of a publisher.
+
+    Args:
+        host: IP address or host name.
+        messages: Port for messages.
+        hellos: Port for hellos.
+    """
     return f"nanomsg://{host}:{messages}/{hellos}"
 
 
 def parse_endpoint(endpoint: str) -> tuple[str, str] | None:
-    """Return the addresses (`HOST:PORT`) for messages and for hellos, or None for another back end."""
+    """Return the addresses (`HOST:PORT`) for messages and hellos, or None for other endpoints."""
     found = _ENDPOINT.fullmatch(endpoint)
     if found is None or not all(0 < int(port) < 65536 for port in found.groups()[1:]):
         return None
@@ -30,12 +36,12 @@ def parse_endpoint(endpoint: str) -> tuple[str, str] | None:
 
 
 def own_part(subscriber: int, topic: str) -> bytes:
-    """Return the prefix of messages for this subscriber alone."""
+    """Return the topic prefix of messages addressed to this subscriber only."""
     return hello_part(subscriber, topic) + b"\0"
 
 
 def split_one(message: bytes, first: bytes, *, is_alone: bool) -> list[bytes]:
-    """Return the parts after the first one: header, payload and extension; of a notice only the header.
+    """Return the parts after the first: header, payload and extension, or only the header of a notice.
 
     Raises `WireError`.
     """

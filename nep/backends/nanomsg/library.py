@@ -1,4 +1,4 @@
-"""Access to pynng: loaded with the first node, unusable after a fork; and helpers for its sockets."""
+"""Access to pynng, which is loaded with the first node and can't be used after a fork."""
 
 from __future__ import annotations
 
@@ -20,20 +20,23 @@ from nep.system.exits import after_nodes, not_after_nodes
 from nep.system.forks import in_child
 
 MAX_QUEUE = 8192
-"""Largest queue that pynng allows, in messages. Its defaults are too small for bursts."""
+"""Maximum queue length that pynng allows, in messages. pynng's defaults are too short for bursts."""
 _QUEUES = {"image": 64, "bytes": 1000}
 SOCKET_FILES = 6
-"""File descriptors per socket: the socket, its port, its signals, and a connection."""
+"""Number of file descriptors per socket: socket, port, signals and a connection."""
 _PORT_ATTEMPTS = 100
 _MODULE = "pynng.nng"
 _at_exit: Callable[[], object] | None = None
 _sockets: WeakSet[Any] = WeakSet()
 _inherited: set[str] = set()
-"""Names of libraries in use before a fork: nng would wait for its threads, which don't exist in the child."""
+"""Names of libraries that were in use before a fork.
+
+In the child process nng would wait for threads that don't exist there.
+"""
 
 
 def library(load: Callable[[str], ModuleType] = importlib.import_module) -> Any:  # noqa: ANN401 - not typed
-    """Return the module pynng.
+    """Load and return the module pynng.
 
     Raises:
         BackendUnavailableError: pynng is not installed or can't be loaded.
@@ -57,7 +60,7 @@ def library(load: Callable[[str], ModuleType] = importlib.import_module) -> Any:
 
 
 def _end_after_nodes() -> None:
-    # pynng's own exit hook would run before the nodes are closed.
+    # pynng's own exit handler would run before the nodes are closed.
     global _at_exit  # noqa: PLW0603 - one per process
     at_exit = getattr(sys.modules.get(_MODULE), "_pynng_atexit", None)
     if at_exit is not None and _at_exit is None:
@@ -66,19 +69,19 @@ def _end_after_nodes() -> None:
 
 
 def new_socket(kind: str, **options: object) -> Any:  # noqa: ANN401 - not typed
-    """Create a socket of pynng, such as "Pub0", with these options."""
+    """Create a pynng socket, such as "Pub0", with these options."""
     created = getattr(library(), kind)(**options)
     _sockets.add(created)
     return created
 
 
 def keep_forever(owned: Any) -> None:  # noqa: ANN401 - pynng is not typed
-    """Prevent the finalizer of an object, also at exit."""
+    """Prevent an object from ever being finalized, even at exit."""
     ctypes.pythonapi.Py_IncRef(ctypes.py_object(owned))
 
 
 def _forked() -> None:
-    # In a forked child no socket may be closed, not even at exit: that would block forever.
+    # Closing a socket in a forked child would block forever, even at exit.
     if _MODULE not in sys.modules:
         return
     _inherited.add("pynng")
@@ -94,17 +97,17 @@ in_child(_forked)
 
 
 def queue_length(codec: str) -> int:
-    """Return the queue length per connection, in messages. pynng doesn't bound the bytes."""
+    """Return the queue length per connection in messages. pynng doesn't limit the bytes."""
     return _QUEUES.get(codec, MAX_QUEUE)
 
 
 def bound_port(listener: Any) -> int:  # noqa: ANN401 - not typed
-    """Return the port of a listener."""
+    """Return the port to which a listener is bound."""
     return int(str(listener.local_address).rpartition(":")[2])
 
 
 def listen(owner: Any, address: str, what: str) -> Any:  # noqa: ANN401 - not typed
-    """Listen at `HOST:PORT`; port 0 selects a free one, except those of the original NEP.
+    """Listen at `HOST:PORT`. Port 0 selects a free port that the original NEP doesn't use.
 
     Raises `AddressInUseError`, `TooManyFilesError`.
     """

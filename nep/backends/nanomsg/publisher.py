@@ -1,8 +1,9 @@
 """NanomsgPublisher: publisher that subscribers find through the master.
 
 A PUB socket doesn't report its subscribers. They therefore send a hello to a second port, with the local
-address of their connection. When both are known, the publisher sends the history and an echo, as on the
-native wire. Messages are sent in the publishing thread, hellos are read in the I/O thread.
+address of their connection. Once the hello and the connection have both arrived, the publisher sends the
+history and an echo, as on the native wire. Messages are sent in the publishing thread; hellos are read in the
+I/O thread.
 """
 
 from __future__ import annotations
@@ -45,7 +46,7 @@ _BYE_RETRY_S = 0.05
 class NanomsgPublisher(GreetedPublisher):
     """Publisher with a PUB socket, and a PULL socket for hellos.
 
-    Never close objects of pynng with the lock held: closing waits for callbacks in other threads, which take
+    Never close pynng objects with the lock held: closing waits for callbacks in other threads, which acquire
     the lock.
     """
 
@@ -77,9 +78,9 @@ class NanomsgPublisher(GreetedPublisher):
         self._is_closed = False
         self._is_released = False
         self._pipes: dict[int, str] = {}
-        """Remote addresses of connections."""
+        """Remote address of each connection, by its id."""
         self._hellos: dict[str, int] = {}
-        """Subscriber ids by the address of their connection, which may not be established yet."""
+        """Subscriber id by the address of its connection, which may not be established yet."""
         self._events: deque[tuple[int, str]] = deque()
         self._refusals = RejectionLog()
         super().__init__(threading.Condition(threading.Lock()), {})
@@ -90,7 +91,7 @@ class NanomsgPublisher(GreetedPublisher):
 
     @property
     def subscribers(self) -> int:
-        """Number of subscribers that have said hello and not left."""
+        """Number of subscribers that have sent a hello and are still connected."""
         return len(self._seen)
 
     @property
@@ -99,14 +100,14 @@ class NanomsgPublisher(GreetedPublisher):
         return bool(self._pipes)
 
     def counts(self) -> PublisherCount:
-        """Return the statistics for a renewal."""
+        """Return the statistics that a renewal reports."""
         with self._changed:
             return PublisherCount(
                 self.spec.id, self.count, self._bytes, self.count, self._last_stamp_ns, self._problem
             )
 
     def move(self, hosts: Sequence[str]) -> tuple[str, ...]:  # noqa: ARG002 - loopback only
-        """Listen at the first call; return the endpoint. Raises `AddressInUseError`, `TooManyFilesError`."""
+        """Listen on the first call; return the endpoint. Raises `AddressInUseError`, `TooManyFilesError`."""
         if not self._endpoint:
             what = f"a publisher of '{self.spec.topic}'"
             messages, hellos = (
@@ -116,16 +117,16 @@ class NanomsgPublisher(GreetedPublisher):
         return (self._endpoint,)
 
     def unbind_local(self) -> None:
-        """Do nothing: there are no Unix socket names."""
+        """Do nothing, because this back end has no Unix socket names."""
 
     # ---- sending
 
     def report(self, problem: str) -> None:
-        """Set the problem of a payload, which is sent with the next renewal."""
+        """Set the reason why payloads can't be encoded; the next renewal reports it."""
         self._problem = problem
 
     def lend(self, _size_bytes: int) -> memoryview | None:
-        """Return None: nanomsg has no shared memory."""
+        """Return None, because nanomsg has no shared memory."""
         return None
 
     def skip(self) -> None:
@@ -157,7 +158,7 @@ class NanomsgPublisher(GreetedPublisher):
     # ---- subscribers, in the node's thread
 
     def serve(self, now: float) -> PollState:  # noqa: ARG002 - nothing to schedule
-        """Process hellos, connects and disconnects."""
+        """Process hellos, connections and disconnections."""
         with self._changed:
             while self._events:
                 self._note_connection_locked(*self._events.popleft())
@@ -203,12 +204,12 @@ class NanomsgPublisher(GreetedPublisher):
             self._greet_locked(remote)
 
     def _discard_lone_hellos_locked(self) -> None:
-        # Hellos whose connection was never established, or is closed. Call with the lock held.
+        # Discards hellos whose connection was never established or is closed. Call with the lock held.
         there = set(self._pipes.values())
         self._hellos = {remote: each for remote, each in self._hellos.items() if remote in there}
 
     def _greet_locked(self, address: str) -> None:
-        # The history, then the echo: from here on the subscriber counts losses. Call with the lock held.
+        # Sends the history, then the echo, after which the subscriber counts losses. Call with the lock held.
         subscriber = self._hellos.get(address)
         if subscriber is None or self._is_released:
             return
@@ -229,7 +230,7 @@ class NanomsgPublisher(GreetedPublisher):
         self._on_close(self, timeout_s)
 
     def say_bye(self) -> None:
-        """Send the bye, after which every subscriber reads the remaining messages and disconnects."""
+        """Send the bye: subscribers read the remaining messages and disconnect."""
         with self._changed:
             self._is_closed = True
             self._send_bye_locked()
@@ -239,7 +240,7 @@ class NanomsgPublisher(GreetedPublisher):
         with self._changed:
             while self._seen and (left := deadline - time.monotonic()) > 0.0:
                 if not wait_until(self._changed, lambda: not self._seen, min(left, _BYE_RETRY_S)):
-                    self._send_bye_locked()  # a full queue drops the bye like any message
+                    self._send_bye_locked()  # a full queue drops the bye like any other message
             undelivered = [max(self.count - seen, len(self._history)) for seen in self._seen.values()]
             if any(undelivered):
                 _logger.warning(
@@ -252,7 +253,7 @@ class NanomsgPublisher(GreetedPublisher):
             self._seen.clear()
 
     def release(self) -> None:
-        """Close the sockets. The I/O thread must not serve them any more."""
+        """Close the sockets. The I/O thread must have stopped serving them."""
         with self._changed:
             if self._is_released:
                 return

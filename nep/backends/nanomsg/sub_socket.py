@@ -1,6 +1,6 @@
-"""NanomsgSubSocket: a SUB socket and its publishers, each greeted at its second port.
+"""NanomsgSubSocket: a SUB socket connected to publishers, with a hello sent to the second port of each.
 
-Not thread-safe, see `Readable`.
+Not thread-safe. See `Readable`.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ _HELLO_QUEUE = 8
 
 
 class PollableSub:
-    """SUB socket with a descriptor to poll; an empty one returns None instead of raising."""
+    """SUB socket with a descriptor for polling. `recv` returns None instead of raising if it is empty."""
 
     def __init__(self, codec: str) -> None:
         nng = library()
@@ -53,13 +53,13 @@ class PollableSub:
         return not self._is_closed and bool(zmq.zmq_poll([(self.fd, zmq.POLLIN)], 0))
 
     def make_room(self, history: int) -> None:
-        """Enlarge the queue for a history of this length."""
+        """Enlarge the receive queue so that it holds a history of this length."""
         room = 2 * min(history, MAX_HISTORY)
         if room > self._room:
             self._room = self.socket.recv_buffer_size = room
 
     def recv(self, *, may_wait: bool) -> bytes | None:
-        """Return the next message, or None; with `may_wait` wait up to `SHORT_WAIT_S`."""
+        """Return the next message, or None; with `may_wait`, wait up to `SHORT_WAIT_S`."""
         try:
             return bytes(self.socket.recv(block=may_wait))
         except self._empty_errors:
@@ -86,7 +86,7 @@ class _Link:
 
 
 class NanomsgSubSocket(UnbatchedReader):
-    """Subscriber socket for publishers of this back end; other endpoints are reported as problems."""
+    """Subscriber socket for publishers of this back end. Other endpoints are reported as problems."""
 
     def __init__(self, spec: SubscriberSpec) -> None:
         self.sources = PublisherTracker()
@@ -100,7 +100,7 @@ class NanomsgSubSocket(UnbatchedReader):
         self._parser = CarefulParser(spec, self._own, self.sources, self.leave, lambda _publisher, _seq: None)
         self._links: dict[int, _Link] = {}
         self._greeters: dict[str, Any] = {}
-        """Sockets for the hello by a publisher's address. Also read by pynng's threads."""
+        """Sockets for the hellos, by address of the publisher. Also read by pynng's threads."""
         self._sub.socket.subscribe(self._topic)
         self._sub.socket.subscribe(self._own)
         self._sub.socket.add_post_pipe_connect_cb(self._connected)
@@ -117,7 +117,7 @@ class NanomsgSubSocket(UnbatchedReader):
 
     @property
     def problem(self) -> str:
-        """Problem of a listed publisher; empty if none."""
+        """Reason why a listed publisher can't be received; "" if there is none."""
         listed = (each for each in self.sources.by_id.values() if each.problem and not each.is_silent)
         return next((each.problem for each in listed), "")
 
@@ -127,7 +127,7 @@ class NanomsgSubSocket(UnbatchedReader):
         return self._sub.has_input
 
     def connect(self, remote: RemotePublisher) -> None:
-        """Connect to a publisher (idempotent). Removes silent publishers that it replaces."""
+        """Connect to a publisher and disconnect from unresponsive ones that it replaces. Idempotent."""
         for old in self.sources.replaced_by(remote):
             self.sources.count_missing(old)
             self.leave(old)
@@ -174,16 +174,16 @@ class NanomsgSubSocket(UnbatchedReader):
         return ""
 
     def _connected(self, pipe: Any) -> None:  # noqa: ANN401 - pynng is not typed
-        # Runs in a thread of pynng. Sends the hello with the local address of the connection.
+        # Called in a thread of pynng. Sends the hello with the local address of the connection.
         greeter = self._greeters.get(str(pipe.remote_address))
         if greeter is not None:
             greeter.send(str(pipe.local_address).encode() + b" " + self._hello, block=False)
 
     def reconnect_remote(self) -> None:
-        """Do nothing: this back end works on one computer only."""
+        """Do nothing, because this back end connects only nodes of one computer."""
 
     def reconnect(self, publisher: int) -> None:
-        """Do nothing: nanomsg connects again after every failure."""
+        """Do nothing, because nanomsg reconnects automatically."""
 
     def leave(self, publisher: int) -> None:
         """Disconnect from a publisher and remove it."""
@@ -197,7 +197,7 @@ class NanomsgSubSocket(UnbatchedReader):
             link.close()
 
     def read(self, rest: MessageBuffer, *, may_wait: bool = False) -> Message | None:  # noqa: ARG002 - never batched
-        """Return the next message, or None; with `may_wait` wait up to `SHORT_WAIT_S`."""
+        """Return the next message, or None; with `may_wait`, wait up to `SHORT_WAIT_S`."""
         while (frame := self._sub.recv(may_wait=may_wait)) is not None:
             is_alone = frame.startswith(self._own)
             first = self._own if is_alone else self._topic
@@ -212,7 +212,7 @@ class NanomsgSubSocket(UnbatchedReader):
         return None
 
     def dropped(self, count: int) -> None:
-        """Count received messages that were dropped for lack of room."""
+        """Count received messages that were dropped from the full queue."""
         self.sources.count_dropped(count)
 
     def close(self) -> None:

@@ -1,6 +1,6 @@
 """NanomsgSurveyor: surveys over a SURVEYOR socket without a master, as in the original NEP.
 
-The surveyor binds the port. Requests and replies are plain JSON; an exception of a callback is sent as the
+The surveyor binds the port. Requests and replies are plain JSON. An exception in a callback is sent as the
 reply `{"nep_error": …}`, as in the original's services.
 """
 
@@ -31,7 +31,7 @@ Then = Callable[[Outcome], None]
 
 @dataclass(eq=False)
 class _Survey:
-    # Open survey; its pynng context receives the replies in a thread.
+    # Survey in progress; a thread receives the replies in its pynng context.
     number: int
     context: Any
     left: int
@@ -51,7 +51,7 @@ class NanomsgSurveyor:
         self.spec = spec
         self.is_closed = False
         self.late = 0
-        """Always 0: pynng drops late replies."""
+        """Always 0, because pynng drops late replies."""
         self._on_close = on_close
         self._changed = threading.Condition(threading.Lock())
         self._pipes: set[int] = set()
@@ -81,12 +81,12 @@ class NanomsgSurveyor:
             self._pipes.discard(pipe.id)
 
     def wait_for_any(self, timeout_s: float) -> None:
-        """Wait for a connection, for up to `timeout_s` seconds."""
+        """Wait up to `timeout_s` seconds for a respondent to connect."""
         with self._changed:
             wait_until(self._changed, lambda: bool(self._pipes), timeout_s)
 
     def begin_all(self, data: bytes | memoryview, timeout_s: float | None, then: Then) -> list[OpenCall]:
-        """Send a request. The list has an item per connected respondent, all of them the same survey."""
+        """Send a request and return one item per connected respondent; all items are the same survey."""
         with self._changed:
             if self.is_closed:
                 raise self._closed_error()
@@ -102,8 +102,8 @@ class NanomsgSurveyor:
                 target=self._receive_replies, args=(survey,), name=f"nep-{self.spec.service}", daemon=True
             )
             self._surveys[survey.number] = survey
-        # Without the lock: callbacks in pynng's threads take it, and sending may wait for them.
-        with contextlib.suppress(library().NNGException):  # just closed
+        # Without the lock: callbacks in pynng's threads acquire it, and sending may wait for them.
+        with contextlib.suppress(library().NNGException):  # already closed
             survey.context.send(bytes(data))
             survey.thread.start()
         return [survey] * count
@@ -131,7 +131,7 @@ class NanomsgSurveyor:
             thread.join(_JOIN_S)
 
     def close(self) -> None:
-        """Close; open surveys fail with `ClosedError`. Idempotent."""
+        """Close the surveyor; surveys in progress fail with `ClosedError`. Idempotent."""
         with self._changed:
             if self.is_closed:
                 return
@@ -144,7 +144,7 @@ class NanomsgSurveyor:
         self._socket.close()
 
     def forked(self) -> None:
-        """Become closed in a forked child, without touching nng."""
+        """Mark the surveyor as closed in a forked child process, without touching nng."""
         self.is_closed = True
         self._changed = threading.Condition(threading.Lock())
         for survey in self._surveys.values():

@@ -39,7 +39,7 @@ from nep.system.addresses import is_loopback
 
 
 class NanomsgTransport(ZeromqTransport):
-    """Connection of one node. Raises `BackendUnavailableError` if pynng is not installed."""
+    """Connection of one node to a network over pynng. Raises `BackendUnavailableError` without pynng."""
 
     def __init__(self, node: NodeRecord) -> None:
         library()
@@ -47,7 +47,7 @@ class NanomsgTransport(ZeromqTransport):
         super().__init__(node)
 
     def server(self, spec: ServerSpec) -> ServerTransport:
-        """Create a server: direct ones use REP or RESPONDENT, others are those of `zeromq`."""
+        """Create a server: REP or RESPONDENT for a direct connection, otherwise the one of `zeromq`."""
         direct = spec.configuration
         if isinstance(direct, Direct) and spec.service.startswith(SURVEY):
             check_direct(direct)
@@ -57,32 +57,32 @@ class NanomsgTransport(ZeromqTransport):
         return super().server(spec)
 
     def client(self, spec: ClientSpec) -> ClientTransport:
-        """Create a client: direct ones use REQ, others are those of `zeromq`."""
+        """Create a client: REQ for a direct connection, otherwise the one of `zeromq`."""
         direct = spec.configuration
         if isinstance(direct, Direct) and direct.wire != "tcp":
             return self._direct_services.client(spec, direct)
         return super().client(spec)
 
     def survey(self, spec: ClientSpec) -> SurveyTransport:
-        """Create a surveyor: direct ones use SURVEYOR, others are those of `zeromq`."""
+        """Create a surveyor: SURVEYOR for a direct connection, otherwise the one of `zeromq`."""
         if isinstance(spec.configuration, Direct):
             check_direct(spec.configuration)
             return self._direct_services.surveyor(spec, spec.configuration, DIRECT_WAIT_S)
         return super().survey(spec)
 
     def begin_close(self) -> None:
-        """Announce the end to all peers; doesn't wait. See `Transport.begin_close`."""
+        """Notify all peers that the node is closing. Doesn't wait. See `Transport.begin_close`."""
         super().begin_close()
         self._direct_services.begin_close()
 
     def close(self, timeout_s: float) -> None:
-        """Close everything. See `Transport.close`."""
+        """Close all sockets and threads. See `Transport.close`."""
         deadline = time.monotonic() + timeout_s
         self._direct_services.close(timeout_s)
         super().close(max(0.0, deadline - time.monotonic()))
 
     def forked(self) -> None:
-        """Become closed in a forked child, see `nep.system.forks`."""
+        """Mark everything as closed in a forked child process. See `nep.system.forks`."""
         self._direct_services.forked()
         super().forked()
 
