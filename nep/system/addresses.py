@@ -53,18 +53,18 @@ _BYTE = re.compile(r"0*\d{1,3}", re.ASCII)
 _ENDPOINT = re.compile(r"tcp://[\w.-]{1,253}:(\d{1,5})|ipc://@nep-(\d{1,5})", re.ASCII)
 
 ANY = "0.0.0.0"  # noqa: S104 - bound only at a user's request
-"""All IPv4 addresses of a computer."""
+"""IPv4 address that stands for all interfaces of a computer."""
 _RETRY_S = 5.0
 _SLICE_S = 0.1
 _LOCAL_NAMES = frozenset({"localhost", "*"})
-"""Names of this computer that need no resolution; a master at "*" is local, too."""
+"""Host names of this computer that need no resolution; a master listening at "*" is local, too."""
 _TUNNEL_PREFIXES = ("docker", "br-", "veth", "virbr", "tun", "tap", "wg", "utun", "vmnet")
 
 
 def master_address(address: str | None = None) -> str:
     """Return the master's address: `address`, else $NEP_MASTER, else "127.0.0.1:7780".
 
-    The port 7780 is added if there is none. Raises `NepError` for an invalid address.
+    Port 7780 is appended if the address has none. Raises `NepError` for an invalid address.
     """
     if address is not None and not isinstance(address, str):
         raise WrongTypeError(
@@ -90,7 +90,7 @@ def master_address(address: str | None = None) -> str:
 def checked_host(host: object) -> str:
     """Validate a host to connect to or bind, and return it: an IPv4 address, a host name, or "*".
 
-    Raises `NepError`.
+    Raises `NepError` if the host is invalid.
     """
     if isinstance(host, str) and _is_ipv6(host):
         raise NepError(
@@ -136,35 +136,35 @@ def _is_valid_host(host: str) -> bool:
 
 
 def is_endpoint(endpoint: str) -> bool:
-    """Return True for an endpoint of a nep publisher: tcp://HOST:PORT, or its local ipc name."""
+    """Return True if the text is a valid endpoint of a publisher: tcp://HOST:PORT or ipc://@nep-PORT."""
     found = _ENDPOINT.fullmatch(endpoint)
     return found is not None and 0 < int(found[1] or found[2]) < 65536
 
 
 def endpoint_of(address: str) -> str:
-    """Return the ZeroMQ endpoint of an address."""
+    """Convert an address HOST:PORT to a ZeroMQ endpoint."""
     return f"tcp://{address}"
 
 
 def host_of(address: str) -> str:
-    """Return the host of an address."""
+    """Return the host of an address HOST:PORT."""
     return address.rpartition(":")[0]
 
 
 def is_loopback(address: str) -> bool:
-    """Return True if only programs of this computer can reach the address."""
+    """Return True if the host of an address is 127.0.0.1 or localhost."""
     return host_of(address) in {"127.0.0.1", "localhost"}
 
 
 class OwnAddress(NamedTuple):
-    """IPv4 address of this computer and the name of its interface, such as "wlan0"."""
+    """IPv4 address of this computer and the name of its network interface, such as "wlan0"."""
 
     host: str
     interface: str
 
 
 def own_addresses() -> tuple[OwnAddress, ...]:
-    """Return the addresses at which other computers may reach this one: wired, Wi-Fi, then tunnels."""
+    """Return the addresses at which other computers may reach this one; tunnels and containers come last."""
     up = {name for name, stats in psutil.net_if_stats().items() if stats.isup}
     found = [
         OwnAddress(each.address, name)
@@ -176,7 +176,7 @@ def own_addresses() -> tuple[OwnAddress, ...]:
 
 
 def has_address(host: str) -> bool:
-    """Return True if this computer currently has the address."""
+    """Return True if an interface of this computer currently has the IP address `host`."""
     if host == ANY or ipaddress.ip_address(host).is_loopback:
         return True
     addresses = (each.address for group in psutil.net_if_addrs().values() for each in group)
@@ -184,10 +184,15 @@ def has_address(host: str) -> bool:
 
 
 def nearest(endpoints: Sequence[str], master: str) -> str:
-    """Return the endpoint to connect to from a program whose master is `master`, or "" if none is reachable.
+    """Return the first of a publisher's endpoints that this program can reach, or "" if none is reachable.
 
-    A program that reaches its master by loopback is on the master's computer, where loopback endpoints work.
-    Elsewhere they don't, and "all addresses" stands for the master's host.
+    If the master's address is a loopback address, this program runs on the master's computer and prefers
+    loopback endpoints. Otherwise loopback endpoints are skipped, and 0.0.0.0 is replaced with the master's
+    host.
+
+    Args:
+        endpoints: Endpoints of the publisher.
+        master: Address of this program's master.
     """
     if is_loopback(master):
         local = [each for each in endpoints if is_loopback(each.removeprefix("tcp://"))]
@@ -216,13 +221,13 @@ def _is_tunnel(interface: str) -> bool:
 def look_up(host: str) -> str:
     """Resolve a host name to its first IPv4 address.
 
-    May block for long; raises `OSError` or `UnicodeError`.
+    Can block for half a minute. Raises `OSError` or `UnicodeError` if the name can't be resolved.
     """
     return str(socket.getaddrinfo(host, None, socket.AF_INET, socket.SOCK_STREAM)[0][4][0])
 
 
 def in_numbers(address: str) -> str:
-    """Return an address with its host resolved. Blocks; raises `NepError`."""
+    """Return an address with its host name resolved to an IPv4 address. Blocks; raises `NepError`."""
     host = host_of(address)
     if _is_number(host):
         return address
@@ -235,15 +240,15 @@ def in_numbers(address: str) -> str:
 
 
 class MasterName:
-    """Resolver of the master's host name, in a thread of its own.
+    """Resolver of the master's host name in a background thread.
 
     Resolution can take half a minute, and libzmq would resolve again in its I/O thread at each connection
-    attempt. So a short-lived thread resolves the name, only while the master is not connected, and libzmq
-    gets numeric addresses.
+    attempt. Therefore a short-lived thread resolves the name, only while the master is not connected, and
+    libzmq gets numeric addresses.
 
     Args:
-        address: Address of the master; a numeric one is known at once.
-        on_change: Called with a new `known`, in the resolver thread.
+        address: Address of the master; a numeric address needs no resolution.
+        on_change: Called in the resolver thread with each new value of `known`.
         look_up: Resolves a host name.
     """
 
@@ -251,7 +256,7 @@ class MasterName:
         self, address: str, on_change: Callable[[str], None], look_up: Callable[[str], str] = look_up
     ) -> None:
         self.known = ""
-        """Address with a numeric host, or "" while unresolved."""
+        """Address with a numeric host, or "" until the name is resolved."""
         self._host, self._port = host_of(address), address.rpartition(":")[2]
         self._on_change = on_change
         self._look_up = look_up
@@ -265,9 +270,12 @@ class MasterName:
             self._resolved.set()
 
     def resolve(self, now: float) -> None:
-        """Start to resolve again, unless the host is numeric or the last attempt was recent.
+        """Start to resolve the name again, unless the host is numeric or the last attempt was recent.
 
-        Call while disconnected.
+        Call this while the master is not connected.
+
+        Args:
+            now: Current time of the monotonic clock in seconds.
         """
         is_asking = self._thread is not None and self._thread.is_alive()
         if _is_number(self._host) or self._host in _LOCAL_NAMES or is_asking or now < self._retry_at:
@@ -281,7 +289,7 @@ class MasterName:
         self._thread = thread
 
     def wait(self, timeout_s: float | None) -> bool:
-        """Wait until the address is resolved; return False after the time limit (None: no limit)."""
+        """Wait until the name is resolved; return False after the time limit (None: no limit)."""
         deadline = None if timeout_s is None else time.monotonic() + timeout_s
         while not self._resolved.is_set():
             left = _SLICE_S if deadline is None else min(_SLICE_S, deadline - time.monotonic())

@@ -1,4 +1,4 @@
-"""Validation of arguments: invalid values are rejected at the call, with a reason."""
+"""Validators for arguments. Each returns the value, or raises `ValueError` that names the argument."""
 
 from __future__ import annotations
 
@@ -30,13 +30,13 @@ __all__ = [
 T = TypeVar("T")
 F = TypeVar("F", bound=Callable[..., object])
 _MAX_LENGTH = 200
-"""Maximum length of a type's name, as at the master."""
+"""Maximum length of a message type's name; the master has the same limit."""
 _MAX_SECONDS = sys.float_info.max
-"""Larger ints can't be added to a clock; they count as no limit."""
+"""Maximum time limit in seconds. Larger ints overflow a float, so they count as no limit."""
 
 
 def text(name: str, value: object) -> str:
-    """Validate the name of a type and return it. Raises `ValueError`."""
+    """Validate the name of a message type and return it. Raises `ValueError`."""
     if not isinstance(value, str):
         raise WrongTypeError(_("{name} is a '{kind}'; give a 'str'").format(name=name, kind=_kind(value)))
     if not value:
@@ -134,7 +134,7 @@ def period(name: str, value: object) -> float:
 
 
 def limit(name: str, value: object) -> float:
-    """Validate a non-negative time limit in seconds and return it. Raises `ValueError`."""
+    """Validate a non-negative time limit in seconds and return it. None is rejected. Raises `ValueError`."""
     if value is None:
         raise WrongTypeError(_("{name} is None; give seconds, 0 or more").format(name=name))
     return math.inf if seconds(name, value) is None else cast("float", value)
@@ -159,7 +159,10 @@ def plain_function(name: str, value: F) -> F:
 
 
 def is_coroutine_function(call: object) -> bool:
-    """Return True if calling `call` returns a coroutine, as far as can be determined."""
+    """Return True if calling the object returns a coroutine.
+
+    Also detects `functools.partial` and `__call__`.
+    """
     while isinstance(call, functools.partial):
         call = call.func
     return inspect.iscoroutinefunction(call) or (

@@ -1,4 +1,4 @@
-"""Id of this computer: programs with the same id share a clock."""
+"""Id of this computer. Programs with the same id share a system clock."""
 
 from __future__ import annotations
 
@@ -20,15 +20,15 @@ _BOOT_ID = Path("/proc/sys/kernel/random/boot_id")
 def computer_id() -> str:
     """Return 16 hexadecimal digits that identify the running system, or "" if unknown.
 
-    Containers of one computer share its clock and its id; a virtual machine has its own. The digits are a
-    hash, so that the system's identifier is not published.
+    Containers on one computer have the same id, because they share its clock; a virtual machine has a
+    different one. The digits are a hash, so that the system's identifier is not published.
     """
     name = clock_name()
     return sha256(f"nep clock {name}".encode("utf-8", "replace")).hexdigest()[:16] if name else ""
 
 
 def clock_name() -> str:
-    """Return the identifier of this system, or "" if unknown."""
+    """Return the system's own identifier (boot id, boot session or machine GUID), or "" if unknown."""
     query = _NAME_QUERIES.get(sys.platform)
     try:
         return "" if query is None else query()

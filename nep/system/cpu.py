@@ -11,10 +11,10 @@ _MIN_INTERVAL_S = 0.5
 
 
 class CpuLoad:
-    """Meter of CPU usage between two readings, in cores: 1.0 is one core, 2.0 are two.
+    """Meter of CPU usage in cores: 1.0 means that one core was busy, 2.0 two cores.
 
     Args:
-        used_s: Returns the CPU time so far in seconds, or None if unknown. Default: this process's.
+        used_s: Returns the CPU time so far in seconds, or None if unknown. Default: that of this process.
         clock: Monotonic clock in seconds.
     """
 
@@ -29,7 +29,10 @@ class CpuLoad:
         self._ratio: float | None = None
 
     def ratio(self) -> float | None:
-        """Return the usage since the last reading, or None at the first; cached for half a second."""
+        """Return the average usage since the last reading; None at the first.
+
+        Readings within 0.5 s are cached.
+        """
         now = self._clock()
         if self._last_reading is not None and now - self._last_reading[0] < _MIN_INTERVAL_S:
             return self._ratio

@@ -9,7 +9,7 @@ __all__ = ["say_where_it_crashes"]
 
 
 def say_where_it_crashes() -> None:
-    """Write the stacks of all threads to stderr when this process crashes (segmentation fault, abort).
+    """Make this process write the stacks of all threads to stderr on a segmentation fault or abort.
 
     Does nothing if stderr is missing.
     """

@@ -15,13 +15,16 @@ _calls: list[Callable[[], object]] = []
 
 
 def after_nodes(call: Callable[[], object]) -> None:
-    """Call a function at interpreter exit, after all nodes are closed, instead of by `atexit`."""
+    """Register a function to be called at interpreter exit, after all nodes are closed.
+
+    If the function is registered with `atexit`, it is unregistered there.
+    """
     atexit.unregister(call)
     _calls.append(call)
 
 
 def not_after_nodes(call: Callable[[], object]) -> None:
-    """Remove a function added by `after_nodes`."""
+    """Unregister a function that was registered with `after_nodes`."""
     _calls[:] = [each for each in _calls if each is not call]
 
 

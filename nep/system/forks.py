@@ -1,13 +1,12 @@
 """Fork support: objects that must be discarded in a forked child process (Linux, macOS).
 
-A child has a copy of the memory, but only the thread that forked: I/O threads are missing, locks stay held,
-and descriptors are shared with the parent. So nothing with sockets can be used, or even closed, in a child:
-one byte to an inherited descriptor would wake the parent's threads. Owners of such objects are registered
-here and notified in a child.
+A child process gets a copy of the memory, but only the thread that called fork: I/O threads are missing,
+locks stay held, and descriptors are shared with the parent. Objects with sockets can't be used or even closed
+in a child, because one byte written to an inherited descriptor would wake the parent's threads. Owners of
+such objects are registered here and notified in a child.
 
-A child that lives on would keep the parent's ports and connections open, and peers would not notice that the
-parent closes them. libzmq doesn't reveal its descriptors, so they are identified by their addresses, and
-closed.
+A long-lived child would keep the parent's ports and connections open, and peers would not notice when the
+parent closes them. libzmq doesn't expose its descriptors, so they are found by their addresses and closed.
 """
 
 from __future__ import annotations
@@ -25,10 +24,10 @@ __all__ = ["Inherited", "give_up", "in_child", "watch"]
 
 
 class Inherited(Protocol):
-    """Object that a forked child inherits and can't use."""
+    """Object that must not be used in a forked child process."""
 
     def forked(self) -> None:
-        """Mark the object as closed in a child, without taking a lock or touching a ZeroMQ socket."""
+        """Mark the object as closed in a child process, without taking a lock or touching a ZeroMQ socket."""
 
 
 _watched: WeakSet[Inherited] = WeakSet()
@@ -39,20 +38,21 @@ _ANY_HOSTS = frozenset({"*", "0.0.0.0"})  # noqa: S104 - nothing is bound
 
 
 def watch(owner: Inherited) -> None:
-    """Register an object whose `forked` is called in every child. Held by a weak reference."""
+    """Register an object whose `forked` is called in every child process. Keeps only a weak reference."""
     _watched.add(owner)
 
 
 def give_up(*endpoints: str) -> None:
-    """Make a child close its sockets that are bound to, accepted at or connected to these endpoints.
+    """Close the sockets in this child process that are bound to, accepted at or connected to these endpoints.
 
-    Call it in `forked`. Endpoints are `tcp://IPV4:PORT` or `ipc://@NAME`; others are ignored.
+    Call this in `forked`; the sockets are closed after all owners were notified. Endpoints have the form
+    `tcp://IPV4:PORT` or `ipc://@NAME`; others are ignored.
     """
     _inherited_endpoints.update(endpoints)
 
 
 def in_child(call: Callable[[], None]) -> None:
-    """Call a function in every child after all owners were notified. For modules."""
+    """Register a function to be called in every child process after all owners were notified. For modules."""
     _calls.append(call)
 
 

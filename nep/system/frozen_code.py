@@ -1,8 +1,8 @@
-"""Keep importing from a frozen program whose file is replaced or removed while it runs.
+"""Import modules from a frozen program's file even if it is replaced or removed while the program runs.
 
 PyInstaller opens the program file by name for each imported module. After an update the file has other
-contents at that position (``zlib.error``, or another module); without the file it raises SystemExit. An open
-file stays as it was.
+contents at that position (``zlib.error``, or another module); if the file is missing, PyInstaller raises
+SystemExit. A file that is already open keeps its contents.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ from typing import Protocol
 __all__ = ["hold_code"]
 
 LOADER = "pyimod02_importers"
-"""PyInstaller's import module."""
+"""Name of PyInstaller's import module."""
 
 
 class Archive(Protocol):
@@ -24,10 +24,10 @@ class Archive(Protocol):
 
 
 def hold_code() -> bool:
-    """Keep the program's file open and import from it; return True if possible.
+    """Keep the program's file open and import modules from the open file. Return True if this is possible.
 
-    Linux only: it can reopen an open file with a position of its own. Windows locks the files of running
-    programs. Returns False when run from source.
+    Works on Linux only, where an open file can be reopened with an independent position. Windows locks the
+    files of running programs. Returns False if the program is not frozen.
     """
     archive: Archive | None = getattr(sys.modules.get(LOADER), "pyz_archive", None)
     if archive is None or not sys.platform.startswith("linux"):

@@ -1,4 +1,4 @@
-"""Modules that are imported at their first use, to speed up the start.
+"""Modules that are imported at their first use, to reduce the startup time.
 
 if TYPE_CHECKING:
     import psutil
@@ -14,7 +14,7 @@ __all__ = ["lazy_module"]
 
 
 class LazyModule:
-    """Proxy of a module that imports it at the first access to an attribute. Thread-safe."""
+    """Proxy that imports a module when an attribute is first accessed. Thread-safe."""
 
     __slots__ = ("_name",)
 
@@ -29,5 +29,5 @@ class LazyModule:
 
 
 def lazy_module(name: str) -> LazyModule:
-    """Return a proxy of a module. Import errors are raised at its first use."""
+    """Return a proxy of a module. Import errors are raised at the first access to an attribute."""
     return LazyModule(name)

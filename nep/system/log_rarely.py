@@ -12,24 +12,24 @@ _LOGGED_COUNTS = frozenset(10**n for n in range(20))
 
 
 def is_logged(count: int) -> bool:
-    """Return True if the `count`-th occurrence is logged."""
+    """Return True if the `count`-th occurrence of an event is to be logged."""
     return count in _LOGGED_COUNTS
 
 
 class SurvivedErrors:
-    """Context manager around one item of work in a thread that must go on: no exception leaves it.
+    """Context manager that suppresses, counts and logs exceptions, for threads that must keep running.
 
-    Exceptions are counted and logged at increasing intervals; also SystemExit, which a callback may raise and
-    which would end the thread.
+    Exceptions are logged at increasing intervals. SystemExit is suppressed too, because a callback may raise
+    it and it would end the thread.
     """
 
     def __init__(self, logger: logging.Logger, what: str) -> None:
-        """Log "`what` failed" for exceptions."""
+        """Initialize with the name of the work; the log message is "`what` failed"."""
         self.count = 0
         self._logger, self._what = logger, what
 
     def add(self, error: BaseException) -> None:
-        """Count an exception, and log it at increasing intervals."""
+        """Count an exception and log it at increasing intervals."""
         self.count += 1
         if is_logged(self.count):
             with suppress(Exception):  # logging may fail without memory or stack

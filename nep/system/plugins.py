@@ -1,4 +1,4 @@
-"""Plug-ins: a module binds one description, so that adding a plug-in is adding a file."""
+"""Plug-in discovery. Each module of a package binds one description, so that a new file is a new plug-in."""
 
 from __future__ import annotations
 
@@ -33,7 +33,10 @@ T = TypeVar("T", bound=Named)
 
 
 def discover_own(package: str, attribute: str, kind: type[T]) -> Mapping[str, T]:
-    """Find plug-ins as `discover` does, without entry points, whose search reads all installed packages."""
+    """Find the plug-ins in a package without entry points, whose search reads all installed packages.
+
+    Arguments and exceptions are those of `discover`.
+    """
     found: dict[str, T] = {}
     home = importlib.import_module(package)
     for info in pkgutil.iter_modules(home.__path__, f"{package}."):
@@ -51,8 +54,13 @@ def discover_own(package: str, attribute: str, kind: type[T]) -> Mapping[str, T]
 def discover(package: str, attribute: str, kind: type[T]) -> Mapping[str, T]:
     """Return plug-ins by name: objects that modules of `package` bind as `attribute`, and entry points.
 
-    Modules without the attribute are ignored. Entry points of third parties that fail are logged and ignored;
-    they can't replace our own plug-ins.
+    Modules without the attribute are ignored. Entry points of third parties that fail to load are logged and
+    ignored; they can't replace plug-ins of the package.
+
+    Args:
+        package: Name of the package, and of the entry point group.
+        attribute: Name that each plug-in module binds.
+        kind: Required class of the bound object.
 
     Raises:
         PluginsMissingError: The package has no plug-ins (left out of a frozen program).

@@ -1,4 +1,4 @@
-"""Replace a file atomically, also while another program has it open."""
+"""Replace a file atomically, even while another program has it open."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ __all__ = ["replace_file"]
 _MAX_ATTEMPTS = 20
 _PAUSE_S = 0.05
 _OPEN_FILE_ERRORS = frozenset({5, 32, 33})
-"""Windows errors of an open file: access denied, sharing violation, lock violation."""
+"""Windows error codes for a file in use: access denied, sharing violation, lock violation."""
 
 
 def replace_file(
@@ -24,10 +24,13 @@ def replace_file(
     replace: Callable[[Path, Path], object] = os.replace,
     pause: Callable[[float], object] | None = None,
 ) -> None:
-    """Rename `new` to `old` atomically. Raises `OSError`; `old` is unchanged then.
+    """Rename `new` to `old` atomically.
 
-    Windows refuses while another program (virus scanner, synchronized folder, editor) has `old` open: retries
-    for a second. `replace` and `pause` are for tests.
+    Windows refuses this while another program (virus scanner, cloud sync, editor) has `old` open, so the
+    rename is retried for a second. `replace` and `pause` are for tests.
+
+    Raises:
+        OSError: The file can't be replaced; `old` is unchanged.
     """
     wait = pause or threading.Event().wait
     for tried in range(1, _MAX_ATTEMPTS + 1):

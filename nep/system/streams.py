@@ -1,8 +1,7 @@
-"""Standard streams of a command: encode every character, and survive a closed output.
+"""Standard streams of a command: encode every character, and handle a closed output.
 
-A pipe on Windows is cp1252 or cp437, on a minimal server ASCII; none has all characters that programs and
-people use. A reader may exit (`| head -1`), a disk may be full, a stream may be closed before the program
-starts.
+A pipe uses cp1252 or cp437 on Windows and ASCII on a minimal server, which lack many characters. The reader
+of a pipe may exit (`| head -1`), a disk may be full, and a stream may be closed before the program starts.
 """
 
 from __future__ import annotations
@@ -24,16 +23,16 @@ _HANDLER = "nep.protocol.encoding"
 _READER_GONE_ERRNOS = frozenset(
     {errno.EPIPE, errno.ESHUTDOWN, *([errno.EINVAL] if sys.platform == "win32" else [])}
 )
-"""Errors of writing to a pipe without a reader; Windows reports an invalid argument."""
+"""errno values for writing to a pipe whose reader has exited; Windows reports an invalid argument."""
 _DISK_ERRNOS = frozenset({errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO, errno.EBADF})
-"""Errors of writing to a full or failing disk, or to a stream closed before the start."""
+"""errno values for writing to a full or failing disk, or to a stream that was closed before the start."""
 
 
 def prepare_streams() -> None:
-    """Configure the standard streams to replace characters that their encoding lacks by similar ones.
+    """Make the standard streams replace characters that their encoding lacks with similar ones.
 
-    Streams closed before the program started are opened to the null device, so that their descriptors are not
-    assigned to sockets. Reading or writing them fails as usual; messages to a closed stderr are discarded.
+    Streams that were closed before the program started are opened to the null device, so that sockets don't
+    get their descriptors. Reading or writing them fails as usual; messages to a closed stderr are discarded.
     """
     codecs.register_error(_HANDLER, _replace_unencodable)
     ways = {"stdin": os.O_WRONLY, "stdout": os.O_RDONLY, "stderr": os.O_WRONLY}
@@ -47,9 +46,9 @@ def prepare_streams() -> None:
 
 
 def buffer_output() -> None:
-    """Add a buffer to an unbuffered standard output (`python -u`, PYTHONUNBUFFERED in a container).
+    """Add a buffer to an unbuffered standard output (`python -u`, or PYTHONUNBUFFERED in a container).
 
-    Unwritten text is then still available for `output_problem`. For programs that flush.
+    Then `output_problem` can detect failed writes by flushing. Programs that call this must flush.
     """
     stream = sys.stdout
     if isinstance(stream, TextIOWrapper) and isinstance(stream.buffer, RawIOBase):
@@ -59,7 +58,7 @@ def buffer_output() -> None:
 
 
 def words_given() -> list[str]:
-    """Return the command-line arguments, decoded as UTF-8 also in the locale "C"."""
+    """Return the command-line arguments, decoded as UTF-8 even in the locale "C"."""
     if os.name != "posix":
         return sys.argv[1:]
     escape = "surrogateescape"
@@ -74,16 +73,16 @@ def _replace_unencodable(error: UnicodeError) -> tuple[str, int]:
 
 
 def print_error(text: str) -> None:
-    """Write a line to stderr; ignore errors."""
+    """Write a line to stderr, ignoring write errors."""
     with suppress(OSError, ValueError):
         print(text, file=sys.stderr, flush=True)  # noqa: T201 - output of a command
 
 
 def output_problem(raised: OSError | None = None) -> str | None:
-    """Return why stdout can't be written: "" if its reader has exited, None if it can.
+    """Return the reason why stdout can't be written; "" if its reader has exited, None if stdout works.
 
-    Call it after an OSError (`raised`): unwritten text is still buffered, so that flushing fails again. Only
-    text larger than the buffer is lost; then `raised` is the only evidence.
+    Unwritten text stays in the buffer, so a failed write is detected by flushing again. Text larger than the
+    buffer is lost; pass the exception of that write as `raised`, because it is the only evidence.
     """
     try:
         sys.stdout.flush()
@@ -103,7 +102,7 @@ def _reason_of(error: OSError) -> str:
 
 
 def close_streams() -> None:
-    """Flush the standard streams; discard text that can't be written, which would fail at exit."""
+    """Flush the standard streams. Text that can't be written is discarded; it would fail again at exit."""
     for stream in (sys.stdout, sys.stderr):
         try:
             stream.flush()

@@ -1,4 +1,4 @@
-"""Parse Python source in several threads.
+"""Thread-safe parsing of Python source.
 
 CPython 3.11 keeps the recursion depth of its AST constructor per process: two threads that parse at the same
 time can end in a SystemError ("AST constructor recursion depth mismatch", see python/cpython#106905).
@@ -19,12 +19,12 @@ if hasattr(os, "register_at_fork"):
 
 
 def parse_module(source: str) -> ast.Module:
-    """Return the syntax tree of statements. Thread-safe; raises as `ast.parse`."""
+    """Parse a module and return its syntax tree. Thread-safe; raises the exceptions of `ast.parse`."""
     with _lock:
         return ast.parse(source)
 
 
 def parse_expression(source: str) -> ast.Expression:
-    """Return the syntax tree of one expression. Thread-safe; raises as `ast.parse`."""
+    """Parse one expression and return its syntax tree. Thread-safe; raises the exceptions of `ast.parse`."""
     with _lock:
         return ast.parse(source, mode="eval")

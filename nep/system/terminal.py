@@ -1,7 +1,7 @@
-"""Terminal output from a thread of its own, so that a blocked terminal doesn't block the program.
+"""Non-blocking terminal output through a writer thread.
 
 A terminal blocks while text is selected (Windows) or after Ctrl+S, a pipe while its reader is busy. Excess
-text is dropped and counted, and the count is written when there is room again.
+text is dropped; the number of dropped lines is written when the queue has room again.
 """
 
 from __future__ import annotations
@@ -29,10 +29,13 @@ _RETRY_S = 0.05
 
 
 class Terminal(io.TextIOBase):
-    """Text stream with a writer thread in front of `stream`. Usable as a context manager.
+    """Text stream with a queue and a writer thread. Usable as a context manager.
 
-    `stream` may be None (a program without a console). `write` never blocks or raises, in any thread. The
-    thread starts with the first text.
+    `write` never blocks or raises, in any thread. The writer thread starts with the first text.
+
+    Args:
+        stream: Stream to write to, or None (a program without a console).
+        max_characters: Maximum size of the queued text.
     """
 
     def __init__(self, stream: TextIO | None, max_characters: int = MAX_CHARACTERS) -> None:
@@ -55,7 +58,7 @@ class Terminal(io.TextIOBase):
         return getattr(self._stream, "encoding", None) or "utf-8"
 
     def writable(self) -> bool:
-        """Return True."""
+        """Return True; the stream is write-only."""
         return True
 
     def isatty(self) -> bool:
@@ -81,12 +84,12 @@ class Terminal(io.TextIOBase):
         """Do nothing: flushing must not block."""
 
     def drain(self, timeout_s: float = CLOSE_S) -> bool:
-        """Wait until everything is written; return False after the time limit."""
+        """Wait until all queued text is written; return False after the time limit."""
         with self._changed:
             return self._changed.wait_for(lambda: not self._queue and not self._is_writing, timeout_s)
 
     def close(self, timeout_s: float = CLOSE_S) -> None:
-        """Wait at most `timeout_s` seconds for queued text, then stop. Idempotent."""
+        """Write the queued text for at most `timeout_s` seconds, then stop the thread. Idempotent."""
         with self._changed:
             self._is_closing = True
             self._changed.notify_all()
@@ -101,7 +104,7 @@ class Terminal(io.TextIOBase):
         self.close()
 
     def forked(self) -> None:
-        """Reset in a forked child process: queued text is the parent's. See `nep.system.forks`."""
+        """Reset in a forked child process; the queued text belongs to the parent. See `nep.system.forks`."""
         self._changed = threading.Condition()
         self._thread = None
         self._queue.clear()
@@ -179,12 +182,12 @@ class LineFormatter(logging.Formatter):
     """Formatter that escapes control characters."""
 
     def format(self, record: logging.LogRecord) -> str:
-        """Return the formatted record with control characters escaped."""
+        """Format a record and escape its control characters."""
         return escaped(super().format(record), lines=True)
 
 
 def log_to(terminal: Terminal, level: int) -> logging.Handler:
-    """Log to `terminal` from `level` on, unless logging is already configured. Return the handler."""
+    """Configure logging to `terminal` from `level` on, unless a root handler exists. Return the handler."""
     handler = logging.StreamHandler(terminal)
     handler.setFormatter(LineFormatter("%(name)s: %(message)s"))
     logging.basicConfig(level=level, handlers=[handler])

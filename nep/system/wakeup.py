@@ -1,4 +1,4 @@
-"""Waker: interrupts a thread that polls file descriptors."""
+"""`Waker`: wakes a thread that polls file descriptors."""
 
 from __future__ import annotations
 
@@ -19,10 +19,10 @@ _HAS_EVENTS = sys.platform == "linux" and hasattr(os, "eventfd")
 
 
 class Waker:
-    """File descriptor that becomes readable when another thread calls `wake`. Thread-safe; one thread waits.
+    """File descriptor that becomes readable when another thread calls `wake`.
 
-    An eventfd on Linux; elsewhere a socket pair, because only sockets can be polled on every system. Raises
-    `TooManyFilesError`.
+    Thread-safe for one waiting thread. Uses an eventfd on Linux, and elsewhere a socket pair, because Windows
+    can only poll sockets. The constructor raises `TooManyFilesError`.
     """
 
     def __init__(self) -> None:
@@ -53,7 +53,7 @@ class Waker:
                 self._ends[1].send(b"\0")
 
     def clear(self) -> None:
-        """Make `fd` unreadable. Called by the waiting thread before it checks for work."""
+        """Make `fd` unreadable. The waiting thread calls this before it checks for work."""
         with self._lock, contextlib.suppress(OSError):
             if self._event >= 0:
                 os.eventfd_read(self._event)
@@ -67,7 +67,7 @@ class Waker:
             self._close()
 
     def forked(self) -> None:
-        """Close the inherited descriptors in a forked child process, which doesn't affect the parent."""
+        """Close the inherited descriptors in a forked child process; those of the parent stay open."""
         self._lock = threading.RLock()
         self._close()
 
