@@ -1,7 +1,4 @@
-"""Alarms of a session.
-
-Stored in one file, evaluated on messages and graphs, shown as alerts, and executed.
-"""
+"""Alarms of a session: stored in one file, evaluated on messages and graphs, shown as alerts."""
 
 from __future__ import annotations
 
@@ -41,8 +38,8 @@ FILE = "alarms.json"
 SHOW = "panel:alarms"
 """Window command that shows the alarms panel."""
 MAX_AGE_S = 10.0
-"""Maximum age of a message that waits for a master. Older ones are discarded, because they may no longer be
-valid."""
+"""Maximum age of a message that waits for a master; older messages may no longer be valid and are discarded.
+"""
 SOUND: Notes = ((880.0, 0.16), (0.0, 0.06), (880.0, 0.16), (0.0, 0.06), (660.0, 0.3))
 VOLUME = 0.6
 NOT_CARRIED = lazy("an alarm can't carry out its action: {error}")
@@ -73,18 +70,19 @@ class AlarmSession(Protocol):
 
 @dataclass(frozen=True, slots=True)
 class _PendingSend:
-    """Message that waits for the answer to a motion question."""
+    """Message of an alarm, held until the user has answered the motion question."""
 
     question: Question
     done: Done
 
 
 class SessionAlarms:
-    """Alarms of a session. Not thread-safe except `take`: use it from the window's thread.
+    """Alarms of a session. Not thread-safe, except `take`: use it from the window's thread.
 
-    ``keep`` saves the flight recorder; ``run_behaviour`` runs a behaviour by name and returns an error
-    sentence or "". Until their owners set them, such actions fail with a reason. ``on_event`` is called for
-    each alarm that went on, went off or is still on.
+    Attributes:
+        keep: Saves the flight recorder. The action fails with a reason until its owner sets this.
+        run_behaviour: Runs a behaviour by name; returns an error message or "". Likewise.
+        on_event: Called for each alarm that was raised, cleared or is still on.
     """
 
     def __init__(
@@ -138,7 +136,7 @@ class SessionAlarms:
 
     @property
     def revision(self) -> int:
-        """Counter that increases with each change of the rules or the history (not of the current values)."""
+        """Counter that increases when the rules or the history change, but not with the measured values."""
         return self.alarms.revision + self.history.revision
 
     @property
@@ -200,7 +198,7 @@ class SessionAlarms:
         self.alarms.evaluator.evaluate(topic, messages)
 
     def see(self, view: GraphView | None) -> None:
-        """Evaluate a new graph; None when the master is lost."""
+        """Evaluate a new graph; None if the connection to the master was lost."""
         self._view = view
         self.alarms.evaluator.see(view)
 

@@ -1,4 +1,4 @@
-"""Active alerts, each with an id, a sentence and a next step; removed when resolved."""
+"""Active alerts, each with an id, a sentence and a next step. Alerts are removed when resolved."""
 
 from __future__ import annotations
 
@@ -13,9 +13,14 @@ SEVERITIES = ("error", "warn", "info")
 class ActiveAlert:
     """One active problem.
 
-    ``title`` is the problem, ``detail`` its meaning, ``button`` and ``action`` the next step (label and name
-    of a window command). ``since_s`` is on the clock given to `Alerts`; ``count`` is the number of
-    occurrences since it was last resolved. With ``for_developers`` only the Developer layout shows it.
+    Attributes:
+        title: The problem, in one sentence.
+        detail: What the problem means.
+        button: Label of the button for the next step.
+        action: Name of the window command that the button runs.
+        since_s: Time of the first occurrence, on the clock given to `Alerts`.
+        count: Number of occurrences since the alert was last resolved.
+        for_developers: True if only the Developer layout shows the alert.
     """
 
     id: str
@@ -50,7 +55,7 @@ class Alerts:
         return self._sorted
 
     def to_tell(self, *, for_developers: bool = False) -> Sequence[ActiveAlert]:
-        """Return errors and warnings, worst first; those for developers only if requested."""
+        """Return errors and warnings, worst first. Alerts for developers are included only on request."""
         return [
             alert
             for alert in self.active
@@ -101,12 +106,12 @@ class Alerts:
             self._changed()
 
     def resolve_all(self, prefix: str) -> None:
-        """Remove every alert whose id starts with ``prefix``."""
+        """Resolve every alert whose id starts with ``prefix``."""
         for id in [id for id in self._alerts if id.startswith(prefix)]:
             self.resolve(id)
 
     def has(self, id: str) -> bool:
-        """Return whether the alert is active."""
+        """Return True if the alert is active."""
         return id in self._alerts
 
     def get(self, id: str) -> ActiveAlert | None:
@@ -120,7 +125,7 @@ class Alerts:
             self.revision += 1
 
     def dismissed(self, id: str) -> bool:
-        """Return whether the user closed the alert's banner."""
+        """Return True if the user closed the banner of the alert."""
         return id in self._dismissed
 
     def _changed(self) -> None:

@@ -25,9 +25,15 @@ _LEVELS = {"warning": "warn"}
 
 @dataclass(frozen=True, slots=True)
 class ConsoleRecord:
-    """One log record: epoch seconds, level (debug, info, warn, error, critical), origin and text.
+    """One log record.
 
-    ``number`` counts records from 1. ``logger`` names the logger and ``place`` the file and line, if known.
+    Attributes:
+        stamp_s: Time in seconds since 1970.
+        level: "debug", "info", "warn", "error" or "critical".
+        origin: Program that logged the record.
+        number: Running number, from 1.
+        logger: Name of the logger, if known.
+        place: File and line, if known.
     """
 
     stamp_s: float
@@ -60,7 +66,7 @@ class Console:
         return self._lines  # type: ignore[return-value]  # all entries are decoded
 
     def add(self, level: str, origin: str, text: str) -> None:
-        """Add a record; text longer than `TEXT_LIMIT` is shortened visibly."""
+        """Add a record. Text longer than `TEXT_LIMIT` is truncated visibly."""
         self._append([ConsoleRecord(self._clock(), level, origin, _shortened(text))])
 
     def add_messages(self, messages: Sequence[Message], dropped: int = 0) -> None:
@@ -88,10 +94,7 @@ class Console:
         self.revision += 1
 
     def rewind(self) -> None:
-        """Remove all records and known errors.
-
-        The replay moved to another time and sends its records again.
-        """
+        """Remove all records and known errors, because a replay jumped and sends its records again."""
         self._errors = log_handler.ShownErrors()
         self.clear()
 

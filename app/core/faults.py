@@ -1,7 +1,8 @@
-"""Unexpected errors of Studio: logged once, shown as an alert, and isolated from the steps that follow.
+"""Unexpected errors of Studio: logged once, shown as an alert, and isolated from the following steps.
 
-Everything goes through `logging`: uncaught exceptions of any thread (`install_hooks`), exceptions caught by a
-guard (`log_errors`), and Qt's messages. Handlers that people read have a `RepeatFilter`.
+All errors go through `logging`: uncaught exceptions of any thread (`install_hooks`), exceptions caught by a
+guard
+(`log_errors`), and messages of Qt. Handlers whose output people read have a `RepeatFilter`.
 """
 
 from __future__ import annotations
@@ -27,16 +28,17 @@ from nep.version import __version__
 FILE_BYTES, FILES_KEPT = 1_000_000, 3
 FAULTS_KEPT = 500
 IN_CONSOLE: dict[str, object] = {"in_console": True}
-"""`extra` of a record that the Console already shows in other words; only the log file gets it."""
+"""``extra`` of a record that the Console already shows in other words, and that only the log file needs."""
 WRITER = "NEP Studio %s writes from here on"
 FORMAT = "%(asctime)s %(levelname)s %(threadName)s %(name)s: %(message)s"
 
 ALERT = "studio"
 RECOVERY_S = 5.0
-"""Time without a failure after which a fault is over, so that intermittent faults don't make the banner
-flicker."""
+"""Time without a failure after which a fault is resolved. Keeps the banner steady when errors are
+intermittent.
+"""
 EXPIRY_S = 60.0
-"""Time after which a fault of a step that isn't repeated (a single event) is over; it stays in the log."""
+"""Time after which a fault of a one-time step, such as an event, is resolved. The log keeps the record."""
 MAX_FAULTS = 100
 
 _log = logging.getLogger("studio")
@@ -60,18 +62,22 @@ def log_errors(what: str) -> Iterator[None]:
 class RepeatFilter:
     """Logging filter that passes a fault when it is new and at its 10th, 100th, 1000th ... occurrence.
 
-    Records are equal if they have the same logger and level, and were raised at the same line or have the
-    same text. The newest 500 faults are known; an older one counts as new. Thread-safe only under the
-    handler's own lock, which logging holds.
+    Records count as repetitions if they have the same logger and level, and were raised at the same line or
+    have the
+    same text. The newest 500 faults are remembered; an older one counts as new. Thread-safe only under the
+    handler's
+    lock, which logging holds.
     """
 
     def __init__(self) -> None:
         self._counts: dict[tuple[object, ...], int] = {}
 
     def filter(self, record: logging.LogRecord) -> logging.LogRecord | None:
-        """Return the record to write, with its number of occurrences if it is a repetition, or None.
+        """Return the record to write, or None to suppress it.
 
-        Never raises, so that logging can't fail because of a record's arguments.
+        A repetition is given its number of occurrences.
+
+        Never raises, not even if the record's arguments can't be formatted.
         """
         record = _formattable(record)
         key = (record.name, record.levelno, _raise_location(record) or record.getMessage())
@@ -115,10 +121,11 @@ def _raise_location(record: logging.LogRecord) -> tuple[object, ...] | None:
 
 
 class LogFile(RotatingFileHandler):
-    """Log file of warnings and errors: ``studio.log`` and three older ones of 1 MB each.
+    """Log file of warnings and errors: ``studio.log`` and three older files of 1 MB each.
 
-    The first line of a run in each file states its version, because an update continues in the same file.
-    Only the user can read the files. Lines that can't be written (disk full or read-only) are dropped.
+    The first line that a run writes to a file contains Studio's version, because files are continued after an
+    update.
+    Only the user can read the files. Records that can't be written (disk full or read-only) are dropped.
     """
 
     def __init__(self, folder: Path) -> None:
@@ -146,10 +153,7 @@ class LogFile(RotatingFileHandler):
         return stream
 
     def handleError(self, record: logging.LogRecord) -> None:  # noqa: N802  logging's name
-        """Ignore errors of writing.
-
-        There is no better place to report them, and the Console has the record.
-        """
+        """Ignore errors of writing, which can't be reported elsewhere; the Console has the record."""
 
 
 def install_hooks() -> None:
@@ -196,7 +200,7 @@ def error_words(error: BaseException) -> str:
 
 @dataclass(slots=True)
 class _Fault:
-    """Failed step: its sentence, the time of the last failure, and whether it succeeded since."""
+    """Failed step: its message, the time of the last failure, and True if it succeeded since."""
 
     said: str
     last_s: float
@@ -212,9 +216,11 @@ class FaultAlerts:
 
     @contextmanager
     def guarded(self, what: str, **holes: object) -> Iterator[None]:
-        """Return a context that logs and alerts exceptions of one step and suppresses them.
+        """Return a context that suppresses exceptions of one step after logging them and raising an alert.
 
-        ``what`` completes the sentence "can't ..."; mark it with `lazy`. Its ``holes`` are filled here.
+        Args:
+            what: Completes the sentence "can't ..."; use `lazy` for it.
+            holes: Values for the placeholders in ``what``.
         """
         try:
             yield
@@ -229,7 +235,7 @@ class FaultAlerts:
                 self._faults[what].is_well = True
 
     def check(self) -> None:
-        """Remove faults that are over and resolve the alert when none is left. Called once a second."""
+        """Remove resolved faults, and resolve the alert if none is left. Called once a second."""
         now = self._clock()
         over = [
             what

@@ -1,4 +1,6 @@
 """Behaviours as documents: tabs, files, journals, versions and problems.
 
-`open_documents` has the tabs, `document` is one of them; `journal` is the backup against a crash.
+`open_documents` manages the tabs and `document` implements one of them; `journal` saves unsaved work against
+a
+crash.
 """

@@ -10,11 +10,14 @@ from app.core.storage.deep_json import start_deep
 
 T = TypeVar("T")
 JOIN_TIMEOUT_S = 2.0
-"""Maximum time that the window waits for a job, for example on a disk that hangs."""
+"""Maximum time that the window waits for a job, for example on a disk that does not respond."""
 
 
 class BackgroundWorker(Generic[T]):
-    """Worker with one thread, started at the first job; `close` ends it. Only `finish` and `close` block."""
+    """Worker with one thread, which the first job starts and `close` stops.
+
+    Only `finish` and `close` block.
+    """
 
     def __init__(self, name: str) -> None:
         self._name = name
@@ -27,7 +30,7 @@ class BackgroundWorker(Generic[T]):
         self._closed = False
 
     def ask(self, owner: str, work: Callable[[], T]) -> None:
-        """Queue a job for the owner, replacing its pending one."""
+        """Queue a job for an owner, replacing the owner's pending job."""
         with self._changed:
             self._pending[owner] = work
             if self._thread is None and not self._closed:
@@ -36,9 +39,9 @@ class BackgroundWorker(Generic[T]):
             self._changed.notify_all()
 
     def pop_result(self, owner: str) -> T | None:
-        """Return the result of the owner's last job once; None while there is none.
+        """Return and clear the result of the owner's last job; None if there is none.
 
-        Raises the job's exception.
+        Raises the exception that the job raised.
         """
         with self._changed:
             failed = self._failed.pop(owner, None)
@@ -47,7 +50,7 @@ class BackgroundWorker(Generic[T]):
             return self._done.pop(owner, None)
 
     def finish(self, owner: str) -> bool:
-        """Wait until the owner has no pending job, at most 2 s; return whether that is so."""
+        """Wait at most 2 s until the owner has no queued or running job; return True if that was reached."""
         with self._changed:
             return self._changed.wait_for(
                 lambda: self._closed or (owner not in self._pending and self._current_owner != owner),
@@ -62,7 +65,7 @@ class BackgroundWorker(Generic[T]):
             self._failed.pop(owner, None)
 
     def close(self) -> None:
-        """Stop the thread; waits for the current job, at most 2 s."""
+        """Stop the thread after the current job; waits at most 2 s."""
         with self._changed:
             self._closed = True
             self._pending.clear()

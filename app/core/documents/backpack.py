@@ -1,7 +1,8 @@
-"""Backpack: blocks kept for other files, other instances of Studio and the next start.
+"""Backpack: blocks that are available in every file, every running Studio and after a restart.
 
-One JSON file beside the settings, shared by all instances: each change is applied to the current content
-under a lock, so that none reverts another. Content that isn't understood is preserved.
+Stored in one JSON file next to the settings and shared by all instances: each change is applied to the
+current
+content under a lock, so that instances don't overwrite each other's changes. Unknown content is preserved.
 """
 
 from __future__ import annotations
@@ -24,7 +25,7 @@ from nep.system.replace_file import replace_file
 
 VERSION = 1
 MAX_STACKS = 100
-"""Maximum number of stacks."""
+"""Maximum number of stacks in the backpack."""
 MAX_BYTES = 4_000_000
 """Maximum file size in bytes."""
 FULL = lazy("the backpack can hold at most {most} stacks; remove something first")
@@ -37,32 +38,41 @@ Stamp = tuple[int, int, int]
 
 @dataclass(frozen=True, slots=True)
 class Packed:
-    """Stack of blocks as saved by Blockly, with its variables' names; ``at`` is when it was added."""
+    """Stack of blocks as saved by Blockly, with the names of its variables.
+
+    ``at`` is the time it was added.
+    """
 
     id: str
     at: float
     block: Json
 
     def to_json(self) -> dict[str, object]:
-        """Return the form used in the file and the page."""
+        """Return the JSON object used in the file and by the editor's page."""
         return {"id": self.id, "at": self.at, "block": self.block}
 
 
 class _Found(NamedTuple):
-    """Content of the file; ``unknown`` are entries that are not understood, preserved unchanged."""
+    """Content of the file. ``unknown`` are entries that this version can't read.
+
+    They are preserved unchanged.
+    """
 
     items: tuple[Packed, ...] = ()
     unknown: tuple[object, ...] = ()
 
 
 class Backpack:
-    """Content of the backpack, newest first. Every change is written at once, or raises BackpackError."""
+    """Content of the backpack, newest first.
+
+    Changes are written immediately; they raise BackpackError on failure.
+    """
 
     def __init__(self, folder: Path | None = None, clock: Callable[[], float] = time.time) -> None:
         # `backpack.json` in `folder` (default: Studio's own); a missing file is an empty backpack.
         self.path = (folder if folder is not None else home()) / "backpack.json"
         self.revision = 0
-        """Number that changes with the content."""
+        """Counter that increases when the content changes."""
         self._clock = clock
         self._known = _Found()
         self._stamp: Stamp | None = None
@@ -72,16 +82,16 @@ class Backpack:
 
     @property
     def items(self) -> tuple[Packed, ...]:
-        """Known content, newest first."""
+        """Stacks that this version can read, newest first."""
         return self._known.items
 
     def take_trouble(self) -> str:
-        """Return and clear the sentence about a problem of the file, or ""."""
+        """Return and clear the message about a problem with the file; "" if there is none."""
         trouble, self._problem = self._problem, ""
         return trouble
 
     def reload_if_changed(self) -> None:
-        """Read the file if another instance has changed it."""
+        """Reload the file if another instance has changed it."""
         if _stamp(self.path) == self._stamp:
             return
         try:

@@ -13,9 +13,13 @@ Workspace = Mapping[str, object]
 
 @dataclass(frozen=True)
 class Difference:
-    """Difference to a state of ``blocks`` blocks.
+    """Difference between an earlier state of a behaviour and its current one.
 
-    Numbers of ``added``, ``removed`` and ``changed`` blocks.
+    Attributes:
+        blocks: Number of blocks in the earlier state.
+        added: Number of added blocks.
+        removed: Number of removed blocks.
+        changed: Number of blocks whose fields, values or texts differ.
     """
 
     blocks: int
@@ -27,7 +31,10 @@ class Difference:
 
 
 def difference(then: Workspace, now: Workspace) -> Difference:
-    """Compare two states by block ids; numbers and texts inside a block are part of it."""
+    """Compare two states by block ids.
+
+    Numbers and texts in the slots of a block count as part of the block.
+    """
     old, new = (dict(_blocks(workspace)) for workspace in (then, now))
     stayed = old.keys() & new.keys()
     result = Difference(

@@ -54,10 +54,13 @@ class Compiled:
 
 
 class Document:
-    """One behaviour.
+    """One open behaviour.
 
-    ``key`` identifies it among the open ones. ``revision`` increases when it is replaced from outside the
-    editor, ``fixes`` when Studio changed its blocks in a way that can be undone, ``edits`` with every edit.
+    Attributes:
+        key: Identifies the behaviour among the open ones.
+        revision: Increases when the behaviour is replaced from outside the editor.
+        fixes: Increases when Studio changes the blocks in a way that can be undone.
+        edits: Increases with every edit.
     """
 
     def __init__(
@@ -74,7 +77,7 @@ class Document:
         self._json = WorkspaceJson.of({})
         self.robots: dict[str, Mapping[str, object]] = {}
         self._read: dict[str, tuple[Mapping[str, object], Robot | None]] = {}
-        """Parsed descriptions: parsing one takes 15 ms, and each edit needs all."""
+        """Cache of parsed robot descriptions: parsing one takes 15 ms, and every edit needs all of them."""
         self.dirty = False
         self.saved_at: float | None = None
         self._stamp: Stamp | None = None  # of the file, as last read or written
@@ -96,7 +99,7 @@ class Document:
 
     @property
     def workspace(self) -> Workspace:
-        """Its blocks; text from the editor is parsed at the first access."""
+        """Blocks of the behaviour; text from the editor is parsed at the first access."""
         return self._json.blocks
 
     @workspace.setter
@@ -105,11 +108,11 @@ class Document:
 
     @property
     def has_blocks(self) -> bool:
-        """True if it has any block."""
+        """True if the behaviour contains at least one block."""
         return self._json.has_blocks
 
     def edited(self, workspace: Workspace | WorkspaceJson) -> None:
-        """Apply an edit of the blocks. The journal gets the editor's text; nothing blocks on the disk."""
+        """Apply an edit from the editor and write it to the journal. Does not block on the disk."""
         edited = workspace if isinstance(workspace, WorkspaceJson) else WorkspaceJson.of(workspace)
         if edited.same_as(self._json):
             return
@@ -120,17 +123,20 @@ class Document:
         self._write_journal()
 
     def new(self, name: str = "") -> None:
-        """Start an empty behaviour."""
+        """Replace the content by an empty behaviour."""
         self._replace(BehaviourFile(name or _(UNNAMED), {}, {}), None)
 
     def open(self, path: Path) -> None:
-        """Open a file. On DocumentError the open behaviour stays."""
+        """Open a file. If DocumentError is raised, the current content stays."""
         self._replace(read_file(path), path)
         self.saved_at = path.stat().st_mtime
         self._stamp = stamp_of(path)
 
     def example(self, path: Path) -> None:
-        """Open an example as a new, unsaved behaviour in the current language. Raises DocumentError."""
+        """Open an example as a new, unsaved behaviour, translated into the current language.
+
+        Raises DocumentError.
+        """
         self._replace(translated(read_file(path)), None)
 
     def copy(self, path: Path, name: str) -> None:
@@ -138,14 +144,14 @@ class Document:
         self._replace(replace(read_file(path), name=name), None)
 
     def duplicate(self, other: Document, name: str) -> None:
-        """Become a new, unsaved behaviour with the blocks of another one."""
+        """Copy the blocks of another behaviour into this one, which is new and unsaved."""
         self._replace(BehaviourFile(name, {}, other.robots, other.others), None)
         self.edited(other.workspace)
 
     def recover(self, unsaved: Unsaved) -> None:
-        """Restore the work of a crashed session.
+        """Restore the unsaved work of a crashed session.
 
-        It is unsaved, and written to a new journal before the old one is deleted.
+        The behaviour is unsaved, and is written to a new journal before the old one is deleted.
         """
         found = BehaviourFile(unsaved.name, unsaved.workspace, unsaved.robots, unsaved.others)
         self._replace(found, unsaved.path)
@@ -158,9 +164,9 @@ class Document:
             unsaved.journal.unlink(missing_ok=True)
 
     def save(self, path: Path | None = None) -> None:
-        """Write the file atomically; ``path`` becomes its file. Raises DocumentError.
+        """Write the file atomically; ``path`` becomes the file of the behaviour. Raises DocumentError.
 
-        The file contains the name too, for programs that read it.
+        The file also contains the name, for programs that need it.
         """
         target = path if path is not None else self.path
         if target is None:
@@ -174,7 +180,10 @@ class Document:
         self._discard_journal()
 
     def rename_to(self, name: str) -> None:
-        """Rename the behaviour and its file, if any. On DocumentError nothing changes."""
+        """Rename the behaviour and its file, if there is one.
+
+        If DocumentError is raised, nothing has changed.
+        """
         wanted = name.strip()
         problem = why_not(wanted, self.path)
         if problem:
@@ -194,9 +203,9 @@ class Document:
             self._write_journal()
 
     def fix(self, action: str) -> bool:
-        """Apply the action of a problem's button to the blocks.
+        """Apply the fix of a problem, given as the action of its button, to the blocks.
 
-        Return False when it doesn't concern blocks.
+        Returns False if the action does not change blocks.
         """
         fixed = deep_json.deeply(lambda: fix(self.workspace, action))
         if fixed is None:
@@ -206,7 +215,10 @@ class Document:
         return True
 
     def use_robot(self, missing: str, robot: Robot) -> bool:
-        """Replace a missing robot in the blocks by another one; return False when no block uses it."""
+        """Replace a missing robot in all blocks by another robot.
+
+        Return False if no block uses the missing one.
+        """
         known = next((each for each in self._known() if each.name == missing), None)
         if known is None or not blocks_of(self.workspace, missing):
             return False
@@ -216,36 +228,36 @@ class Document:
         return True
 
     def lose_file(self) -> None:
-        """Detach its file, which another behaviour was saved to: its blocks are unsaved now."""
+        """Detach the file, because another behaviour was saved to it: the blocks become unsaved."""
         self.path, self.dirty = None, True
         self._write_journal()
 
     def file_went_back(self) -> None:
-        """Mark it as unsaved: the last save of its file was undone."""
+        """Mark the behaviour as unsaved, because the last save of its file was undone."""
         self.dirty, self._stamp = True, stamp_of(self.path) if self.path is not None else None
         self._write_journal()
 
     @property
     def changed_outside(self) -> bool:
-        """True if its file was changed outside since it was opened or saved."""
+        """True if another program changed the file since it was opened or saved."""
         now = stamp_of(self.path) if self.path is not None else None
         return now is not None and now != self._stamp
 
     @property
     def blank(self) -> bool:
-        """True if it is new and unchanged, so that another behaviour may replace it."""
+        """True for a new, unchanged and empty behaviour, whose tab may be used for another one."""
         return self.path is None and not self.dirty and not self.workspace
 
     @property
     def journal(self) -> str:
-        """File name of its journal."""
+        """File name of the journal."""
         return self._journal.name
 
     @property
     def journal_error(self) -> str | None:
-        """Sentence why unsaved work can't be written to the journal.
+        """Message why unsaved work can't be written to the journal.
 
-        None while it is, or is being written.
+        None if it was written or is being written.
         """
         if self.journal_writer is not None:
             self._apply_journal_result(partial(self.journal_writer.pop_result, self._journal.name))
@@ -253,18 +265,18 @@ class Document:
 
     @property
     def is_kept(self) -> bool:
-        """True if its newest state is on disk. Waits for a write in progress, at most 2 s."""
+        """True if the newest state is on disk. Waits at most 2 s for a write in progress."""
         finished = self.journal_writer is None or self.journal_writer.finish(self._journal.name)
         return finished and self.journal_error is None
 
     def keep_again(self) -> bool:
-        """Retry a failed write of the journal; return whether all unsaved work is on disk."""
+        """Retry a failed write of the journal; return True if all unsaved work is on disk."""
         if self.dirty and not self.is_kept:
             self._write_journal()
         return not self.dirty or self.is_kept
 
     def close(self) -> None:
-        """Close at the end of the window.
+        """Close the behaviour when the window closes.
 
         Unsaved work stays in the journal and is offered at the next start.
         """
@@ -290,12 +302,12 @@ class Document:
 
     @property
     def absent(self) -> tuple[Robot, ...]:
-        """Robots in the behaviour that are not connected."""
+        """Robots that the behaviour uses and that are not connected."""
         there = {robot.name for robot in self._connected}
         return tuple(robot for robot in self._known() if robot.name not in there)
 
     def program(self) -> Program:
-        """Return the compiled program for the known robots; compiled once for each edit."""
+        """Return the compiled program for the known robots. The result is cached until the next edit."""
         key = self._key()
         if self._compiled is None or self._compiled[0] != key:
             began = self._timer()
@@ -304,7 +316,7 @@ class Document:
         return self._compiled[1]
 
     def try_program(self, stack: Stack) -> Program | None:
-        """Return one stack of blocks as a program; None when it no longer exists."""
+        """Compile one stack of blocks as a program; None if the stack no longer exists."""
         workspace = deep_json.deeply(lambda: stack.workspace(self.workspace))
         if workspace is None:
             return None
@@ -312,9 +324,10 @@ class Document:
         return replace(program, shows_value=stack.is_value)
 
     def newest(self) -> Program | None:
-        """Return the newest compiled program; long ones are compiled in the background.
+        """Return the newest compiled program; long behaviours are compiled in the background.
 
-        It may be that of an earlier edit, and None when a long behaviour has just been opened.
+        The program may be that of an earlier edit; None while a long behaviour is compiled for the first
+        time.
         """
         key = self._key()
         if self._compiled is not None and self._compiled[0] == key:
@@ -344,11 +357,11 @@ class Document:
         return partial(_compile, self._json, self._connected, self.absent, self.name)
 
     def problems(self) -> tuple[Problem, ...]:
-        """Return the compiler's problems."""
+        """Return the problems that the compiler found."""
         return self.program().problems
 
     def definitions(self) -> Mapping[str, object]:
-        """Return blocks and toolbox for the editor, from the categories and the connected robots."""
+        """Return the block and toolbox definitions for the editor, including those of connected robots."""
         if self._definitions is None or self._definitions[0] != self.definitions_revision:
             definitions = editor_definitions(self._connected, self.absent, self._topics)
             self._definitions = (self.definitions_revision, definitions)
@@ -454,6 +467,9 @@ def _parsed(description: Mapping[str, object]) -> Robot | None:
 
 
 def read(path: Path) -> tuple[str, Workspace, Descriptions]:
-    """Return name, workspace and robots of a behaviour file. Raises DocumentError with the next step."""
+    """Return the name, workspace and robots of a behaviour file.
+
+    Raises DocumentError with advice what to do.
+    """
     found = read_file(path)
     return found.name, found.workspace, found.robots

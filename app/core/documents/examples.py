@@ -1,7 +1,7 @@
 """Translation of examples into the current language.
 
-The file stays English; it is translated when opened, and belongs to the user from then on. Texts between
-programs stay: topics, field names of messages, types, choices, robots.
+Example files are in English; an example is translated when it is opened as a new behaviour of the user. Texts
+that programs exchange are not translated: topics, field names of messages, types, choices and robots.
 """
 
 from __future__ import annotations
@@ -22,15 +22,16 @@ NAME, ABOUT, TEXT, LABEL, NOTE = (
     "name in an example",
     "note of an example",
 )
-"""Contexts of the catalogue: the example's name, its one-line description, a text block, a variable or
-function, and the note beside the blocks."""
+"""Translation contexts: the example's name, its one-line description, a text block, the name of a variable or
+function, and the comment next to the blocks.
+"""
 
 Say = Callable[[str, str], str]
-"""Translates an English text in a context."""
+"""Function that translates an English text in a context."""
 
 
 def translated(example: BehaviourFile, translate_text: Say = translate) -> BehaviourFile:
-    """Return an example of Studio translated; never use it for the user's own file.
+    """Return a translated copy of an example of Studio; don't use it for a file of the user.
 
     Equal English texts get equal translations, so that comparisons still work.
     """
@@ -58,7 +59,7 @@ def translated(example: BehaviourFile, translate_text: Say = translate) -> Behav
 
 @lru_cache(maxsize=1)
 def example_block_ids() -> frozenset[str]:
-    """Return the ids of all blocks of Studio's examples; the user's own blocks have others."""
+    """Return the ids of all blocks in Studio's examples, which differ from those of the user's blocks."""
     return frozenset(
         str(block.get("id"))
         for path in sorted(resources.path("examples").glob(f"*{SUFFIX}"))

@@ -1,6 +1,6 @@
 """Behaviour file: JSON with name, blocks and robots.
 
-Fields that this version doesn't know (a description, a field of a later version) are preserved.
+Fields that this version doesn't know, such as those of a later version, are preserved.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ TOO_DEEP = lazy("one stack has more than 4000 blocks")
 FROM_BEFORE = lazy("open an earlier copy")
 DIVIDE = lazy("split it into several scripts")
 FULL = frozenset({errno.ENOSPC, errno.EFBIG, getattr(errno, "EDQUOT", errno.ENOSPC)})
-"""Error numbers of a full disk, file or quota."""
+"""Error numbers that mean a full disk, a file at its maximum size or an exhausted quota."""
 OURS = frozenset({"format", "version", "name", "workspace", "robots"})
 
 Workspace = Mapping[str, object]
@@ -40,9 +40,9 @@ class BehaviourFile:
 
 
 def read_file(path: Path, name: str = "") -> BehaviourFile:
-    """Read a behaviour file. Raises DocumentError with the next step.
+    """Read a behaviour file. Raises DocumentError with advice what to do.
 
-    ``name`` is used in the sentence if the user knows the file by another name.
+    ``name`` replaces the file name in error messages, if the user knows the file by another name.
     """
     name = name or path.name
     try:
@@ -57,7 +57,7 @@ def read_file(path: Path, name: str = "") -> BehaviourFile:
 
 
 def parse_file(data: bytes, path: Path, name: str = "") -> BehaviourFile:
-    """Parse the bytes of a behaviour file; ``path`` and ``name`` are for the sentence.
+    """Parse the bytes of a behaviour file; ``path`` and ``name`` are used in error messages only.
 
     Raises DocumentError.
     """
@@ -105,7 +105,7 @@ def file_bytes(behaviour: BehaviourFile) -> bytes:
 def write_file(path: Path, behaviour: BehaviourFile) -> None:
     """Write a behaviour file atomically.
 
-    On DocumentError, which contains the next step, the old file is intact.
+    If DocumentError is raised, which says what to do, the old file is unchanged.
     """
     try:
         data = file_bytes(behaviour)
@@ -130,5 +130,5 @@ def write_file(path: Path, behaviour: BehaviourFile) -> None:
 
 
 def what_behaviours_are() -> str:
-    """Return a hint for a file that isn't a behaviour."""
+    """Return a hint about the file extension of behaviours, for a file that isn't one."""
     return _("behaviours are files ending in {suffix}").format(suffix=SUFFIX)

@@ -14,7 +14,7 @@ from nep.i18n import _
 MAX_ENTRIES = 5000
 REFUSED = re.compile(r'[/\\:*?"<>|\x00-\x1f]')
 RESERVED = re.compile(r"(con|prn|aux|nul|com\d|lpt\d)(\..*)?", re.IGNORECASE)
-"""Names that one of the systems rejects: a file should be usable on all of them."""
+"""File names that Windows reserves. They are rejected everywhere, so that files work on every system."""
 MAX_NAME_LENGTH = 120
 
 
@@ -29,7 +29,10 @@ class FolderEntry:
 
 
 def entries_of(folder: Path, endings: tuple[str, ...] = (SUFFIX,)) -> tuple[FolderEntry, ...]:
-    """Return the folders and the files with one of these endings, without hidden ones. Raises OSError."""
+    """Return the folders, and the files with one of these extensions; hidden ones are omitted.
+
+    Raises OSError.
+    """
     entries = []
     with os.scandir(folder) as found:
         for each in found:
@@ -48,7 +51,7 @@ def entries_of(folder: Path, endings: tuple[str, ...] = (SUFFIX,)) -> tuple[Fold
 
 
 def name_refusal(name: str) -> str:
-    """Return why a name is invalid for a file or folder, or ""."""
+    """Return why a name is invalid for a file or folder; "" if it is valid."""
     bad = REFUSED.search(name)
     if bad:
         return _("A name can't have “{sign}” in it.").format(sign=bad[0])
@@ -62,13 +65,13 @@ def name_refusal(name: str) -> str:
 
 
 def whole_path(typed: str) -> Path | None:
-    """Return the path if an absolute path was typed; None for a name."""
+    """Return the path if the typed text is an absolute path; None if it is a name."""
     path = Path(typed).expanduser() if typed.startswith("~") else Path(typed)
     return path if path.is_absolute() and path.name else None
 
 
 def free_name(folder: Path, name: str, ending: str = SUFFIX) -> str:
-    """Return the name, numbered if a file has it: "Greeting 2"."""
+    """Return the name, with a number appended if a file has this name: "Greeting 2"."""
     number, candidate = 2, name
     while (folder / f"{candidate}{ending}").exists():
         candidate, number = f"{name} {number}", number + 1

@@ -1,7 +1,8 @@
 """Journal of unsaved work against a crash: every edit is written in the background.
 
-One file per open behaviour, in ``journal/`` of Studio's folder. It contains the process that writes it, so
-that a second instance doesn't offer the work of the first.
+Each open behaviour has one file in ``journal/`` of Studio's folder. The file contains the id of the process
+that
+writes it, so that a second instance doesn't offer the work of the first one.
 """
 
 from __future__ import annotations
@@ -28,15 +29,16 @@ else:
     psutil = lazy_module("psutil")
 
 FORMAT = 1
-"""Format version; increased when older versions can't read newer journals."""
+"""Format version; increased when older versions of Studio can't read the new format."""
 MAX_JOURNAL_BYTES = 64_000_000
-"""Maximum journal size; larger than that of a behaviour file, so that oversized work can be restored and
-reduced."""
+"""Maximum journal size. Larger than the limit of behaviour files, so that oversized work can be restored and
+reduced.
+"""
 
 
 @dataclass(frozen=True, slots=True)
 class Unsaved:
-    """Work of a crashed session: its name, its file, and the time of the last edit."""
+    """Unsaved work of a crashed session, with its name, its file and the time of the last edit."""
 
     journal: Path
     name: str
@@ -68,9 +70,11 @@ class Journal:
         robots: Mapping[str, Mapping[str, object]],
         others: Mapping[str, object] | None = None,
     ) -> None:
-        """Write the newest state, which survives a crash of this process. Raises OSError.
+        """Write the current state to disk, where it survives a crash of this process. Raises OSError.
 
-        ``text`` is the JSON of the workspace, written unchanged; ``others`` are further fields of the file.
+        Args:
+            text: JSON of the workspace, written unchanged.
+            others: Further fields of the behaviour file.
         """
         entry = {
             "format": FORMAT,
@@ -87,16 +91,16 @@ class Journal:
         write_atomically(self._file, data, durable=False, private=True)
 
     def discard(self) -> None:
-        """Delete the journal: the work is saved or discarded.
+        """Delete the journal, because the work was saved or discarded.
 
-        Errors are ignored: at worst the work is offered once more at the next start.
+        Errors are ignored; at worst the work is offered again at the next start.
         """
         with contextlib.suppress(OSError):
             self._file.unlink(missing_ok=True)
 
 
 def left_behind(folder: Path | None = None) -> list[Unsaved]:
-    """Return the work of crashed sessions, newest first. Unreadable journals are left in place."""
+    """Return the unsaved work of crashed sessions, newest first. Unreadable journals are left unchanged."""
     folder = folder if folder is not None else home() / "journal"
     make_private(folder, "*.json")
     found = [_read(file) for file in folder.glob("*.json")] if folder.is_dir() else []
@@ -104,7 +108,7 @@ def left_behind(folder: Path | None = None) -> list[Unsaved]:
 
 
 def of_newer(folder: Path | None = None) -> list[str]:
-    """Return the names of unsaved work of a newer Studio, which is left unchanged."""
+    """Return the names of unsaved work written by a newer Studio; those journals are left unchanged."""
     folder = folder if folder is not None else home() / "journal"
     found = []
     for file in folder.glob("*.json") if folder.is_dir() else ():

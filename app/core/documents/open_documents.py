@@ -1,6 +1,6 @@
-"""Open behaviours as tabs: one is current, each has its own file, journal and mark.
+"""Open behaviours as tabs; one of them is current.
 
-The tabs are restored at the next start (`kept`, `put_back`); closed ones can be reopened.
+The tabs are restored at the next start (`Documents.kept`, `Documents.put_back`); closed tabs can be reopened.
 """
 
 from __future__ import annotations
@@ -50,7 +50,7 @@ class Documents:
     # -- opening -----------------------------------------------------------------------------------------
 
     def new(self) -> Document:
-        """Start an empty behaviour in a new tab, or in an unchanged one."""
+        """Open an empty behaviour in a new tab; if the current tab is empty and unchanged, use that."""
         if self.current.blank:
             return self.current
         document = self._new_document()
@@ -58,7 +58,7 @@ class Documents:
         return self._insert(document)
 
     def open(self, path: Path) -> Document:
-        """Open a file in a tab, or show its tab. On DocumentError nothing changes."""
+        """Open a file in a new tab, or switch to its tab. If DocumentError is raised, nothing has changed."""
         there = self.with_path(path)
         if there is not None:
             return self._make_current(there)
@@ -69,25 +69,25 @@ class Documents:
         return self._with_unique_name(self._open_with(lambda document: document.example(path)))
 
     def copy(self, path: Path, name: str) -> Document:
-        """Open a file as a new behaviour with another name in a tab. Raises DocumentError."""
+        """Open a file as a new behaviour with another name in a new tab. Raises DocumentError."""
         return self._with_unique_name(self._open_with(lambda document: document.copy(path, name)))
 
     def duplicate(self, document: Document) -> Document:
-        """Open a copy of a behaviour in the next tab."""
+        """Open a copy of a behaviour in a tab next to it."""
         self.show(document)
         copied = self._new_document()
         copied.duplicate(document, self._free_name(_("{name} copy").format(name=document.name)))
         return self._insert(copied)
 
     def rename(self, document: Document, name: str) -> None:
-        """Rename a behaviour and its file. On DocumentError nothing changes."""
+        """Rename a behaviour and its file. If DocumentError is raised, nothing has changed."""
         before = document.path
         document.rename_to(name)
         self._closed = [document.path if each == before and document.path else each for each in self._closed]
         self.revision += 1
 
     def recover(self, unsaved: Unsaved) -> Document:
-        """Restore unsaved work: into the tab of its file, else into a new tab."""
+        """Restore unsaved work into the tab of its file, or into a new tab."""
         there = self.with_path(unsaved.path) if unsaved.path is not None else None
         if there is None or there.dirty:
             return self._open_with(lambda document: document.recover(unsaved))
@@ -104,7 +104,7 @@ class Documents:
         return next((each for each in self._open if each.key == key), None)
 
     def title(self, document: Document) -> str:
-        """Return the title of an open behaviour, which is unique."""
+        """Return the title of a behaviour, unique among the open ones."""
         opened = [*self._open, *([document] if document not in self._open else [])]
         return told_apart([(each.name, each.path) for each in opened])[opened.index(document)]
 
@@ -116,18 +116,18 @@ class Documents:
             self._make_current(document)
 
     def neighbour(self, step: int) -> Document:
-        """Return the behaviour ``step`` tabs further, cyclically."""
+        """Return the behaviour ``step`` tabs further to the right, wrapping around."""
         return self._open[(self._open.index(self.current) + step) % len(self._open)]
 
     def move(self, document: Document, place: int) -> None:
-        """Move a tab to a position, from 0."""
+        """Move a tab to a position, counted from 0."""
         if document in self._open and self._open.index(document) != place:
             self._open.remove(document)
             self._open.insert(max(0, place), document)
             self.revision += 1
 
     def close(self, document: Document) -> None:
-        """Close a tab, whose unsaved work the caller has saved.
+        """Close a tab. Save unsaved work before: it is discarded.
 
         The last tab is replaced by an empty behaviour.
         """
@@ -147,7 +147,7 @@ class Documents:
         self.revision += 1
 
     def reopen(self) -> Document | None:
-        """Reopen the last closed tab; None when there is none. Raises DocumentError."""
+        """Reopen the tab closed last; None if there is none. Raises DocumentError."""
         while self._closed:
             path = self._closed.pop()
             if self.with_path(path) is None:
@@ -155,7 +155,7 @@ class Documents:
         return None
 
     def saved(self, document: Document) -> None:
-        """Apply a save: other tabs of the same file are detached, and their blocks are unsaved."""
+        """Detach other tabs from the file that ``document`` was saved to; their blocks become unsaved."""
         for other in self._open:
             if other is not document and other.path == document.path:
                 other.lose_file()
@@ -181,29 +181,32 @@ class Documents:
         return tuple((each.key, each.definitions_revision, len(each.robots)) for each in self._open)
 
     def definitions(self) -> Mapping[str, object]:
-        """Return blocks and toolbox for the editor.
+        """Return the block and toolbox definitions for the editor, shared by all tabs.
 
-        Of the connected robots, and of those in any open behaviour.
-
-        They are the same for all tabs, so that hidden tabs keep their blocks.
+        They contain the connected robots and all robots used in any open behaviour, so that hidden tabs keep
+        their
+        blocks.
         """
         absent = {robot.name: robot for document in self._open for robot in document.absent}
         return editor_definitions(self._robots, tuple(absent.values()), self._topics)
 
     @property
     def journal_error(self) -> str | None:
-        """Sentence why unsaved work of one behaviour can't be written; None when all of it is."""
+        """Message why unsaved work of a behaviour can't be written; None if there is no such problem."""
         return next((each.journal_error for each in self._open if each.journal_error), None)
 
     def unkept(self) -> list[Document]:
-        """Return the behaviours whose unsaved work can't be written, after a retry.
+        """Retry failed journal writes; return the behaviours whose unsaved work still can't be written.
 
-        Called at the end of the window.
+        Called when the window closes.
         """
         return [each for each in self._open if not each.keep_again()]
 
     def end(self) -> None:
-        """Close at the end of the window; unsaved work stays in the journals."""
+        """Close all documents and background threads when the window closes.
+
+        Unsaved work stays in the journals.
+        """
         for document in self._open:
             document.close()
         self._compiler.close()
@@ -212,7 +215,7 @@ class Documents:
     # -- between sessions --------------------------------------------------------------------------------
 
     def kept(self) -> dict[str, object]:
-        """Return the tabs in the form of the settings."""
+        """Return the open tabs as JSON data for the settings."""
         tabs = [
             {"path": str(each.path) if each.path is not None else None, "journal": each.journal}
             for each in self._open
@@ -222,9 +225,12 @@ class Documents:
         return {"tabs": tabs, "current": shown.index(self.current) if self.current in shown else 0}
 
     def put_back(self, kept: Mapping[str, object], left: Iterable[Unsaved], *, ended_well: bool) -> set[Path]:
-        """Restore the tabs of the last session; return the journals that were restored.
+        """Restore the tabs of the last session; return the paths of the journals that were restored.
 
-        Unsaved work is restored after a normal end; after a crash the user is asked.
+        Args:
+            kept: Result of `kept` of the last session.
+            left: Unsaved work that was found.
+            ended_well: True if the last session ended normally; then unsaved work is restored without asking.
         """
         tabs, current = kept.get("tabs"), kept.get("current")
         unsaved = {each.journal.name: each for each in left} if ended_well else {}
@@ -244,9 +250,11 @@ class Documents:
         return taken
 
     def arrange(self, kept: Mapping[str, object], recovered: Mapping[str, Document]) -> None:
-        """Arrange recovered work at the positions of its tabs, and show the last current tab.
+        """Move recovered work to the positions of its tabs, and show the tab that was current.
 
-        ``recovered`` is by journal name of the last session. Tabs opened since come last.
+        Args:
+            kept: Result of `kept` of the last session.
+            recovered: Recovered documents by journal name. Tabs opened since then are moved to the end.
         """
         tabs, current = kept.get("tabs"), kept.get("current")
         found: dict[int, Document] = {}

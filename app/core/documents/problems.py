@@ -1,4 +1,4 @@
-"""Problems of a behaviour for display: one line for each missing robot, with its fixes."""
+"""Problems of a behaviour as lines of the problem list; a missing robot is one line with its fixes."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ MAX_FIXES = 2  # a line has no space for more
 
 @dataclass(frozen=True)
 class Mend:
-    """Button of a problem: its label, and the command that it runs."""
+    """Fix offered for a problem: the label of the button, and the command that it runs."""
 
     words: str
     action: str
@@ -24,7 +24,7 @@ class Mend:
 
 @dataclass(frozen=True)
 class Listed:
-    """One line: the problem, its fixes (best first), and the number of blocks concerned."""
+    """Line of the problem list: the problem, its fixes (best first), and the number of affected blocks."""
 
     problem: Problem
     fixes: tuple[Mend, ...]
@@ -44,10 +44,14 @@ def listed(
     virtual_models: Collection[str],
     absent: Collection[str] = (),
 ) -> tuple[Listed, ...]:
-    """Return the lines for these problems.
+    """Return the lines of the problem list.
 
-    All blocks of a missing robot are one line, with the number of grey ones, which are in `absent`
-    (`Program.absent`). Its fixes are connected robots that can do the same, and a virtual robot of its model.
+    All blocks of a missing robot are one line with the number of disabled blocks. The fixes of that line are
+    connected
+    robots with the same actions, and a virtual robot of the same model.
+
+    Args:
+        absent: Ids of the disabled blocks (`Program.absent`).
     """
     found: list[Listed] = []
     place: dict[str, int] = {}
@@ -78,7 +82,10 @@ def robot_fixes(
     able: Sequence[Robot],
     virtual_models: Collection[str],
 ) -> tuple[Mend, ...]:
-    """Return the fixes for a missing robot, best first; `able` robots can do the same."""
+    """Return the fixes for a missing robot, best first.
+
+    ``able`` are the robots that have the same actions.
+    """
     if robot is None:
         return (_show_robots(name),)
     alike = [other for other in able if other.model == robot.model] or able

@@ -1,4 +1,4 @@
-"""Renaming a behaviour's file: with a name that every system accepts, and never over another file."""
+"""Renaming of behaviour files to names that are valid on every system, without overwriting another file."""
 
 from __future__ import annotations
 
@@ -16,18 +16,18 @@ MAX_BYTES = 200
 DEVICES = frozenset(
     {"con", "prn", "aux", "nul", *(f"{port}{digit}" for port in ("com", "lpt") for digit in range(1, 10))}
 )
-"""Reserved names of Windows: a file must stay usable when it is copied there."""
+"""Names reserved by Windows, rejected everywhere so that files can be copied there."""
 
 
 def path_named(path: Path, name: str) -> Path:
-    """Return the path with this name in the same folder; unchanged in Studio's own folder."""
+    """Return the path in the same folder with another name; unchanged for files in Studio's own folder."""
     if name_of(path, "") != path.stem:
         return path
     return path.with_name(f"{name}{path.suffix or SUFFIX}")
 
 
 def why_not(name: str, path: Path | None) -> str:
-    """Return why a behaviour can't have this name, or "". ``path`` is its file, if any."""
+    """Return why a behaviour can't have this name, or "". ``path`` is the file of the behaviour, if any."""
     wanted = name.strip()
     if not wanted:
         return _("A behaviour needs a name.")
@@ -52,10 +52,11 @@ def why_not(name: str, path: Path | None) -> str:
 
 
 def rename_file(old: Path, new: Path) -> None:
-    """Rename a file. On DocumentError it keeps its old name.
+    """Rename a file. If DocumentError is raised, the file keeps its old name.
 
-    An existing file is never overwritten: the new name is reserved first by an empty file, which only one
-    program can create. (A hard link would do too, but file systems of memory sticks have none.)
+    An existing file is never overwritten: the new name is reserved first by creating an empty file
+    exclusively. (Hard
+    links are no alternative, because file systems of USB drives don't support them.)
     """
     try:
         if not old.is_file():

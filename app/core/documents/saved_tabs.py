@@ -1,4 +1,4 @@
-"""Tabs between sessions: open behaviours and their unsaved work."""
+"""Saving and restoring the tabs between sessions, with their unsaved work."""
 
 from __future__ import annotations
 
@@ -14,20 +14,24 @@ KEY = "tabs"
 
 
 class SavedTabs:
-    """Saves the open tabs in the settings, and restores them at the next start."""
+    """Saves the open tabs in the settings and restores them at the next start."""
 
     def __init__(self, settings: Settings, documents: Documents, complain: Callable[[str], object]) -> None:
         # `complain` is called with a sentence when they can't be saved.
         self._settings, self._documents, self._complain = settings, documents, complain
         self.active = False
-        """True if this window's tabs are saved; those of a second window are not."""
+        """True if the tabs of this window are saved; False in a second window."""
         self._last_session: dict[str, object] = {}
         self._kept_revision = -1
 
     def come_back(self, left: Sequence[Unsaved]) -> list[Unsaved]:
-        """Restore the tabs of the last session, and save them from now on.
+        """Restore the tabs of the last session, and start saving them.
 
-        Return the entries of ``left`` (work of crashed sessions) that the user must be asked about.
+        Args:
+            left: Unsaved work of crashed sessions.
+
+        Returns:
+            Entries of ``left`` that were not restored and that the user must be asked about.
         """
         self.active = True
         kept: dict[str, object] = self._settings.get(KEY, {})
@@ -37,27 +41,27 @@ class SavedTabs:
         return [each for each in left if each.journal not in taken]
 
     def recover(self, left: Sequence[Unsaved]) -> None:
-        """Restore unsaved work into its tabs, and show the last current one."""
+        """Restore unsaved work into its tabs, and show the tab that was current."""
         newest_last = sorted(left, key=lambda each: each.edited_s)
         recovered = {each.journal.name: self._documents.recover(each) for each in newest_last}
         self._documents.arrange(self._last_session, recovered)
         self.save()
 
     def edited(self, document: Document, *, was_blank: bool) -> None:
-        """Save the tabs at the first edit of a new behaviour."""
+        """Save the tabs at the first edit of an empty behaviour."""
         if was_blank and not document.blank:
             self.save()
 
     def follow(self) -> None:
         """Save the tabs if they changed.
 
-        Called once a second, so that showing a tab doesn't wait for the disk.
+        Called once a second, so that switching tabs does not wait for the disk.
         """
         if self._documents.revision != self._kept_revision:
             self.save()
 
     def save(self, *, ended_well: bool = False) -> None:
-        """Save the open tabs; ``ended_well`` when the window closes normally."""
+        """Save the open tabs; ``ended_well`` is True when the window closes normally."""
         if not self.active:
             return
         self._kept_revision = self._documents.revision

@@ -1,4 +1,4 @@
-"""Titles of behaviours: file names, with folders where two are equal."""
+"""Titles of behaviours: file names, with parent folders where names are equal."""
 
 from __future__ import annotations
 
@@ -11,16 +11,16 @@ from nep.i18n import _
 
 
 def name_of(path: Path, inside: str) -> str:
-    """Return the name of a behaviour file: its file name; ``inside`` is the name in the file.
+    """Return the display name of a behaviour file: its file name, or ``inside``, the name stored in the file.
 
-    The latter is used only in Studio's folder of work that was closed unsaved, where file names are
+    ``inside`` is used only in Studio's folder of work that was closed unsaved, where file names are
     generated.
     """
     return inside if path.parent == kept_folder() else path.stem
 
 
 def told_apart(named: Sequence[tuple[str, Path | None]]) -> list[str]:
-    """Return a unique title for each name and file: the name, with as many folders as necessary."""
+    """Return a unique title for each name and file: the name, with as many parent folders as necessary."""
     alike: dict[str, set[Path]] = {}
     for name, path in named:
         if path is not None:
@@ -39,7 +39,7 @@ def told_apart(named: Sequence[tuple[str, Path | None]]) -> list[str]:
 
 
 def recent_titles(files: Sequence[RecentFile]) -> list[RecentFile]:
-    """Return the files with unique names."""
+    """Return the files with unique titles."""
     titles = told_apart([(file.name, file.path) for file in files])
     return [replace(file, name=title) for file, title in zip(files, titles, strict=True)]
 

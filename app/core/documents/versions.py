@@ -1,7 +1,8 @@
-"""Earlier versions of behaviour files, kept when Studio overwrites them.
+"""Earlier versions of behaviour files, copied before Studio overwrites a file.
 
-The name of a copy contains the file's name, the time of overwriting, and a hash of the file's path; its
-modification time is that of the file then.
+The file name of a copy consists of the original file name, the time of overwriting, and a hash of the
+original
+path. The modification time of the copy is that of the original.
 """
 
 from __future__ import annotations
@@ -28,7 +29,9 @@ COPIES_KEPT = 300
 BYTES_KEPT = 500_000_000
 OF_ONE_FILE = 30
 NEWEST = 10
-"""Number of newest versions of a file that always stay; of the others close ones are removed first."""
+"""Number of newest versions of a file that are never removed. Of older versions, those written shortly after
+another one are removed first.
+"""
 
 _STAMP = "%Y-%m-%d %H.%M.%S"
 _NAME = re.compile(
@@ -41,13 +44,13 @@ Stamp = tuple[int, int]
 
 @dataclass(frozen=True)
 class Earlier:
-    """File with a copy of its earlier content."""
+    """File together with a copy of its earlier content."""
 
     path: Path
     copy: Path
 
     def put_back(self) -> None:
-        """Restore the content. On DocumentError the file is unchanged."""
+        """Restore the earlier content. If DocumentError is raised, the file is unchanged."""
         try:
             write_atomically(self.path, read_whole(self.copy))
         except (OSError, ValueError) as error:
@@ -62,10 +65,12 @@ class Earlier:
 def keep_earlier(
     path: Path, folder: Path | None = None, clock: Callable[[], float] = time.time
 ) -> Earlier | None:
-    """Copy the current content of a file; None when it is missing or empty.
+    """Copy the current content of a file; None if the file is missing or empty.
 
-    The copies are in ``folder`` (default: ``earlier`` in Studio's data folder), at most 300 in all and 30 of
-    one file. Content that is kept already isn't copied again. Raises DocumentError when it can't be copied.
+    The copies are in ``folder`` (default: ``earlier`` in Studio's data folder), at most 300 in total and 30
+    for each
+    file. Content that was already copied isn't copied again. Raises DocumentError if the file can't be
+    copied.
     """
     where = _folder(folder)
     if not path.is_file() or not path.stat().st_size:
@@ -90,7 +95,7 @@ def keep_earlier(
 
 @dataclass(frozen=True)
 class Version:
-    """Version of a file: its name, time of writing, and time of overwriting."""
+    """Earlier version of a file: its name, and the times when it was written and overwritten."""
 
     copy: Path
     name: str
@@ -106,13 +111,16 @@ def versions_of(path: Path, folder: Path | None = None) -> list[Version]:
 
 
 def namesakes_of(path: Path, folder: Path | None = None) -> list[Version]:
-    """Return versions of other files with the same name, newest first, such as of a moved file."""
+    """Return versions of other files with the same name, newest first.
+
+    For example of a file that was moved.
+    """
     mark, stem = _mark(path), _plain(path.stem)
     return [each for each in _newest_first(_folder(folder)) if each.mark != mark and each.name == stem]
 
 
 def follow_file(old: Path, new: Path, folder: Path | None = None) -> None:
-    """Reassign the versions of a renamed file; those that can't be renamed stay."""
+    """Assign the versions of a renamed file to its new name. Versions that can't be renamed are skipped."""
     for each in reversed(versions_of(old, folder)):
         copy = free_path(_folder(folder), f"{new.stem}, before", each.replaced_s, f" {_mark(new)}")
         with contextlib.suppress(OSError):
@@ -145,9 +153,9 @@ def _folder(chosen: Path | None) -> Path:
 
 
 def bring_here(old: Path | None = None, new: Path | None = None) -> None:
-    """Move versions that an earlier Studio kept in the configuration folder to the data folder.
+    """Move the versions that an earlier Studio stored in the configuration folder to the data folder.
 
-    Those that can't be moved are retried at the next start. Only their owner can read them.
+    Versions that can't be moved are retried at the next start. Only their owner can read them.
     """
     old = old if old is not None else home() / NAME
     new = new if new is not None else data_home() / NAME

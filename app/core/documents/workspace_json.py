@@ -1,6 +1,8 @@
-"""Workspace JSON between the editor's page, a document and its journal: text, parsed on demand.
+"""JSON of a workspace as passed between the editor's page, a document and its journal.
 
-Code that needs the blocks (compiler, file) gets them parsed, once and in its own thread.
+The JSON is passed as text. Code that needs the blocks (compiler, file) parses it on demand, once and in its
+own
+thread.
 """
 
 from __future__ import annotations
@@ -10,7 +12,7 @@ from collections.abc import Mapping
 from app.core.storage import deep_json
 
 LONG_CHARACTERS = 20_000
-"""Text length above which parsing or compiling takes too long for the window's thread."""
+"""Text length above which parsing or compiling is too slow for the window's thread."""
 EMPTY: Mapping[str, object] = {"blocks": {"languageVersion": 0, "blocks": []}}
 
 
@@ -31,12 +33,12 @@ class WorkspaceJson:
 
     @classmethod
     def of(cls, blocks: Mapping[str, object]) -> WorkspaceJson:
-        """Return the JSON of parsed blocks, which must not be changed any more."""
+        """Wrap parsed blocks, which must not be changed afterwards."""
         return cls(None, blocks)
 
     @property
     def text(self) -> str:
-        """JSON text. Raises RecursionError beyond 9000 levels."""
+        """JSON text. Raises RecursionError for more than 9000 levels of nesting."""
         if self._text is None:
             self._text = deep_json.dumps(self._blocks)
         return self._text
@@ -51,14 +53,17 @@ class WorkspaceJson:
 
     @property
     def has_blocks(self) -> bool:
-        """True if there is any block; assumed for a long text."""
+        """True if the workspace contains a block. For a long text that isn't parsed yet, True is assumed."""
         if self._blocks is None and self.is_longer_than(LONG_CHARACTERS):
             return True
         inner = self.blocks.get("blocks")
         return isinstance(inner, Mapping) and bool(inner.get("blocks"))
 
     def same_as(self, other: WorkspaceJson) -> bool:
-        """Return whether both are equal; two texts of the page are compared as text, too deep ones differ."""
+        """Return True if both are equal. Texts from the page are compared as text.
+
+        Too deeply nested ones differ.
+        """
         if self._was_told and other._was_told:
             return self._text == other._text
         try:
@@ -67,7 +72,7 @@ class WorkspaceJson:
             return False
 
     def is_longer_than(self, characters: int) -> bool:
-        """Return whether the text is longer than this, or too deep."""
+        """Return True if the text is longer than this, or too deeply nested to be written."""
         try:
             return len(self.text) > characters
         except RecursionError:

@@ -12,14 +12,15 @@ from app.core.networks.kinds import kind_named
 QUIET_S = 60.0
 CALLS_OVER_S = 60.0
 LOOKS = 61
-"""Number of stored samples of the call counts: one a second."""
+"""Number of stored samples of the call counts, taken once a second."""
 
 
 class QuietNodes:
-    """Finds quiet nodes by their counters. Not thread-safe: use it from the window's thread.
+    """Finds nodes without traffic by their counters. Not thread-safe: use it from the window's thread.
 
-    Nodes without counters are not quiet: those of a network without statistics, an original program that only
-    subscribes.
+    Nodes without counters are never quiet: those of a network without statistics, and original programs that
+    only
+    subscribe.
     """
 
     def __init__(self) -> None:

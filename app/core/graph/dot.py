@@ -8,7 +8,12 @@ from app.core.graph.node_graph import GraphLine, NodeGraph
 
 
 def dot_of(graph: NodeGraph, group_names: Mapping[str, str], label: Callable[[GraphLine], str]) -> str:
-    """Return the graph as DOT. ``group_names`` is by key; ``label`` returns the label of a line."""
+    """Return the graph as DOT text.
+
+    Args:
+        group_names: Name of each group by its key.
+        label: Returns the label of a line.
+    """
     names = {node.key: f"n{number}" for number, node in enumerate(graph.nodes)}
     lines = ["digraph nodes {", "  rankdir=LR;", "  node [shape=box, style=rounded];"]
     inside: dict[str, list[str]] = {}
@@ -35,6 +40,6 @@ def dot_of(graph: NodeGraph, group_names: Mapping[str, str], label: Callable[[Gr
 
 
 def quoted(text: str) -> str:
-    r"""Quote a string for DOT: quotes and backslashes are escaped, line breaks become ``\n``."""
+    r"""Quote a string for DOT: escape quotes and backslashes, and replace line breaks by ``\n``."""
     kept = text.replace("\\", "\\\\").replace('"', '\\"').replace("\0", "")
     return '"' + "\\n".join(kept.splitlines() or [""]) + '"'

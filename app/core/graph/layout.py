@@ -1,8 +1,9 @@
-"""Layout of the graph: layered by a library first; existing nodes keep their places when others appear.
+"""Layout of the graph in layers; existing nodes keep their positions when others appear.
 
-The library (graphlay) places nodes in layers with few crossings, and routes lines around nodes. It computes
-places once; later only routes. All lengths are pixels at 100 % zoom, x to the right and y down; places are
-centres.
+The library (graphlay) places nodes in layers with few crossings and routes lines around nodes. Positions are
+computed once; later updates compute routes only. All lengths are pixels at 100 % zoom, x to the right and y
+down;
+positions are centres of boxes.
 """
 
 from __future__ import annotations
@@ -21,29 +22,31 @@ _log = logging.getLogger(__name__)
 
 Place = tuple[float, float]
 Box = tuple[float, float, float, float]
-"""Left, top, width, height."""
+"""Rectangle: left, top, width, height."""
 RouteKey = tuple[tuple[str, tuple[str, ...], tuple[str, ...]], str, str]
-"""Key of a line, source node, target node."""
+"""Key of a route: line, source node, target node."""
 
 MAX_ROUTES = 6000
-"""Maximum number of drawn routes; of more, those of lines with the most ends are omitted and counted."""
+"""Maximum number of routes drawn. Beyond it, routes of the lines with the most ends are omitted and counted.
+"""
 MAX_PLACES = 4000
-"""Maximum number of places kept of nodes that left, for their return."""
+"""Maximum number of positions stored for nodes that left and may return."""
 LAYER_GAP, NODE_GAP, GROUP_GAP, DUMMY_GAP = 150.0, 36.0, 40.0, 10.0
 ALONE_COLUMNS = 4
 """Number of columns for nodes without lines within their group."""
 MANY = 60
-"""Number of boxes from which the library uses less effort."""
+"""Number of boxes above which the library uses fewer iterations."""
 MAX_LED = 400
-"""Maximum number of routes around nodes, which would take many seconds beyond: then they are straight."""
-WIDEST, ASPECT = 3.0, 1.6
-"""Maximum ratio of width to height of a row of groups; a wider one is broken into rows of about this shape.
+"""Maximum number of routes led around nodes. Above it all are straight, because routing would take many
+seconds.
 """
+WIDEST, ASPECT = 3.0, 1.6
+"""Maximum ratio of width to height of a row of groups, and the ratio to which a wider row is broken."""
 
 
 @dataclass(frozen=True, slots=True)
 class LayoutSizes:
-    """Sizes: a node, a group's header, the margins around its nodes, the line about quiet nodes."""
+    """Sizes of a node, of a group's header and margins, and of the line about quiet nodes."""
 
     node: Place = (152.0, 48.0)
     head: float = 36.0
@@ -67,8 +70,11 @@ class LayoutSizes:
 class GraphLayout:
     """Positions of boxes and groups, and routes of lines.
 
-    ``kept`` are places of nodes that left, by key, oldest first. ``routes`` begin and end at the edges of
-    boxes. ``left_out`` counts omitted routes. ``is_plain``: the library failed, and boxes are in rows.
+    Attributes:
+        routes: Points of each route, from the edge of one box to the edge of another.
+        kept: Positions of nodes that left, by key, oldest first.
+        left_out: Number of omitted routes.
+        is_plain: True if the library failed and the boxes are arranged in rows.
     """
 
     places: Mapping[str, Place] = field(default_factory=dict)
@@ -79,7 +85,7 @@ class GraphLayout:
     is_plain: bool = False
 
     def bounds(self, sizes: LayoutSizes) -> Box:
-        """Return the bounding box of everything; of size 0 when empty."""
+        """Return the rectangle around everything; of size 0 if the layout is empty."""
         boxes = [*self.groups.values(), *(_box_at(place, sizes.node) for place in self.places.values())]
         boxes += [(x, y, 0.0, 0.0) for way in self.routes.values() for x, y in way]
         return _around(boxes)
@@ -88,10 +94,11 @@ class GraphLayout:
 def arrange(
     graph: NodeGraph, before: GraphLayout | None = None, sizes: LayoutSizes | None = None
 ) -> GraphLayout:
-    """Compute the layout of ``graph``; nodes with a place in ``before`` keep it.
+    """Compute the layout of ``graph``; nodes with a position in ``before`` keep it.
 
-    Everything is placed again without ``before``, or when more nodes appeared than stayed. Takes seconds for
-    hundreds of nodes, so that `LayoutThread` calls it.
+    Everything is placed again without ``before``, or if more nodes appeared than remained. Takes seconds for
+    hundreds
+    of nodes, so call it in `LayoutThread`.
     """
     sizes = sizes if sizes is not None else LayoutSizes()
     ways, left_out = _routes_to_draw(graph)
@@ -114,7 +121,7 @@ def arrange(
 
 
 def arrange_plainly(graph: NodeGraph, sizes: LayoutSizes) -> GraphLayout:
-    """Lay everything out in rows without the library, when that failed or took too long."""
+    """Arrange all boxes in rows without the library, if the library failed or took too long."""
     places = _in_rows(graph, sizes)
     ways, left_out = _routes_to_draw(graph)
     return GraphLayout(

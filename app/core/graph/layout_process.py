@@ -1,7 +1,8 @@
-"""Layout of large graphs in a child process: the library holds the GIL while it works.
+"""Layout of large graphs in a child process, because the library holds the GIL while it works.
 
-Started by `LayoutThread` as a module. Standard input has the arguments of `arrange`, standard output its
-result, both pickled: parent and child are the same program.
+`LayoutThread` starts this module. Standard input contains the pickled arguments of `arrange`, standard output
+its
+pickled result; pickle is safe here, because parent and child are the same program.
 """
 
 from __future__ import annotations
@@ -19,12 +20,11 @@ from nep.masters.process import NO_CONSOLE
 
 TIMEOUT_S = 60.0
 MAX_HERE, MAX_LINES_HERE = 40, 60
-"""Maximum size of graphs laid out in this process, which takes some milliseconds, far less than starting a
-process."""
+"""Maximum number of nodes and lines laid out in this process, which takes a few milliseconds."""
 
 
 class LayoutProcess:
-    """Process that lays out one graph; another thread may end it by `kill`."""
+    """Child process that lays out one graph. `kill` may be called from another thread."""
 
     def __init__(self) -> None:
         self._process = subprocess.Popen(
@@ -36,7 +36,10 @@ class LayoutProcess:
         )
 
     def arrange(self, graph: NodeGraph, before: GraphLayout | None, sizes: LayoutSizes) -> GraphLayout | None:
-        """Call `arrange` in the process; None when it failed, was killed, or took longer than `TIMEOUT_S`."""
+        """Call `arrange` in the child process.
+
+        None if it failed, was killed, or took longer than `TIMEOUT_S`.
+        """
         bare = replace(graph, nodes=tuple(replace(node, entry=None) for node in graph.nodes))
         try:
             output, _nothing = self._process.communicate(pickle.dumps((bare, before, sizes)), TIMEOUT_S)
@@ -64,13 +67,13 @@ class LayoutProcess:
 
 
 def is_large(graph: NodeGraph) -> bool:
-    """Return whether a graph should be laid out by another process."""
+    """Return True if a graph should be laid out in a child process."""
     lines = sum(len(line.sources) * len(line.targets) for line in graph.lines)
     return len(graph.nodes) > MAX_HERE or lines > MAX_LINES_HERE
 
 
 def main() -> None:
-    """Lay out the graph on standard input; see the module."""
+    """Lay out the graph on standard input and write the result to standard output."""
     graph, before, sizes = pickle.load(sys.stdin.buffer)  # noqa: S301 - written by our own parent
     sys.stdout.buffer.write(pickle.dumps(arrange(graph, before, sizes)))
     sys.stdout.buffer.flush()

@@ -1,4 +1,4 @@
-"""Layout in a background thread, of the newest graph only."""
+"""Layout in a background thread; only the newest graph is processed."""
 
 from __future__ import annotations
 
@@ -16,9 +16,9 @@ Arrange = Callable[[NodeGraph, "GraphLayout | None", LayoutSizes], GraphLayout]
 
 
 class LayoutThread:
-    """Thread that starts with the first graph; a pending graph is replaced by a newer one.
+    """Thread that is started by the first graph; a newer graph replaces a pending one.
 
-    A large graph is passed to a process (see `layout_process`).
+    Large graphs are passed to a child process (see `layout_process`).
     """
 
     def __init__(self, arranged: Arrange | None = None) -> None:
@@ -49,13 +49,13 @@ class LayoutThread:
             self._changed.notify()
 
     def pop_result(self) -> tuple[NodeGraph, GraphLayout] | None:
-        """Return the newest finished graph with its layout once; None when there is none."""
+        """Return and clear the newest finished graph and its layout; None if there is none."""
         with self._changed:
             layout, self._made = self._made, None
             return layout
 
     def close(self) -> None:
-        """Stop; returns when the thread has ended, or after `JOIN_TIMEOUT_S` if the library hangs."""
+        """Stop the thread; waits at most `JOIN_TIMEOUT_S`, in case the library hangs."""
         with self._changed:
             self._is_closing, self._waiting = True, None
             self._changed.notify()

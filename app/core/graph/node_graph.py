@@ -1,4 +1,4 @@
-"""Graph for drawing: nodes in groups, and lines, each for one or several topics."""
+"""Graph for drawing: nodes in groups, and lines that stand for one or several topics."""
 
 from __future__ import annotations
 
@@ -23,21 +23,26 @@ NodeKind = Literal["program", "studio", "behaviour", "robot", "bridge", "origina
 LineKind = Literal["topic", "service"]
 
 OWN = "/nep/"
-"""Prefix of nep's own topics and services, such as the log's, which every node has."""
+"""Prefix of nep's internal topics and services, such as logging, which every node has."""
 MAX_EXPANDED_NODES = 200
-"""Number of nodes above which all groups are collapsed at first."""
+"""Number of nodes above which all groups are collapsed initially."""
 BRIDGE_TO = "-to-"
 """Infix of bridge node names: "bridge-NAME-to-BACKEND"."""
 
 
 WEB_LANGUAGE = "web"
-"""Language of the nodes of web pages; as in `nep.programs.web.server`, which loads slowly."""
+"""Language of the nodes of web pages. Copied from `nep.programs.web.server`, whose import is slow."""
 WEB_GROUP = "web:"
 
 
 @dataclass(frozen=True, slots=True)
 class GraphFacts:
-    """Input of all networks; ``services`` are the native one's, ``robots`` the names of robots."""
+    """Input of the drawing from all networks.
+
+    Attributes:
+        services: Services of the native network.
+        robots: Names of the robots.
+    """
 
     nodes: Sequence[NodeEntry] = ()
     topics: Sequence[Topic] = ()
@@ -52,9 +57,10 @@ class GraphFacts:
 class GraphChoices:
     """Options of the drawing.
 
-    ``quiet`` are the keys of quiet nodes; with ``hides_quiet`` they are hidden except in the groups
-    ``quiet_shown``. With ``starts_closed`` groups are collapsed except those ``toggled``; otherwise the
-    reverse.
+    Attributes:
+        quiet: Keys of the nodes without traffic.
+        hides_quiet: True if quiet nodes are hidden, except in the groups of `quiet_shown`.
+        starts_closed: True if all groups are collapsed except those in `toggled`; if False, only those are.
     """
 
     group_by: GroupBy = "computer"
@@ -67,16 +73,20 @@ class GraphChoices:
     toggled: frozenset[str] = frozenset()
 
     def is_closed(self, group: str) -> bool:
-        """Return whether a group is drawn as one box."""
+        """Return True if a group is collapsed and drawn as one box."""
         return bool(group) and self.starts_closed is not (group in self.toggled)
 
 
 @dataclass(frozen=True, slots=True)
 class DrawnNode:
-    """Drawn box. ``key`` is the same for a restarted program; ``entry`` is its current state.
+    """Box of the drawing: a node, a web page or a collapsed group.
 
-    A collapsed group is a box too, without an entry and with the number of its ``members``. ``joins`` is the
-    network that a bridge connects to, in words; ``has_pictures`` is whether it publishes images.
+    Attributes:
+        key: Remains the same when a program is restarted.
+        entry: Current state of the node; None for a collapsed group.
+        members: Number of nodes in a collapsed group.
+        joins: Name of the network that a bridge connects to.
+        has_pictures: True if the node publishes images.
     """
 
     key: str
@@ -96,9 +106,11 @@ class DrawnNode:
 
 @dataclass(frozen=True, slots=True)
 class GraphLine:
-    """Line from each of the ``sources`` to each of the ``targets``, for the same ``topics``.
+    """Line from each of the ``sources`` to each of the ``targets``, for the same topics.
 
-    ``topics`` are keys among all networks (`key_of`); the sources of a service are its clients.
+    Attributes:
+        sources: Keys of the publishing nodes; for a service, of the clients.
+        topics: Topic keys, unique among all networks (`key_of`).
     """
 
     kind: LineKind
@@ -108,17 +120,17 @@ class GraphLine:
 
     @property
     def key(self) -> tuple[LineKind, tuple[str, ...], tuple[str, ...]]:
-        """Key of the line, constant while its ends are the same."""
+        """Key of the line, which stays the same while its ends are the same."""
         return self.kind, self.sources, self.targets
 
     def pairs(self) -> Iterator[tuple[str, str]]:
-        """Return the pairs of different sources and targets."""
+        """Return the pairs of source and target; a node is not paired with itself."""
         return ((source, target) for source in self.sources for target in self.targets if source != target)
 
 
 @dataclass(frozen=True, slots=True)
 class GraphGroup:
-    """Nodes of one computer, robot or network. ``quiet`` of its ``members`` are hidden."""
+    """Nodes of one computer, robot or network. ``quiet`` is how many of the ``members`` are hidden."""
 
     key: str
     name: str
@@ -131,7 +143,7 @@ class GraphGroup:
 
 @dataclass(frozen=True, slots=True)
 class NodeGraph:
-    """Drawing, in a stable order; ``nodes_there`` counts all nodes, including hidden ones."""
+    """Drawing of a graph, in a stable order. ``nodes_there`` counts all nodes, including hidden ones."""
 
     nodes: tuple[DrawnNode, ...] = ()
     lines: tuple[GraphLine, ...] = ()
@@ -152,7 +164,10 @@ class NodeGraph:
 
 
 def node_graph(facts: GraphFacts, choices: GraphChoices) -> NodeGraph:
-    """Return the drawing of these facts and options. Linear in the number of nodes and topics."""
+    """Return the drawing for these facts and options.
+
+    Takes time proportional to the number of nodes and topics.
+    """
     boxes = _boxes(facts, choices)
     groups = _groups(facts, choices, boxes)
     closed = {group.key for group in groups if group.is_closed}
@@ -337,7 +352,7 @@ _Ends = tuple[tuple[str, ...], tuple[str, ...]]
 
 
 def is_shown(topic: str, choices: GraphChoices) -> bool:
-    """Return whether topics with this name are drawn: internal ones only on request."""
+    """Return True if topics with this name are drawn; internal topics only on request."""
     return choices.shows_own or not topic.startswith(OWN)
 
 

@@ -1,4 +1,4 @@
-"""Navigation with arrow keys: from a node along its lines to connected nodes, and up and down."""
+"""Navigation with arrow keys: along the lines from node to node, and up and down."""
 
 from __future__ import annotations
 
@@ -13,9 +13,11 @@ Arrow = Literal["left", "right", "up", "down"]
 
 @dataclass(frozen=True, slots=True)
 class GraphChoice:
-    """Selection: the node with this ``key``, or the topic with this name.
+    """Selection in the graph: the node or topic with this ``key``.
 
-    A topic was reached from the node ``origin``; ``is_outward`` is whether the topic leads away from it.
+    Attributes:
+        origin: Node from which a topic was selected.
+        is_outward: True if the topic leads away from `origin`.
     """
 
     kind: Literal["node", "topic"]
@@ -27,10 +29,13 @@ class GraphChoice:
 def step(
     graph: NodeGraph, layout: GraphLayout, chosen: GraphChoice | None, arrow: Arrow
 ) -> GraphChoice | None:
-    """Return the selection after an arrow key; unchanged where nothing follows, None in an empty graph.
+    """Return the selection after an arrow key was pressed.
 
-    Right goes from a node to an outgoing line and on to its target; left goes against the arrows. Up and down
-    go to the next line of that node, or the next node above or below.
+    Right goes from a node to an outgoing line and on to its target; left goes against the direction of the
+    lines. Up
+    and down go to the next line of the same node, or to the next node above or below. The selection is
+    unchanged if
+    nothing follows, and None in an empty graph.
     """
     if chosen is None or not _exists(graph, layout, chosen):
         first = min(layout.places, key=lambda key: (layout.places[key], key), default=None)

@@ -16,7 +16,8 @@ MAX_SHAPES = 2000
 MAX_POINTS = 20_000
 MAX_TEXT_LENGTH = 200
 MAX_PIXELS = 1e6
-"""Limit of coordinates and sizes: larger ones are not drawn, as no painter supports them."""
+"""Maximum coordinates and sizes. Larger shapes are not drawn, because graphics libraries don't support them.
+"""
 FACE_FRAME = (640, 480)
 """Image size that RIZE's face detection uses."""
 POINTS, LINE_LOOP, LINE_STRIP, LINE_LIST = 1, 2, 3, 4
@@ -29,11 +30,16 @@ YELLOW: Colour = (1.0, 0.77, 0.24, 1.0)
 
 @dataclass(frozen=True, slots=True)
 class Drawn:
-    """One drawn shape; its points are fractions of the image.
+    """One shape to draw; its points are fractions of the image.
 
-    ``kind`` is "points", "line", "area" (closed), "circle" (centre; ``size`` is its radius as fractions of
-    width and height), or "text" (lower left corner; ``size`` is the letter height as a fraction).
-    ``thickness`` is in pixels of the image. Without ``outline`` or ``fill`` there is none.
+    Attributes:
+        kind: "points", "line", "area" (closed), "circle" or "text".
+        points: Vertices; the centre of a circle, the lower left corner of a text.
+        outline: Colour of the outline; None for no outline.
+        fill: Colour inside; None for no fill.
+        thickness: Width of the outline in pixels of the image.
+        size: Radius of a circle as fractions of width and height; height of a text as a fraction.
+        words: Text to draw.
     """
 
     kind: str
@@ -46,7 +52,7 @@ class Drawn:
 
 
 def is_annotation(payload: object) -> bool:
-    """Return whether a decoded message may have annotations."""
+    """Return True if a decoded message may contain annotations."""
     if not isinstance(payload, Mapping):
         return False
     lists = (payload.get(name) for name in ("circles", "points", "texts"))
@@ -54,7 +60,7 @@ def is_annotation(payload: object) -> bool:
 
 
 def drawn_by(payload: object, width: int, height: int) -> tuple[Drawn, ...]:
-    """Return the shapes of a decoded message for an image of this size; invalid ones are skipped."""
+    """Return the shapes in a decoded message for an image of this size; invalid shapes are skipped."""
     if not isinstance(payload, Mapping) or width <= 0 or height <= 0:
         return ()
     frame = _Frame(width, height)
@@ -62,7 +68,7 @@ def drawn_by(payload: object, width: int, height: int) -> tuple[Drawn, ...]:
 
 
 class _Frame:
-    """Converts pixels to fractions, and counts the remaining points."""
+    """Converter from pixels to fractions, which also limits the total number of points."""
 
     def __init__(self, width: float, height: float) -> None:
         self.width, self.height = width, height

@@ -14,10 +14,11 @@ MAX_MESSAGES = 2000
 
 
 class MessageHistory:
-    """Messages numbered from 0, oldest first; a message keeps its number.
+    """Recent messages, numbered from 0, oldest first. The number of a message never changes.
 
-    The newest one is kept whatever its size. Messages are kept encoded, with copied bytes that no publisher
-    reuses.
+    The newest message is stored whatever its size. Messages are stored encoded, as copies that no publisher
+    can
+    modify.
     """
 
     def __init__(self, most_bytes: int = MAX_BYTES, most_messages: int = MAX_MESSAGES) -> None:
@@ -25,9 +26,9 @@ class MessageHistory:
         self._kept: deque[Message] = deque()
         self.size_bytes = 0
         self.first = 0
-        """Number of the oldest message, which is the number of evicted ones."""
+        """Number of the oldest stored message; equals the number of evicted ones."""
         self.missed = 0
-        """Messages that arrived too fast to be kept or seen."""
+        """Number of messages dropped before they reached this history."""
 
     def __len__(self) -> int:
         return len(self._kept)
@@ -38,17 +39,17 @@ class MessageHistory:
 
     @property
     def end(self) -> int:
-        """Number of the next message."""
+        """Number that the next message will have."""
         return self.first + len(self._kept)
 
     def at(self, number: int) -> Message | None:
-        """Return a copy of a message for display; None when it is not kept."""
+        """Return a copy of the message with this number for display; None if it is not stored."""
         if not self.first <= number < self.end:
             return None
         return copy(self._kept[number - self.first])
 
     def nearest(self, number: int) -> int:
-        """Return the number of the nearest kept message. Undefined while there is none."""
+        """Return the number of the nearest stored message. Don't call it while the history is empty."""
         return min(max(number, self.first), self.end - 1)
 
     def add(self, message: Message) -> None:
@@ -73,6 +74,6 @@ class MessageHistory:
             self.add(message)
 
     def rewind(self) -> None:
-        """Clear: the source moved to another time."""
+        """Remove all messages, because the source jumped to another time."""
         self._kept.clear()
         self.size_bytes = self.first = self.missed = 0

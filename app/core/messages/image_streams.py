@@ -1,7 +1,8 @@
 """Image streams: one thread decodes the newest image of each visible topic.
 
-Older pending images are never decoded: at overload an image is late by one decoding, not by a queue. An image
-is decoded no larger than it is shown (`ImageStream.want`).
+Older pending images are never decoded, so that under overload an image is late by one decoding and not by a
+queue.
+Images are decoded no larger than they are shown (`ImageStream.want`).
 """
 
 from __future__ import annotations
@@ -23,17 +24,18 @@ RATE_DELAY_S = 0.25
 
 
 class Rate:
-    """Image rate by arrival time, over two seconds; None until two arrived.
+    """Image rate by arrival time over the last two seconds.
 
-    The window ends slightly before now: images that arrived but may still be painted are not counted yet, so
-    that "shown 30 of 30/s" compares the same images.
+    The window ends slightly before the current time, so that images that arrived but are not painted yet are
+    not
+    counted: the rates of arriving and shown images then refer to the same images.
     """
 
     def __init__(self) -> None:
         self._times: deque[float] = deque(maxlen=4096)
 
     def add(self, arrived_s: float) -> None:
-        """Count an image that arrived at this time (monotonic seconds)."""
+        """Count an image that arrived at ``arrived_s`` (monotonic seconds)."""
         self._times.append(arrived_s)
 
     def per_second(self, now: float) -> float | None:
@@ -49,10 +51,11 @@ class Rate:
 
 @dataclass(eq=False)
 class ImageStream:
-    """Images of one topic, for one panel. Unknown values are None.
+    """Images of one topic for one panel. Unknown values are None.
 
-    While `held` the image stays; arriving ones are counted but not decoded. `awaits_picture` until one
-    arrives after opening or after a `rest`.
+    Attributes:
+        held: True if the image is frozen; arriving images are counted but not decoded.
+        awaits_picture: True from opening or `rest` until the next image arrives.
     """
 
     topic: str
@@ -63,16 +66,16 @@ class ImageStream:
     held: bool = False
     awaits_picture: bool = True
     wish: Size | None = None
-    """Requested size. Used by `Images` under its lock, as are the next three."""
+    """Requested size. This and the next three attributes are used by `Images` under its lock."""
     look: PictureLook = PLAIN
-    """Requested style."""
+    """Requested display style."""
     waiting: tuple[Message, float] | None = None
     """Newest message that is not decoded yet, and its arrival time."""
     arriving: Rate = field(default_factory=Rate)
     """Rate of arriving images."""
     _shown: Rate = field(default_factory=Rate)
     looked_s: float = 0.0
-    """Time since which an image could have arrived; its silence counts from then. Used by `Images`."""
+    """Time from which the silence of the topic is measured. Used by `Images`."""
     _resting: bool = False
     closed: bool = False
 
@@ -94,7 +97,10 @@ class ImageStream:
 
     @property
     def silent_s(self) -> float | None:
-        """Seconds without an image while visible; None before the first."""
+        """Seconds since the last image, without the time in which the stream was suspended.
+
+        None before the first.
+        """
         picture = self.picture
         if picture is None:
             return None
@@ -114,25 +120,25 @@ class ImageStream:
     def want(self, size: Size | None) -> None:
         """Set the displayed size in screen pixels; None for full resolution.
 
-        The current image is decoded again if it was decoded smaller.
+        The current image is decoded again if it was decoded at a smaller size.
         """
         self._images.want(self, size)
 
     def show_as(self, look: PictureLook) -> None:
-        """Set the style; the current image is decoded again, also while held."""
+        """Set the display style; the current image is decoded again, even while it is frozen."""
         self._images.show_as(self, look)
 
     def hold(self, held: bool) -> None:
-        """Hold the current image, or show the newest again."""
+        """Freeze the current image, or resume showing the newest one."""
         self._images.hold(self, held)
 
     def count_painted(self) -> None:
-        """Count that the panel painted `picture`; called once for each."""
+        """Count that the panel painted `picture`; call it once for each image."""
         if self.picture is not None:
             self._shown.add(self.picture.received_s)
 
     def suspend(self) -> None:
-        """Suspend: nothing is received or decoded until `wake`; the image stays."""
+        """Suspend the stream: nothing is received or decoded until `wake`; the last image remains."""
         if not self._resting:
             self._resting = self.awaits_picture = True
             self._images.forget(self)
@@ -154,13 +160,13 @@ class ImageStream:
 
 
 class Images:
-    """All open streams and the thread that decodes for them."""
+    """All open streams, and the thread that decodes their images."""
 
     def __init__(self, watch: Callable[[str], Watching], clock: Callable[[], float] = time.monotonic) -> None:
         self._watch = watch
         self.clock = clock
         self.now_ns: Callable[[], int] = time.time_ns
-        """Current time (epoch nanoseconds); in a recording that of the playhead."""
+        """Returns the current time in nanoseconds since 1970; during a replay, the time of the playhead."""
         self.lock = threading.Lock()
         self._arrived = threading.Condition(self.lock)
         self._streams: dict[str, list[ImageStream]] = {}
@@ -184,7 +190,7 @@ class Images:
                 self._thread = self._begin_decoding()
 
     def stand_still(self) -> None:
-        """Reset the silence of all streams: nothing can arrive, such as from a paused recording."""
+        """Restart the measurement of silence, because no images can arrive (the replay is paused)."""
         now = self.clock()
         with self.lock:
             for streams in self._streams.values():
@@ -194,7 +200,7 @@ class Images:
     def offer(self, messages: Sequence[Message], key: str = "") -> None:
         """Store the newest message of each visible topic. Called in nep's thread.
 
-        ``key`` is the topic's key among those of all networks, if it isn't its name.
+        ``key`` is the key of the topic among those of all networks, if it differs from the name.
         """
         if not self._streams:
             return
@@ -208,7 +214,7 @@ class Images:
             self._arrived.notify()
 
     def rewind(self, topics: Collection[str] = ()) -> None:
-        """Discard all images except of these topics: the source moved to another time."""
+        """Discard all images except those of these topics, because the source jumped to another time."""
         with self.lock:
             self._times += 1
             for topic, streams in self._streams.items():
@@ -287,7 +293,7 @@ class Images:
             self.decode_waiting()
 
     def decode_waiting(self) -> None:
-        """Decode the newest pending image of each stream. Called by its own thread."""
+        """Decode the newest pending image of each stream. Called by the decoding thread."""
         with self.lock:
             work, times = self._take_waiting(), self._times
         for streams, message, arrived_s, size, look in work:

@@ -1,8 +1,10 @@
-"""Large JSON decoded on demand: only the parts that are opened.
+"""Large JSON, decoded only where it is opened.
 
-A text of 10 MB is scanned once for its brackets, commas and colons (with numpy, which releases the GIL);
-objects and arrays then are `LazyObject` and `LazyList`, whose values are decoded at each access. Decoding
-everything at once would block all threads of the program for a tenth of a second.
+A text of 10 MB is scanned once for brackets, commas and colons (with numpy, which releases the GIL). Objects
+and
+arrays then are `LazyObject` and `LazyList`, whose values are decoded at each access. Decoding everything at
+once
+would block all threads of the program for a tenth of a second.
 """
 
 from __future__ import annotations
@@ -48,7 +50,10 @@ class Unreadable:
 
 
 class JsonIndex:
-    """Index of one JSON text. Raises ValueError when its brackets do not match."""
+    """Positions of the brackets, commas and colons of one JSON text.
+
+    Raises ValueError for unbalanced brackets.
+    """
 
     def __init__(self, data: memoryview) -> None:
         # Scans the text; safe in any thread.
@@ -78,7 +83,7 @@ class JsonIndex:
         return self.value(0, len(self.data), 0)
 
     def value(self, start: int, end: int, level: int) -> object:
-        """Return the value between two positions: decoded, or lazy for an object or array."""
+        """Return the value between two positions, decoded; a lazy one for an object or array."""
         while start < end and self.data[start] in SPACE:
             start += 1
         first = self.data[start] if start < end else 0
@@ -101,7 +106,7 @@ class JsonIndex:
         return found
 
     def inside(self, start: int, level: int) -> tuple[int, Places, Places]:
-        """Return the end, commas and colons of the container that starts at ``start``."""
+        """Return end, comma positions and colon positions of the container that starts at ``start``."""
         import numpy as np  # noqa: PLC0415
 
         if start in self._many:
@@ -130,7 +135,7 @@ class JsonIndex:
 
 
 class _Lazy:
-    """Common part of objects and arrays: the bounds of their elements."""
+    """Base of lazy objects and arrays: the positions of their elements."""
 
     def __init__(self, index: JsonIndex, start: int, level: int) -> None:
         self._index, self._start, self._level = index, start, level
@@ -207,7 +212,7 @@ class LazyList(_Lazy, Sequence[object]):
 
 
 class LazyObject(_Lazy, Mapping[str, object]):
-    """Object whose values are decoded at each access; of duplicate keys the last one counts."""
+    """Object whose values are decoded at each access. The last of duplicate keys is used."""
 
     def __len__(self) -> int:
         return len(self._rows)
@@ -219,7 +224,7 @@ class LazyObject(_Lazy, Mapping[str, object]):
         return self.value_at(self._rows[key])
 
     def key_at(self, row: int) -> str:
-        """Return the key of a child."""
+        """Return the key of the element at an index."""
         start, _end = self._bounds(row)
         text = bytes(self._index.data[start : self._colon(row)])
         try:
@@ -228,7 +233,7 @@ class LazyObject(_Lazy, Mapping[str, object]):
             return text.decode("utf-8", "replace").strip()
 
     def value_at(self, row: int) -> object:
-        """Return a child."""
+        """Return the value of the element at an index."""
         _start, end = self._bounds(row)
         colon = self._colon(row)
         if colon == end:

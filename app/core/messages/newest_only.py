@@ -1,4 +1,4 @@
-"""Thread that processes only the newest job."""
+"""Background thread that processes only the newest job."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ Done = TypeVar("Done")
 
 
 class NewestOnly(Generic[Asked, Done]):
-    """Thread that is started by the first job; a pending job is replaced by a newer one. Thread-safe."""
+    """Thread that is started by the first job; a newer job replaces a pending one. Thread-safe."""
 
     def __init__(self, work: Callable[[Asked], Done], name: str) -> None:
         # `work` is called in the thread and must not raise.
@@ -39,18 +39,18 @@ class NewestOnly(Generic[Asked, Done]):
             self._wake.notify()
 
     def pop_result(self) -> Done | None:
-        """Return the last result once."""
+        """Return and clear the last result; None if there is none."""
         with self._wake:
             done, self._done = self._done, []
         return done[0] if done else None
 
     def forget(self) -> None:
-        """Discard pending, running and finished jobs."""
+        """Discard pending and finished jobs, and the result of a running one."""
         with self._wake:
             self._waiting, self._working, self._done = [], [], []
 
     def close(self) -> None:
-        """Stop the thread; waits for a running job, at most one second."""
+        """Stop the thread; waits at most one second for a running job."""
         with self._wake:
             self._closing = True
             self._waiting, self._working, self._done = [], [], []

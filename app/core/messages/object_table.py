@@ -1,6 +1,6 @@
-"""Arrays of objects as tables: finding them in a message, their columns, sorting, and CSV.
+"""Arrays of objects as tables: search in a message, columns, sorting, and CSV.
 
-Lazy: a row of a large message is decoded when it is shown.
+Rows are decoded on demand, so that a large message is not decoded completely.
 """
 
 from __future__ import annotations
@@ -20,18 +20,23 @@ Steps: TypeAlias = tuple[str | int, ...]
 MAX_ROWS = 2000
 MAX_COLUMNS = 40
 LOOKED_AT = 50
-"""Number of rows from which the columns are taken."""
+"""Number of rows in which columns are searched."""
 MAX_LISTS = 20
 _MAX_SEARCHED_VALUES = 2000
-"""Maximum number of values of a message that are searched for arrays of objects."""
+"""Maximum number of values in a message that are searched for arrays of objects."""
 _MAX_FLATTENED_KEYS = 8
-"""Maximum number of keys of an object that gets a column for each of its keys."""
+"""Maximum number of keys of a nested object for which each key becomes a column."""
 MISSING = object()
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ObjectRow:
-    """Row of a table: its index, its ``name`` (index as text, or a path), and its value."""
+    """Row of a table.
+
+    Attributes:
+        place: Index of the row.
+        name: Index as text, or the path of the object in the message.
+    """
 
     place: int
     name: str
@@ -48,12 +53,12 @@ class ObjectRow:
 
 
 def is_list(value: object) -> bool:
-    """Return whether a value is an array; strings and bytes are not."""
+    """Return True if a value is an array; strings and bytes are not arrays."""
     return isinstance(value, Sequence) and not isinstance(value, (str, bytes, bytearray, memoryview))
 
 
 def is_list_of_objects(value: object) -> bool:
-    """Return whether a value is an array whose first elements are non-empty objects."""
+    """Return True if a value is an array whose first elements are non-empty objects."""
     if not is_list(value) or not len(value):  # type: ignore[arg-type]
         return False
     first = list(islice(value, 5))  # type: ignore[call-overload]
@@ -61,7 +66,10 @@ def is_list_of_objects(value: object) -> bool:
 
 
 def lists_of_objects(value: object, most: int = MAX_LISTS) -> list[Steps]:
-    """Return the paths to arrays of objects in a message, upper levels first; ``()`` is the message."""
+    """Return the paths to arrays of objects in a message, upper levels first.
+
+    ``()`` is the message itself.
+    """
     found: list[Steps] = []
     waiting: deque[tuple[Steps, object]] = deque([((), value)])
     for _each in range(_MAX_SEARCHED_VALUES):
@@ -91,7 +99,7 @@ def value_at(value: object, steps: Steps) -> object:
 
 
 def rows_of(value: object, most: int = MAX_ROWS) -> list[ObjectRow]:
-    """Return the first objects of an array; other elements are skipped."""
+    """Return the first ``most`` objects of an array as rows; other elements are skipped."""
     if not is_list(value):
         return []
     return [
@@ -102,7 +110,10 @@ def rows_of(value: object, most: int = MAX_ROWS) -> list[ObjectRow]:
 
 
 def rows_found(found: Iterable[tuple[str, object]], most: int = MAX_ROWS) -> list[ObjectRow]:
-    """Return the objects in a query result, by path; of a single array of objects its elements."""
+    """Return the objects in a query result as rows, named by path.
+
+    A single array of objects gives its elements.
+    """
     pairs = list(found)
     if len(pairs) == 1 and is_list_of_objects(pairs[0][1]):
         return rows_of(pairs[0][1], most)
@@ -115,7 +126,10 @@ def rows_found(found: Iterable[tuple[str, object]], most: int = MAX_ROWS) -> lis
 
 
 def columns_of(rows: Sequence[ObjectRow], most: int = MAX_COLUMNS) -> tuple[Steps, ...]:
-    """Return the keys of the first rows in order; keys of small nested objects get their own columns."""
+    """Return the keys of the first rows in order.
+
+    The keys of small nested objects become separate columns.
+    """
     columns: dict[Steps, None] = {}
     for row in rows[:LOOKED_AT]:
         for key, value in row.value.items():
@@ -130,14 +144,14 @@ def columns_of(rows: Sequence[ObjectRow], most: int = MAX_COLUMNS) -> tuple[Step
 
 
 def column_name(column: Steps) -> str:
-    """Return the title of a column: ``at.x``."""
+    """Return the title of a column, such as ``at.x``."""
     return path_text(tuple(str(step) for step in column))
 
 
 def sort_key(value: object) -> tuple[int, float, str] | None:
-    """Return the sort key of a value of any type; None for values without an order.
+    """Return the sort key of a value of any type; None for values that can't be ordered, such as NaN.
 
-    Numbers and booleans first, then strings, then objects and arrays by length. NaN has no order.
+    Numbers and booleans come first, then strings, then objects and arrays by length.
     """
     if value is MISSING or value is None or value != value:  # noqa: PLR0124
         return None
@@ -166,7 +180,7 @@ def cell_text(value: object) -> str:
 
 
 def table_csv(first: str, columns: Sequence[Steps], rows: Iterable[ObjectRow]) -> str:
-    """Return the table as CSV; ``first`` is the title of the rows' names."""
+    """Return the table as CSV; ``first`` is the title of the column with the row names."""
     head = [first, *(harmless(column_name(column)) for column in columns)]
     lines = ([harmless(row.name), *(cell_text(row.at(column)) for column in columns)] for row in rows)
     return csv_text([head, *lines])

@@ -1,4 +1,4 @@
-"""Decoded images, and decoding messages to images no larger than they are shown."""
+"""Decoded images; messages are decoded to images no larger than they are shown."""
 
 from __future__ import annotations
 
@@ -22,16 +22,22 @@ REDUCED = (8, 4, 2)
 PNG_NUMBERS = ("uint8", "uint16")
 COMPARED_FIRST = 4096
 AVERAGED = ("uint8", "uint16")
-"""Types whose mean is meaningful; of others, which may contain NaN, every n-th pixel is taken."""
+"""Types that are reduced in size by averaging. Other types may contain NaN and are reduced by taking every
+nth
+pixel.
+"""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Picture:
     """Decoded image of ``width`` x ``height`` pixels.
 
-    ``bgra`` is a contiguous uint8 array (rows, columns, 4) in the layout of QImage.Format_RGB32; it is
-    smaller than the image when decoded for a small view (then `whole` is False). ``numbers`` are the values
-    of an image with one channel (grey, depth), else None. ``message`` is its source.
+    Attributes:
+        bgra: Contiguous uint8 array (rows, columns, 4) in the layout of QImage.Format_RGB32. Smaller than the
+            image if
+            decoded for a small view; then `whole` is False.
+        numbers: Values of an image with one channel (grey, depth), else None.
+        message: Message that was decoded.
     """
 
     bgra: NDArray[np.uint8]
@@ -43,19 +49,19 @@ class Picture:
     message: Message | None = None
     numbers: NDArray[Any] | None = None
     look: PictureLook = PLAIN
-    """Style that it was decoded with."""
+    """Display style with which the image was decoded."""
     scale: ColourScale | None = None
-    """Meaning of its colours, if they represent numbers."""
+    """Colour scale, if the colours represent numbers."""
     one_channel: bool = False
-    """True if it has one channel, also where `numbers` were not kept."""
+    """True if the image has one channel, even if `numbers` is None."""
 
     @property
     def whole(self) -> bool:
-        """True if it has full resolution."""
+        """True if the image was decoded in full resolution."""
         return self.bgra.shape[:2] == (self.height, self.width)
 
     def pixel(self, x: int, y: int) -> Pixel | None:
-        """Return red, green and blue, or the number of an image with one channel; None where unknown."""
+        """Return red, green and blue, or the number of an image with one channel; None if it is unknown."""
         if not (self.whole and 0 <= x < self.width and 0 <= y < self.height):
             return None
         if self.numbers is not None:
@@ -68,10 +74,14 @@ class Picture:
 def decode(
     message: Message, received_s: float, fit: Size | None = None, look: PictureLook = PLAIN
 ) -> tuple[Picture | None, str | None]:
-    """Decode a message to an image, or return the error sentence.
+    """Decode a message to an image; return the image and None, or None and an error message.
 
-    ``fit`` is the displayed size (width, height in screen pixels): an image at least twice as large is
-    decoded smaller. None means full resolution. ``look`` is the style.
+    Args:
+        received_s: Arrival time of the message.
+        fit: Displayed width and height in screen pixels. An image at least twice as large is decoded at a
+            reduced
+            size. None means full resolution.
+        look: Display style.
     """
     import cv2  # noqa: PLC0415  150 MB: loaded with the first image, not at the start
 
@@ -101,9 +111,10 @@ def decode(
 def once_more(
     shown: Picture | None, message: Message, received_s: float, fit: Size | None, look: PictureLook = PLAIN
 ) -> Picture | None:
-    """Return the shown image for a message with equal bytes, without decoding.
+    """Return the shown image with the data of a new message, if both messages have equal bytes.
 
-    None when the message differs, or another size or style is requested (see `decode`).
+    Avoids decoding. Returns None if the bytes differ, or if another size or style is requested (see
+    `decode`).
     """
     if shown is None or shown.message is None or shown.message is message or shown.look != look:
         return None
@@ -133,9 +144,9 @@ def _short_message(error: BaseException) -> str:
 
 
 def png_of(message: Message) -> bytes:
-    """Return the image in full resolution as a PNG file. Raises NepError, or OSError when encoding fails.
+    """Return the image in full resolution as a PNG file. Raises NepError, or OSError if encoding fails.
 
-    A message that is a PNG already is returned unchanged, without trailing data.
+    A message that already is a PNG is returned unchanged, except for trailing data.
     """
     import cv2  # noqa: PLC0415  slow import
 

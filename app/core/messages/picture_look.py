@@ -1,4 +1,4 @@
-"""Display style of images: brightness, contrast, colour map of numbers."""
+"""Display style of images: brightness, contrast, and colour map for numbers."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
 COLOUR_MAPS = ("grey", "viridis", "turbo", "inferno", "jet")
-"""Usual names; "" is the default: grey for bytes, viridis for other types."""
+"""Names of the colour maps; "" is the default: grey for bytes, viridis for other types."""
 MIN_CONTRAST, MAX_CONTRAST = 0.1, 10.0
 STRIP_ROWS = 64
 SPREAD = "viridis"
@@ -21,11 +21,14 @@ SPREAD = "viridis"
 
 @dataclass(frozen=True, slots=True)
 class PictureLook:
-    """Display style; equal styles give equal images.
+    """Display style of an image; equal styles give equal images.
 
-    ``brightness`` is -1 to 1, 0 is unchanged; ``contrast`` 0.1 to 10, 1 is unchanged. For images with one
-    channel ``colours`` is one of `COLOUR_MAPS` or "", which covers the range from ``low`` to ``high``; None
-    is the image's own minimum or maximum (of bytes 0 and 255).
+    Attributes:
+        brightness: -1 to 1; 0 leaves the image unchanged.
+        contrast: 0.1 to 10; 1 leaves the image unchanged.
+        colours: Colour map of images with one channel: one of `COLOUR_MAPS`, or "" for the default.
+        low: Value of the first colour; None for the minimum of the image (0 for bytes).
+        high: Value of the last colour; None for the maximum of the image (255 for bytes).
     """
 
     brightness: float = 0.0
@@ -35,7 +38,7 @@ class PictureLook:
     high: float | None = None
 
     def saved(self) -> dict[str, object]:
-        """Return the form stored in a layout; `restored` parses it."""
+        """Return the style as JSON data for a layout; `restored` parses it."""
         return {
             "brightness": self.brightness,
             "contrast": self.contrast,
@@ -75,9 +78,12 @@ def _number(value: object) -> float | None:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ColourScale:
-    """Colour scale of an image with one channel: from ``low`` (first colour) to ``high`` (last colour).
+    """Colour scale of an image with one channel.
 
-    ``colours`` is a uint8 array (256, 3) of red, green and blue.
+    Attributes:
+        low: Value of the first colour.
+        high: Value of the last colour.
+        colours: uint8 array (256, 3) of red, green and blue.
     """
 
     low: float
@@ -98,7 +104,7 @@ def toned(look: PictureLook, picture: NDArray[np.uint8]) -> NDArray[np.uint8]:
 def in_colours(look: PictureLook, numbers: NDArray[Any]) -> tuple[NDArray[np.uint8], ColourScale]:
     """Apply the colour map to an image with one channel (rows, columns).
 
-    Return blue, green, red and 255, black for NaN; and the colour scale.
+    Returns an array of blue, green, red and 255 for each pixel, black for NaN, and the colour scale.
     """
     import cv2  # noqa: PLC0415
     import numpy as np  # noqa: PLC0415
@@ -128,7 +134,10 @@ def _ends(look: PictureLook, values: NDArray[Any], *, is_bytes: bool) -> tuple[f
 
 
 def scaled(frame: NDArray[Any], known: NDArray[np.bool_], low: float, high: float) -> NDArray[np.uint8]:
-    """Scale values linearly from 0 (``low`` and below) to 255 (``high`` and above); 0 where unknown."""
+    """Scale values linearly to 0 (``low`` and below) ... 255 (``high`` and above).
+
+    0 where ``known`` is False.
+    """
     import numpy as np  # noqa: PLC0415
 
     shown = np.zeros(frame.shape, np.uint8)

@@ -1,7 +1,8 @@
 """JSONPath queries (RFC 9535) on decoded messages, with bounded run time.
 
-Each visited value is counted, so that an explosive query (``$..*..*..*``) ends with what it found until then.
-Regular expressions are disabled: their run time can't be bounded.
+Each visited value is counted, so that an expensive query (``$..*..*..*``) stops and returns the values found
+so
+far. Regular expressions are disabled, because their run time can't be bounded.
 """
 
 from __future__ import annotations
@@ -23,7 +24,7 @@ else:
     jsonpath = lazy_module("jsonpath")  # takes 30 ms to import, needed only for queries
 
 MAX_LENGTH = 500
-"""Maximum length of a query."""
+"""Maximum length of a query in characters."""
 MAX_STEPS = 50_000
 """Maximum number of visited values."""
 MAX_RESULTS = 2_000
@@ -31,14 +32,14 @@ Steps = tuple[str | int, ...]
 
 
 class FoundPath(str):
-    """Path of a found value as text; ``steps`` lead to it from the message."""
+    """Path of a found value as text; ``steps`` are the keys and indices from the message to the value."""
 
     __slots__ = ("steps",)
     steps: Steps
 
     @classmethod
     def of(cls, steps: Steps) -> FoundPath:
-        """Return the path of these steps; ``$`` for the whole message."""
+        """Return the path with these steps; ``$`` for the whole message."""
         found = cls(path_text(steps) if steps else "$")
         found.steps = steps
         return found
@@ -46,14 +47,14 @@ class FoundPath(str):
 
 @dataclass(frozen=True, slots=True)
 class QueryAnswer:
-    """Result of a query: values by path, and a sentence why it is incomplete, or ""."""
+    """Result of a query: values by path. ``cut`` is the reason why the result is incomplete, or ""."""
 
     found: Mapping[FoundPath, object]
     cut: str = ""
 
 
 class JsonQuery:
-    """Parsed query. Thread-safe for one message at a time."""
+    """Parsed query. Can be used from any thread, but for one message at a time."""
 
     def __init__(self, text: str) -> None:
         # Raises `QueryError` with the reason and its position.
@@ -72,7 +73,12 @@ class JsonQuery:
     def answer(
         self, value: object, most_steps: int = MAX_STEPS, most_found: int = MAX_RESULTS
     ) -> QueryAnswer:
-        """Return the values found in a decoded message, with limits of visited and returned values."""
+        """Return the values found in a decoded message.
+
+        Args:
+            most_steps: Maximum number of visited values.
+            most_found: Maximum number of returned values.
+        """
         count = _Steps(most_steps)
         looked_through = _counted(value, count)
         found: dict[FoundPath, object] = {}
@@ -112,7 +118,7 @@ def _sentence(error: jsonpath.JSONPathError, text: str) -> str:
 
 
 class _LimitReached(Exception):  # noqa: N818  not an error: it ends the search
-    """The limit of visited values is reached."""
+    """Raised when the maximum number of visited values is reached."""
 
 
 class _Steps:
@@ -149,7 +155,7 @@ def _same(one: object, other: object) -> bool:
 
 @dataclass(frozen=True, slots=True)
 class _Bytes:
-    """Bytes of msgpack: one value, not an array."""
+    """Wrapper of bytes from msgpack, which count as one value and not as an array."""
 
     raw: object
 

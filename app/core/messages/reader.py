@@ -1,4 +1,4 @@
-"""Reading messages for display: small ones at once, large ones in a thread, only the newest."""
+"""Reading of messages for display: small ones immediately, large ones in a background thread."""
 
 from __future__ import annotations
 
@@ -11,16 +11,15 @@ from nep.i18n import _
 from nep.messages.message import Message
 
 LARGE_BYTES = 1_000_000
-"""Size above which JSON is indexed instead of decoded; larger messages are never read in the window's thread.
-"""
+"""Size above which JSON is indexed instead of decoded, and messages are read in a background thread."""
 READ_INTERVAL_S = 1.0
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Reading:
-    """Result of reading a message: its ``value``, or the error sentence.
+    """Result of reading a message: the ``value``, or an error message.
 
-    ``index`` is that of a large JSON text; None for other messages.
+    ``index`` belongs to a large JSON text; None for other messages.
     """
 
     message: Message
@@ -30,7 +29,10 @@ class Reading:
 
 
 def read(message: Message) -> Reading:
-    """Read a message in any thread; large JSON is indexed (`app.core.messages.lazy_json`)."""
+    """Decode a message for display; large JSON is indexed instead (`app.core.messages.lazy_json`).
+
+    Thread-safe.
+    """
     try:
         if message.codec == "json" and message.size_bytes > LARGE_BYTES:
             index = JsonIndex(message.data)
@@ -43,7 +45,7 @@ def read(message: Message) -> Reading:
 
 
 class Reader(NewestOnly[Message, Reading]):
-    """Reading thread of one panel, started by the first message."""
+    """Background thread that reads the messages of one panel; started by the first message."""
 
     def __init__(self) -> None:
         super().__init__(self._read, "studio-reader")
@@ -54,10 +56,10 @@ class Reader(NewestOnly[Message, Reading]):
         return read(message)
 
     def ask_at_leisure(self, message: Message, now: float) -> bool:
-        """Read a message unless one is being read, or was begun less than a second ago.
+        """Read a message unless another one is being read or a read started less than a second ago.
 
-        Large messages take a while, and people don't read faster. ``now`` is monotonic seconds. Return
-        whether it will be read.
+        Limits the load by large messages. ``now`` is monotonic seconds. Returns True if the message will be
+        read.
         """
         if self.busy or (self._asked_at is not None and now - self._asked_at < READ_INTERVAL_S):
             return False
@@ -66,6 +68,6 @@ class Reader(NewestOnly[Message, Reading]):
         return True
 
     def forget(self) -> None:
-        """Discard pending and running reads; the next one may start at once."""
+        """Discard pending and running reads, so that the next one may start immediately."""
         self._asked_at = None
         super().forget()

@@ -1,4 +1,4 @@
-"""Snapshots of images: PNG files in full resolution."""
+"""Snapshots of images, saved as PNG files in full resolution."""
 
 from __future__ import annotations
 
@@ -21,9 +21,9 @@ CHOSEN = "pictures_folder"
 
 
 def folder(settings: Settings | None = None) -> Path:
-    """Return the folder of snapshots: the chosen one, else ``NEP Studio`` in the system's picture folder.
+    """Return the folder of snapshots: the chosen one, or ``NEP Studio`` in the system's picture folder.
 
-    With ``$NEP_STUDIO_HOME`` it is ``Pictures`` in there.
+    If ``$NEP_STUDIO_HOME`` is set, the default is ``Pictures`` in that folder.
     """
     chosen = settings.get(CHOSEN, "") if settings is not None else ""
     if chosen:
@@ -34,9 +34,10 @@ def folder(settings: Settings | None = None) -> Path:
 
 
 def save(message: Message, into: Path | None = None) -> Path:
-    """Write the image of a message to a new file, named by topic and time; return its path.
+    """Save the image of a message to a new file, named by topic and time; return its path.
 
-    Raises NepError when it is not an image, OSError when it can't be written. Never overwrites a file.
+    Never overwrites a file. Raises NepError if the message is not an image, OSError if the file can't be
+    written.
     """
     data = png_of(message)
     place = into if into is not None else folder()
@@ -57,7 +58,7 @@ def save(message: Message, into: Path | None = None) -> Path:
 
 
 def file_stem(message: Message) -> str:
-    """Return ``Pepper camera 2026-11-20 12.48.20.123``: a file name that is valid on every system."""
+    """Return a file stem valid on every system, such as ``Pepper camera 2026-11-20 12.48.20.123``."""
     stamp_ns = message.stamp_ns if message.stamp_ns is not None else time.time_ns()
     when = time.strftime("%Y-%m-%d %H.%M.%S", time.localtime(stamp_ns // 1_000_000_000))
     topic = re.sub(r"[^\w\-]+", " ", message.topic).strip()[:80] or "picture"

@@ -1,4 +1,4 @@
 """Live network of the window: threads receive messages and pass them on through the mailbox.
 
-Topics, nodes, watches and their statistics; the master and remote access to it.
+Contains topics, nodes, watches and their statistics, the master, and remote access to it.
 """

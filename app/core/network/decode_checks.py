@@ -1,8 +1,9 @@
-"""Test whether messages can be decoded, in the receiving thread instead of the window's.
+"""Check in the receiving thread whether messages can be decoded.
 
-Every message of a watched topic is decoded within a budget: at most 7 % of the time, with up to 1 s of saved
-budget for bursts. Half of that is reserved for topics with earlier errors, so that their count is exact when
-it matters. Messages beyond the budget are counted as unchecked.
+Every message of a watched topic is decoded as long as that takes at most 7 % of the time; up to 1 s of unused
+time is saved for bursts. Half of the time is reserved for topics with earlier errors, so that their error
+count is
+exact. Messages beyond these limits are counted as unchecked.
 """
 
 from __future__ import annotations
@@ -22,16 +23,20 @@ ADVANCE_S = 1.0
 RESERVE_S = 0.5
 SUSPECT_S = 30.0
 CLOCK_READ_INTERVAL_S = 0.0002
-"""Reading the clock takes as long as decoding a small message, so it is read once per this much work."""
+"""Minimum decoding time between two readings of the clock, which take as long as decoding a small message."""
 SOME, SOME_BYTES = 256, 64_000
 
 
 @dataclass(slots=True)
 class Checked:
-    """Result for one topic since the last `Checks.pop_results`.
+    """Result of one topic since the last `Checks.pop_results`.
 
-    ``bad`` of the ``checked`` messages can't be decoded; ``unchecked`` exceeded the budget. ``sentence``
-    describes the newest error; ``last_good`` is whether the newest message can be decoded.
+    Attributes:
+        checked: Number of checked messages.
+        bad: Number of checked messages that can't be decoded.
+        unchecked: Number of messages that were not checked for lack of time.
+        sentence: Description of the newest error.
+        last_good: True if the newest message can be decoded.
     """
 
     checked: int = 0
@@ -42,7 +47,7 @@ class Checked:
 
 
 class Checks:
-    """Decoding test of received messages. `look` runs in the source's thread, `take` in the window's."""
+    """Checks received messages. `check` runs in the source's thread, `pop_results` in the window's."""
 
     def __init__(
         self,
@@ -58,7 +63,7 @@ class Checks:
         self._refilled = clock()
 
     def check(self, topic: str, messages: Sequence[Message]) -> None:
-        """Check messages of one topic, oldest first. Images and bytes are not decoded."""
+        """Check messages of one topic, oldest first. Images and bytes are skipped."""
         if not messages or messages[-1].codec not in READABLE:
             return
         found = Checked()
@@ -74,7 +79,7 @@ class Checks:
             self._found[topic] = found
 
     def pop_results(self) -> dict[str, Checked]:
-        """Return and clear the results by topic."""
+        """Return the results by topic, and clear them."""
         with self._lock:
             found, self._found = self._found, {}
         return found

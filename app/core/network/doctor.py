@@ -1,4 +1,4 @@
-"""Connection doctor of the window: runs the checks in a thread and stores the findings."""
+"""Connection doctor of the window, which runs the checks in a thread and stores the findings."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ JOIN_TIMEOUT_S = 4.0
 
 
 class Doctor:
-    """Runs the connection checks in a thread of its own. Not thread-safe: use it from the window's thread."""
+    """Runs the connection checks in a background thread. Not thread-safe: use it from the window's thread."""
 
     def __init__(
         self,
@@ -35,7 +35,7 @@ class Doctor:
         self._found: tuple[doctor.Finding, ...] = ()
         self._so_far: tuple[doctor.Finding, ...] | None = None
         self.looked_at = self.things = 0
-        """Number of checks done in the current or last run; `things` is the number of all checks."""
+        """Number of checks done in the current or last run; ``things`` is the total number of checks."""
         self._looked_s: float | None = None
         self.revision = 0
 
@@ -56,26 +56,26 @@ class Doctor:
 
     @property
     def looked_s(self) -> float | None:
-        """Time of the last completed run (epoch seconds); None before the first."""
+        """Time of the last completed run in seconds since 1970; None before the first."""
         return self._looked_s
 
     @property
     def missed(self) -> str:
-        """Topic that the user expects messages from; "" for no specific topic."""
+        """Topic that the user expects messages from; "" if none was selected."""
         return self._missed
 
     @property
     def told_of(self) -> str:
-        """Topic that was missed in the run that produced `findings`."""
+        """Value of `missed` in the run that produced `findings`."""
         return self._told_of
 
     def miss(self, topic: str) -> None:
-        """Set the topic that the user misses ("" for no specific topic) and run the checks."""
+        """Set the topic that the user expects messages from ("" for none) and run the checks."""
         self._missed = topic
         self.start()
 
     def start(self) -> None:
-        """Start the checks; a run in progress continues with the topic that is missed now."""
+        """Start the checks, unless they are running."""
         if self.looking:
             return
         self._thread = threading.Thread(target=self._run, name="studio-doctor", daemon=True)
@@ -121,9 +121,9 @@ class Doctor:
 
 
 def doctor_of(address: str, folder: Path) -> Doctor:
-    """Return a doctor for the master at this address that also checks Studio's folder.
+    """Return a doctor for the master at this address, which also checks Studio's folder.
 
-    A topic of another network is not checked: the doctor knows only Studio's own network.
+    A topic of another network is not checked, because the doctor knows only Studio's own network.
     """
     folders = [(_("Settings and unsaved work"), folder)]
     return Doctor(lambda key, tell: doctor.diagnose(address, "" if split_key(key)[0] else key, folders, tell))

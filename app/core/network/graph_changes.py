@@ -1,4 +1,4 @@
-"""Compare two graphs: nodes and topics that appeared or disappeared, one console line each."""
+"""Comparison of two graphs: one console line for each node or topic that appeared or disappeared."""
 
 from __future__ import annotations
 
@@ -14,12 +14,12 @@ PROGRAM = "program "
 NEP = "/nep/"
 FEW = 2
 MAX_LINES = 8
-"""Number of changes above which one line with the count is written: a bridge can add a thousand topics."""
+"""Number of changes above which one line with their count is written; a bridge can add a thousand topics."""
 NAMED = 3
 
 
 def arrivals(before: GraphView, after: GraphView) -> list[str]:
-    """Return sentences for new nodes with their topics, new topics of known nodes, and nodes that left."""
+    """Return sentences about new nodes with their topics, new topics of known nodes, and nodes that left."""
     here: list[tuple[str, str]] = []
     more: list[tuple[str, str]] = []
     came = [id for id, node in after.nodes.items() if id not in before.nodes and _is_reported(node)]

@@ -1,8 +1,10 @@
 """Bounded mailbox from background threads to the window.
 
-Threads post; the window drains once per tick. Each topic has a ring buffer that keeps the newest messages and
-counts dropped ones. Events (a new graph, a robot's reply, the end of a program) are rare and must not be
-lost, so their queue is long; events beyond its limit are counted.
+Threads post; the window drains once per tick. Each topic has a ring buffer that holds the newest messages and
+counts
+dropped ones. Events (a new graph, a robot's reply, the end of a program) are rare and must not be lost, so
+their
+queue is long; events beyond its limit are counted.
 """
 
 from __future__ import annotations
@@ -21,10 +23,7 @@ EVENTS = 20_000
 
 @dataclass(slots=True)
 class Batch:
-    """Messages of one topic since the last drain.
-
-    The newest messages, and the number of older ones that were dropped.
-    """
+    """Newest messages of one topic since the last drain; ``dropped`` counts older ones."""
 
     messages: list[Message] = field(default_factory=list)
     dropped: int = 0
@@ -72,7 +71,7 @@ class Mailbox:
         self._ring_sizes: dict[str, int] = {}
 
     def set_room(self, topic: str, messages: int | None) -> None:
-        """Set the ring size of a topic in messages (at least 1, the byte limit stays).
+        """Set the ring size of a topic in messages (at least 1). The byte limit still applies.
 
         None restores the default.
         """
@@ -83,10 +82,10 @@ class Mailbox:
                 self._ring_sizes[topic] = max(1, messages)
 
     def post(self, topic: str, messages: Sequence[Message]) -> None:
-        """Post a batch of one topic, oldest first, under one lock.
+        """Post a batch of messages of one topic, oldest first.
 
-        Messages beyond the ring's size are only counted, so a batch of thousands costs no more than a full
-        ring.
+        Messages beyond the ring's size are only counted, so that a batch of thousands costs no more than a
+        full ring.
         """
         room = self._ring_sizes.get(topic, self._messages_per_topic)
         newest = messages[-room:]
@@ -111,7 +110,7 @@ class Mailbox:
             self._rings.pop(topic, None)
 
     def post_event(self, event: object) -> None:
-        """Post an event; when `EVENTS` events are pending, it is counted as lost instead."""
+        """Post an event. If the event queue is full, the event is counted as lost instead."""
         with self._lock:
             if len(self._events) >= self._event_limit:
                 self._lost_events += 1
@@ -119,7 +118,7 @@ class Mailbox:
                 self._events.append(event)
 
     def drain(self) -> Drained:
-        """Return and clear everything posted since the last drain."""
+        """Return and clear all messages and events posted since the last drain."""
         with self._lock:
             rings, self._rings = self._rings, {}
             events, self._events = self._events, deque()

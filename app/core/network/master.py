@@ -26,10 +26,14 @@ else:
 DISCOVERY_S = 1.5
 """Time during which a newly started master may not know all nodes yet (it collects them for one second)."""
 AGAIN_S, AGAIN_AT_MOST_S = 2.0, 30.0
-"""Pause before another attempt to start a master, and its maximum; the pause doubles with each failure."""
+"""Initial and maximum pause before another attempt to start a master; the pause doubles with each failure."""
 START_TIMEOUT_S = 50.0
-"""Time limit for a started master to answer while its process is alive. The first start after an
-installation, from a slow disk and with a virus scanner, takes longer than the usual ten seconds."""
+"""Time limit for a started master to reply while its process is alive.
+
+The first start after an installation, from a slow disk and with a virus scanner, takes longer than the usual
+ten
+seconds.
+"""
 END_TIMEOUT_S = 2.0
 
 _log = logging.getLogger("studio.master")
@@ -39,7 +43,9 @@ _log = logging.getLogger("studio.master")
 class MasterState:
     """State of the connection to the master.
 
-    ``kind`` is ``searching``, ``connected`` or ``none``; ``sentence`` explains it.
+    Attributes:
+        kind: ``searching``, ``connected`` or ``none``.
+        sentence: Explanation for the user.
     """
 
     kind: str
