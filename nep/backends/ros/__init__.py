@@ -1,7 +1,8 @@
-"""Back end `ros`: ROS 1 over rospy. Nodes of nep and ROS nodes share the ROS master.
+"""Back end `ros`: ROS 1 over rospy. nep nodes and ROS nodes use the same ROS master.
 
-`library` loads rospy, `process` is the process's one ROS node, `master` queries the ROS master, `definition`
-and `carried` convert ROS messages, and `transport` implements `nep.backends.base`. See docs/ros.md.
+`library` loads rospy, `process` is the single ROS node of this process, `master` queries the ROS master,
+`definition` and `carried` convert ROS messages, and `transport` implements `nep.backends.base`. See
+docs/ros.md.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""Address of the ROS master. Kept separate because it is imported with every nep node."""
+"""Address of the ROS master. A separate module, because every nep node imports it."""
 
 from __future__ import annotations
 
@@ -16,7 +16,8 @@ _PORT = 11311
 def address_of(given: str | None) -> str:
     """Return the ROS master's address as HOST:PORT: `given`, else $ROS_MASTER_URI, else 127.0.0.1:11311.
 
-    Accepts "http://HOST:PORT"; the port defaults to 11311. Raises `NepError`.
+    "http://HOST:PORT" is also accepted; the port defaults to 11311. Raises `NepError` if the address is
+    invalid.
     """
     text = given or os.environ.get("ROS_MASTER_URI") or f"127.0.0.1:{_PORT}"
     if not isinstance(text, str):
@@ -38,6 +39,6 @@ def address_of(given: str | None) -> str:
 
 
 def is_own_computer(address: str) -> bool:
-    """Return True for a loopback address."""
+    """Return True if the host of an address is this computer's loopback."""
     host = host_of(address)
     return host == "localhost" or host.startswith("127.")

@@ -32,7 +32,7 @@ from nep.messages.image_codec import picture_info, raw_array, raw_image, raw_lay
 from nep.text import escaped, shortened
 
 STAMP = struct.Struct("<III")
-"""Start of a message with a header: seq, secs, nsecs."""
+"""Start of a message that has a header: seq, secs, nsecs."""
 _LENGTH = struct.Struct("<I")
 _ROS_TYPE = re.compile(r"[A-Za-z]\w*/[A-Z]\w*", re.ASCII)
 _STRING = "std_msgs/String"
@@ -50,9 +50,9 @@ _MD5SUMS = {
 _CARRIERS = {"string": _STRING, "json": _STRING, "bytes": _ARRAY, "msgpack": _ARRAY, "image": _COMPRESSED}
 _EMPTY_LAYOUT = bytes(8)
 _DEPTH_HEADER = 12
-"""Header of compressed_depth_image_transport, unused for 16-bit images; a PNG follows."""
+"""Size in bytes of the header of compressed_depth_image_transport. 16-bit images ignore it; a PNG follows."""
 _CODEC_NUMBER = 6
-"""Not a codec number of the native wire, on which such messages aren't sent."""
+"""Codec number of ROS messages; unused on the native wire, on which such messages aren't sent."""
 _definitions: dict[str, Definition] = {}
 
 Unpacked = tuple[bytes | memoryview, Mapping[str, object] | None]
@@ -60,12 +60,12 @@ Unpack = Callable[[memoryview], Unpacked]
 
 
 def is_ros_type(msg_type: str) -> bool:
-    """Return True for a ROS type name: "package/Type", the type with a capital letter."""
+    """Return True for a ROS type name: "package/Type", with a capital T."""
     return _ROS_TYPE.fullmatch(msg_type) is not None
 
 
 def ros_type_of(msg_type: str) -> str:
-    """Return the ROS message for a message type."""
+    """Return the ROS message type that carries a message type."""
     return msg_type if is_ros_type(msg_type) else _CARRIERS[codec_for(msg_type).name]
 
 
@@ -83,7 +83,7 @@ def installed(name: str) -> Definition:
 
 
 def not_installed(name: str, what: str) -> NepError:
-    """Return the error for a type that isn't installed; `what` is its kind."""
+    """Return the error for a type that isn't installed; `what` names its kind in the message."""
     known = escaped(shortened(name, 100))
     return NepError(
         _(
@@ -107,7 +107,7 @@ def codec_of(msg_type: str) -> Codec:
 
 
 def ros_codec(definition: Definition) -> Codec:
-    """Return a codec that converts between maps and a ROS message."""
+    """Return a codec that converts maps to and from a ROS message."""
 
     def encode(payload: object) -> Encoded:
         return Encoded(definition.encode(_stamped(payload) if definition.has_header else payload))
@@ -168,7 +168,7 @@ def _check_file(encoded: Encoded, kind: str) -> str:
 
 
 def to_ros(ros_type: str, codec: str, encoded: Encoded) -> bytes:
-    """Return the ROS message body for encoded data. Raises `EncodeError`, `WireError`."""
+    """Convert encoded data to the body of a ROS message. Raises `EncodeError`, `WireError`."""
     data, extension = encoded.data, encoded.extension
     if codec == "image" and extension:
         head = bytes(4) + _now() + bytes(4)
@@ -218,7 +218,15 @@ def _raw_body(data: bytes | memoryview, extension: Mapping[str, object]) -> byte
 
 @dataclass(frozen=True)
 class Unpacker:
-    """Decoder for messages of one publisher. `unpack` raises `WireError` for invalid messages."""
+    """Decoder for the messages of one publisher.
+
+    Attributes:
+        codec: Codec of the converted data.
+        msg_type: Message type of the converted data.
+        unpack: Converts the body of a ROS message to data and extension; raises `WireError` for an invalid
+            one.
+        has_header: True if the ROS message starts with a header.
+    """
 
     codec: Codec
     msg_type: str
@@ -227,9 +235,16 @@ class Unpacker:
 
 
 def unpacker(msg_type: str, ros_type: str, text: str, md5sum: str = "*") -> Unpacker:
-    """Return the decoder for a subscriber of `msg_type` and messages of `ros_type`, defined by `text`.
+    """Return the decoder for a subscriber.
 
-    Raises `NepError` if the types aren't compatible.
+    Args:
+        msg_type: Message type of the subscriber.
+        ros_type: ROS type of the publisher.
+        text: Definition of `ros_type`; "" if the publisher doesn't send it.
+        md5sum: MD5 sum of the definition, or "*" if unknown.
+
+    Raises:
+        NepError: The types aren't compatible.
     """
     wanted = codec_for(msg_type)
     if md5sum not in {"*", _MD5SUMS.get(ros_type, md5sum)}:
@@ -256,7 +271,7 @@ def _installed_like(ros_type: str, md5sum: str) -> Definition:
 
 
 def version_error(ros_type: str) -> NepError:
-    """Return the error for a type with another definition on the other side."""
+    """Return the error for a type whose definition differs between this program and the publisher."""
     return NepError(
         _(
             "its '{ros_type}' has other fields than the definition on this computer; use the same "

@@ -1,9 +1,9 @@
-"""ROS message definitions: parser, and conversion between maps and bytes. Needs no ROS installation.
+"""Parser for ROS message definitions, and conversion between maps and bytes. Needs no ROS installation.
 
 A publisher sends the full definition to each subscriber, so messages of packages that aren't installed can be
-decoded, and no code is generated from untrusted input. A map has the fields by name; missing ones are zero or
-empty. `time` and `duration` are `{"secs": 1, "nsecs": 500000000}`, or a number of seconds when encoding.
-Arrays are lists, `uint8[]` and `char[]` are bytes.
+decoded, and no code is generated from untrusted input. A map has the fields by name; missing fields are zero
+or empty. `time` and `duration` are `{"secs": 1, "nsecs": 500000000}`; a number of seconds is accepted as well
+when encoding. Arrays are lists; `uint8[]` and `char[]` are bytes.
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ _LENGTH = struct.Struct("<I")
 _HEADERS = ("Header", "std_msgs/Header", "roslib/Header")
 _MAX_DEPTH = 30
 _MAX_FIELDS = 2_000
-"""Limit including nested fields: a definition may come from an untrusted publisher."""
+"""Maximum number of fields including nested ones, because a publisher's definition is untrusted."""
 _MAX_EMPTY = 10_000
 """Maximum number of nested messages without content."""
 
@@ -51,7 +51,7 @@ class _Reader:
         self.data = memoryview(data)
         self.at = 0
         self.messages_left = _MAX_EMPTY + _MAX_DEPTH * len(self.data)
-        """Remaining number of nested messages; those without content are not bounded by the data's size."""
+        """Remaining number of nested messages. Empty ones aren't limited by the size of the data."""
 
     @property
     def left(self) -> int:
@@ -69,10 +69,16 @@ class _Reader:
 
 @dataclass(frozen=True)
 class FieldKind:
-    """Type of a field with its encoder and decoder. A value has at least `min_bytes` bytes.
+    """Type of a field, with its encoder and decoder.
 
-    `fields` are those of a message; `element` is the type of an array's items, `length` the size of a fixed
-    array.
+    Attributes:
+        name: Name of the type.
+        write: Encodes a value; its arguments are the value, its field path and the output.
+        read: Decodes a value; its arguments are the reader and the field path.
+        min_bytes: Minimum size of an encoded value in bytes.
+        fields: Fields of a message.
+        element: Type of an array's items, or None.
+        length: Number of items of a fixed-size array, or None.
     """
 
     name: str
@@ -86,7 +92,7 @@ class FieldKind:
 
 @dataclass(frozen=True)
 class DefinitionField:
-    """Field of a message."""
+    """Name and type of a field."""
 
     name: str
     kind: FieldKind
@@ -94,7 +100,13 @@ class DefinitionField:
 
 @dataclass(frozen=True)
 class Definition:
-    """Message type, created by `parse`. `text` is its definition including those of nested types."""
+    """Message type. Created by `parse`.
+
+    Attributes:
+        name: Name of the type.
+        text: Its definition, including those of nested types.
+        fields: Its fields in order.
+    """
 
     name: str
     text: str
@@ -119,7 +131,7 @@ class Definition:
         return bytes(out)
 
     def decode(self, data: bytes | memoryview) -> dict[str, object]:
-        """Decode a map. Raises `DecodeError` with the path of the invalid field."""
+        """Decode a map. Raises `DecodeError` with the path of the field that is invalid."""
         reader = _Reader(data)
         try:
             values = _read_fields(self.fields, reader, "")

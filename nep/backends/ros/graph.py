@@ -35,10 +35,15 @@ _GENERATION = "ros"
 
 @dataclass(frozen=True)
 class OwnNode:
-    """nep node in this process; `ros_name` is the name of the process's ROS node.
+    """nep node in this process, with its statistics.
 
-    `publishers` are (topic, type, is_latched, counts), `subscribers` (topic, type, counts), `servers` and
-    `clients` (service, counts).
+    Attributes:
+        node: Record of the node.
+        ros_name: Name of the process's ROS node.
+        publishers: (topic, message type, is_latched, statistics) of each publisher.
+        subscribers: (topic, message type, statistics) of each subscriber.
+        servers: (service, statistics) of each server.
+        clients: (service, statistics) of each client.
     """
 
     node: NodeRecord
@@ -50,9 +55,9 @@ class OwnNode:
 
 
 def view_of(known: RosNodes, own: list[OwnNode]) -> GraphView:
-    """Return the graph, with this process's nep nodes in place of its ROS node.
+    """Return the graph, in which this process's nep nodes replace its ROS node.
 
-    Rates of other nodes are unknown: ROS doesn't report them.
+    The rates of other nodes are unknown, because ROS doesn't report them.
     """
     graph = Graph(epoch=1, now=time.monotonic(), learn_s=0.0)
     for topic, name in _foreign(known.publishers, own, lambda each: each.publishers):
@@ -123,11 +128,11 @@ def _node(name: str, uri: str) -> NodeRecord:
 
 
 def publisher_id(node: str, topic: str) -> int:
-    """Return the id of a ROS node's publisher of a topic, both by full name."""
+    """Return the id of a ROS node's publisher on a topic. Both names are full names."""
     return _id(node, topic, "o")
 
 
 def _id(*words: str) -> int:
-    # Stable across processes.
+    # The id must be the same in every process.
     digest = hashlib.sha256("\0".join(words).encode()).digest()
     return int.from_bytes(digest[:8], "little") >> 1 or 1

@@ -1,8 +1,8 @@
-"""Access to rospy: loaded with the first node, also from a venv beside Debian's Python.
+"""Access to rospy, which is loaded with the first node, also in a venv beside Debian's Python.
 
 rospy isn't on PyPI, and a venv doesn't search the folder of Debian's packages. A finder at the end of
-`sys.meta_path` searches it for ROS and the dependencies of ROS only, so that no other system package, such as
-numpy, is imported, and packages of the venv take precedence.
+`sys.meta_path` searches that folder, but only for ROS and its dependencies, so that no other system package,
+such as numpy, is imported, and packages of the venv take precedence.
 """
 
 from __future__ import annotations
@@ -35,7 +35,7 @@ _inherited: set[str] = set()
 
 
 class RosFinder(MetaPathFinder):
-    """Finder for ROS, and for the message packages in `extra`, in a list of folders."""
+    """Import finder for ROS and for the message packages in `extra`, searching a list of folders."""
 
     def __init__(self, places: Sequence[str]) -> None:
         self._places = list(places)
@@ -47,7 +47,7 @@ class RosFinder(MetaPathFinder):
         path: Sequence[str] | None,
         target: ModuleType | None = None,  # noqa: ARG002 - signature of the base class
     ) -> importlib.machinery.ModuleSpec | None:
-        """Find a top-level package of ROS; submodules are found by the package itself."""
+        """Find a top-level package of ROS. Its submodules are found through the package."""
         if path is not None or not (name in _NAMES or name in self.extra or name.endswith(_PACKAGE_SUFFIXES)):
             return None
         return importlib.machinery.PathFinder.find_spec(name, self._places)
@@ -76,7 +76,7 @@ in_child(_forked)
 
 
 def library() -> Any:  # noqa: ANN401 - not typed
-    """Return rospy.
+    """Load and return rospy.
 
     Raises:
         BackendUnavailableError: rospy is not installed.
@@ -114,7 +114,7 @@ def load_rospy(load: Callable[[str], ModuleType] = importlib.import_module) -> M
 
 
 class ServiceTexts(NamedTuple):
-    """Definitions of a service's request and response, and its MD5 sum."""
+    """Definitions of a service's request and response, and their common MD5 sum."""
 
     request: str
     answer: str
@@ -122,14 +122,14 @@ class ServiceTexts(NamedTuple):
 
 
 def message_text(name: str) -> tuple[str, str] | None:
-    """Return definition and MD5 sum of an installed message type; None if not installed."""
+    """Return the definition and MD5 sum of a message type, or None if it is not installed."""
     found = _installed_class(name, "msg")
     text, checksum = getattr(found, "_full_text", None), getattr(found, "_md5sum", None)
     return (text, checksum) if isinstance(text, str) and isinstance(checksum, str) else None
 
 
 def service_texts(name: str) -> ServiceTexts | None:
-    """Return the definition of an installed service type, such as "std_srvs/SetBool", or None."""
+    """Return the definition of a service type such as "std_srvs/SetBool", or None if it is not installed."""
     found = _installed_class(name, "srv")
     request, answer = (
         getattr(getattr(found, each, None), "_full_text", None)

@@ -1,4 +1,4 @@
-"""RosMaster: XML-RPC client for the ROS master, with timeouts. Doesn't need rospy."""
+"""RosMaster: XML-RPC client for the ROS master, with timeouts. Works without rospy."""
 
 from __future__ import annotations
 
@@ -16,18 +16,18 @@ from nep.i18n import _
 
 _CALLER = "/nep"
 _REQUEST_TIMEOUT_S = 1.0
-"""Timeout of one request to a master."""
+"""Timeout of a single request to a master."""
 _RETRY_S = 0.1
 _ROSPY_SERVICES = ("/get_loggers", "/set_logger_level")
-"""Services that every ROS node has."""
+"""Services that every ROS node provides."""
 _FAILURES = (
     OSError, xmlrpc.client.Error, http.client.HTTPException, ExpatError, ValueError, TypeError, LookupError
 )  # fmt: skip
-"""Exceptions of a request, including those caused by other servers at the address."""
+"""Exceptions of a failed request, also if the server at the address isn't a ROS master."""
 
 
 class RosMasterUnreachable(MasterUnreachable):
-    """Error when no ROS master answers at `address` within `waited_s` seconds."""
+    """No ROS master replied at `address` within `waited_s` seconds."""
 
     def __init__(self, address: str, waited_s: float) -> None:
         self.address = address
@@ -66,7 +66,10 @@ def _call(uri: str, timeout_s: float, method: str, *args: object) -> Any:  # noq
 
 
 def buses_of(uri: str, timeout_s: float) -> list[tuple[str, str, str]]:
-    """Return a node's connections: peer, direction ("i" or "o") and topic. Empty if it doesn't answer."""
+    """Return (peer, direction, topic) of a node's connections; direction is "i" or "o".
+
+    Returns an empty list if the node doesn't reply.
+    """
     try:
         buses = _call(uri, timeout_s, "getBusInfo", _CALLER)
         return [(str(each[1]), str(each[2]), str(each[4])) for each in buses]
@@ -76,7 +79,15 @@ def buses_of(uri: str, timeout_s: float) -> list[tuple[str, str, str]]:
 
 @dataclass(frozen=True)
 class RosNodes:
-    """State of a master: node names by topic or service, types by topic, addresses by node."""
+    """Snapshot of a ROS master.
+
+    Attributes:
+        publishers: Names of the publishing nodes by topic.
+        subscribers: Names of the subscribing nodes by topic.
+        services: Names of the serving nodes by service.
+        types: Message types by topic.
+        uris: Addresses by node name.
+    """
 
     publishers: Mapping[str, Sequence[str]]
     subscribers: Mapping[str, Sequence[str]]
@@ -87,7 +98,13 @@ class RosNodes:
 
 @dataclass(frozen=True)
 class Registered:
-    """Registrations of a node: topics with types, services with addresses."""
+    """Registrations of a node.
+
+    Attributes:
+        publications: (topic, type) of each publisher.
+        subscriptions: (topic, type) of each subscriber.
+        services: (service, address) of each server.
+    """
 
     publications: Sequence[Sequence[str]]
     subscriptions: Sequence[Sequence[str]]
@@ -95,14 +112,14 @@ class Registered:
 
 
 class RosMaster:
-    """ROS master at an address. Requests raise `RosMasterUnreachable` if it doesn't answer."""
+    """Client for the ROS master at `address`. Requests raise `RosMasterUnreachable` without a reply."""
 
     def __init__(self, address: str) -> None:
         self.address = address
         self.uri = f"http://{address}/"
 
     def wait(self, timeout_s: float | None) -> None:
-        """Wait until the master answers; None waits forever."""
+        """Wait until the master replies; None waits forever."""
         started = time.monotonic()
         pause = threading.Event()
         while True:
@@ -118,13 +135,13 @@ class RosMaster:
             pause.wait(_RETRY_S)
 
     def names(self, topic: str, timeout_s: float) -> tuple[tuple[str, ...], tuple[str, ...]]:
-        """Return the nodes that publish a topic, and those that subscribe to it."""
+        """Return the names of the nodes that publish a topic, and of those that subscribe to it."""
         state = self._request("getSystemState", timeout_s)
         found = [next((tuple(names) for each, names in part if each == topic), ()) for part in state[:2]]
         return found[0], found[1]
 
     def has_forgotten(self, name: str, timeout_s: float) -> bool:
-        """Return True if the master answers and doesn't know the node."""
+        """Return True if the master replies but doesn't know the node, because it was restarted."""
         try:
             _call(self.uri, timeout_s, "lookupNode", _CALLER, name)
         except _RefusedError:
@@ -134,7 +151,7 @@ class RosMaster:
         return False
 
     def register(self, name: str, uri: str, node: Registered, timeout_s: float) -> bool:
-        """Register a node again after a restart of the master; return False on failure."""
+        """Repeat a node's registrations after a restart of the master; return False on failure."""
         try:
             for topic, kind in node.publications:
                 _call(self.uri, timeout_s, "registerPublisher", name, topic, kind, uri)
@@ -148,14 +165,14 @@ class RosMaster:
         return True
 
     def uri_of(self, name: str, timeout_s: float) -> str:
-        """Return the address of a node, or ""."""
+        """Return the address of a node, or "" if it is unknown."""
         try:
             return str(_call(self.uri, timeout_s, "lookupNode", _CALLER, name))
         except _FAILURES:
             return ""
 
     def nodes(self, timeout_s: float) -> RosNodes:
-        """Return the state of the master."""
+        """Return a snapshot of the master."""
         state = self._request("getSystemState", timeout_s)
         publishers, subscribers, services = (
             {str(each): tuple(names) for each, names in part} for part in state[:3]
@@ -173,7 +190,7 @@ class RosMaster:
         return tuple(str(name) for name, _nodes in services if not str(name).endswith(_ROSPY_SERVICES))
 
     def service_uri(self, name: str, timeout_s: float) -> str:
-        """Return the address of a service, or ""."""
+        """Return the address of a service, or "" if it is unknown."""
         try:
             return str(_call(self.uri, timeout_s, "lookupService", _CALLER, name))
         except _FAILURES:

@@ -1,7 +1,7 @@
-"""RosProcess: the one ROS node of this process, shared by all its nep nodes, because rospy allows only one.
+"""RosProcess: the single ROS node of this process, shared by all its nep nodes.
 
-It is named after the first nep node and lives until the process ends. Nodes that close only unregister their
-publishers and subscribers, because rospy can't be restarted.
+rospy allows one node per process and can't be restarted. The ROS node is therefore named after the first nep
+node and lives until the process ends; a nep node that closes only unregisters its publishers and subscribers.
 """
 
 from __future__ import annotations
@@ -38,11 +38,11 @@ _REQUEST_TIMEOUT_S = 0.5
 _MASTER_CHECK_S = 1.0
 """Interval for detecting a restart of the master."""
 _MIN_TIMEOUT_S = 0.2
-"""Minimum time in seconds for a request to the master, even when the timeout has almost passed."""
+"""Minimum timeout of a request to the master in seconds, even if less time is left."""
 
 
 def ros_topic(topic: str) -> str:
-    """Return `topic` if ROS allows it. Raises `BadTopicError`."""
+    """Return `topic` if it is a valid ROS name. Raises `BadTopicError`."""
     if not _TOPIC.fullmatch(topic) or "//" in topic or topic.endswith(("/", "~")):
         raise BadTopicError(
             topic,
@@ -52,7 +52,7 @@ def ros_topic(topic: str) -> str:
 
 
 class RosShutdownError(ClosedError):
-    """Error after rospy was shut down.
+    """rospy was shut down.
 
     Causes are the program itself, 'rosnode kill', or a new node with the same name.
     """
@@ -67,7 +67,7 @@ class RosShutdownError(ClosedError):
 
 
 class RosProcess:
-    """Running rospy. Thread-safe."""
+    """The process's ROS node. Thread-safe."""
 
     def __init__(self, rospy: Any, address: str) -> None:  # noqa: ANN401 - rospy is not typed
         self.rospy = rospy
@@ -86,18 +86,18 @@ class RosProcess:
         self._published: dict[str, dict[int, Any]] = {}
         self.handshakes = Handshakes()
         self.at_shutdown: set[Callable[[], None]] = set()
-        """Callbacks for a shutdown of rospy before the end of the program."""
+        """Functions called when rospy is shut down before the program ends."""
         self._ended = threading.Event()
         rospy.on_shutdown(self._shut_down)
         threading.Thread(target=self._watch, name="nep-ros-master", daemon=True).start()
 
     @property
     def is_over(self) -> bool:
-        """True after rospy was shut down: no messages are sent or received any more."""
+        """True after rospy was shut down; messages are no longer sent or received."""
         return bool(self.rospy.core.is_shutdown_requested())
 
     def end(self) -> None:
-        """Unregister everything and shut rospy down at the end of the program."""
+        """Shut rospy down at the end of the program, which unregisters the node from the master."""
         self._ended.set()
         try:
             self.master.wait(_REQUEST_TIMEOUT_S)
@@ -113,7 +113,7 @@ class RosProcess:
                 callback()
 
     def _watch(self) -> None:
-        # Thread that detects restarts of the master until rospy ends.
+        # Thread that detects restarts of the master; runs until rospy is shut down.
         while not self._ended.wait(_MASTER_CHECK_S):
             if self.master.has_forgotten(self.name, _REQUEST_TIMEOUT_S) and self._register_again():
                 _logger.warning("the ROS master at '%s' was restarted; registered again", self.master.address)
@@ -136,9 +136,9 @@ class RosProcess:
     # ---- publishers
 
     def advertise(self, topic: str, definition: Definition, *, is_latched: bool, queue: int) -> Any:  # noqa: ANN401 - rospy is not typed
-        """Create rospy's publisher for a full name.
+        """Create and return rospy's publisher on a topic (full name).
 
-        Raises `NepError` if the process uses another type on it.
+        Raises `NepError` if the process already publishes another type on the topic.
         """
         with self._lock:
             impl = self.rospy.impl.registration.get_topic_manager().get_publisher_impl(topic)
@@ -161,7 +161,7 @@ class RosProcess:
         return made
 
     def add_publisher(self, topic: str, id_: int, publisher: Any) -> None:  # noqa: ANN401 - rospy is not typed
-        """Add a nep publisher, with the publisher returned by `advertise`."""
+        """Add a nep publisher that uses the publisher returned by `advertise`."""
         with self._lock:
             self._published.setdefault(topic, {})[id_] = publisher
 
@@ -171,10 +171,10 @@ class RosProcess:
             self._published.get(topic, {}).pop(id_, None)
 
     def publisher_on(self, topic: str) -> int | None:
-        """Return the id of the only publisher of a topic in this process.
+        """Return the id of this process's publisher on a topic, or None if it is ambiguous.
 
-        None if there are several, or others than nep's: ROS reports only the process that a message came
-        from.
+        ROS reports only the process that a message came from. The publisher is ambiguous if there are
+        several, or if the program has publishers of its own.
         """
         with self._lock:
             found = self._published.get(topic, {})
@@ -200,7 +200,7 @@ class RosProcess:
             run_with_timeout(subscriber.unregister, timeout_s)
 
     def unsent(self, publisher: Any, deadline: float) -> int:  # noqa: ANN401 - rospy is not typed
-        """Wait until rospy has sent its queue; return the number of connections with unsent messages."""
+        """Wait until rospy has sent its queues; return the number of connections with unsent messages."""
         impl = publisher.impl
         pause = threading.Event()
         while True:
@@ -210,9 +210,9 @@ class RosProcess:
             pause.wait(_POLL_S)
 
     def send(self, publisher: Any, definition: Definition, topic: str, body: bytes, room: QueueRoom) -> int:  # noqa: ANN401
-        """Publish a body; return the number of older messages dropped because a subscriber doesn't read.
+        """Publish a message body and return the number of older messages that were dropped from full queues.
 
-        A header gets the next sequence number of its topic, as rospy assigns it.
+        The header gets the next sequence number of its topic, as rospy would assign it.
         """
         message = self._class_of(definition)()
         impl = publisher.impl
@@ -229,7 +229,7 @@ class RosProcess:
         return dropped
 
     def _class_of(self, definition: Definition) -> type:
-        # Creates a message class whose instances contain encoded bodies.
+        # Creates a message class whose instances hold encoded bodies.
         made = self._classes.get(definition.name)
         if made is None:
             genpy = self.rospy.msg.genpy
@@ -252,7 +252,7 @@ class RosProcess:
     # ---- services
 
     def serve(self, service: str, kind: type, handler: Callable[[Any], Any]) -> Any:  # noqa: ANN401 - rospy is not typed
-        """Create rospy's server for a full name. Raises `NepError` if the process already has one."""
+        """Create rospy's server for a service (full name). Raises `NepError` if the process has one."""
         with self._lock:
             if self.rospy.impl.registration.get_service_manager().get_service(service) is not None:
                 raise NepError(
@@ -267,20 +267,20 @@ class RosProcess:
     # ---- connections
 
     def peer_subscribe(self, *_told: object) -> None:
-        """Process a new connection to a publisher. Called by rospy."""
+        """Handle a new connection to a publisher. Called by rospy."""
         with self.changed:
             self.changed.notify_all()
 
     def peer_unsubscribe(self, *_told: object) -> None:
-        """Do nothing when a subscriber disconnects. Called by rospy."""
+        """Ignore a disconnected subscriber. Called by rospy."""
 
     def connected_nodes(self, publisher: Any) -> tuple[str, ...]:  # noqa: ANN401 - rospy is not typed
-        """Return the names of the nodes connected to a publisher."""
+        """Return the names of the nodes that are connected to a publisher."""
         impl = publisher.impl
         return () if impl is None else tuple(str(each.endpoint_id) for each in impl.connections)
 
     def wait_for_subscribers(self, publisher: Any, topic: str, timeout_s: float) -> None:  # noqa: ANN401
-        """Wait until all registered subscribers are connected, for up to `timeout_s` seconds."""
+        """Wait up to `timeout_s` seconds until all registered subscribers are connected."""
         expected = set(self.master.names(topic, _REQUEST_TIMEOUT_S)[1])
         with self.changed:
             self.changed.wait_for(lambda: expected <= set(self.connected_nodes(publisher)), timeout_s)
@@ -288,7 +288,7 @@ class RosProcess:
     def wait_for_publishers(self, topic: str, timeout_s: float) -> None:
         """Wait until all publishers of a topic report a connection to this node.
 
-        rospy lists its own side of a connection before it is established.
+        rospy itself lists a connection before it is established.
         """
         deadline = time.monotonic() + timeout_s
         pause = threading.Event()
@@ -309,9 +309,9 @@ class RosProcess:
 
 
 def run_with_timeout(call: Callable[[], object], timeout_s: float) -> bool:
-    """Run `call` in a thread and wait; return False on timeout.
+    """Run `call` in a thread and wait for it; return False on timeout.
 
-    rospy's requests to a master have no timeout.
+    Needed because rospy's requests to a master have no timeout.
     """
     thread = threading.Thread(target=call, name="nep-ros-unregister", daemon=True)
     try:
@@ -345,9 +345,11 @@ in_child(_forked)
 
 
 def process_with(address: str, name: str, wait_s: float | None) -> RosProcess:
-    """Return the process's ROS node; start it for the node `name` if needed.
+    """Return the process's ROS node. If there is none, start it under the name `name`.
 
-    Raises `MasterUnreachable`, or `NepError` if it is connected to another master or was shut down.
+    Raises:
+        MasterUnreachable: The ROS master didn't reply within `wait_s` seconds.
+        NepError: The ROS node uses another master or was shut down.
     """
     global _process  # noqa: PLW0603 - one per process
     rospy = library()

@@ -1,4 +1,4 @@
-"""Bound for rospy's queues in bytes. rospy bounds them by number only, and drops the oldest silently."""
+"""Limit in bytes for rospy's queues; rospy limits only the number of messages."""
 
 from __future__ import annotations
 
@@ -7,18 +7,18 @@ from typing import Any
 from nep.messages.queue import MAX_BYTES
 
 _STEP_BYTES = 8 * 2**20
-"""Published bytes after which queues are measured: measuring for each message would be slow."""
+"""Published bytes after which the queues are measured; measuring them for each message would be slow."""
 
 
 class QueueRoom:
-    """Bound for the queues of one publisher's connections."""
+    """Limit in bytes for the queues of one publisher's connections."""
 
     def __init__(self, max_bytes: int = MAX_BYTES) -> None:
         self._max_bytes = max_bytes
         self._unmeasured = 0
 
     def make(self, connections: list[Any], size: int) -> int:
-        """Drop the oldest messages to make room for `size` bytes; return the number of dropped messages."""
+        """Drop the oldest messages until `size` bytes fit; return the number of dropped messages."""
         self._unmeasured += size
         is_measured = self._unmeasured >= min(_STEP_BYTES, self._max_bytes)
         if is_measured:

@@ -1,4 +1,4 @@
-"""RosClient: calls a ROS service, with a connection and a thread per call."""
+"""RosClient: calls a ROS service. Each call has its own connection and thread."""
 
 from __future__ import annotations
 
@@ -43,7 +43,7 @@ class _Call:
 
 
 class RosClient(ClientCalls[_Call]):
-    """Client with its calls in flight."""
+    """Client and its calls in flight."""
 
     def __init__(self, process: RosProcess, spec: ClientSpec, forget: Callable[[RosClient], None]) -> None:
         super().__init__(spec)
@@ -136,7 +136,7 @@ class RosClient(ClientCalls[_Call]):
         self._finish(call, outcome)
 
     def _retry_discovery(self, call: _Call) -> None:
-        # Waits first, so that a registered but unreachable server isn't tried continuously.
+        # Waits first, so that a registered but unreachable server isn't retried in a tight loop.
         left = call.deadline - time.monotonic()
         self._closed.wait(max(0.0, min(_RETRY_S, left)))
         if left <= 0.0:
@@ -202,11 +202,11 @@ class RosClient(ClientCalls[_Call]):
             return ()
 
     def counts(self) -> SubscriberCount:
-        """Return the statistics for the graph."""
+        """Return the statistics shown in the graph."""
         return SubscriberCount(self.spec.id, self._answered, self._failed)
 
     def close(self, timeout_s: float = _REQUEST_TIMEOUT_S) -> None:
-        """Unregister; calls in flight fail with `ClosedError`."""
+        """Unregister the client; calls in flight fail with `ClosedError`."""
         with self._lock:
             if self.is_closed:
                 return

@@ -1,4 +1,4 @@
-"""ServiceConnection: one call of a ROS service over TCP. rospy's own implementation has no timeout."""
+"""ServiceConnection: a single call of a ROS service over TCP. rospy's own implementation has no timeout."""
 
 from __future__ import annotations
 
@@ -19,13 +19,12 @@ _LENGTH = struct.Struct("<I")
 _HEADER_MAX_BYTES = 2**20
 _HANDSHAKE_S = 5.0
 _HANDSHAKES_MAX = 3
-"""Limit of concurrent handshakes with one server: rospy's backlog is five, and more are delayed for seconds.
-"""
+"""Limit of concurrent handshakes with one server: rospy's backlog is five; others are delayed for seconds."""
 _SLICE_S = 0.1
 
 
 class ServiceConnectionError(OSError):
-    """Error when the server has disconnected or doesn't offer this service."""
+    """The server has disconnected or doesn't offer this service."""
 
 
 class Handshakes:
@@ -37,7 +36,7 @@ class Handshakes:
 
     @contextlib.contextmanager
     def turn(self, uri: str, is_over: Callable[[], bool], deadline: float) -> Iterator[None]:
-        """Wait for a turn. Raises `TimeoutError`, and `ServiceConnectionError` when `is_over`."""
+        """Hold a handshake; wait for a free one. Raises `TimeoutError`, `ServiceConnectionError`."""
         with self._changed:
             while self._counts[uri] >= _HANDSHAKES_MAX:
                 left = deadline - time.monotonic()
@@ -58,9 +57,9 @@ class Handshakes:
 
 
 class ServiceConnection:
-    """Connection to the server at `uri`. Steps raise `TimeoutError` at `deadline`, or `OSError`.
+    """Connection to the server at `uri`, made within 5 seconds.
 
-    Connecting takes up to 5 seconds.
+    All methods raise `TimeoutError` at `deadline`, or `OSError` if the connection fails.
     """
 
     def __init__(self, uri: str, service: str, caller: str, deadline: float) -> None:
@@ -100,7 +99,7 @@ class ServiceConnection:
         return header
 
     def call(self, body: bytes) -> tuple[bool, bytes]:
-        """Send a request; return True and the response, or False and the error."""
+        """Send a request; return (True, response) or (False, error message)."""
         self._send(body)
         is_carried_out = self._receive_exactly(1) != b"\0"
         return is_carried_out, self._receive_sized(PAYLOAD_MAX_BYTES + 2**20)
@@ -136,10 +135,10 @@ class ServiceConnection:
         self._socket.settimeout(left)
 
     def end(self) -> None:
-        """Interrupt the thread that uses the connection. Callable from any thread."""
+        """Interrupt the thread that uses the connection. Thread-safe."""
         with contextlib.suppress(OSError):
             self._socket.shutdown(socket.SHUT_RDWR)
 
     def close(self) -> None:
-        """Close the connection. Call in the thread that uses it."""
+        """Close the connection. Call it in the thread that uses the connection."""
         self._socket.close()

@@ -1,4 +1,4 @@
-"""RosServer: serves a ROS service. Each connection has a thread of rospy, which waits for the reply."""
+"""RosServer: serves a ROS service. Each connection has a thread of rospy that waits for the reply."""
 
 from __future__ import annotations
 
@@ -112,12 +112,12 @@ class RosServer:
     # ---- closing
 
     def counts(self) -> PublisherCount:
-        """Return the statistics for the graph."""
+        """Return the statistics shown in the graph."""
         tally = self.tally
         return PublisherCount(self.spec.id, tally.calls, tally.bytes, tally.calls, errors=tally.errors)
 
     def begin_close(self) -> None:
-        """Unregister, and reject queued calls."""
+        """Unregister and reject queued calls."""
         with self._changed:
             if self._unregistering is not None:
                 return
@@ -139,7 +139,7 @@ class RosServer:
                 self._rospy_service.shutdown()
 
     def close(self, timeout_s: float) -> None:
-        """Close; replies within `timeout_s` seconds are sent."""
+        """Close the server; replies are still sent for up to `timeout_s` seconds."""
         deadline = time.monotonic() + timeout_s
         self.begin_close()
         if self._unregistering is not None:
@@ -153,7 +153,7 @@ class RosServer:
         self._forget(self)
 
     def forked(self) -> None:
-        """Become closed in a forked child."""
+        """Mark the server as closed in a forked child process."""
         self.is_closed = True
         self.calls.forked()
 

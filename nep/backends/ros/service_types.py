@@ -17,7 +17,7 @@ _types: dict[str, ServiceType] = {}
 
 @dataclass(frozen=True)
 class ServiceType(TypedService):
-    """Service type with its checksum."""
+    """Service type with its MD5 sum."""
 
     md5sum: str = ""
 
@@ -32,7 +32,7 @@ NEP_CALL = ServiceType(
 
 
 def installed_service(name: str) -> ServiceType:
-    """Return an installed service type, or `nep_msgs/Call`. Raises `NepError`, which names the package."""
+    """Return an installed service type, or `nep_msgs/Call`. Raises `NepError` with the package to install."""
     if name == NEP_CALL.name:
         return NEP_CALL
     if name not in _types:
@@ -45,7 +45,7 @@ def installed_service(name: str) -> ServiceType:
 
 
 def served_type(msg_type: str) -> ServiceType:
-    """Return the service type for a server's `msg_type`. Raises `NepError`."""
+    """Return the service type that serves a server's `msg_type`. Raises `NepError`."""
     if is_ros_type(msg_type):
         return installed_service(msg_type)
     if msg_type not in {"json", "msgpack"}:

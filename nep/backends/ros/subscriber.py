@@ -1,4 +1,4 @@
-"""RospySubscriber: queues messages received by rospy. They are decoded by the reader."""
+"""RospySubscriber: queues messages received by rospy; the reader decodes them."""
 
 from __future__ import annotations
 
@@ -25,12 +25,12 @@ from nep.text import escaped, shortened
 
 _logger = logging.getLogger("nep")
 _BUFFER_BYTES = 2**18
-"""Receive buffer of rospy: its default of 64 KiB is slow for images."""
+"""Receive buffer size in bytes; rospy's default of 64 KiB is slow for images."""
 _MAX_SOURCES = 1_000
 
 
 class RospyOwner(Protocol):
-    """Transport that owns a subscriber."""
+    """Transport that a subscriber belongs to."""
 
     changed: threading.Condition
 
@@ -41,7 +41,7 @@ class RospyOwner(Protocol):
         """End all waits in progress."""
 
     def forget(self, closed: Any) -> None:  # noqa: ANN401 - publishers, too
-        """Remove a closed object."""
+        """Remove a closed publisher or subscriber."""
 
 
 @dataclass
@@ -69,7 +69,7 @@ def _bytes_of(message: Any) -> bytes:  # noqa: ANN401 - rospy is not typed
 
 
 class RospySubscriber(WakingSubscriber):
-    """Subscriber to messages of any type, so that a wrong type becomes a reported problem."""
+    """Subscriber that accepts messages of any ROS type, so that a wrong type can be reported as a problem."""
 
     def __init__(self, owner: RospyOwner, process: RosProcess, spec: SubscriberSpec, max_bytes: int) -> None:
         if is_ros_type(spec.msg_type):
@@ -90,7 +90,7 @@ class RospySubscriber(WakingSubscriber):
         self._subscriber: Any = None
 
     def begin(self) -> None:
-        """Subscribe."""
+        """Subscribe at the ROS master."""
         with self._owner.changed:
             self.process.subscribed[self.topic] += 1
         self.process.at_shutdown.add(self._on_rospy_shutdown)
@@ -105,7 +105,7 @@ class RospySubscriber(WakingSubscriber):
 
     @property
     def problem(self) -> str:
-        """Problem of the newest message; empty if none."""
+        """Reason why the newest message was rejected; "" if it was accepted."""
         return self._reader_problem or self.refusals.recent_message()
 
     # ---- callbacks of rospy, in a thread per connection
@@ -216,16 +216,16 @@ class RospySubscriber(WakingSubscriber):
         return self.poll()
 
     def take_batch(self, most_bytes: int) -> list[Message]:
-        """Return the messages for one call of the sink."""
+        """Remove and return the messages for one call of the sink."""
         with self._owner.changed:
             return self.inbox.take_all(most_bytes)
 
     def report(self, problem: str) -> None:
-        """Set the reader's problem, which the graph of this process shows."""
+        """Set the reason why messages can't be decoded, shown in the graph of this process."""
         self._reader_problem = problem
 
     def forked(self) -> None:
-        """Become closed in a forked child."""
+        """Mark the subscriber as closed in a forked child process."""
         self.is_closed = True
 
     def close(self, timeout_s: float = 2.0) -> None:

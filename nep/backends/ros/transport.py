@@ -30,10 +30,9 @@ from nep.protocol.requests import NodeRecord, PublisherCount, SubscriberCount
 _logger = logging.getLogger("nep")
 _QUEUE_LENGTHS = {"image": 64, "bytes": 1000, "ros": 1000}
 _DEFAULT_QUEUE_LENGTH = 10_000
-"""Queue length per connection: rospy then drops the oldest message silently."""
+"""Queue length per connection in messages; rospy silently drops the oldest message of a full queue."""
 _BATCH_BYTES = 64 * 2**20
-"""Maximum size of a sink's batch; the inbox is smaller by this, so that both together stay within the bound.
-"""
+"""Maximum size of a sink's batch. The inbox is smaller by this size, so that both stay within the bound."""
 _BATCH_S = 0.005  # at most 200 calls of a sink per second
 
 
@@ -44,7 +43,10 @@ def _address(configuration: Configuration) -> str:
 
 
 class RospyPublisher:
-    """Publisher over rospy. `count` is nep's; a header's seq counts the messages of the whole topic."""
+    """Publisher over rospy.
+
+    `count` is the number of this publisher's messages, whereas seq in a ROS header counts all of its topic.
+    """
 
     def __init__(self, transport: RospyTransport, process: RosProcess, spec: PublisherSpec) -> None:
         self.spec = spec
@@ -73,20 +75,20 @@ class RospyPublisher:
 
     @property
     def subscribers(self) -> int:
-        """Number of connected ROS nodes; this process counts with its number of subscribers."""
+        """Number of connected ROS nodes. This process counts with the number of its subscribers."""
         connected_nodes = () if self._is_closed else self.process.connected_nodes(self._publisher)
         own = max(1, self.process.subscribed[self.topic]) if self.process.name in connected_nodes else 0
         return sum(each != self.process.name for each in connected_nodes) + own
 
     @property
     def is_heard(self) -> bool:
-        """True if any node is connected, or after rospy was shut down: `send` then raises."""
+        """True if any node is connected, and after rospy was shut down, so that `send` raises the error."""
         impl = self._publisher.impl
         return (impl is not None and bool(impl.connections)) or self.process.is_over
 
     @property
     def missing(self) -> tuple[str, ...]:
-        """Registered subscribers that aren't connected."""
+        """Names of registered subscribers that aren't connected."""
         try:
             registered = self.process.master.names(self.topic, HANDSHAKE_S)[1]
         except RosMasterUnreachable:
@@ -95,7 +97,7 @@ class RospyPublisher:
         return tuple(each.lstrip("/") for each in registered if each not in connected_nodes)
 
     def lend(self, _size_bytes: int) -> memoryview | None:
-        """Return None: rospy has no shared memory."""
+        """Return None, because rospy has no shared memory."""
         return None
 
     def skip(self) -> None:
@@ -105,13 +107,13 @@ class RospyPublisher:
             self.last_stamp_ns = time.time_ns()
 
     def report(self, problem: str) -> None:
-        """Set the problem of a payload, which the graph of this process shows."""
+        """Set the reason why payloads can't be encoded, shown in the graph of this process."""
         self.problem = problem
 
     def send(self, encoded: Encoded) -> None:
-        """Queue a message at each connection. Raises as `to_ros` does, and `ClosedError`.
+        """Add a message to the queue of each connection. Raises as `to_ros` does, and `ClosedError`.
 
-        For subscribers without room the oldest messages are dropped and counted.
+        Full queues drop their oldest messages, which are counted.
         """
         body = to_ros(self._definition.name, self.spec.codec.name, encoded)
         with self._lock:
@@ -134,12 +136,12 @@ class RospyPublisher:
                     self.spec.topic, self._drops.count, reason)  # fmt: skip
 
     def counts(self) -> PublisherCount:
-        """Return the statistics for the graph."""
+        """Return the statistics shown in the graph."""
         problem = self.problem or self._drops.recent_message()
         return PublisherCount(self.spec.id, self.count, self.bytes, self.count, self.last_stamp_ns, problem)
 
     def close(self, timeout_s: float) -> None:
-        """Wait until rospy has sent its queue, and unregister."""
+        """Wait up to `timeout_s` seconds until rospy has sent its queues, then unregister."""
         deadline = time.monotonic() + timeout_s
         with self._lock:
             if self._is_closed:
@@ -156,7 +158,7 @@ class RospyPublisher:
 
 
 class RospyTransport:
-    """Connection of one node. Raises `BackendUnavailableError` if rospy is not installed."""
+    """Connection of one node to a ROS network. Raises `BackendUnavailableError` if rospy is not installed."""
 
     def __init__(self, node: NodeRecord) -> None:
         library()
@@ -174,7 +176,7 @@ class RospyTransport:
         _transports.add(self)
 
     def publisher(self, spec: PublisherSpec) -> RospyPublisher:
-        """Create a publisher; waits up to `HANDSHAKE_S` for registered subscribers."""
+        """Create a publisher and wait up to `HANDSHAKE_S` for the registered subscribers to connect."""
         process = process_with(_address(spec.configuration), self.node.name, spec.wait_s)
         publisher = RospyPublisher(self, process, spec)
         with self._lock:
@@ -188,7 +190,7 @@ class RospyTransport:
         return publisher
 
     def subscriber(self, spec: SubscriberSpec) -> RospySubscriber:
-        """Create a subscriber; waits up to `HANDSHAKE_S` for registered publishers."""
+        """Create a subscriber and wait up to `HANDSHAKE_S` for the registered publishers to connect."""
         process = process_with(_address(spec.configuration), self.node.name, spec.wait_s)
         batch = 0 if spec.sink is None else _BATCH_BYTES
         subscriber = RospySubscriber(self, process, spec, spec.max_bytes - batch)
@@ -210,7 +212,7 @@ class RospyTransport:
             raise ClosedError(f"node '{self.node.name}'")
 
     def forget(self, closed: RospyPublisher | RospySubscriber | RosServer | RosClient) -> None:
-        """Remove a closed object."""
+        """Remove a closed publisher, subscriber, server or client."""
         with self._lock:
             self._servers = tuple(each for each in self._servers if each is not closed)
             self._clients = tuple(each for each in self._clients if each is not closed)
@@ -280,7 +282,7 @@ class RospyTransport:
         return view_of(known, own)
 
     def own(self, address: str) -> OwnNode:
-        """Return this node's part of the graph, with its statistics."""
+        """Return this node's entry for the graph, with its statistics."""
         outs: list[RospyPublisher] = [
             each for each in self._publishers if each.process.master.address == address
         ]
@@ -312,7 +314,7 @@ class RospyTransport:
             server.begin_close()
 
     def close(self, timeout_s: float) -> None:
-        """Unregister everything and join the threads. The process's ROS node stays."""
+        """Unregister everything and join the threads. The process's ROS node stays running."""
         deadline = time.monotonic() + timeout_s
         with self._lock:
             self._is_closed = True
@@ -348,7 +350,7 @@ class RospyTransport:
                 if messages and subscriber.spec.sink is not None:
                     try:
                         subscriber.spec.sink(messages)
-                    except BaseException:  # also SystemExit: the sinks' thread continues
+                    except BaseException:  # also SystemExit: the sink thread continues
                         _logger.exception("the sink of '%s' failed", subscriber.spec.topic)
             self._closing.wait(_BATCH_S)
 

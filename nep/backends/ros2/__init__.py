@@ -1,8 +1,7 @@
-"""Back end `ros2`: nodes that are ROS 2 nodes, over Cyclone DDS and rosbags, without a ROS installation.
+"""Back end `ros2`: nep nodes as ROS 2 nodes, over Cyclone DDS and rosbags. Needs no ROS installation.
 
-`names`, `message_types`, `fields` and `type_mapping` convert names and values, `participant` is this
-program's presence in DDS, and `publisher`, `subscriber`, `graph` and `transport` implement
-`nep.backends.base`.
+`names`, `message_types`, `fields` and `type_mapping` convert names and values; `participant` represents this
+process in DDS; `publisher`, `subscriber`, `graph` and `transport` implement `nep.backends.base`.
 """
 
 from nep.backends.base import Backend

@@ -12,24 +12,23 @@ from nep.errors import NepError, WrongTypeError
 from nep.i18n import _
 
 _DOMAINS = 233
-"""Number of domains; higher ones have no valid ports."""
+"""Number of domains; higher domain ids have no valid ports."""
 _SUBNET_RANGES = frozenset({"SUBNET", "SYSTEM_DEFAULT"})
 _VALID_RANGES = frozenset({"", "OFF", "LOCALHOST", *_SUBNET_RANGES})
 PARTICIPANTS_MAX = 100
 """Maximum number of participants per computer in a domain, and of ports probed without multicast."""
 _PARTICIPANTS = PARTICIPANTS_MAX - 1
 _PACKET_SIZES = "<MaxMessageSize>65500B</MaxMessageSize><FragmentSize>65000B</FragmentSize>"
-"""Large packets: 8 MB take a seventh of the time."""
+"""Packet sizes for Cyclone DDS. Large packets send 8 MB in a seventh of the time."""
 _INTERNALS = (
     "<Internal><Watermarks><WhcHigh>64MB</WhcHigh></Watermarks>"
     "<WriterLingerDuration>0s</WriterLingerDuration></Internal>"
 )
-"""Amount of data in flight before publishing blocks. Closing doesn't linger, because nep has already waited.
-"""
+"""Amount of data in flight at which publishing blocks. No lingering: nep itself waits before closing."""
 
 
 def domain(master: str | None, environment: Mapping[str, str] = os.environ) -> str:
-    """Return the domain for a node's `master`; the default is $ROS_DOMAIN_ID, then "0". Raises `NepError`."""
+    """Return the DDS domain of a node: `master`, else $ROS_DOMAIN_ID, else "0". Raises `NepError`."""
     if master is not None and not isinstance(master, str):
         raise WrongTypeError(
             _("a ROS 2 domain must be a 'str' such as '5', not a '{kind}'").format(kind=type(master).__name__)
@@ -88,12 +87,12 @@ def _peers(environment: Mapping[str, str]) -> list[str]:
 
 
 def is_loopback_only(environment: Mapping[str, str]) -> bool:
-    """Return True if only programs of this computer, or none, are discovered. This is the default."""
+    """Return True, the default, if programs of other computers are not discovered."""
     return _discovery_reach(environment) in {"nobody", "computer"}
 
 
 def configuration(environment: Mapping[str, str]) -> str | None:
-    """Return the XML configuration for Cyclone DDS; None if $CYCLONEDDS_URI has the user's own."""
+    """Return the XML configuration for Cyclone DDS, or None if $CYCLONEDDS_URI sets it."""
     if environment.get("CYCLONEDDS_URI"):
         return None
     reach = _discovery_reach(environment)

@@ -1,4 +1,4 @@
-"""Conversion between maps and rosbags' message objects, with validation that reports the field path."""
+"""Conversion between maps and rosbags' message objects. Errors contain the field path."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from nep.text import escaped
 
 _BASE, _NAME, _ARRAY = 1, 2, 3
 PLACEHOLDER = "structure_needs_at_least_one_member"
-"""Member of an empty message in DDS."""
+"""Name of the member that DDS requires in an otherwise empty message."""
 _BITS = {"int8": 8, "int16": 16, "int32": 32, "int64": 64}
 _RANGES = {
     **{name: (-(2 ** (bits - 1)), 2 ** (bits - 1) - 1) for name, bits in _BITS.items()},
@@ -25,16 +25,21 @@ _NUMBERS = {
 }
 _FLOATS = frozenset({"float32", "float64"})
 _FLOAT32_OVERFLOW = 3.4028235677973366e38
-"""Smallest number that rounds to infinity."""
+"""Smallest number that rounds to infinity as float32."""
 _OCTETS = frozenset({"uint8", "byte"})
 
 
 @dataclass(frozen=True, slots=True)
 class RosField:
-    """Field of a message; `kind` is the type of its value or of its items.
+    """Field of a message.
 
-    `length` is None for a single value, the number of items of an array, and -1 for a sequence. `size` bounds
-    a sequence and `max_text_bytes` each string; 0 is unbounded.
+    Attributes:
+        name: Name of the field.
+        kind: Type of the value, or of the items of an array or sequence.
+        is_message: True if `kind` is a message type.
+        length: Number of items of an array, -1 for a sequence, None for a single value.
+        size: Maximum number of items of a sequence; 0 is unlimited.
+        max_text_bytes: Maximum size of each string in bytes; 0 is unlimited.
     """
 
     name: str
@@ -46,7 +51,7 @@ class RosField:
 
 
 class RosFieldError(Exception):
-    """Error of the value at `path`."""
+    """The value at `path` is invalid."""
 
     def __init__(self, path: str, reason: str) -> None:
         self.path = path
@@ -55,17 +60,21 @@ class RosFieldError(Exception):
 
 
 class Types(Protocol):
-    """Registry of message definitions."""
+    """Registry of message types."""
 
     def fields(self, name: str) -> tuple[RosField, ...]:
         """Return the fields of a type."""
 
     def message_class(self, name: str) -> Any:  # noqa: ANN401 - created by rosbags
-        """Return the class of a type."""
+        """Return rosbags' class of a type."""
 
 
 def read_definition(entries: Sequence[tuple[str, Any]]) -> tuple[list[tuple[str, Any]], tuple[RosField, ...]]:
-    """Return rosbags' description with `char` as `uint8`, and the corresponding `RosField` objects."""
+    """Convert rosbags' description of a type; `char` becomes `uint8`.
+
+    Returns:
+        The converted description, and the fields.
+    """
     plain = [(name, _without_char(each)) for name, each in entries]
     return plain, tuple(_field(name, each) for name, each in plain)
 

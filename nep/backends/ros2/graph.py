@@ -1,8 +1,8 @@
 """Graph of a domain, built from DDS discovery.
 
 Nodes of this program are listed with statistics and problems. For others, DDS discovery provides names,
-topics, types and ownership, but no rates. Endpoints that belong to no ROS 2 node, such as those of plain DDS
-programs, are listed under a node named after their participant.
+topics, types and owners, but no rates. Writers and readers that belong to no ROS 2 node, such as those of
+plain DDS programs, are listed under a node named after their participant.
 """
 
 from __future__ import annotations
@@ -44,7 +44,7 @@ from nep.protocol.requests import (
 from nep.protocol.service_wire import SERVICE_TYPE, topic_of
 
 _MAX_FOREIGN = 10_000
-"""Maximum number of foreign writers and readers shown."""
+"""Maximum number of other programs' writers and readers in the graph."""
 
 
 @dataclass
@@ -64,7 +64,7 @@ class _Names:
         return known or endpoint.announced.get("neptype") or ros_type(endpoint.type)
 
     def id(self, endpoint: DdsEndpoint) -> int:
-        # The announced id, unless another endpoint announces the same.
+        # Returns the announced id, unless another endpoint announces the same one.
         announced_ids = id_of(endpoint.gid, endpoint.announced.get("nepid"))
         found = id_of(endpoint.gid, None) if announced_ids in self.ids else announced_ids
         self.ids.add(found)

@@ -1,4 +1,4 @@
-"""Access to cyclonedds and rosbags: loaded with the first node, unusable after a fork."""
+"""Access to cyclonedds and rosbags, which are loaded with the first node and can't be used after a fork."""
 
 from __future__ import annotations
 
@@ -20,13 +20,13 @@ _PARTS = ("core", "domain", "idl", "pub", "sub", "topic", "qos", "builtin")
 _MACHINES_WITH_WHEELS = frozenset({"x86_64", "amd64"})
 _DESCRIPTORS = "/proc/self/fd"
 _PORTS, _PORTS_OF_A_DOMAIN = 7400, 250
-"""Base port of domain 0, and ports per domain, as specified by the DDS wire protocol (RTPS)."""
+"""Base port of domain 0, and number of ports per domain, as the DDS wire protocol (RTPS) specifies."""
 _inherited: set[str] = set()
-"""Not empty in a forked child, where the threads of Cyclone DDS don't exist."""
+"""Names of libraries that were in use before a fork. In the child process their threads don't exist."""
 
 
 class Dds(NamedTuple):
-    """Modules of cyclonedds, which is not typed."""
+    """Modules of cyclonedds. They have no type annotations."""
 
     core: Any
     domain: Any
@@ -39,11 +39,11 @@ class Dds(NamedTuple):
 
 
 def dds(load: Callable[[str], ModuleType] = importlib.import_module) -> Dds:
-    """Return the modules of Cyclone DDS.
+    """Load and return the modules of Cyclone DDS.
 
     Raises:
         BackendUnavailableError: cyclonedds is not installed or can't be loaded.
-        NepError: The process was forked from one that uses it.
+        NepError: The process was forked from one that uses cyclonedds.
     """
     if _inherited:
         raise NepError(
@@ -77,9 +77,9 @@ def _unavailable() -> BackendUnavailableError:
 
 
 def keep_to_loopback(domain: int) -> None:
-    """Restrict the receiving sockets of a domain to loopback. Linux only.
+    """Restrict the receiving sockets of a domain to the loopback interface. Linux only.
 
-    Cyclone DDS always binds them to all addresses.
+    Needed because Cyclone DDS always binds them to all addresses.
     """
     if not sys.platform.startswith("linux"):
         return
@@ -101,7 +101,7 @@ def keep_to_loopback(domain: int) -> None:
 
 
 def has_forked() -> bool:
-    """Return True in a forked child, where DDS must not be used."""
+    """Return True in a forked child process, where DDS must not be used."""
     return bool(_inherited)
 
 

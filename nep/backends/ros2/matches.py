@@ -1,8 +1,8 @@
-"""Matches: nep programs exchange which writers and readers they have matched.
+"""Matches: nep programs tell each other which writers and readers they have matched.
 
-A DDS writer's messages reach a reader only after the reader's program has also discovered the writer, which
-DDS doesn't report to the writer. Each program therefore publishes its matches on a topic hidden from ROS 2:
-its participant's GUID, then pairs of GUIDs, an own endpoint and its match.
+A DDS writer's messages reach a reader only after the reader's program has discovered the writer, which DDS
+doesn't report to the writer. Each program therefore publishes its matches on a topic hidden from ROS 2: the
+GUID of its participant, followed by pairs of GUIDs: its own endpoint and the match.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ _MAX_PAIRS, _MAX_PARTICIPANTS = 100_000, 4096
 
 
 def matched_gids(entity: Any) -> frozenset[bytes]:  # noqa: ANN401 - cyclonedds is not typed
-    """Return the GUIDs matched by a writer or reader."""
+    """Return the GUIDs that a writer or reader has matched."""
     if hasattr(entity, "get_matched_subscriptions"):
         handles, get_data = entity.get_matched_subscriptions(), entity.get_matched_subscription_data
     else:
@@ -32,7 +32,7 @@ def matched_gids(entity: Any) -> frozenset[bytes]:  # noqa: ANN401 - cyclonedds 
 
 
 class Matches:
-    """Matches of all programs; see the module. Guarded by the participant's lock."""
+    """Matches of all programs; see the module docstring. Guarded by the participant's lock."""
 
     def __init__(self, library: Dds, types: MessageTypes, topics: DdsTopics, gid: bytes) -> None:
         self._types = types
@@ -63,7 +63,7 @@ class Matches:
         self._has_changes = True
 
     def publish_changes(self) -> None:
-        """Publish the own matches if they have changed."""
+        """Publish the matches of this program if they have changed."""
         for gid, entity in self._followed.items():
             if entity.take_status():
                 found = matched_gids(entity)
@@ -105,13 +105,18 @@ class Matches:
         )
 
     def is_confirmed(self, own: bytes, other: bytes, participant: bytes) -> bool:
-        """Return True if the other program has reported a match of `other` with `own`."""
+        """Return True if a program has reported that its endpoint `other` is matched with our endpoint `own`.
+
+        `participant` is the GUID of that program's participant.
+        """
         return self._is_own(other) or (other, own) in self._confirmed.get(participant, ())
 
     def unready(self, entities: Iterable[Any], known: Iterable[tuple[bytes, bytes, bool]]) -> set[bytes]:
         """Return the GUIDs in `known` that aren't matched on both sides.
 
-        Each item of `known` is a GUID, the GUID of its participant, and True if its program reports matches.
+        Args:
+            entities: Writers or readers of this program.
+            known: GUID of an endpoint, GUID of its participant, and True if its program reports its matches.
         """
         found = [(each.guid.bytes, matched_gids(each)) for each in entities]
         return {

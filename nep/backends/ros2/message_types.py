@@ -1,7 +1,7 @@
-"""ROS message types: definitions, and conversion between maps and CDR by rosbags.
+"""ROS 2 message types: their definitions, and conversion between maps and CDR by rosbags.
 
 rosbags includes the common packages of each ROS 2 release. `MessageTypes.add` adds a type from the text of a
-.msg file, `MessageTypes.add_folder` from a folder of such files.
+.msg file, `MessageTypes.add_folder` adds a folder of .msg files.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ from nep.errors import DecodeError, EncodeError, NepError, did_you_mean
 from nep.i18n import _
 
 FOLDERS = "NEP_ROS_MSG_PATH"
-"""Environment variable with folders of .msg files."""
+"""Environment variable that lists folders of .msg files."""
 _MAX_FILE_BYTES = 2**20
 _MAX_FILES = 10_000
 _WIDE = "wstring"
@@ -70,11 +70,11 @@ class MessageTypes:
 
     @property
     def gid_bytes(self) -> int:
-        """Length of GUIDs in the `ros_discovery_info` of this release."""
+        """Length in bytes of a GUID in this release's `ros_discovery_info`."""
         return self._fields[_GID][0].size if _GID in self._fields else 24
 
     def checked(self, msg_type: str) -> str:
-        """Return the full name of a known type. Raises `NepError` for an unknown one."""
+        """Return the full name of a type. Raises `NepError` if the type is unknown."""
         name = type_name(msg_type)
         if name in self._left_out and name not in self._fields:
             raise self._left_out[name]
@@ -160,10 +160,10 @@ class MessageTypes:
                 self._read_definitions()
 
     def add_folder(self, folder: Path) -> None:
-        """Add all .msg files in a folder, such as `my_robot/msg/Arm.msg`.
+        """Add all .msg files of a folder, such as `my_robot/msg/Arm.msg`.
 
-        The package of a file outside a `msg` folder is the name of its folder. Errors in a file are reported
-        when its type is used; raises as `add` does if no file is valid.
+        The package of a file outside a `msg` folder is the name of its folder. An error in a file is reported
+        when its type is used. Raises as `add` does if no file is valid.
         """
         texts: dict[str, str] = {}
         for path in sorted(folder.rglob("*.msg")):

@@ -1,4 +1,4 @@
-"""Alerts for writers and readers of one topic that DDS doesn't match because of type or QoS.
+"""Alerts for writers and readers of a topic that DDS doesn't match because their type or QoS differs.
 
 DDS itself reports this only in the program's log, if at all.
 """
@@ -14,9 +14,9 @@ from nep.i18n import _
 from nep.protocol.graph_view import Alert
 
 _MAX_NAMES = 3
-"""Maximum number of nodes named in an alert."""
+"""Maximum number of node names in an alert."""
 _MAX_ENDPOINTS = 100
-"""Maximum number of a topic's writers, and of its readers, that are compared."""
+"""Maximum number of writers, and of readers, that are compared per topic."""
 
 
 @dataclass(frozen=True)

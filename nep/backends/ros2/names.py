@@ -13,7 +13,7 @@ _TOPIC = re.compile(r"/?[A-Za-z_]\w*(/[A-Za-z_]\w*)*", re.ASCII)
 _TYPE = re.compile(r"([A-Za-z]\w*)(/msg)?/([A-Z]\w*)", re.ASCII)
 _DDS_TYPE = re.compile(r"(\w+)::msg::dds_::(\w+)_", re.ASCII)
 _PARAMETERS = re.compile(r"(/?nep/parameters/)(\d[0-9a-f]{15})", re.ASCII)
-"""Parameter topics of nodes whose id starts with a digit, which ROS 2 doesn't allow after a "/"."""
+"""Parameter topics of nodes whose id starts with a digit. ROS 2 doesn't allow a digit after "/"."""
 _ROS_PARAMETERS = re.compile(r"(/nep/parameters/)_(\d[0-9a-f]{15})", re.ASCII)
 _SERVICE_TYPE = re.compile(r"([A-Za-z]\w*)(/srv)?/([A-Z]\w*)", re.ASCII)
 _DDS_REQUEST = re.compile(r"(\w+)::srv::dds_::(\w+)_Request_", re.ASCII)
@@ -22,7 +22,7 @@ _NO_NAME = re.compile(r"\W", re.ASCII)
 
 
 def dds_topic(topic: str) -> str:
-    """Return the DDS topic: `rt/chatter` for "chatter" and "/chatter". Raises `BadTopicError`."""
+    """Return the DDS topic of a topic: `rt/chatter` for "chatter" and "/chatter". Raises `BadTopicError`."""
     found = _PARAMETERS.fullmatch(topic)
     if found is not None:
         topic = f"{found[1]}_{found[2]}"
@@ -38,7 +38,7 @@ def dds_topic(topic: str) -> str:
 
 
 def ros_topic(topic: str) -> str | None:
-    """Return the ROS topic: `/chatter` for "rt/chatter"; None for other DDS topics."""
+    """Return the topic of a DDS topic: `/chatter` for "rt/chatter"; None for DDS topics outside ROS 2."""
     return _as_nep_has_it(topic[2:]) if topic.startswith("rt/") else None
 
 
@@ -54,7 +54,7 @@ def is_type_name(msg_type: str) -> bool:
 
 
 def type_name(msg_type: str) -> str:
-    """Return the full name, `std_msgs/msg/String`, for both forms. Raises `NepError`."""
+    """Return the full name of a type: `std_msgs/msg/String`, for both forms. Raises `NepError`."""
     found = _TYPE.fullmatch(msg_type)
     if found is None:
         raise NepError(
@@ -66,7 +66,7 @@ def type_name(msg_type: str) -> str:
 
 
 def dds_type(ros_type: str) -> str:
-    """Return the DDS type, such as `std_msgs::msg::dds_::String_`."""
+    """Return the DDS type of a ROS type, such as `std_msgs::msg::dds_::String_`."""
     package, kind, name = ros_type.split("/")
     return f"{package}::{kind}::dds_::{name}_"
 
@@ -81,25 +81,25 @@ def dds_service(service: str) -> tuple[str, str]:
 
 
 def ros_service(topic: str) -> str | None:
-    """Return the service: `/add` for "rq/addRequest"; None for other DDS topics."""
+    """Return the service of a request topic: `/add` for "rq/addRequest"; None for other DDS topics."""
     found = _REQUESTS.fullmatch(topic)
     return None if found is None else _as_nep_has_it(found[1])
 
 
 def service_type_of(dds_type: str) -> str | None:
-    """Return the service type, `std_srvs/srv/SetBool`, for the DDS type of its requests; otherwise None."""
+    """Return the service type, `std_srvs/srv/SetBool`, whose requests have this DDS type, or None."""
     found = _DDS_REQUEST.fullmatch(dds_type)
     return None if found is None else f"{found[1]}/srv/{found[2]}"
 
 
 def service_type_name(msg_type: str) -> str | None:
-    """Return the full name, `std_srvs/srv/SetBool`, for both forms; None for other names."""
+    """Return the full name of a service type, `std_srvs/srv/SetBool`, for both forms, or None."""
     found = _SERVICE_TYPE.fullmatch(msg_type)
     return None if found is None else f"{found[1]}/srv/{found[3]}"
 
 
 def ros_type(dds_type: str) -> str:
-    """Return the ROS type, `std_msgs/msg/String`, for a DDS type; unchanged if it isn't from ROS 2."""
+    """Return the ROS type of a DDS type: `std_msgs/msg/String`; unchanged if the type isn't from ROS 2."""
     found = _DDS_TYPE.fullmatch(dds_type)
     return dds_type if found is None else f"{found[1]}/msg/{found[2]}"
 
@@ -112,11 +112,11 @@ def split_node_name(name: str) -> tuple[str, str]:
 
 
 def user_data(entries: Mapping[str, str]) -> bytes:
-    """Encode entries as `key=value;`."""
+    """Encode entries of USER_DATA as `key=value;`."""
     return "".join(f"{key}={value};" for key, value in entries.items()).encode("ascii")
 
 
 def user_data_of(data: bytes) -> dict[str, str]:
-    """Decode such entries; malformed ones are skipped."""
+    """Decode the entries of USER_DATA. Malformed entries are skipped."""
     entries = (entry.partition("=") for entry in data.decode("ascii", "replace").split(";"))
     return {key: value for key, _equals, value in entries if key and value}

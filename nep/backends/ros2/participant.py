@@ -1,6 +1,6 @@
-"""Participant: this program in one DDS domain, shared by its nodes. A thread of its own reads for them.
+"""Participant: this process in one DDS domain, shared by its nodes. Its thread reads for all of them.
 
-Other participants learn its nodes and their writers and readers from `ros_discovery_info`, as in ROS 2. The
+As in ROS 2, `ros_discovery_info` announces the nodes and their writers and readers to other participants. The
 USER_DATA of a writer or reader contains the type hash for ROS 2, and for other nep programs the ids of the
 node and of the publisher or subscriber.
 """
@@ -40,18 +40,18 @@ _logger = logging.getLogger("nep")
 _INFO = "rmw_dds_common/msg/ParticipantEntitiesInfo"
 _INFO_TOPIC = "ros_discovery_info"
 _MAX_PARTICIPANTS = 4096
-"""Maximum number of other participants remembered."""
+"""Maximum number of other participants that are tracked."""
 _PARTICIPANT_FILES = 16
-"""File descriptors per participant."""
+"""Number of file descriptors per participant."""
 _SETTLE_S = 0.3
-"""Seconds after which a new participant knows the existing ones, which respond within milliseconds."""
+"""Time in seconds after which a new participant has discovered the others, which respond in milliseconds."""
 _POLL_S = 0.01
 _READ_MAX = 10_000
 
 
 @dataclass(frozen=True)
 class RosNode:
-    """Node in `ros_discovery_info`; `gids` are those of its writers and readers."""
+    """Node in `ros_discovery_info`, with the GUIDs of its writers and readers."""
 
     name: str
     gids: frozenset[bytes]
@@ -59,7 +59,7 @@ class RosNode:
 
 @dataclass(frozen=True)
 class DdsEndpoint:
-    """Discovered writer or reader, possibly of this program. `announced` has the entries of its USER_DATA."""
+    """Discovered writer or reader, also of this program. `announced` has the entries of its USER_DATA."""
 
     gid: bytes
     participant: bytes
@@ -70,12 +70,12 @@ class DdsEndpoint:
     announced: dict[str, str]
 
     def is_of(self, kind: str, type_hash: str) -> bool:
-        """Return True if it has this type, and announces no other definition of it."""
+        """Return True if the endpoint has this type and doesn't announce another definition of the type."""
         return self.type == kind and self.announced.get("typehash", type_hash) == type_hash
 
 
 class Local(Protocol):
-    """Node of this process."""
+    """Node of this process, as its participant uses it."""
 
     node: NodeRecord
 
@@ -99,63 +99,63 @@ class Local(Protocol):
         """Return the CPU load of the process, as a share of one core."""
 
     def endpoints_changed(self) -> None:
-        """Process changed endpoints. Runs in the participant's thread, with its lock held."""
+        """Handle added or removed endpoints. Called in the participant's thread, with its lock held."""
 
 
 class LocalPublisher(Protocol):
-    """Publisher of this process."""
+    """Publisher of this process, as its participant uses it."""
 
     spec: PublisherSpec
 
     @property
     def record(self) -> PublisherRecord:
-        """Record for the graph."""
+        """Registration record of the publisher, for the graph."""
 
     @property
     def counts(self) -> PublisherCount:
-        """Statistics for the graph."""
+        """Statistics shown in the graph."""
 
 
 class LocalSubscriber(Protocol):
-    """Subscriber of this process."""
+    """Subscriber of this process, as its participant uses it."""
 
     spec: SubscriberSpec
 
     @property
     def record(self) -> SubscriberRecord:
-        """Record for the graph."""
+        """Registration record of the subscriber, for the graph."""
 
     @property
     def counts(self) -> SubscriberCount:
-        """Statistics for the graph."""
+        """Statistics shown in the graph."""
 
 
 class LocalServer(Protocol):
-    """Server of this process."""
+    """Server of this process, as its participant uses it."""
 
     spec: ServerSpec
 
     @property
     def record(self) -> PublisherRecord:
-        """Record for the graph."""
+        """Registration record of the server, for the graph."""
 
     @property
     def counts(self) -> PublisherCount:
-        """Statistics for the graph."""
+        """Statistics shown in the graph."""
 
 
 class LocalClient(Protocol):
-    """Client of this process."""
+    """Client of this process, as its participant uses it."""
 
     spec: ClientSpec
 
     @property
     def record(self) -> SubscriberRecord:
-        """Record for the graph."""
+        """Registration record of the client, for the graph."""
 
     @property
     def counts(self) -> SubscriberCount:
-        """Statistics for the graph."""
+        """Statistics shown in the graph."""
 
 
 @dataclass
@@ -165,7 +165,7 @@ class _Member:
 
 
 class Participant:
-    """Participant of a domain; see the module. Raises `NepError` if Cyclone DDS can't start."""
+    """Participant of a DDS domain. Raises `NepError` if Cyclone DDS can't start."""
 
     def __init__(self, number: int) -> None:
         self.number = number
@@ -206,7 +206,7 @@ class Participant:
             keep_to_loopback(self.number)
         self.gid = self.entity.guid.bytes
         self.topics = DdsTopics(self.dds, self.types, self.entity)
-        """Topics; guarded by `changed`."""
+        """DDS topics; guarded by `changed`."""
         self._waitset = core.WaitSet(self.entity)
         self._guard = core.GuardCondition(self.entity)
         self._waitset.attach(self._guard)
@@ -243,11 +243,11 @@ class Participant:
             return None  # the program has already created the domain, with its own settings
 
     def qos(self, *policies: Any) -> Any:  # noqa: ANN401 - cyclonedds is not typed
-        """Combine policies to a Qos object."""
+        """Return a Qos object with these policies."""
         return self.dds.qos.Qos(*policies)
 
     def wait_for_discovery(self) -> None:
-        """Wait until existing participants are discovered. Returns at once if that was done."""
+        """Wait until existing participants are discovered. Returns immediately after the first time."""
         if self._is_settled:
             return
         with self.changed:
@@ -277,7 +277,7 @@ class Participant:
             self._publish_nodes_locked()
 
     def remove(self, node_id: str) -> bool:
-        """Remove a node; return True if it was the last."""
+        """Remove a node; return True if it was the last one."""
         with self.changed:
             self._members.pop(node_id, None)
             if self._members:
@@ -285,7 +285,7 @@ class Participant:
             return not self._members
 
     def assign(self, node_id: str, kind: str, entity: Any) -> None:  # noqa: ANN401 - cyclonedds is not typed
-        """Assign a "writer" or "reader" to a node."""
+        """Assign a writer or reader (`kind`) to a node."""
         with self.changed:
             if node_id in self._members:
                 self._members[node_id].gids[kind].add(entity.guid.bytes)
@@ -294,7 +294,7 @@ class Participant:
             self._waitset.attach(entity)
 
     def withdraw(self, node_id: str, kind: str, entity: Any) -> None:  # noqa: ANN401 - cyclonedds is not typed
-        """Remove and delete a "writer" or "reader"."""
+        """Remove a writer or reader (`kind`) from a node and delete it."""
         with self.changed:
             if node_id in self._members:
                 self._members[node_id].gids[kind].discard(entity.guid.bytes)
@@ -347,14 +347,14 @@ class Participant:
         )
 
     def names_of(self, gids: Iterable[bytes]) -> tuple[str, ...]:
-        """Return the names of the nodes that own these foreign writers and readers."""
+        """Return the names of the nodes of other programs that own these writers and readers."""
         wanted = set(gids)
         with self.changed:
             nodes = [node for others in self._others.values() for node in others if node.gids & wanted]
         return tuple(sorted({each.name for each in nodes}))
 
     def own_gids(self) -> dict[bytes, str]:
-        """Return the GUIDs of this process's writers and readers with the names of their nodes."""
+        """Return the GUIDs of this process's writers and readers, each with the name of its node."""
         with self.changed:
             return {
                 gid: member.local.node.name
@@ -370,7 +370,7 @@ class Participant:
             return tuple(each.local for each in self._members.values())
 
     def others(self, alive: frozenset[bytes]) -> dict[bytes, tuple[RosNode, ...]]:
-        """Return the nodes of other participants in `alive`; remove all others."""
+        """Return the nodes of other participants. Participants that are not in `alive` are removed."""
         with self.changed:
             self._others = {gid: nodes for gid, nodes in self._others.items() if gid in alive}
             return dict(self._others)
@@ -378,7 +378,7 @@ class Participant:
     # ---- discovery
 
     def participants(self, *, with_nodes: bool = False) -> frozenset[bytes]:
-        """Return the GUIDs of all participants of the domain, or of those with ROS 2 nodes."""
+        """Return the GUIDs of all participants of the domain, or only of those with ROS 2 nodes."""
         core, builtin = self.dds.core, self.dds.builtin
         with self.changed:
             reader = builtin.BuiltinDataReader(self.entity, builtin.BuiltinTopicDcpsParticipant)
@@ -424,7 +424,7 @@ class Participant:
     # ---- the thread
 
     def watch(self, reader: Any, condition: Any, read: Callable[[], None]) -> None:  # noqa: ANN401 - see above
-        """Call `read` in the participant's thread whenever `condition` is true."""
+        """Register a function that the participant's thread calls whenever `condition` becomes true."""
         with self.changed:
             self._reads[id(reader)] = (reader, condition, read)
             self._waitset.attach(condition)
@@ -456,11 +456,11 @@ class Participant:
         return self._is_closing
 
     def is_in_its_thread(self) -> bool:
-        """Return True in the participant's thread."""
+        """Return True if called in the participant's thread."""
         return threading.current_thread() is self._thread
 
     def has_closed(self) -> bool:
-        """Return True once `close` was called."""
+        """Return True after `close` was called."""
         return self._is_closing
 
     def close(self) -> None:
@@ -516,7 +516,7 @@ _lock = threading.Lock()
 
 
 def join(local: Local, number: int) -> Participant:
-    """Return the process's participant in a domain and add a node. Raises as `Participant` does."""
+    """Add a node to the process's participant in a domain; return the participant. Raises `NepError`."""
     with _lock:
         if number not in _participants:
             _participants[number] = Participant(number)
@@ -525,7 +525,7 @@ def join(local: Local, number: int) -> Participant:
 
 
 def leave(participant: Participant, node_id: str) -> None:
-    """Remove a closed node, and close the participant with the last one."""
+    """Remove a closed node from a participant. The participant is closed with its last node."""
     with _lock:
         if participant.remove(node_id):
             if _participants.get(participant.number) is participant:

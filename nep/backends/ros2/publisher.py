@@ -23,21 +23,24 @@ from nep.protocol.requests import PublisherCount, PublisherRecord
 _logger = logging.getLogger("nep")
 _PLAIN_TYPE = re.compile(r"[\w./-]{1,100}", re.ASCII)
 _READY_DELAY_S = 0.1
-"""Seconds that programs without nep need to get ready after discovery on both sides."""
+"""Time in seconds that programs without nep need after discovery until they can receive."""
 _POLL_S = 0.01
 
 
 def wait_for_matches(
     participant: Participant, known: Sequence[DdsEndpoint], entities: Callable[[], Sequence[Any]]
 ) -> tuple[str, ...]:
-    """Wait until `known` endpoints and ours are matched; return the names of nodes that aren't.
+    """Wait up to `HANDSHAKE_S` until the `known` endpoints are matched with ours.
 
-    Waits up to `HANDSHAKE_S`. Programs without nep don't report their matches, so they get a fixed time.
+    Programs without nep don't report their matches, so a fixed time is waited for them.
 
     Args:
         participant: Participant of this process.
         known: Endpoints to wait for.
         entities: Returns our writers or readers.
+
+    Returns:
+        The names of the nodes that are not matched.
     """
     deadline = time.monotonic() + HANDSHAKE_S
     expected = [(each.gid, each.participant, "nepid" in each.announced) for each in known]
@@ -114,13 +117,13 @@ class Ros2Publisher:
         ]
         try:
             self.missing = wait_for_matches(participant, wanted, lambda: [self._writer])
-        except BaseException:  # also Ctrl+C: the caller would have nothing to close
+        except BaseException:  # also Ctrl+C: the caller has no object to close yet
             self.finish(0.0)
             raise
 
     @property
     def record(self) -> PublisherRecord:
-        """Record for the graph."""
+        """Registration record of the publisher, for the graph."""
         spec = self.spec
         return PublisherRecord(
             spec.id, spec.topic, spec.msg_type, spec.codec.name, ("ros2",), spec.is_latched
@@ -128,12 +131,12 @@ class Ros2Publisher:
 
     @property
     def counts(self) -> PublisherCount:
-        """Statistics for the graph."""
+        """Statistics shown in the graph."""
         return PublisherCount(self.spec.id, self.count, self._bytes, self.count, self._stamp_ns, self.problem)
 
     @property
     def subscribers(self) -> int:
-        """Number of matched subscribers; two readers of one nep subscriber count as one."""
+        """Number of matched subscribers. The two readers of a nep subscriber count as one."""
         with self._participant.changed:
             if self._is_closed:
                 return 0
@@ -159,15 +162,15 @@ class Ros2Publisher:
             self._stamp_ns = time.time_ns()
 
     def report(self, problem: str) -> None:
-        """Set the problem of a payload, which the graph of this program shows."""
+        """Set the reason why payloads can't be encoded, shown in the graph of this program."""
         self.problem = problem
 
     def lend(self, size_bytes: int) -> memoryview | None:  # noqa: ARG002 - no shared memory
-        """Return None: payloads are copied."""
+        """Return None, because payloads are copied."""
         return None
 
     def send(self, encoded: Encoded) -> None:
-        """Publish a message. Blocks for up to 0.1 s while a reader is far behind."""
+        """Publish a message. Blocks for up to 0.1 s if the queue of a slow reader is full."""
         cdr = self._mapping.pack(encoded)
         sample = sample_of(self._kind, cdr)
         if self._is_closed:
@@ -191,11 +194,11 @@ class Ros2Publisher:
             self._bytes += len(encoded.data)
 
     def close(self, timeout_s: float) -> None:
-        """Wait for acknowledgements and close. Called by the publisher."""
+        """Wait up to `timeout_s` seconds for acknowledgements and close. Called once, by the publisher."""
         self._on_close(self, timeout_s)
 
     def finish(self, timeout_s: float) -> None:
-        """Wait up to `timeout_s` seconds for acknowledgements and close (idempotent)."""
+        """Wait up to `timeout_s` seconds for acknowledgements and close. Idempotent."""
         if self._is_closed or has_forked():
             return
         if self._participant.has_closed():

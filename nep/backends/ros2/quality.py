@@ -21,10 +21,10 @@ from nep.backends.ros2.type_mapping import CDR
 QUALITIES = ("reliable", "best_effort", "sensor")
 _SENSOR_DEPTH = 5
 _BLOCKING_NS = 100_000_000
-"""Maximum time that a message waits for room before it is lost: the default of DDS."""
+"""Maximum time in nanoseconds that a message waits for room in a queue before it is lost; DDS's default."""
 _DEPTH_BY_CODEC = {"image": 16, "bytes": 200, CDR: 200}
 _DEFAULT_DEPTH = 8192
-"""ROS 2's default of 10 would lose bursts of small messages."""
+"""Default queue depth in messages. The default of ROS 2, 10, would lose bursts of small messages."""
 _UNLIMITED = -1
 
 
@@ -36,7 +36,7 @@ def depth_of(quality: str, codec: str) -> int:
 def policies_of(
     library: Dds, quality: str, depth: int, *, is_latched: bool, announced: bytes, history: int = 1
 ) -> tuple[Any, ...]:
-    """Return the policies of a writer or reader; `history` messages are kept for late readers."""
+    """Return the QoS policies of a writer or reader. `history` messages are kept for late readers."""
     policies = policy(library)
     is_reliable = quality in ("", "reliable")
     found = [

@@ -1,8 +1,8 @@
-"""Ros2Subscriber: a DDS reader, and a second one if a publisher latches.
+"""Ros2Subscriber: a DDS reader, and a second one for latching publishers.
 
 A TRANSIENT_LOCAL reader isn't matched with volatile writers, and a VOLATILE reader doesn't receive older
 messages. The first reader is therefore volatile; a second one is added when a latching publisher is
-discovered. Messages received by both count once.
+discovered. A message received by both is counted once.
 """
 
 from __future__ import annotations
@@ -34,11 +34,11 @@ _logger = logging.getLogger("nep")
 _BATCH = 256
 _BATCH_BYTES = 64 * 2**20
 _MAX_SOURCES = 4096
-"""Maximum number of publishers remembered."""
+"""Maximum number of publishers that are tracked."""
 
 
 def id_of(gid: bytes, announced: str | None) -> int:
-    """Return the id of a publisher or subscriber: the announced one, or one derived from its GUID."""
+    """Return the id of a publisher or subscriber: the announced one, else one derived from its GUID."""
     try:
         number = int(announced or "", 16)
     except ValueError:
@@ -49,7 +49,7 @@ def id_of(gid: bytes, announced: str | None) -> int:
 
 
 class ReaderOwner(Protocol):
-    """Transport that owns the subscriber."""
+    """Transport that a subscriber belongs to."""
 
     node: NodeRecord
     changed: threading.Condition
@@ -66,13 +66,13 @@ class ReaderOwner(Protocol):
 
 @dataclass
 class _Source:
-    # Publisher of received messages.
+    # Publisher whose messages were received.
     id: int
     kind: MessageKind
     newest_ns: int = -1
     is_caught_up: bool = False
     held: list[tuple[int, Message]] = field(default_factory=list)
-    """Messages received before the history, with their time stamps."""
+    """Messages with their time stamps that arrived before the publisher's history and are held back."""
 
 
 class Ros2Subscriber(WakingSubscriber):
@@ -109,7 +109,7 @@ class Ros2Subscriber(WakingSubscriber):
                 self._add_reader_locked(is_latched=True)
         try:
             wait_for_matches(participant, writers, lambda: self._readers)
-        except BaseException:  # also Ctrl+C: the caller would have nothing to close
+        except BaseException:  # also Ctrl+C: the caller has no object to close yet
             self.close()
             raise
 
@@ -133,7 +133,7 @@ class Ros2Subscriber(WakingSubscriber):
         participant.watch(reader, ready, lambda: self._read(reader, ready))
 
     def update_latched_reader(self) -> None:
-        """Add a second reader if a latching publisher has appeared. Runs in the participant's thread."""
+        """Add the second reader if a latching publisher has appeared. Runs in the participant's thread."""
         if not self._has_latched and not self.is_closed:
             for handle in self._readers[0].get_matched_publications():
                 if self._source(self._readers[0], handle).kind.is_latched:
@@ -256,13 +256,13 @@ class Ros2Subscriber(WakingSubscriber):
         return self.poll()
 
     def take_batch(self) -> list[Message]:
-        """Return the messages for one call of the sink."""
+        """Remove and return the messages for one call of the sink."""
         with self._transport.changed:
             return self.inbox.take_all(_BATCH_BYTES)
 
     @property
     def lost(self) -> int | None:
-        """Number of messages lost according to DDS, or dropped here."""
+        """Number of messages that DDS reports as lost, plus those dropped from the full queue."""
         with self._participant.changed:
             return self._lost_before + self._lost_now() + self._dropped
 
@@ -273,26 +273,26 @@ class Ros2Subscriber(WakingSubscriber):
 
     @property
     def record(self) -> SubscriberRecord:
-        """Record for the graph."""
+        """Registration record of the subscriber, for the graph."""
         return SubscriberRecord(self.spec.id, self.spec.topic, self.spec.msg_type)
 
     @property
     def counts(self) -> SubscriberCount:
-        """Statistics for the graph."""
+        """Statistics shown in the graph."""
         return SubscriberCount(self.spec.id, self.received, self.lost, self.problem)
 
     @property
     def gids(self) -> frozenset[bytes]:
-        """GUIDs of its readers."""
+        """GUIDs of the subscriber's readers."""
         with self._participant.changed:
             return frozenset() if self.is_closed else frozenset(each.guid.bytes for each in self._readers)
 
     def report(self, problem: str) -> None:
-        """Set the reader's problem, which the graph of this program shows."""
+        """Set the reason why messages can't be decoded, shown in the graph of this program."""
         self.problem = problem
 
     def forked(self) -> None:
-        """Become closed in a forked child."""
+        """Mark the subscriber as closed in a forked child process."""
         self.is_closed = True
 
     def close(self) -> None:

@@ -1,7 +1,7 @@
-"""DdsTopics: topics of Cyclone DDS, and sample classes whose content is already CDR.
+"""DdsTopics: topics of Cyclone DDS whose samples are already encoded as CDR.
 
-A class has the members of its ROS message, for the type description in discovery. Encoding and decoding are
-done by rosbags.
+The class of a topic's samples has the members of the ROS message, for the type description in discovery.
+rosbags does the encoding and decoding.
 """
 
 from __future__ import annotations
@@ -28,21 +28,21 @@ class DdsTopics:
         self._topics: dict[tuple[str, str], Any] = {}
 
     def topic(self, name: str, ros_type: str) -> Any:  # noqa: ANN401 - cyclonedds is not typed
-        """Return the DDS topic of this name, for samples of a ROS type in CDR."""
+        """Return the DDS topic with this name, whose samples are CDR of a ROS type."""
         key = (name, ros_type)
         if key not in self._topics:
             self._topics[key] = self._dds.topic.Topic(self._entity, name, self.sample_class(ros_type))
         return self._topics[key]
 
     def service_topic(self, name: str, ros_type: str) -> Any:  # noqa: ANN401 - cyclonedds is not typed
-        """Return the topic of a service's requests or responses."""
+        """Return the DDS topic for a service's requests or responses."""
         key = (name, ros_type)
         if key not in self._topics:
             self._topics[key] = self._dds.topic.Topic(self._entity, name, self.service_class(ros_type))
         return self._topics[key]
 
     def state_writer(self, name: str, ros_type: str) -> Any:  # noqa: ANN401 - cyclonedds is not typed
-        """Create a writer whose last sample is kept for late readers."""
+        """Create a writer that keeps its last sample for late readers."""
         policies = self._dds.qos.Policy
         last = policies.History.KeepLast(1)
         history = (last, policies.DurabilityService(0, last, -1, -1, -1))
@@ -51,7 +51,7 @@ class DdsTopics:
         )
 
     def state_reader(self, name: str, ros_type: str) -> Any:  # noqa: ANN401 - cyclonedds is not typed
-        """Create a reader for the samples of state writers."""
+        """Create a reader that also receives the last sample of each `state_writer`."""
         history = self._dds.qos.Policy.History.KeepLast(1000)
         return self._dds.sub.DataReader(
             self._entity, self.topic(name, ros_type), self._state_qos(ros_type, history)
@@ -105,12 +105,12 @@ class DdsTopics:
         return hints.sequence[item, field.size] if field.size else hints.sequence[item]
 
     def clear(self) -> None:
-        """Release all topics, when the participant is closed."""
+        """Release all topics. Called when the participant is closed."""
         self._topics.clear()
 
 
 def sample_of(kind: Any, cdr: bytes) -> Any:  # noqa: ANN401 - created dynamically
-    """Return a sample with this content."""
+    """Return a sample of class `kind` with this content."""
     created = kind.__new__(kind)
     created.cdr = cdr
     return created

@@ -30,7 +30,7 @@ _BATCH_S = 0.005  # at most 200 calls of a sink per second
 
 
 class Ros2Transport:
-    """Connection of one node. Raises `BackendUnavailableError` if its packages are not installed."""
+    """Connection of one node to a DDS domain. Raises `BackendUnavailableError` without its packages."""
 
     def __init__(self, node: NodeRecord) -> None:
         dds()
@@ -88,12 +88,12 @@ class Ros2Transport:
             raise
 
     def endpoints_changed(self) -> None:
-        """Process changed endpoints. Runs in the participant's thread, with its lock held."""
+        """Handle added or removed endpoints. Called in the participant's thread, with its lock held."""
         for each in self._subscribers:
             each.update_latched_reader()
 
     def publisher(self, spec: PublisherSpec) -> Ros2Publisher:
-        """Create a writer; returns when it is matched with the known readers."""
+        """Create a writer and wait until it is matched with the known readers."""
         with self._closed_errors():
             participant = self._join_domain(spec.configuration)
             publisher = Ros2Publisher(participant, self.node.id, spec, self._close_publisher)
@@ -105,7 +105,7 @@ class Ros2Transport:
         raise ClosedError(f"node '{self.node.name}'")
 
     def subscriber(self, spec: SubscriberSpec) -> Ros2Subscriber:
-        """Create a reader; returns when it is matched with the known writers."""
+        """Create a reader and wait until it is matched with the known writers."""
         with self._closed_errors():
             participant = self._join_domain(spec.configuration)
             subscriber = Ros2Subscriber(self, participant, spec)
@@ -122,7 +122,7 @@ class Ros2Transport:
         raise ClosedError(f"node '{self.node.name}'")
 
     def server(self, spec: ServerSpec) -> Ros2Server:
-        """Create a server; returns when it is matched with the known clients."""
+        """Create a server and wait until it is matched with the known clients."""
         with self._closed_errors():
             participant = self._join_domain(spec.configuration)
             server = Ros2Server(participant, self.node.id, spec, self._forget_service)
@@ -134,7 +134,7 @@ class Ros2Transport:
         raise ClosedError(f"node '{self.node.name}'")
 
     def client(self, spec: ClientSpec) -> Ros2Client:
-        """Create a client; returns when it is matched with the known servers."""
+        """Create a client and wait until it is matched with the known servers."""
         with self._closed_errors():
             participant = self._join_domain(spec.configuration)
             client = Ros2Client(participant, self.node.id, spec, self._deadlines, self._forget_service)
@@ -218,14 +218,14 @@ class Ros2Transport:
         return self._load.ratio()
 
     def begin_close(self) -> None:
-        """Reject calls. Messages need no flushing."""
+        """Reject queued and new calls. Messages don't need flushing."""
         with self._lock:
             self._is_closing = True
         for server in self._servers:
             server.begin_close()
 
     def close(self, timeout_s: float) -> None:
-        """Close everything, leave the domain and join the threads."""
+        """Close all writers and readers, leave the domain and join the threads."""
         if has_forked():
             return
         with self._lock:
@@ -259,6 +259,6 @@ class Ros2Transport:
                 if messages and subscriber.spec.sink is not None:
                     try:
                         subscriber.spec.sink(messages)
-                    except BaseException:  # also SystemExit: the sinks' thread continues
+                    except BaseException:  # also SystemExit: the sink thread continues
                         _logger.exception("the sink of '%s' failed", subscriber.spec.topic)
             self._closing.wait(_BATCH_S)

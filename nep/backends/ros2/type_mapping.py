@@ -31,7 +31,7 @@ from nep.messages.message import MessageKind
 from nep.protocol.wire import extension_part
 
 CDR = "cdr"
-"""Codec of messages that are ROS messages for their readers."""
+"""Codec of messages whose readers receive ROS messages."""
 _STRING_TYPE = "std_msgs/msg/String"
 _BYTES_TYPE = "std_msgs/msg/UInt8MultiArray"
 _IMAGE_TYPE = "sensor_msgs/msg/CompressedImage"
@@ -43,7 +43,14 @@ _MAX_CDR_BYTES = 2**32 - 64
 
 @dataclass(frozen=True)
 class TypeMapping:
-    """Conversion of one message type. `pack` and `unpack` raise `WireError` for invalid data."""
+    """Conversion between a message type of nep and a ROS type.
+
+    Attributes:
+        ros_type: ROS type.
+        codec: Codec of the payloads.
+        pack: Converts encoded data to a ROS message. Raises `WireError`.
+        unpack: Converts a ROS message to encoded data. Raises `WireError`.
+    """
 
     ros_type: str
     codec: Codec
@@ -51,7 +58,7 @@ class TypeMapping:
     unpack: Callable[[bytes], bytes | memoryview]
 
     def kind(self, topic: str, msg_type: str, *, is_latched: bool) -> MessageKind:
-        """Return the common attributes of one publisher's messages."""
+        """Return the properties shared by all messages of a publisher."""
         return MessageKind(topic, self.codec.name, msg_type, is_latched, self.codec.decode)
 
 

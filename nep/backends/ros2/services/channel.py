@@ -1,8 +1,9 @@
 """ServiceChannel: the DDS writers and readers of a server or client, and their matches.
 
-As in rmw_cyclonedds, requests are on `rq/NAMERequest` and responses on `rr/NAMEReply`, and the fields are
-preceded by the client's id (u64) and the number of the call (i64). ROS has no form for errors of a server;
-nep programs exchange them on a topic hidden from ROS 2: the same 16 bytes, the kind (u8), and the reason.
+As in rmw_cyclonedds, requests are sent on `rq/NAMERequest` and responses on `rr/NAMEReply`; the client's id
+(u64) and the number of the call (i64) precede the fields. ROS 2 can't transfer a server's errors. nep
+programs therefore exchange them on a topic hidden from ROS 2: the same 16 bytes, the kind (u8), and the
+reason.
 """
 
 from __future__ import annotations
@@ -30,10 +31,10 @@ _FAILURE_TYPE = "std_msgs/msg/UInt8MultiArray"
 _FAILED = struct.Struct("<QqB")
 _BATCH = 256
 _MAX_WRITERS = 1024
-"""Maximum number of clients remembered."""
+"""Maximum number of clients that are tracked."""
 _BLOCKING_NS = 100_000_000
 _READY_DELAY_S = 0.1
-"""Seconds that programs without nep need to get ready after discovery on both sides."""
+"""Time in seconds that programs without nep need after discovery until they can receive."""
 _KINDS = (CallKind.ERROR, CallKind.REFUSED)
 
 
@@ -45,7 +46,7 @@ class CallId(NamedTuple):
 
 
 class ReceivedPart(NamedTuple):
-    """Request or response: its CDR without the id, and its writer; None if the writer has disappeared."""
+    """Received request or response: its CDR without the call id, and its writer (None if unknown)."""
 
     id: CallId
     cdr: bytes
@@ -53,7 +54,7 @@ class ReceivedPart(NamedTuple):
 
 
 class ServiceChannel:
-    """DDS endpoints of a server or client; see the module.
+    """DDS endpoints of a server or client.
 
     Args:
         participant: Participant of this process.
@@ -61,9 +62,9 @@ class ServiceChannel:
         service: Name of the service.
         kind: Service type.
         entry_id: Id of the server or client.
-        guid: Id in the calls of a client; None for a server.
-        on_part: Called with requests or responses, in the participant's thread.
-        on_failure: Called with errors, in the participant's thread.
+        guid: Client id in the calls of a client; None for a server.
+        on_part: Called with each request or response, in the participant's thread.
+        on_failure: Called with each error, in the participant's thread.
     """
 
     def __init__(
@@ -203,7 +204,7 @@ class ServiceChannel:
     # ---- sending, without the participant's lock
 
     def send(self, call: CallId, cdr: bytes) -> None:
-        """Write a request or response. Raises `WireError`, or `DDSException` after closing."""
+        """Write a request or response. Raises `WireError`; `DDSException` after closing."""
         order = "<" if cdr[1] else ">"
         whole = cdr[:_CDR_BYTES] + struct.pack(f"{order}Qq", *call) + cdr[_CDR_BYTES:]
         codes = self.participant.dds.core.DDSException
@@ -224,7 +225,7 @@ class ServiceChannel:
 
     @property
     def discovered(self) -> list[DdsEndpoint]:
-        """Discovered endpoints of the other side."""
+        """Discovered endpoints of the peers: clients for a server, servers for a client."""
         (out_topic, out_type), (in_topic, in_type) = self._topics
         found = [(each, out_type) for each in self.participant.endpoints("reader", out_topic)] + [
             (each, in_type) for each in self.participant.endpoints("writer", in_topic)
@@ -233,7 +234,7 @@ class ServiceChannel:
 
     @property
     def entities(self) -> Sequence[Any]:
-        """Own writer and reader of requests and responses."""
+        """This channel's writer and reader of requests and responses."""
         return (self._writers[0], self._readers[0])
 
     def _matched(self, entity: Any) -> list[DdsEndpoint]:  # noqa: ANN401 - cyclonedds is not typed
@@ -244,7 +245,7 @@ class ServiceChannel:
         return [self.participant.described(data) for data in map(get_data, handles) if data is not None]
 
     def ready_servers(self) -> frozenset[bytes]:
-        """Return the response writers of callable servers. For clients."""
+        """Return the response writers of servers that can be called. Used by clients."""
         if self.is_closed:
             return frozenset()
         found_here = self._handles()
@@ -254,7 +255,7 @@ class ServiceChannel:
         return self._ready
 
     def _handles(self) -> tuple[int, ...]:
-        # Changes whenever the matches do.
+        # Changes whenever the set of matches changes.
         readers = (each.get_matched_publications() for each in self._readers)
         return (*self._writers[0].get_matched_subscriptions(), -1, *(one for each in readers for one in each))
 
@@ -296,11 +297,11 @@ class ServiceChannel:
         )
 
     def servers(self) -> frozenset[bytes]:
-        """Return the response writers of all matched servers. For clients."""
+        """Return the response writers of all matched servers. Used by clients."""
         return frozenset() if self.is_closed else frozenset(e.gid for e in self._matched(self._readers[0]))
 
     def can_reply_to(self, client: DdsEndpoint) -> bool:
-        """Return True if the client with this request writer can be answered. For servers."""
+        """Return True if responses reach the client with this request writer. Used by servers."""
         found_here = [
             each for each in self._matched(self._writers[0]) if each.participant == client.participant
         ]

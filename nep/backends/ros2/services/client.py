@@ -1,6 +1,6 @@
-"""Ros2Client: calls a ROS 2 service. The type is taken from the server unless it is given.
+"""Ros2Client: calls a ROS 2 service. If no type is given, the server's type is used.
 
-DDS delivers a request to all servers of a name; the first response counts.
+DDS delivers a request to all servers of a service; the first response is used.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ from nep.protocol.service_wire import SERVICE_TYPE, Reply, topic_of
 
 _logger = logging.getLogger("nep")
 _DISCOVERY_POLL_S, _SERVER_CHECK_S = 0.02, 0.1
-"""Intervals for discovering a server, and for checking that it still exists."""
+"""Intervals in seconds: for discovering a server, and for checking that it still exists."""
 
 Then = Callable[[Outcome], None]
 
@@ -48,7 +48,7 @@ class _Call:
 
 
 class Ros2Client(ClientCalls[_Call]):
-    """Client with its calls in flight. Raises `BadTopicError`, `NepError`.
+    """Client and its calls in flight. Raises `BadTopicError`, `NepError`.
 
     Lock order: the participant's lock before `_lock`.
     """
@@ -77,7 +77,7 @@ class Ros2Client(ClientCalls[_Call]):
                 channel = self._open_channel()
             if channel is not None:
                 wait_for_matches(participant, channel.discovered, lambda: channel.entities)
-        except BaseException:  # also Ctrl+C: the caller would have nothing to close
+        except BaseException:  # also Ctrl+C: the caller has no object to close yet
             self.close()
             raise
 
@@ -111,12 +111,12 @@ class Ros2Client(ClientCalls[_Call]):
 
     @property
     def record(self) -> SubscriberRecord:
-        """Record for the graph."""
+        """Registration record of the client, for the graph."""
         return SubscriberRecord(self.spec.id, topic_of(self.spec.service), SERVICE_TYPE)
 
     @property
     def counts(self) -> SubscriberCount:
-        """Statistics for the graph."""
+        """Statistics shown in the graph."""
         return SubscriberCount(self.spec.id, as_count(self._answered), as_count(self._failed))
 
     @property
@@ -244,7 +244,7 @@ class Ros2Client(ClientCalls[_Call]):
     # ---- closing
 
     def close(self) -> None:
-        """Unregister; calls in flight fail with `ClosedError`. Idempotent."""
+        """Unregister the client; calls in flight fail with `ClosedError`. Idempotent."""
         with self._lock:
             if self.is_closed:
                 return

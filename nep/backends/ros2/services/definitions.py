@@ -69,7 +69,7 @@ class _Part:
 
 
 def known_service(types: MessageTypes, name: str) -> TypedService:
-    """Return a service type by its full name. Raises `NepError` for an unknown one."""
+    """Return a service type by its full name. Raises `NepError` if it is unknown."""
     texts = _COMMON.get(name) or _in_folders(name)
     if texts is None:
         raise NepError(
@@ -113,7 +113,7 @@ def _in_folders(name: str) -> tuple[str, str] | None:
 
 
 def served_type(types: MessageTypes, msg_type: str) -> TypedService:
-    """Return the service type for a server's or client's `msg_type`. Raises `NepError`."""
+    """Return the service type that serves a server's or client's `msg_type`. Raises `NepError`."""
     name = service_type_name(msg_type)
     if name is not None:
         return known_service(types, name)

@@ -18,7 +18,7 @@ from nep.protocol.service_wire import SERVICE_TYPE, CallKind, Reply, failure, to
 
 _logger = logging.getLogger("nep")
 _MATCH_TIMEOUT_S = 1.0
-"""Seconds that a response waits for the match with the client's reader."""
+"""Time in seconds that a response waits until the client's reader is matched."""
 _POLL_S = 0.01
 
 
@@ -46,20 +46,20 @@ class Ros2Server:
         )
         try:
             wait_for_matches(participant, self._channel.discovered, lambda: self._channel.entities)
-        except BaseException:  # also Ctrl+C: the caller would have nothing to close
+        except BaseException:  # also Ctrl+C: the caller has no object to close yet
             self._channel.close()
             raise
 
     @property
     def record(self) -> PublisherRecord:
-        """Record for the graph."""
+        """Registration record of the server, for the graph."""
         return PublisherRecord(
             self.spec.id, topic_of(self.spec.service), self._type.name, SERVICE_TYPE, self.endpoints
         )
 
     @property
     def counts(self) -> PublisherCount:
-        """Statistics for the graph."""
+        """Statistics shown in the graph."""
         tally = self.tally
         return PublisherCount(self.spec.id, tally.calls, tally.bytes, tally.calls, errors=tally.errors)
 
@@ -123,7 +123,7 @@ class Ros2Server:
             call.answer(refusal(self.spec.service, is_closed=True))
 
     def close(self, timeout_s: float) -> None:
-        """Close; waits up to `timeout_s` seconds for acknowledgements of responses. Idempotent."""
+        """Close the server; wait up to `timeout_s` seconds for acknowledgements of responses. Idempotent."""
         self.begin_close()
         if self.is_closed:
             return
@@ -133,6 +133,6 @@ class Ros2Server:
         self._on_close(self)
 
     def forked(self) -> None:
-        """Become closed in a forked child."""
+        """Mark the server as closed in a forked child process."""
         self.is_closed = True
         self.calls.forked()
