@@ -28,17 +28,17 @@ class ParameterForm:
         self._kind = declared
         members = list(declared) if issubclass(declared, Enum) else []
         self.choices: tuple[object, ...] = tuple(each.value for each in members)
-        """Plain values of an Enum's members; empty if any value of the shape is allowed."""
+        """Plain values of the Enum's members; empty for other classes."""
         kinds = {type(each).__name__ for each in self.choices}
         if len(kinds) > 1:
             kinds = {"mixed"}
         self.plain_kind = kinds.pop() if kinds else "dict"
-        """Name of the plain values' type, as in `NodeParameter.kind`."""
+        """Type name of the plain values, as in `NodeParameter.kind`."""
 
     def plain(self, value: object) -> object:
-        """Return the plain value of an instance, or validate a plain value.
+        """Return the plain value of an instance, or a validated copy of a plain value.
 
-        Raises `ValueError` with the path.
+        Raises `ValueError` with the field path if the value doesn't match the class.
         """
         try:
             if not issubclass(self._kind, dict) and isinstance(value, self._kind):
@@ -54,7 +54,7 @@ class ParameterForm:
         return plain
 
     def instance(self, plain: object) -> object:
-        """Return a new instance for a validated plain value."""
+        """Create an instance from a validated plain value."""
         return self._shape.read(plain)
 
 

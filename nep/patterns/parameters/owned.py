@@ -1,4 +1,4 @@
-"""Parameters of this node, which others can read and set. See `Node.parameters`."""
+"""Parameters of a node, which other nodes can read and set. See `Node.parameters`."""
 
 from __future__ import annotations
 
@@ -23,31 +23,32 @@ OnChange = Callable[[Mapping[str, object]], "str | None"]
 
 
 class StateTopic(Protocol):
-    """Publisher of the parameters."""
+    """Latched topic on which a node publishes the state of its parameters."""
 
     def publish(self, payload: object) -> None:
         """Publish the parameters."""
 
 
 class ParameterHost(Protocol):
-    """Node as its parameters use it."""
+    """Interface to the node that owns the parameters."""
 
     name: str
     id: str
 
     def open_parameters(self, place: str, answer: Callable[[object], object]) -> StateTopic:
-        """Offer the service `place` with the callback `answer`, if possible, and open the topic `place`."""
+        """Serve `answer` as the service `place` if the back end has services, and open the topic `place`."""
 
 
 def place_of(node_id: str) -> str:
-    """Return the name of the service and topic of a node's parameters."""
+    """Return the name shared by the service and the topic of a node's parameters."""
     return f"/nep/parameters/{node_id}"
 
 
 class Parameters:
     """Parameters of a node by name. Thread-safe. See `Node.parameters`.
 
-    Others can read them from the first `declare` on, and set them where the back end has services.
+    From the first `declare` on, other nodes can read the parameters. They can set them if the back end
+    supports services.
 
         node.parameters.declare("speed", 0.3, min=0.0, max=1.0, description="m/s")
         node.parameters["speed"] = 0.5
@@ -79,18 +80,19 @@ class Parameters:
         Args:
             name: Name of the parameter; the rules of topic names apply.
             default: Initial value.
-            type: bool, int, float, str, list or dict; or a dataclass, TypedDict or Enum, whose instances are
-                the values here. Others see and set the map of its fields, or the value of the member.
-                Default: the type of `default`.
+            type: bool, int, float, str, list or dict; or a dataclass, TypedDict or Enum. With a class, `get`
+                returns instances, while other nodes see and set the plain value (the fields as a map, or the
+                member's value). Default: the type of `default`.
             description: Text for people.
             min: Minimum of a number, inclusive.
             max: Maximum of a number, inclusive.
             choices: Allowed values; empty for any value.
-            read_only: Reject changes by others.
+            read_only: Reject changes by other nodes.
 
         Raises:
             ParameterError: The name is declared already, or the default is not allowed.
-            NepError: As `Node.new_pub` does, at the first parameter of a node.
+            NepError: The topic of the parameters can't be opened, as in `Node.new_pub` (first parameter
+                only).
         """
         parameter = declared(
             name,
@@ -151,14 +153,18 @@ class Parameters:
         self.set_all({name: value})
 
     def set_all(self, values: Mapping[str, object]) -> None:
-        """Set several parameters: all of them, or none. Raises `ParameterError` as `set` does."""
+        """Set several parameters atomically: all of them, or none.
+
+        Raises `ParameterError` if a value is invalid or a callback rejects the change.
+        """
         self._set(values, is_own=True)
 
     def on_change(self, callback: OnChange) -> None:
-        """Call `callback` with the new values by name before values change.
+        """Register a callback that is invoked with the new values by name before parameters change.
 
-        The callback rejects the whole change by returning a string, the reason, or by raising. It runs in the
-        thread that calls `set`; for requests of others that is a thread of the node.
+        The callback rejects the whole change by returning the reason as a string, or by raising an exception.
+        It runs in the thread that calls `set`, or in a thread of the node if another node requested the
+        change.
         """
         with self._lock:
             self._watchers = (*self._watchers, callback)

@@ -1,4 +1,4 @@
-"""NodeParameter: a value with a name, a type and limits. Free of input and output."""
+"""`NodeParameter`: a value with a name, a type and limits. Performs no input or output."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ _MAX_INT = 2**63 - 1
 
 @dataclass(frozen=True)
 class NodeParameter:
-    """State of a parameter.
+    """Immutable state of a parameter.
 
     Attributes:
         name: Name of the parameter.
@@ -45,7 +45,7 @@ class NodeParameter:
         minimum: Minimum of a number, inclusive, or None.
         maximum: Maximum of a number, inclusive, or None.
         choices: Allowed values; empty for any value.
-        is_read_only: True if only the own node may set it.
+        is_read_only: True if only the node itself may set the parameter.
         form: Conversion to a class, or None for plain values.
     """
 
@@ -62,7 +62,7 @@ class NodeParameter:
 
     @property
     def typed_value(self) -> object:
-        """Value as a new instance of the parameter's class, or the plain value without a class."""
+        """Value as a new instance of the parameter's class; the plain value if it has no class."""
         return self.value if self.form is None else self.form.instance(self.value)
 
     def with_value(self, value: object) -> NodeParameter:
@@ -123,7 +123,7 @@ class NodeParameter:
         return ParameterError(self.name, short_repr(value), reason)
 
     def as_map(self) -> dict[str, object]:
-        """Return the parameter as sent to others, in JSON types."""
+        """Return the parameter as a JSON-serializable dict, the form in which it is published."""
         return {
             "name": self.name,
             "value": self.value,
@@ -148,7 +148,10 @@ def declared(
     choices: Sequence[object],
     is_read_only: bool,
 ) -> NodeParameter:
-    """Return a new parameter with its default value. Raises `ValueError` for invalid arguments."""
+    """Create a parameter with its default value.
+
+    Raises `ParameterError` or `ValueError` for invalid arguments.
+    """
     form = _form_of(name, type(default) if kind is None else kind, default)
     word = kind if isinstance(kind, str) else (type(default) if kind is None else kind).__name__
     if form is not None:
@@ -196,7 +199,7 @@ def _is_finite(value: object) -> bool:
 
 
 def short_repr(value: object) -> str:
-    """Return the shortened `repr` of a value for a message."""
+    """Return the `repr` of a value, shortened and escaped for use in a message."""
     try:
         written = repr(value)
     except Exception:  # noqa: BLE001 - `repr` of any class may raise; ints may have too many digits

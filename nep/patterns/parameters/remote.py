@@ -59,7 +59,7 @@ class RemoteParameters:
         self.set_all({name: value})
 
     def set_all(self, values: Mapping[str, object]) -> None:
-        """Set several parameters: all of them, or none. Raises as `set` does."""
+        """Set several parameters atomically. Raises the exceptions of `set`."""
         self._request({"set": dict(values)})
 
     def _request(self, request: Mapping[str, object]) -> tuple[Mapping[str, object], ...]:
@@ -82,9 +82,9 @@ class RemoteParameters:
 
 
 def node_with_parameters(graph: GraphView, name: str) -> str:
-    """Return the id of the node with parameters that has this name or id.
+    """Return the id of the node that has parameters and the given name or id.
 
-    Raises `NepError` when no node or several nodes match.
+    Raises `NepError` if no node or more than one node matches.
     """
     able = {each.id: each.name for each in graph.nodes.values() if place_of(each.id) in graph.services}
     found = [id_ for id_, known in able.items() if name in {id_, known}]

@@ -31,12 +31,12 @@ if TYPE_CHECKING:
 __all__ = ["Client", "Limit"]
 
 Limit = float | Literal["default"] | None
-"""Time limit in seconds, None for no limit, or the client's default."""
+"""Time limit of a call in seconds; None for no limit, "default" for the client's time limit."""
 
 SLICE_S = 0.1
 """Maximum duration of a single wait: on Windows Ctrl+C does not interrupt a wait."""
 _SERVICE_QUERY_S = 0.5
-"""Time limit for querying the existing services when one was not found."""
+"""Time limit for querying the existing services after a service was not found."""
 _JOIN_S = 2.0
 
 
@@ -75,12 +75,12 @@ class Client:
 
     @property
     def is_connected(self) -> bool:
-        """True if a server was connected a moment ago."""
+        """True if a server was connected at the last check; this can be outdated."""
         return self._transport.is_connected
 
     @property
     def late(self) -> int:
-        """Number of replies dropped because they arrived after the time limit."""
+        """Number of replies that were dropped because they arrived after the time limit."""
         return self._transport.late
 
     @property
@@ -245,7 +245,7 @@ class Client:
         self._on_close(self)
 
     def join(self) -> None:
-        """Stop the thread of futures, when its calls have ended."""
+        """Wait until the calls of `call_async` have ended, and stop their thread."""
         with self._lock:
             ends, self._future_thread = self._future_thread, None
         if ends is not None:
@@ -272,7 +272,7 @@ class Client:
 
 
 class _FutureThread:
-    """Thread that resolves futures, so that their slow callbacks don't block a socket."""
+    """Thread that completes futures, so that slow done-callbacks don't block a socket."""
 
     def __init__(self, name: str) -> None:
         self._jobs: queue.SimpleQueue[Callable[[], None] | None] = queue.SimpleQueue()

@@ -1,4 +1,4 @@
-"""Servers and clients of one node."""
+"""`ServiceRegistry`: the servers and clients of one node."""
 
 from __future__ import annotations
 
@@ -29,12 +29,12 @@ class ServiceRegistry:
     """Factory and registry of a node's servers and clients, which are closed with the node. Thread-safe.
 
     Args:
-        transport: The node's transport.
-        backend: The node's back end.
+        transport: Transport of the node.
+        backend: Back end of the node.
         wait_s: Time limit for the master in seconds.
-        new_id: Returns a new id, and the number that proves it.
+        new_id: Returns a new id and its secret number, which proves who registered the id.
         wake: Wakes the spinning thread.
-        closed_error: Returns the exception to raise when the node was closed.
+        closed_error: Returns the exception to raise after the node was closed.
     """
 
     def __init__(
@@ -57,7 +57,10 @@ class ServiceRegistry:
         self._servers: tuple[Server, ...] = ()
         self._clients: tuple[Client | Surveyor, ...] = ()
         self.has_servers = False
-        """True if the node has servers; read for every message of a spinning node."""
+        """True if the node has servers.
+
+        A plain attribute, because a spinning node reads it for every message.
+        """
 
     def server(
         self,
@@ -192,11 +195,11 @@ class ServiceRegistry:
 
     @property
     def queues(self) -> list[CallQueue]:
-        """Queues of calls that the spinning thread serves."""
+        """Queues of the calls that the spinning thread serves."""
         return [queue for each in self._servers if (queue := each.spun) is not None and not each.is_closed]
 
     def run(self, node_ends: threading.Event) -> bool:
-        """Serve one call per server; return True if there was any. Stops when `node_ends` is set."""
+        """Serve one call per server. Return True if there was any; stop early when `node_ends` is set."""
         has_run = False
         for server in self._servers:
             if node_ends.is_set():
@@ -208,7 +211,10 @@ class ServiceRegistry:
     # ---- closing
 
     def finish_calls(self, timeout_s: float) -> None:
-        """Wait for calls running in threads of the servers; the transport accepts no more calls."""
+        """Wait for calls that run in the servers' threads.
+
+        Call after the transport stopped accepting calls.
+        """
         deadline = time.monotonic() + timeout_s
         with self._lock:
             self._is_closed = True
@@ -216,7 +222,7 @@ class ServiceRegistry:
             server.join(max(0.0, deadline - time.monotonic()))
 
     def end(self, timeout_s: float) -> None:
-        """Stop all threads; the transport has closed its sockets."""
+        """Stop all threads of servers and clients. Call after the transport closed its sockets."""
         deadline = time.monotonic() + timeout_s
         with self._lock:
             servers, self._servers = self._servers, ()
@@ -228,7 +234,7 @@ class ServiceRegistry:
                 client.join()
 
     def forked(self) -> None:
-        """Mark everything as closed in a forked child process. See `nep.system.forks`."""
+        """Mark all servers and clients as closed in a forked child process. See `nep.system.forks`."""
         self._lock = threading.Lock()
         self._is_closed = True
         for server in self._servers:
@@ -239,7 +245,7 @@ class ServiceRegistry:
 
 
 def codec_checked(codec: Codec) -> Codec:
-    """Return a codec if calls can use it. Raises `NepError`."""
+    """Return the codec if calls can use it; raise `NepError` otherwise."""
     if codec.name == "image":
         raise NepError(_("a call can't carry an image; publish it on a topic"))
     if codec_numbered(codec.number) is not codec:  # a back end's codec without a number

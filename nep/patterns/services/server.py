@@ -31,9 +31,9 @@ SLICE_S = 0.1
 _CLOSE_TIMEOUT_S = 2.0
 
 Callback = Callable[[object], object]
-"""Function of the request that returns the reply, or a `concurrent.futures.Future` of it.
+"""Function that receives the request and returns the reply, or a `concurrent.futures.Future` of it.
 
-None is sent as an empty map.
+A reply of None is sent as an empty map.
 """
 
 
@@ -80,12 +80,12 @@ class Server:
 
     @property
     def calls(self) -> int:
-        """Number of answered calls, including errors."""
+        """Number of calls that were replied to, including replies with an error."""
         return self._transport.tally.calls
 
     @property
     def errors(self) -> int:
-        """Number of calls answered with an error."""
+        """Number of calls whose reply was an error."""
         return self._transport.tally.errors
 
     @property
@@ -100,7 +100,7 @@ class Server:
 
     @property
     def endpoints(self) -> tuple[str, ...]:
-        """Addresses of the server."""
+        """Addresses at which clients reach the server."""
         return self._transport.endpoints
 
     @property
@@ -110,7 +110,7 @@ class Server:
 
     @property
     def spun(self) -> CallQueue | None:
-        """Queue of calls that the spinning thread serves, or None if the calls are served elsewhere."""
+        """Queue of calls for the spinning thread; None if there is no callback or the server has threads."""
         return self._transport.calls if self._callback is not None and not self._threads else None
 
     def run_one(self) -> bool:
@@ -263,7 +263,10 @@ class Server:
         self._on_close(self)
 
     def join(self, timeout_s: float) -> None:
-        """Wait at most `timeout_s` seconds for the server's own threads, whose queue is closed."""
+        """Wait at most `timeout_s` seconds for the server's own threads to end.
+
+        Call after its queue was closed.
+        """
         deadline = time.monotonic() + timeout_s
         for thread in self._threads:
             if thread is not threading.current_thread():

@@ -47,11 +47,12 @@ class ServiceNode(ABC):
 
         Args:
             service: Name of the service.
-            callback: Function of the request that returns the reply, called by `spin`. Exceptions are raised
-                at the client as `ServiceError`. None: use `Server.listen_info` and `send_info`.
-            configuration: Result of `hybrid` or `direct`; with `direct` it also serves the original NEP's
-                `client`. Default: the node's master.
-            threads: Number of threads that run the callback; 0 runs it in the thread that calls `spin`.
+            callback: Function that receives the request and returns the reply; called by `spin`. Exceptions
+                are raised at the client as `ServiceError`. None: use `Server.listen_info` and `send_info`.
+            configuration: Result of `hybrid` or `direct`; with `direct` the server also accepts clients of
+                the original NEP. Default: the node's master.
+            threads: Number of threads that run the callback; 0 runs the callback in the thread that calls
+                `spin`.
             msg_type: Service type of back ends with typed services ("ros": "std_srvs/SetBool"). Other back
                 ends reply in the type of the request.
             request: Dataclass or TypedDict of the requests (docs/types.md); others are rejected.
@@ -83,8 +84,8 @@ class ServiceNode(ABC):
 
         Args:
             service: Name of the service.
-            configuration: Result of `hybrid` or `direct`; with `direct` it also calls the original NEP's
-                `server`. Default: the node's master.
+            configuration: Result of `hybrid` or `direct`; with `direct` the client can also call servers of
+                the original NEP. Default: the node's master.
             msg_type: "json", or "msgpack" for requests with bytes; or the service type of the back end.
             timeout_s: Default time limit of calls in seconds; None for no limit.
             request: Dataclass or TypedDict of the requests (docs/types.md); others raise `EncodeError`.
@@ -114,8 +115,8 @@ class ServiceNode(ABC):
 
         Args:
             survey: Name of the survey.
-            callback: Function of the question that returns the answer. None: use `Respondent.listen_json` and
-                `send_json`.
+            callback: Function that receives the question and returns the answer. None: use
+                `Respondent.listen_json` and `send_json`.
             configuration: As for `new_server`.
             threads: As for `new_server`.
             question: Dataclass or TypedDict of the questions.

@@ -1,4 +1,4 @@
-"""Surveys: a surveyor asks all respondents. See `Node.new_surveyor` and `Node.new_respondent`."""
+"""`Surveyor` and `Respondent`. See `Node.new_surveyor` and `Node.new_respondent`."""
 
 from __future__ import annotations
 
@@ -29,10 +29,10 @@ _logger = logging.getLogger("nep.patterns.services")
 
 
 class Surveyor:
-    """Surveyor: asks all respondents of a survey and collects their answers within a time limit. Thread-safe.
+    """Client that asks all respondents of a survey and collects the answers within a time limit. Thread-safe.
 
-    It asks the respondents registered at the time of the question, and returns early when all have answered.
-    Errors of respondents are counted in `failures` and logged. Usable as a context manager.
+    Only respondents registered when the question is sent are asked. Iteration ends early when all have
+    answered. Errors of respondents are counted in `failures` and logged. Usable as a context manager.
 
         for answer in surveyor.answers({"unit": "%"}, timeout_s=0.5):
             print(answer)
@@ -60,16 +60,16 @@ class Surveyor:
         self._is_forked = False
         self._sent: Iterator[object] | None = None
         self.failures = 0
-        """Number of respondents that replied with an error or stopped."""
+        """Number of respondents that replied with an error or stopped before replying."""
 
     @property
     def respondents(self) -> int:
-        """Number of registered respondents."""
+        """Number of registered respondents of the survey."""
         return self._transport.respondents
 
     @property
     def late(self) -> int:
-        """Number of answers dropped because they arrived after the time limit."""
+        """Number of answers that were dropped because they arrived after the time limit."""
         return self._transport.late
 
     @property
@@ -80,7 +80,7 @@ class Surveyor:
     def ask(
         self, question: object, timeout_s: Limit = "default", *, expect: int | None = None
     ) -> list[object]:
-        """Ask a question and return the answers in the order of their arrival.
+        """Send a question and return the answers in the order of their arrival.
 
         Args:
             question: Value of the question.
@@ -97,7 +97,7 @@ class Surveyor:
     def answers(
         self, question: object, timeout_s: Limit = "default", *, expect: int | None = None
     ) -> Iterator[object]:
-        """Ask a question and iterate over the answers as they arrive. See `ask`.
+        """Send a question and iterate over the answers as they arrive. See `ask`.
 
         The question is sent before this method returns.
         """
@@ -166,7 +166,10 @@ class Surveyor:
     # ---- API of the original NEP
 
     def send_json(self, question: object) -> None:
-        """Ask a question; `listen_json` returns the answers. Discards open answers of the last question."""
+        """Send a question; `listen_json` returns the answers.
+
+        Unread answers of the last question are discarded.
+        """
         self._sent = self.answers(question)
 
     def listen_json(self) -> tuple[bool, object]:
@@ -207,7 +210,7 @@ class Surveyor:
 class Respondent(Server):
     """Respondent of a survey, with a callback or with `listen_json` and `send_json`. Thread-safe.
 
-    Callbacks run as those of `Server`; an exception is logged and counted in
+    Callbacks are run as by `Server`. An exception is logged here, and counted at the surveyor in
     `Surveyor.failures`.
 
         node.new_respondent("battery", lambda question: {"percent": 87})
@@ -220,10 +223,10 @@ class Respondent(Server):
         return self.service.removeprefix(SURVEY)
 
     def listen_json(self, block_mode: bool = False) -> tuple[bool, object]:
-        """Return (True, next question), or (False, {}) without one. Reply with `send_json`.
+        """Return (True, next question), or (False, {}) if no question is waiting. Reply with `send_json`.
 
         Args:
-            block_mode: Wait without limit.
+            block_mode: Wait for a question without time limit.
 
         Raises:
             NepError: As `listen_info` does.
@@ -232,7 +235,7 @@ class Respondent(Server):
         return (False, {}) if self._open_request is None else (True, question)
 
     def send_json(self, answer: object) -> None:
-        """Answer the question that `listen_json` returned. Raises as `send_info` does."""
+        """Reply to the question that `listen_json` returned. Raises the exceptions of `send_info`."""
         self.send_info(answer)
 
     def __repr__(self) -> str:

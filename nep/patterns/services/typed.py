@@ -25,9 +25,9 @@ _MAX_SHOWN_LENGTH = 60
 
 
 class PayloadType:
-    """Declared type of requests or replies; None accepts any value.
+    """Declared class of requests or replies; None allows any value.
 
-    Raises `ValueError` for a class that can't be sent.
+    Raises `ValueError` for a class whose fields can't be encoded.
     """
 
     def __init__(self, declared: type | None) -> None:
@@ -35,15 +35,18 @@ class PayloadType:
 
     @property
     def is_any(self) -> bool:
-        """True if values are not validated."""
+        """True if any value is allowed and nothing is validated."""
         return self._declared is None
 
     def codec(self, base: Codec) -> Codec:
-        """Return a codec of instances of the type, based on the codec of plain values."""
+        """Return a codec for instances of the class, based on a codec of plain values."""
         return base if self._declared is None else typed.typed_codec(self._declared, base)
 
     def read(self, plain: object, size_bytes: int) -> object:
-        """Return the instance of a decoded payload. Raises `DecodeError` with the path of the mismatch."""
+        """Convert a decoded payload to an instance.
+
+        Raises `DecodeError` with the field path of a mismatch.
+        """
         if self._declared is None:
             return plain
         try:
@@ -57,7 +60,7 @@ class PayloadType:
 
 @dataclass(frozen=True)
 class CallTypes:
-    """Types of a service's requests and replies."""
+    """Declared types of a service's requests and replies."""
 
     request: PayloadType
     answer: PayloadType
@@ -67,7 +70,7 @@ UNTYPED = CallTypes(PayloadType(None), PayloadType(None))
 
 
 def call_types(**given: object) -> CallTypes:
-    """Return the types of requests and replies, given in this order. Raises `ValueError`."""
+    """Validate two classes, passed as keywords in the order request, reply. Raises `ValueError`."""
     declared: list[PayloadType] = []
     for name, each in given.items():
         if each is not None and not isinstance(each, type):
