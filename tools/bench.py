@@ -1,7 +1,7 @@
 """Run the benchmarks one after the other.
 
-    python tools/bench.py                   all except those of ASKED, such as nep_tail and film
-    python tools/bench.py nep_rate -- ARGS  one; arguments after -- are passed on to it
+    python tools/bench.py                   all except those in ASKED, such as nep_tail and film
+    python tools/bench.py nep_rate -- ARGS  one benchmark; arguments after -- are passed on to it
 
 Exits with 1 if a result is invalid because the computer was busy. See `bench/README.md`.
 """
@@ -36,11 +36,11 @@ NAMES = (
     "studio_tabs",
 )
 ASKED = ("nep_clients", "nep_tail", "nep_ros", "paper", "soak", "ways", "film", "package_start", "recorder")
-"""Run only by name: they take long, need ROS 1, Node.js or a package, or don't measure time."""
+"""Benchmarks that run only when named: slow, dependent on ROS 1, Node.js or a package, or without times."""
 
 
 def main() -> int:
-    """Run the requested benchmarks."""
+    """Run the requested benchmarks; return the exit code."""
     own, dashes, rest = " ".join(sys.argv[1:]).partition("--")
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter

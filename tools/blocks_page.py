@@ -23,7 +23,7 @@ _HOLE = re.compile(r"%([A-Z_]+)")
 
 
 def tables() -> str:
-    """Return the tables of all categories: the block's text, its description, its Python code."""
+    """Return a Markdown table for each category: text, description and Python code of its blocks."""
     parts = []
     for category in categories():
         if category.blocks:
@@ -33,7 +33,7 @@ def tables() -> str:
 
 
 def page(text: str) -> str:
-    """Return the page with new tables."""
+    """Replace the tables in the text of docs/blocks.md."""
     before, _, rest = text.partition(BEGIN)
     _, _, after = rest.partition(END)
     return f"{before}{BEGIN}\n\n{tables()}\n{END}{after}"

@@ -1,12 +1,12 @@
 """Run all checks of the project, cheapest first.
 
-    python tools/check.py          ruff, format, mypy, lint-imports, test collection, pytest
-    python tools/check.py --fast   the same without pytest
-    python tools/check.py -- ARGS  arguments after -- are passed on to pytest
+    python tools/check.py           ruff, format, mypy, lint-imports, test collection, pytest
+    python tools/check.py --fast    the same without pytest
+    python tools/check.py -- ARGS   arguments after -- are passed on to pytest
 
-All checks run, even after a failure; the exit code is 1 if any has failed. Collecting the tests writes
-pytest's compiled files, which otherwise each of its processes would compile. Collection takes as long as
-mypy, which uses a single core, so it runs in parallel.
+All checks run, even after a failure; the exit code is 1 if any check failed. Test collection writes pytest's
+compiled files, which otherwise every worker would compile. It takes as long as mypy, which uses a single
+core, so it runs in parallel.
 """
 
 from __future__ import annotations
@@ -27,9 +27,12 @@ MAX_WORKERS = 6
 
 
 class Check(NamedTuple):
-    """A check: its name and command.
+    """Check to run.
 
-    ``is_beside``: run it in parallel with the others and show its output only if it fails.
+    Attributes:
+        name: Name in the output.
+        command: Command and arguments.
+        is_beside: True to run the check in parallel with the others and show its output only if it fails.
     """
 
     name: str
@@ -38,7 +41,7 @@ class Check(NamedTuple):
 
 
 class Outcome(NamedTuple):
-    """Result of a check."""
+    """Result and duration of a check."""
 
     name: str
     passed: bool
@@ -46,7 +49,7 @@ class Outcome(NamedTuple):
 
 
 def checks(*, fast: bool, pytest_arguments: Sequence[str] = ()) -> tuple[Check, ...]:
-    """Return all checks, cheapest first; `fast` omits the tests."""
+    """Return all checks, cheapest first; `fast` omits pytest."""
     python = sys.executable
     lint_imports = str(Path(sysconfig.get_path("scripts")) / "lint-imports")
     found = (
@@ -63,10 +66,11 @@ def checks(*, fast: bool, pytest_arguments: Sequence[str] = ()) -> tuple[Check, 
 
 
 def side_by_side() -> tuple[str, ...]:
-    """Return options of pytest-xdist: two workers more than cores, at most six; see tests/scheduler.py.
+    """Return options of pytest-xdist: two workers more than cores, at most six. See tests/scheduler.py.
 
-    Many tests wait for processes and windows: on two cores, one worker more leaves a fifth of the time idle.
-    With two more, some tests would wait too long for a robot or a page, so the last worker opens no windows.
+    Many tests wait for processes and windows: on two cores, one extra worker leaves a fifth of the time idle.
+    With two extra workers, some tests would wait too long for a robot or a page, so the last worker opens no
+    windows.
     """
     workers = min(MAX_WORKERS, (os.cpu_count() or 1) + 2)
     return ("-n", str(workers), "--dist", "loadfile")
@@ -96,14 +100,17 @@ def run(check: Check) -> Outcome:
 
 
 def run_all(found: Sequence[Check]) -> list[Outcome]:
-    """Run the checks in order; parallel ones start with the first and are awaited last."""
+    """Run the checks in order and return their outcomes.
+
+    Parallel checks start with the first and end last.
+    """
     with ThreadPoolExecutor() as pool:
         beside = {check: pool.submit(run, check) for check in found if check.is_beside}
         return [beside[check].result() if check.is_beside else run(check) for check in found]
 
 
 def summary(outcomes: Sequence[Outcome]) -> str:
-    """Return a table of the results."""
+    """Format the outcomes as a table."""
     width = max(len(outcome.name) for outcome in outcomes)
     return "\n".join(
         f"  {outcome.name:<{width}}  {'ok    ' if outcome.passed else 'FAILED'}  {outcome.elapsed_s:6.1f} s"

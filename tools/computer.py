@@ -1,4 +1,4 @@
-"""Interface of dev.py to the computer that it runs on. Uses only the standard library."""
+"""`Computer`: properties of the computer on which dev.py runs. Uses only the standard library."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ END_S = 10.0
 
 
 class Trouble(Exception):  # noqa: N818 (not a fault of this program, but of the computer it runs on)
-    """Error for a missing requirement; its text contains the solution."""
+    """Error raised when the computer lacks a requirement; the message says how to fix it."""
 
 
 def _ask(command: Sequence[str]) -> str:
@@ -36,7 +36,7 @@ def _ask(command: Sequence[str]) -> str:
 def watch(command: Sequence[str], environ: Mapping[str, str], log: Path | None = None) -> int:
     """Run a command and return its exit code; its output goes to the terminal or to `log`.
 
-    Ctrl+C also reaches the command, which is in the same process group; it gets time to end by itself.
+    Ctrl+C also reaches the command, which is in the same process group, and gives it time to stop.
     """
     with open(log, "ab") if log else contextlib.nullcontext() as output:  # noqa: PTH123 (a path or nothing)
         process = subprocess.Popen(command, cwd=ROOT, env=dict(environ), stdout=output, stderr=output)
@@ -48,7 +48,7 @@ def watch(command: Sequence[str], environ: Mapping[str, str], log: Path | None =
 
 
 def end(process: subprocess.Popen[bytes]) -> None:
-    """Wait for a process, then terminate and finally kill it; takes at most END_S."""
+    """Wait for a process to exit, then terminate and finally kill it. Takes at most `END_S` seconds."""
     for harder in (process.terminate, process.kill):
         with contextlib.suppress(subprocess.TimeoutExpired):
             process.wait(END_S / 2)
@@ -58,7 +58,7 @@ def end(process: subprocess.Popen[bytes]) -> None:
 
 @dataclass(frozen=True)
 class Computer:
-    """Computer with its properties and the functions that run commands."""
+    """Properties of a computer, and the functions that run commands on it; tests replace them."""
 
     platform: str = sys.platform
     machine: str = machine()
@@ -72,25 +72,25 @@ class Computer:
 
     @property
     def has_apt(self) -> bool:
-        """True for Debian, Ubuntu and derivatives."""
+        """True if apt is available: Debian, Ubuntu and derivatives."""
         return self.platform == "linux" and bool(self.which("apt-get") and self.which("dpkg-query"))
 
     @property
     def has_screen(self) -> bool:
-        """True if windows can be displayed; always on Windows and macOS."""
+        """True if windows can be displayed; always true on Windows and macOS."""
         return self.platform != "linux" or bool(
             self.environ.get("DISPLAY") or self.environ.get("WAYLAND_DISPLAY")
         )
 
 
 def venv_python(folder: Path, platform: str) -> Path:
-    """Return the interpreter of a virtual environment."""
+    """Return the path of the Python interpreter of a virtual environment."""
     return folder / ("Scripts/python.exe" if platform == "win32" else "bin/python")
 
 
 @contextlib.contextmanager
 def timed(what: str) -> Iterator[None]:
-    """Print a description and then the elapsed time."""
+    """Print a description when entering the context, and the elapsed time when leaving it."""
     print(f"· {what} …", flush=True)
     begin = time.monotonic()
     yield

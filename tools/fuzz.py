@@ -1,13 +1,13 @@
 """Fuzz all parsers with atheris: `python3 dev.py fuzz`. Uses only the standard library.
 
-    python3 dev.py fuzz                        all targets, 15 minutes in total
-    python3 dev.py fuzz -- --minutes 60        an hour
-    python3 dev.py fuzz -- json_codec keys     only these targets; --list prints all
-    python3 dev.py fuzz -- --again FILE        reproduce a finding
+    python3 dev.py fuzz                         all targets, 15 minutes in total
+    python3 dev.py fuzz -- --minutes 60         all targets, one hour in total
+    python3 dev.py fuzz -- json_codec keys      only these targets; --list prints all
+    python3 dev.py fuzz -- --again FILE         reproduce a finding
 
 Creates an environment in `build/fuzz` with pinned packages, without Qt. The corpus in `build/fuzz/corpus` is
-reused by later runs; each finding is a file in `build/fuzz/findings` next to its traceback. Exits with 1 if
-there are any. Then fix the library and add the bytes to `tests/fuzz/cases.py`. See docs/fuzzing.md.
+reused by later runs. Each finding is a file in `build/fuzz/findings` next to its traceback. Exits with 1 if
+there are findings; then fix the library and add the bytes to `tests/fuzz/cases.py`. See docs/fuzzing.md.
 """
 
 from __future__ import annotations
@@ -26,23 +26,29 @@ FOLDER = ROOT / "build" / "fuzz"
 HARNESS = "tests/fuzz/harness.py"
 MINUTES = 15.0
 MIN_S = 1
-"""Minimum time for a target."""
+"""Minimum time for a target in seconds."""
 
 
 def seconds_each(weights: Mapping[str, int], minutes: float) -> dict[str, int]:
-    """Return the time in seconds for each target; slow ones get twice as long."""
+    """Distribute the total time among the targets, in seconds; slow targets get twice as much."""
     shares = {name: 2 if weight > 1 else 1 for name, weight in weights.items()}
     one = minutes * 60 / max(1, sum(shares.values()))
     return {name: max(MIN_S, round(one * share)) for name, share in shares.items()}
 
 
 def findings_in(folder: Path) -> list[Path]:
-    """Return the files with inputs that made a parser fail; each has a traceback next to it."""
+    """Return the files in a folder with inputs that made a parser fail; each has a traceback next to it."""
     return sorted(path for path in folder.glob("*") if path.suffix != ".txt") if folder.is_dir() else []
 
 
 def fuzz(computer: Computer, given: Sequence[str], folder: Path = FOLDER) -> int:
-    """Fuzz the requested targets; return 1 if there are findings, else 0."""
+    """Fuzz the requested targets; return 1 if there are findings, else 0.
+
+    Args:
+        computer: Computer to run on.
+        given: Command-line arguments.
+        folder: Folder of the environment, the corpus and the findings.
+    """
     parser = argparse.ArgumentParser(
         prog="dev.py fuzz", description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )

@@ -43,7 +43,7 @@ WAVE = (1.0, 3.0, 2.0, 5.0, 4.0, 6.0, 2.0, 3.0, 1.0, 4.0)
 
 
 def row(*widgets: QWidget) -> QWidget:
-    """Return a widget with the given ones side by side."""
+    """Create a widget that shows the given widgets side by side."""
     made = QWidget()
     line = QHBoxLayout(made)
     line.setContentsMargins(0, 0, 0, 0)
@@ -134,7 +134,7 @@ def _rest(theme: Theme) -> list[QWidget]:
 
 
 def page(theme: Theme) -> QWidget:
-    """Return a page with all widgets."""
+    """Create a page with all widgets."""
     made = QWidget()
     made.setAutoFillBackground(True)
     column = QVBoxLayout(made)
@@ -146,7 +146,7 @@ def page(theme: Theme) -> QWidget:
 
 
 def pictures(percent: int) -> QPixmap:
-    """Return an image of the page in both themes side by side."""
+    """Render the page in both themes side by side, with the text size in percent."""
     shots = []
     for mode in ("light", "dark"):
         theme = Theme("light" if mode == "light" else "dark")

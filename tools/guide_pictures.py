@@ -2,8 +2,8 @@
 
     python3 dev.py guide-pictures [FOLDER]
 
-Images are created for each language of the guide in the light and dark theme, in a process per language with
-settings of its own. Needs a screen; dev.py provides a virtual one.
+Creates the images for each language of the guide in the light and dark theme. A process with separate
+settings runs for each language and theme. Needs a screen; dev.py provides a virtual one.
 """
 
 from __future__ import annotations
@@ -39,7 +39,7 @@ COLOURS = 128  # sufficient for flat surfaces, and a sixth smaller than with 256
 WAY = 10  # steps of a mouse movement
 THEMES = ("light", "dark")
 WIDE = 640
-"""Maximum width of an image in the guide; images of the whole window are scaled down."""
+"""Maximum width of an image in the guide in px; images of the whole window are scaled down."""
 WINDOW, WHOLE = QSize(1280, 800), QSize(1200, 740)
 ARROW = ((0, 0), (0, 17), (4, 13.3), (6.8, 19.5), (9.6, 18.2), (6.9, 12.2), (12.3, 12))
 TAB = "document.querySelector('.nepTab:not([hidden])')"
@@ -47,19 +47,19 @@ TALK, SWING = "talk", "swing"  # blocks highlighted in the images
 
 
 def variable(kind: str, *, id: str = "", **given: object) -> Block:
-    """Return a block that uses the variable "points"."""
+    """Create a block that uses the variable "points"."""
     made = block(kind, id=id, **given)
     made["fields"] = {"VAR": {"id": "points"}}
     return made
 
 
 def placed(x: int, y: int, script: Block) -> Block:
-    """Return a script at a position of the page."""
+    """Return a script at a position (px) of the page."""
     return {**script, "x": x, "y": y}
 
 
 def hello() -> list[Block]:
-    """Return the first behaviour of the guide."""
+    """Return the scripts of the guide's first behaviour."""
     swing = chain(
         pepper("do_turn", id=SWING, DIRECTION="left", ANGLE=number(30)),
         pepper("do_turn", DIRECTION="right", ANGLE=number(30)),
@@ -73,13 +73,13 @@ def hello() -> list[Block]:
 
 
 def beginning() -> list[Block]:
-    """Return a start block with one block below it."""
+    """Return one script: a start block and one block below."""
     say = pepper("do_say", id=TALK, TEXT=text("Hello! I am Pepper."))
     return [placed(28, 28, chain(block("events_started"), say))]
 
 
 def counting() -> list[Block]:
-    """Return scripts that count with a variable."""
+    """Return scripts that count touches with a variable."""
     start = chain(
         block("events_started"),
         variable("variables_set", VALUE=number(3)),
@@ -94,7 +94,7 @@ def counting() -> list[Block]:
 
 
 def wrong() -> list[Block]:
-    """Return a block without a start and two scripts that both move the robot."""
+    """Return scripts with errors: a block without a start, and two scripts that both move the robot."""
     first = chain(block("events_started"), pepper("do_turn", DIRECTION="left", ANGLE=number(90)))
     second = chain(block("events_started"), pepper("do_walk", DISTANCE=number(0.3)))
     loose = pepper("do_say", TEXT=text("Nice to see you."))
@@ -107,11 +107,14 @@ SCRIPTS = {
     "Reaction to touch": counting,
     "A careful walk": wrong,
 }
-"""Scripts by name; the examples have the same names, so these are translated."""
+"""Functions that create the scripts of a behaviour, by its name.
+
+The names are those of the examples, so their translations exist.
+"""
 
 
 def write_behaviour(folder: Path, name: str) -> Path:
-    """Write a behaviour like an example, whose texts are translated when opened."""
+    """Write a behaviour with the format and robots of an example, whose texts are translated when opened."""
     content = {
         "format": "nep-behaviour",
         "version": 1,
@@ -128,7 +131,7 @@ def write_behaviour(folder: Path, name: str) -> Path:
 
 
 class GuidePictures(SelfDrive):
-    """Steps of the guide in one theme."""
+    """Self-driving window that takes the images of the guide in one theme."""
 
     def __init__(self, window: MainWindow, folder: Path, home: Path, theme: str) -> None:
         self._home, self._theme = home, theme
@@ -329,7 +332,7 @@ class GuidePictures(SelfDrive):
 
 
 def paint_mouse(picture: QPixmap, tip: QPoint) -> None:
-    """Paint the mouse pointer, which grabbed images don't contain."""
+    """Paint the mouse pointer, which grabbed images don't contain, with its tip at `tip`."""
     painter = QPainter(picture)
     painter.setRenderHint(QPainter.RenderHint.Antialiasing)
     painter.setPen(QPen(QColor("white"), 1.4))
@@ -339,7 +342,7 @@ def paint_mouse(picture: QPixmap, tip: QPoint) -> None:
 
 
 def take_screenshots(folder: Path, theme: str) -> int:
-    """Create the images in the language of this process; return 0 if all steps succeeded."""
+    """Create the images in the language of this process; return 0 if all steps succeeded, else 1."""
     with tempfile.TemporaryDirectory(prefix="nep-guide-") as home:
         free = next(port for port in PORTS if not is_running(f"127.0.0.1:{port}", 0.2))
         os.environ.update(NEP_STUDIO_HOME=home, NEP_MASTER=f"127.0.0.1:{free}", NEP_GATEWAY="0")

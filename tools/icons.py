@@ -3,7 +3,7 @@
     npm pack lucide-static@1.62.0 && tar xzf lucide-static-1.62.0.tgz
     python3 tools/icons.py package
 
-Each line contains an icon's name, a tab and the content of its <svg>, sorted by name.
+Each line contains the name of an icon, a tab and the content of its <svg>. Lines are sorted by name.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ HEAD = re.compile(r"\s*(?:<!--.*?-->\s*)?<svg\b[^>]*>(.*)</svg>\s*", re.DOTALL)
 
 
 def inside(svg: str) -> str:
-    """Return the content of <svg> in one line.
+    """Return the content of the <svg> element as one line.
 
     Raises:
         ValueError: The text isn't a Lucide icon.
@@ -29,7 +29,7 @@ def inside(svg: str) -> str:
 
 
 def main(package: Path) -> int:
-    """Write the file and the licence; return the exit code."""
+    """Write lucide.txt and the licence; return the exit code."""
     lines = [
         f"{path.stem}\t{inside(path.read_text('utf-8'))}\n"
         for path in sorted((package / "icons").glob("*.svg"))

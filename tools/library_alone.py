@@ -1,6 +1,6 @@
-"""Test an installation of nep without extras; exits with 1 and prints the failures.
+"""Test an installation of nep without extras; print the failures and exit with 1 if there are any.
 
-    python -I tools/library_alone.py        run by `python3 dev.py versions`; -I excludes local sources
+    python -I tools/library_alone.py    run by `python3 dev.py versions`; -I excludes local sources
 
 Tests messages of all plain types with and without a master, a service, the error for a missing extra, the
 command line (also in Spanish), and that all modules can be imported without Qt and the other extras.
@@ -20,7 +20,7 @@ from typing import Any
 import nep
 
 ABSENT = ("PySide6", "shiboken6", "numpy", "cv2", "pynng", "zenoh", "iceoryx2", "cyclonedds", "pytest")
-"""Packages of the extras; if one is installed, this test proves nothing."""
+"""Packages of the extras. If one of them is installed, the test is meaningless and fails."""
 MESSAGES = {
     "json": {"number": 1, "text": "ñ"},
     "string": "ñandú",
@@ -29,11 +29,11 @@ MESSAGES = {
 }
 WAIT_S = 30.0
 EXTRAS = {"nanomsg": "nanomsg", "zenoh": "zenoh", "ros2": "ros2"}
-"""Back ends and the extras that their error must name."""
+"""Names of back ends and the extras that must be named in their error."""
 
 
 def installed() -> list[str]:
-    """Check that nep is imported from the installation and that no extra is installed."""
+    """Check that nep is imported from the installation and no extra is installed; return the failures."""
     faults = [f"{name} is installed" for name in ABSENT if importlib.util.find_spec(name)]
     if not Path(nep.__file__).is_relative_to(sys.prefix):
         faults.append(f"nep was imported from {nep.__file__}, not from {sys.prefix}")
@@ -41,7 +41,7 @@ def installed() -> list[str]:
 
 
 def modules() -> list[str]:
-    """Check that all modules of nep, including back ends, can be imported."""
+    """Check that all modules of nep, including back ends, can be imported; return the failures."""
     faults = []
     for found in pkgutil.walk_packages(nep.__path__, "nep."):
         if found.name == "nep.__main__":  # this runs the command itself
@@ -54,7 +54,11 @@ def modules() -> list[str]:
 
 
 def messages(master: str | None) -> list[str]:
-    """Check messages of all plain types through a master, or in memory for None."""
+    """Check messages of all plain types; return the failures.
+
+    Args:
+        master: Address of the master, or None for the back end "memory".
+    """
     backend = "zeromq" if master else "memory"
     faults = []
     with nep.node("talker", backend, master=master) as one, nep.node("hearer", backend, master=master) as two:
@@ -72,7 +76,7 @@ def _added_up(request: Any) -> dict[str, int]:  # noqa: ANN401 - whatever JSON a
 
 
 def services(master: str) -> list[str]:
-    """Check a service with a thread of its own."""
+    """Check a service whose server runs in a separate thread; return the failures."""
     with nep.node("server", master=master) as one, nep.node("caller", master=master) as two:
         one.new_server("sum", _added_up, threads=1)
         answer = two.new_client("sum", timeout_s=WAIT_S).call({"of": [1, 2, 3]})
@@ -80,7 +84,7 @@ def services(master: str) -> list[str]:
 
 
 def sentences(master: str) -> list[str]:
-    """Check that the error for a missing package names its extra."""
+    """Check that the error for a missing package names its extra; return the failures."""
     faults = []
     with nep.node("painter", master=master) as node:
         try:
@@ -100,7 +104,7 @@ def sentences(master: str) -> list[str]:
 
 
 def command_line(master: str) -> list[str]:
-    """Check the installed command `nep`."""
+    """Check the installed command `nep`; return the failures."""
     faults = []
     for arguments in (["--help"], ["--master", master, "topic", "list"], ["--master", master, "doctor"]):
         done = _said(arguments)
@@ -127,7 +131,7 @@ def _said(arguments: list[str], language: str = "en") -> subprocess.CompletedPro
 
 
 def main() -> int:
-    """Run all checks; return 0 if all pass."""
+    """Run all checks and print the failures; return 1 if there are any."""
     with nep.master("127.0.0.1:0", learn_s=0.0) as master:
         faults = [
             *installed(),

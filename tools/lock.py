@@ -1,10 +1,10 @@
 """Pin the packages with their hashes in requirements/*.txt.
 
     python tools/lock.py            add new requirements of pyproject.toml and keep existing pins
-    python tools/lock.py --upgrade  the newest versions that pyproject.toml allows
+    python tools/lock.py --upgrade  pin the newest versions that pyproject.toml allows
 
-Uses uv (`pip install uv`), which, unlike pip, resolves for all systems and Pythons at once. dev.py installs
-the files with the uv of requirements/installer.txt, or with pip if that fails.
+Uses uv (`pip install uv`), which, unlike pip, resolves for all systems and Python versions at once. dev.py
+installs the files with the uv of requirements/installer.txt, or with pip if that fails.
 """
 
 from __future__ import annotations
@@ -24,17 +24,17 @@ else:
 ROOT = Path(__file__).resolve().parents[1]
 OLDEST_PYTHON = "3.10"
 PLAIN = "library"
-"""File with the requirements of nep without extras."""
+"""Name of the file with the requirements of nep without extras."""
 LOCKED = ("studio", "dev", "test", "fuzz", "package", PLAIN)
-"""Files, each constrained by the previous ones; all but the last are named after their extra."""
+"""Names of the files, each constrained by the previous ones; all but the last are named after their extra."""
 INSTALLER = "installer"
-"""File for the installer of the others: only uv, which has no dependencies."""
+"""Name of the file that pins uv, which installs the other files and has no dependencies."""
 EDITABLE = ("editables",)
-"""Requirements of hatchling for editable installs, which pyproject.toml doesn't declare."""
+"""Build requirements of editable installs with hatchling, which pyproject.toml doesn't declare."""
 
 
 def command(uv: str, extra: str, output: Path, upgrade: bool) -> list[str]:
-    """Return the command that pins a file; build requirements are read from stdin."""
+    """Return the uv command that writes a file; it reads build requirements from stdin."""
     found = [uv, "pip", "compile", "--quiet", "--universal", "--python-version", OLDEST_PYTHON]
     found += ["--generate-hashes", "--no-annotate", "--no-header", "--no-emit-package", "nep-studio"]
     found += ["--output-file", str(output)]

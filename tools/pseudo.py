@@ -1,4 +1,7 @@
-"""Pseudo-language that reveals untranslated text, and the texts of blocks. Doesn't use Babel."""
+"""Pseudo-language that reveals untranslated texts, and the texts of blocks and examples.
+
+Doesn't use Babel.
+"""
 
 from __future__ import annotations
 
@@ -17,7 +20,7 @@ _ACCENTS = str.maketrans(
 
 
 def pseudo(english: str) -> str:
-    """Return `[Ŕúñ ~~]` for `Run`: a third longer, with brackets and accents; placeholders stay unchanged."""
+    """Convert `Run` to `[Ŕúñ ~~]`: a third longer, with brackets and accents; placeholders stay unchanged."""
     pieces, at = [], 0
     for found in _KEPT.finditer(english):
         pieces += [english[at : found.start()].translate(_ACCENTS), found.group()]
@@ -30,7 +33,7 @@ def pseudo(english: str) -> str:
 
 
 def sentences_of_blocks() -> Iterator[tuple[str | None, str, str]]:
-    """Yield (context, English, file) of the texts in block definitions, which don't call `_`."""
+    """Yield (context, English text, file) for the block definitions, whose texts are not passed to `_`."""
     # imported here because catalogues are also compiled with only the build requirements installed
     from app.blocks.categories.robot import GROUPS  # noqa: PLC0415
     from app.blocks.toolbox.catalogue import english_categories, has_words  # noqa: PLC0415
@@ -58,7 +61,7 @@ def sentences_of_blocks() -> Iterator[tuple[str | None, str, str]]:
 
 
 def sentences_of_examples() -> Iterator[tuple[str, str, str]]:
-    """Yield (context, English, file) of the texts that are translated when an example is opened."""
+    """Yield (context, English text, file) for the texts that are translated when an example is opened."""
     from app.core.documents.examples import translated  # noqa: PLC0415 - as above
     from app.core.documents.file_format import read_file  # noqa: PLC0415
 

@@ -1,10 +1,10 @@
-"""Write the reference in docs/api, a page per subject, from the docstrings of nep's public names.
+"""Write the reference in docs/api, one page per subject, from the docstrings of nep's public names.
 
     python tools/reference.py          write the pages
     python tools/reference.py --check  exit with 1 if a page is out of date
 
-It reads the sources without importing nep. Google style sections become tables of arguments and attributes,
-with errors and results below; so do sentences that begin with an argument's name or with "Raises".
+The sources are parsed without importing nep. Google style sections become tables of arguments and attributes,
+followed by exceptions and results; so do sentences that begin with the name of an argument or with "Raises".
 `tests/test_reference.py` compares the pages with the code.
 """
 
@@ -30,7 +30,13 @@ MADE_BY = "Made from the docstrings by `python3 dev.py reference`; do not write 
 
 @dataclass(frozen=True)
 class Field:
-    """A page: its title, introduction, and the modules of its names."""
+    """Page of the reference.
+
+    Attributes:
+        title: Heading of the page.
+        words: Introduction.
+        homes: Modules whose public names are on the page.
+    """
 
     title: str
     words: str
@@ -72,11 +78,14 @@ PAGES: Mapping[str, Field] = {
     "errors": Field("Errors", "All of them are `NepError`s, and say what to do next.", ("nep.errors",)),
 }
 OWN_PAGES = ("nep.geometry", "nep.sensor")
-"""Public modules of which all names in `__all__` are public."""
+"""Public modules with pages that list every name in their `__all__`."""
 MADE_BY_HAND = frozenset(
     {"Node", "Master", "FixedServer", "FixedClient", "Blackboard", "ImageFormat", "Encoded"}
 )
-"""Classes that programs instantiate. Others are created by nep, except those on pages of types."""
+"""Classes that programs instantiate, so that their constructor is documented.
+
+The other classes are instantiated by nep, except for those on the page of types.
+"""
 INTERNAL = frozenset({
     "Blackboard.deliver", "BlackboardWatch.attach", "BlackboardWatch.store_messages", "Client.join",
     "Master.epoch", "Master.submit", "Message.decoded", "Message.kind", "Message.raw",
@@ -87,11 +96,11 @@ INTERNAL = frozenset({
     "Subscriber.want_payloads",
     "Timer.callback", "Timer.due", "Timer.run_if_due", "Timer.take_turn",
 })  # fmt: skip
-"""Public members of these classes that are only for nep itself."""
+"""Public members that are omitted because only nep uses them."""
 INTERNAL_EVERYWHERE = frozenset({"args", "forked", "node_closes"})
-"""The same for all classes."""
+"""Names of members that are omitted in all classes."""
 _BEGINNINGS: Mapping[str, str] = {"0": "int", "''": "str"}
-"""Types of default values."""
+"""Types of default values, by the beginning of their source text."""
 
 _SENTENCE = re.compile(r"(?<=[.!?]) +(?=[A-Z`\"(])")
 _SAID = re.compile(r"`(\w+)`(?::| (?=(?:is|are|as|tells|says|has|counts|are|may)\b))\s*(.*)", re.DOTALL)
@@ -105,7 +114,13 @@ _CODE = "    "
 
 @dataclass(frozen=True)
 class Words:
-    """A parsed docstring: descriptions of names, errors, and the remaining paragraphs."""
+    """Parsed docstring.
+
+    Attributes:
+        paragraphs: Paragraphs outside of sections.
+        names: Descriptions of arguments or attributes by name.
+        raises: Descriptions of exceptions.
+    """
 
     paragraphs: tuple[str, ...]
     names: Mapping[str, str]
@@ -113,7 +128,12 @@ class Words:
 
 
 def words_of(docstring: str, names: Iterable[str]) -> Words:
-    """Parse a docstring; `names` are its arguments or attributes."""
+    """Parse a docstring.
+
+    Args:
+        docstring: Text of the docstring.
+        names: Names of the documented object's arguments or attributes.
+    """
     known, told, raises = frozenset(names), dict[str, str](), list[str]()
     paragraphs: list[str] = []
     is_first = True
@@ -182,7 +202,11 @@ def _listed(paragraph: str) -> Mapping[str, str]:
 
 
 class Reference:
-    """All public names by page. `package` is nep."""
+    """Generator of the reference pages.
+
+    Args:
+        package: The package nep, loaded by griffe.
+    """
 
     def __init__(self, package: griffe.Module) -> None:
         self._package = package
@@ -190,11 +214,11 @@ class Reference:
 
     @property
     def names(self) -> frozenset[str]:
-        """All names that have a page."""
+        """All public names that are documented on a page."""
         return frozenset(self._pages)
 
     def page(self, name: str) -> str:
-        """Return the content of a page."""
+        """Return the Markdown text of a page."""
         field = PAGES[name]
         parts = [
             f"# {field.title}",
@@ -206,7 +230,7 @@ class Reference:
         return "\n\n".join(part.rstrip() for part in parts) + "\n"
 
     def contents(self) -> str:
-        """Return the page with links to all others."""
+        """Return the Markdown text of the index page, README.md."""
         lines = [
             "# The reference",
             MADE_BY,
@@ -242,7 +266,7 @@ class Reference:
                 yield str(name), _target(module.members[str(name)])
 
     def find(self, name: str) -> griffe.Object:
-        """Return the object with a public name."""
+        """Return the object with this public name."""
         return next(found for each, found in self._public() if each == name)
 
     def members(self, of: griffe.Class) -> list[griffe.Object]:
@@ -472,13 +496,13 @@ def _parameters(of: griffe.Function, type_of: Callable[[str | griffe.Expr | None
 
 
 def reference() -> Reference:
-    """Return the reference of the current sources."""
+    """Load the current sources and return their reference."""
     package = griffe.load("nep", search_paths=[ROOT], allow_inspection=False, resolve_aliases=True)
     return Reference(cast("griffe.Module", package))
 
 
 def pages() -> dict[str, str]:
-    """Return the content of all pages by file name."""
+    """Return the Markdown text of all pages by file name."""
     found = reference()
     return {"README.md": found.contents(), **{f"{each}.md": found.page(each) for each in PAGES}}
 

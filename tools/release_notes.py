@@ -1,10 +1,10 @@
 """Print the notes of a release from CHANGELOG.md. Uses only the standard library.
 
-    python3 -m tools.release_notes v1.2.3                  the version's section as Markdown
-    python3 -m tools.release_notes v1.2.3 --links ADDRESS  with links to project files below ADDRESS
+    python3 -m tools.release_notes v1.2.3                   the version's section as Markdown
+    python3 -m tools.release_notes v1.2.3 --links ADDRESS   with links to project files below ADDRESS
 
-Exits with 1 and a message if the tag isn't the version in nep/version.py or the changelog has no section for
-it; .github/workflows/release.yml builds nothing then.
+Exits with 1 and a message if the tag isn't the version in nep/version.py, or if the changelog has no section
+for it. Then .github/workflows/release.yml builds nothing.
 """
 
 from __future__ import annotations
@@ -22,14 +22,14 @@ _LINK_TO_FILE = re.compile(r"\]\((?![a-z]+:|#)([^)\s]+)\)")
 
 
 class RefusedError(Exception):
-    """Error that a release is invalid; the text contains the reason and the solution."""
+    """Error for an invalid release; the message contains the reason and the fix."""
 
 
 def checked_version(tag: str, version: str = __version__) -> str:
-    """Return the version of a tag.
+    """Return the version that a tag names.
 
     Raises:
-        RefusedError: It isn't the project's version.
+        RefusedError: The tag doesn't match the project's version.
     """
     if tag.removeprefix("v") != version:
         raise RefusedError(f"'{tag}' is not the version of nep/version.py, which says '{version}'")
@@ -54,12 +54,12 @@ def section(changelog: str, version: str) -> str:
 
 
 def with_links(text: str, address: str) -> str:
-    """Return the text with relative links made absolute by an address, for use outside the repository."""
+    """Return the Markdown text with its relative links changed to absolute ones below `address`."""
     return _LINK_TO_FILE.sub(rf"]({address.rstrip('/')}/\1)", text)
 
 
 def main(arguments: Sequence[str] | None = None, changelog: Path = CHANGELOG) -> int:
-    """Print the notes; return 1 if the release is invalid."""
+    """Print the release notes; return 1 if the release is invalid."""
     parser = argparse.ArgumentParser(
         prog="release_notes", description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )

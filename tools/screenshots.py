@@ -2,8 +2,8 @@
 
     python3 dev.py screenshots [FOLDER]
 
-The images show the behaviour of the design on the virtual robot, and one robot that isn't connected. Settings
-are separate from the user's. Needs a screen; dev.py provides a virtual one.
+The images show the behaviour "Greeting" with a virtual robot and a robot that isn't connected. The user's
+settings are not used. Needs a screen; dev.py provides a virtual one.
 """
 
 from __future__ import annotations
@@ -37,7 +37,7 @@ Block = dict[str, object]
 
 
 def block(kind: str, *, id: str = "", **given: object) -> Block:
-    """Return a block in the editor's format; texts become fields, other values inputs."""
+    """Create a block in the editor's format; strings become fields, other values inputs."""
     made: Block = {"type": kind, "id": id or f"picture-{next(NUMBERS)}"}
     fields = {name: value for name, value in given.items() if isinstance(value, str)}
     inputs = {name: value for name, value in given.items() if not isinstance(value, str)}
@@ -47,24 +47,24 @@ def block(kind: str, *, id: str = "", **given: object) -> Block:
 
 
 def number(value: float) -> Block:
-    """Return an input with a number."""
+    """Return a block input that contains a number."""
     return {
         "shadow": {"type": "values_number", "id": f"picture-{next(NUMBERS)}", "fields": {"NUMBER": value}}
     }
 
 
 def text(value: str) -> Block:
-    """Return an input with a text."""
+    """Return a block input that contains a text."""
     return {"shadow": {"type": "values_text", "id": f"picture-{next(NUMBERS)}", "fields": {"TEXT": value}}}
 
 
 def pepper(what: str, *, id: str = "", **given: object) -> Block:
-    """Return a block of the virtual robot."""
+    """Create a block of the virtual robot Pepper; `what` is the block's name."""
     return block(f"robot_pepper_{what}", id=id, ROBOT="Pepper", **given)
 
 
 def chain(first: Block, *others: Block) -> Block:
-    """Connect blocks below each other."""
+    """Connect blocks into a stack and return its first block."""
     last: Block | None = None
     for each in reversed((first, *others)):
         last = {**each, **({"next": {"block": last}} if last else {})}
@@ -72,7 +72,7 @@ def chain(first: Block, *others: Block) -> Block:
 
 
 def scripts() -> list[Block]:
-    """Return the three scripts of design image 02."""
+    """Return the three scripts shown in design image 02."""
     loop = chain(
         pepper("do_turn", id=TURN, DIRECTION="left", ANGLE=number(30)),
         pepper("do_say", id=TOUCH, TEXT=text("Touch my head.")),
@@ -107,7 +107,7 @@ def scripts() -> list[Block]:
 
 
 def write_behaviour(path: Path) -> None:
-    """Write the behaviour with the robots Pepper and NAO, which isn't connected."""
+    """Write a behaviour file with the robots Pepper and NAO; NAO isn't connected."""
     robots = json.loads(EXAMPLE.read_text("utf-8"))["robots"]
     nao = json.loads(json.dumps(robots["Pepper"]).replace("/Pepper/", "/NAO/"))
     nao["title"] = "NAO"
@@ -123,7 +123,7 @@ def write_behaviour(path: Path) -> None:
 
 
 class Pictures(SelfDrive):
-    """Steps for the README's images."""
+    """Self-driving window that takes the README's images."""
 
     def __init__(self, window: MainWindow, folder: Path, behaviour: Path) -> None:
         self._behaviour = behaviour
@@ -202,7 +202,7 @@ class Pictures(SelfDrive):
 
 
 def take_screenshots(folder: Path) -> int:
-    """Create the images; return 0 if all steps succeeded."""
+    """Create the images; return 0 if all steps succeeded, else 1."""
     with tempfile.TemporaryDirectory(prefix="nep-screenshots-") as home:
         free = next(port for port in PORTS if not is_running(f"127.0.0.1:{port}", 0.2))
         os.environ.update(NEP_STUDIO_HOME=home, NEP_MASTER=f"127.0.0.1:{free}", NEP_GATEWAY="0")

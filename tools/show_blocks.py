@@ -1,6 +1,6 @@
-"""Create images of the block editor with the sample of the tests: running, stopped, with errors.
+"""Create images of the block editor with the tests' sample: running, stopped, and with errors.
 
-Run it with a screen: ``xvfb-run -a .venv/bin/python tools/show_blocks.py FOLDER [--open CATEGORY]``
+Needs a screen: ``xvfb-run -a .venv/bin/python tools/show_blocks.py FOLDER [--open CATEGORY]``
 """
 
 from __future__ import annotations
@@ -43,7 +43,7 @@ def options() -> argparse.Namespace:
 
 
 class Photographer(QObject):
-    """Saves images of the sample light and running, dark and stopped, and with errors, then exits."""
+    """Saves three images of the sample (light and running, dark and stopped, with errors), then exits."""
 
     def __init__(self, view: BlocklyView, folder: Path, category: str | None) -> None:
         super().__init__(view)

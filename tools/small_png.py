@@ -18,7 +18,7 @@ SAMPLE, ROUNDS = 40_000, 12
 
 
 def shrink(path: Path, most: int = COLOURS) -> int:
-    """Rewrite an image with at most ``most`` colours; return its new size in bytes."""
+    """Rewrite an image file with at most `most` colours; return the new size in bytes."""
     picture = cv2.imread(str(path), cv2.IMREAD_COLOR)
     if picture is None:
         raise OSError(f"{path} is no picture")

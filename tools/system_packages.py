@@ -1,6 +1,7 @@
 """System packages that Studio needs on Debian and Ubuntu: find and install missing ones.
 
-`sudo python3 -B -m tools.system_packages` does only this; dev.py does it by itself as root.
+Run alone with `sudo python3 -B -m tools.system_packages`; dev.py installs them automatically when run as
+root.
 """
 
 from __future__ import annotations
@@ -53,7 +54,7 @@ TEST_PACKAGES = {
     ),
     "nanocat": ("nanomsg-utils",),
 }
-"""Packages that some tests need, by subject; without them these tests are skipped."""
+"""Packages that some tests need, by subject. If they are missing, the tests are skipped."""
 
 
 def wanted_packages(computer: Computer) -> list[str]:
@@ -76,7 +77,7 @@ def missing_packages(computer: Computer) -> list[str]:
 
 
 def available(computer: Computer, entries: Sequence[str]) -> tuple[list[str], list[str]]:
-    """Return the first available name of each entry, and the entries that apt doesn't know."""
+    """Return the first available name of each entry, and the entries of which apt knows no name."""
     names = [name for entry in entries for name in entry.split("|")]
     can: set[str] = set()
     name = ""
@@ -91,7 +92,7 @@ def available(computer: Computer, entries: Sequence[str]) -> tuple[list[str], li
 
 
 def bring_system_packages(computer: Computer) -> None:
-    """Install missing packages as root, otherwise raise Trouble with the command to type."""
+    """Install missing packages if run as root; otherwise raise `Trouble` with the command to install them."""
     if not computer.has_apt:
         return
     missing = missing_packages(computer)
@@ -109,7 +110,7 @@ def bring_system_packages(computer: Computer) -> None:
 
 
 def bring_test_packages(computer: Computer) -> None:
-    """Install `TEST_PACKAGES` as root; otherwise print which tests are skipped and what to install."""
+    """Install `TEST_PACKAGES` if run as root; otherwise print which tests are skipped and how to install."""
     if not computer.has_apt:
         return
     names = [name for packages in TEST_PACKAGES.values() for name in packages]
@@ -128,7 +129,10 @@ def bring_test_packages(computer: Computer) -> None:
 
 
 def apt_install(computer: Computer, missing: Sequence[str], names: list[str], unknown: list[str]) -> None:
-    """Install `names` as root; raise Trouble with apt's last output on failure."""
+    """Install `names` as root; raise `Trouble` with apt's last output on failure.
+
+    `unknown` are entries that apt doesn't know; if there are any, the package lists are updated first.
+    """
     log = ROOT / "build" / "apt.log"
     log.parent.mkdir(exist_ok=True)
     log.unlink(missing_ok=True)

@@ -1,8 +1,8 @@
 """Build the Unity package of the C# client: ``python -m tools.unity_package FOLDER``.
 
-The package contains the library's sources. Unity ignores files of an installed package without a ``.meta``
-file, so one is generated for each, with an id derived from the file's path: references to a script survive
-an update of the package.
+The package contains the library's sources. Unity ignores files of an installed package that have no ``.meta``
+file, so one is generated for each. Its id is derived from the file's path, so that references to a script
+survive an update of the package.
 """
 
 from __future__ import annotations
@@ -68,7 +68,7 @@ def _meta(path: PurePosixPath, *, is_folder: bool) -> bytes:
 
 
 def build(folder: Path) -> Path:
-    """Write the tarball into a folder and return its path. The same sources give the same bytes."""
+    """Write the package as a tarball into a folder and return its path. Builds are reproducible."""
     version = json.loads((UNITY / "package.json").read_text("utf-8"))["version"]
     target = folder / f"org.nep.unity-{version}.tgz"
     packed = io.BytesIO()
@@ -83,7 +83,7 @@ def build(folder: Path) -> Path:
 
 
 def main() -> int:
-    """Build into the folder given on the command line."""
+    """Build the package into the folder given on the command line; return the exit code."""
     if len(sys.argv) != 2:
         print(__doc__, file=sys.stderr)
         return 2

@@ -1,13 +1,13 @@
-"""Test the library with each supported Python: `python3 dev.py versions`. Standard library only.
+"""Test the library with each supported Python: `python3 dev.py versions`. Uses only the standard library.
 
-    python3 dev.py versions                            each Python of this computer in turn
-    python3 dev.py versions --only 3.10 --only 3.13    only these
-    python3 dev.py versions --plain                    only nep without extras, no tests
-    python3 dev.py versions --plain --install FILE     a wheel or source distribution built before
-    python3 dev.py versions -- tests/nep/protocol -x   arguments after -- are passed on to pytest
+    python3 dev.py versions                             each Python of this computer in turn
+    python3 dev.py versions --only 3.10 --only 3.13     only these
+    python3 dev.py versions --plain                     only nep without extras, no tests
+    python3 dev.py versions --plain --install FILE      an existing wheel or source distribution
+    python3 dev.py versions -- tests/nep/protocol -x    arguments after -- are passed on to pytest
 
-Creates two environments of pinned packages without Qt for each Python in `build/versions`: one with the built
-distribution and its requirements, in which a program publishes, receives and calls; and one in which the
+Creates two environments for each Python in `build/versions`, with pinned packages and without Qt. In the
+first, the built distribution is installed and a program publishes, receives and calls; in the second, the
 library's tests run. Exits with 1 if anything failed.
 """
 
@@ -29,25 +29,25 @@ TESTS = ("tests/nep", "tests/interop")
 WHO = "import sys; print('{}.{}'.format(*sys.version_info[:2]), sys.implementation.name, sys.executable)"
 PYENV = ".pyenv/versions"
 OLDEST_MACOS = "13_0"
-"""In the format of wheels: minimum version of the macOS package (installers/macos/information.py)."""
+"""Minimum version of the macOS package (installers/macos/information.py) in the format of wheel tags."""
 
 
 @dataclass(frozen=True)
 class Outcome:
-    """Result for one Python: failed steps in order."""
+    """Result for one Python version, with the names of the failed steps in order."""
 
     version: str
     failed: list[str] = field(default_factory=list)
 
     def told(self) -> str:
-        """Return the result as one line of the table."""
+        """Format the result as one line of the table."""
         return f"  Python {self.version}  {'FAILED: ' + ', '.join(self.failed) if self.failed else 'ok'}"
 
 
 def found(computer: Computer, home: Path | None = None) -> dict[str, str]:
-    """Return the interpreters of supported Pythons on this computer by version.
+    """Find interpreters of the supported Python versions on this computer; return their paths by version.
 
-    Searches the current one, the PATH, the Windows launcher and pyenv, in this order.
+    Searches the current interpreter, the PATH, the Windows launcher and pyenv, in this order.
     """
     have: dict[str, str] = {}
     for version in PROMISED:
@@ -85,10 +85,15 @@ def _stamp(requirements: str) -> str:
 def environment(
     computer: Computer, python: str, folder: Path, requirements: str, *, is_for_oldest: bool = False
 ) -> Path:
-    """Create an environment with the pinned packages of a file if needed; return its interpreter.
+    """Create a virtual environment with pinned packages, unless it is up to date; return its interpreter.
 
-    ``is_for_oldest``: on a Mac choose wheels that run on `OLDEST_MACOS`. By default pip chooses those for the
-    current macOS; numpy's require macOS 14.
+    Args:
+        computer: Computer to run on.
+        python: Interpreter that creates the environment.
+        folder: Folder of the environment.
+        requirements: Name of the file in requirements/, without its extension.
+        is_for_oldest: On a Mac, install wheels that run on `OLDEST_MACOS`. By default pip chooses those for
+            the current macOS; numpy's require macOS 14.
     """
     made = venv_python(folder, computer.platform)
     stamp = folder / "nep-stamp"
@@ -112,12 +117,12 @@ def environment(
 
 
 def pip(python: Path) -> list[str]:
-    """Return the command of pip's install."""
+    """Return the `pip install` command of an interpreter."""
     return [str(python), "-m", "pip", "install", "--disable-pip-version-check", "--quiet"]
 
 
 def try_plain(computer: Computer, python: str, folder: Path, distribution: str = ".") -> list[str]:
-    """Install the distribution without extras and use it from another folder; return the failures."""
+    """Install the distribution without extras and test it from another folder; return the failed steps."""
     made = environment(computer, python, folder, "library")
     ours = [*pip(made), "--no-deps", "--no-build-isolation", "--force-reinstall", distribution]
     # -I: test the installed package, not the local sources.
@@ -129,7 +134,7 @@ def try_plain(computer: Computer, python: str, folder: Path, distribution: str =
 
 
 def try_tests(computer: Computer, python: str, folder: Path, arguments: Sequence[str]) -> list[str]:
-    """Run the library's tests with their requirements; return the failures."""
+    """Run the library's tests in an environment with their requirements; return the failed steps."""
     made = environment(computer, python, folder, "test")
     ours = [*pip(made), "--no-deps", "--no-build-isolation", "-e", "."]
     pytest = [str(made), "-m", "pytest", "-q", *arguments]
@@ -144,7 +149,7 @@ def try_tests(computer: Computer, python: str, folder: Path, arguments: Sequence
 def versions(
     computer: Computer, given: Sequence[str], folder: Path = FOLDER, home: Path | None = None
 ) -> int:
-    """Run the requested tests; return 0 if all Pythons found succeeded, else 1."""
+    """Run the requested tests; return 0 if they passed with all Python versions found, else 1."""
     parser = argparse.ArgumentParser(
         prog="dev.py versions", description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )

@@ -1,7 +1,7 @@
 """Write the generated test vectors of the native wire: tests/data/wire.
 
-    python tools/wire_vectors.py            write the files
-    python tools/wire_vectors.py --check    exit with 1 if a file is out of date
+    python tools/wire_vectors.py          write the files
+    python tools/wire_vectors.py --check  exit with 1 if a file is out of date
 
 `filters.json`, `notices.json`, `master.json` and `malformed.json` are generated; `messages.json`,
 `batches.json`, `ids.json` and `services.json` are written by hand. See tests/data/wire/README.md for their
@@ -38,7 +38,7 @@ PAYLOAD = b'{"message":"hello"}'
 
 
 def as_text(value: Any) -> Any:  # noqa: ANN401 - any plain value
-    """Return `value` with every integer, including keys, as decimal text."""
+    """Convert every integer in `value`, including keys, to decimal text."""
     if isinstance(value, bool) or value is None or isinstance(value, (str, float)):
         return value
     if isinstance(value, int):
@@ -49,7 +49,7 @@ def as_text(value: Any) -> Any:  # noqa: ANN401 - any plain value
 
 
 def filters() -> list[dict[str, Any]]:
-    """Return the filters of subscribers: topics, hellos, answers to echoes and offers, and malformed ones."""
+    """Return valid and malformed filters of subscribers: topics, hellos, and answers to echoes and offers."""
     made: list[dict[str, Any]] = [
         {"name": "topic", "filter": wire.topic_part(TOPIC).hex(), "means": {"kind": "topic", "topic": TOPIC}},
         {
@@ -95,7 +95,7 @@ def filters() -> list[dict[str, Any]]:
 
 
 def malformed_filters() -> list[dict[str, Any]]:
-    """Return filters that a publisher must ignore."""
+    """Return malformed filters, which a publisher must ignore."""
     digits = b"%016x" % SUBSCRIBER
     malformed = {
         "hello without a topic": b"\xffhello/" + digits,
@@ -116,7 +116,7 @@ def malformed_filters() -> list[dict[str, Any]]:
 
 
 def notices() -> list[dict[str, Any]]:
-    """Return the notices that a publisher sends under a hello, and a message sent under a hello."""
+    """Return the notices that a publisher sends in reply to a hello, and a message sent under a hello."""
     hello = wire.hello_part(SUBSCRIBER, TOPIC, batches=True)
     kinds: list[tuple[str, str, wire.Header, bytes | None]] = [
         ("echo", "echo before the first message", wire.Header(1, 0, 0, STAMP_NS, PUBLISHER), None),
@@ -152,7 +152,7 @@ def notices() -> list[dict[str, Any]]:
 
 
 def node(key: str, name: str) -> requests.NodeRecord:
-    """Return the record of a node with this key."""
+    """Create the record of a node with this key."""
     return requests.NodeRecord(requests.node_id_from(key), name, "here", 4711, key=key)
 
 
@@ -281,7 +281,7 @@ class _Master:
 
 
 def master() -> dict[str, Any]:
-    """Return requests with their replies, and pushes."""
+    """Return requests with the master's replies, and the messages that the master pushes."""
     asked = []
     for name, before, last in ASKED:
         answers = _Master()
@@ -325,7 +325,7 @@ def master() -> dict[str, Any]:
 
 
 class _Bytes:
-    """Deterministic pseudorandom bytes, the same on every platform."""
+    """Generator of deterministic pseudorandom bytes, the same on every platform."""
 
     def __init__(self, seed: str) -> None:
         self._seed, self._count = seed, 0
@@ -538,7 +538,7 @@ KINDS: tuple[tuple[str, Callable[[_Bytes], Parts]], ...] = (
 
 
 def malformed() -> Iterator[list[str]]:
-    """Yield code and parts (hexadecimal) of each malformed message, without duplicates."""
+    """Yield the error code and the parts (hexadecimal) of each malformed message, without duplicates."""
     seen: set[tuple[bytes, ...]] = set()
     number = 0
     while len(seen) < MALFORMED_COUNT:
@@ -551,7 +551,7 @@ def malformed() -> Iterator[list[str]]:
 
 
 def files() -> dict[str, str]:
-    """Return the text of each generated file."""
+    """Return the text of each generated file by its name."""
     whole: dict[str, Any] = {"filters": filters(), "notices": notices(), "master": master()}
     texts = {f"{name}.json": json.dumps(value, indent=1) + "\n" for name, value in whole.items()}
     lines = ",\n".join(json.dumps(each, separators=(",", ":")) for each in malformed())
@@ -559,7 +559,7 @@ def files() -> dict[str, str]:
 
 
 def main() -> int:
-    """Write the files, or check that they are up to date."""
+    """Write the files, or check that they are up to date; return the exit code."""
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )

@@ -4,9 +4,9 @@
     python tools/words.py extract  only the template nep/locale/nep-studio.pot
     python tools/words.py compile  only generated files: .mo, languages.json and the pseudo-language
     python tools/words.py add fr   add a language
-    python tools/words.py check    exit with 0 if everything is consistent, else 1 with messages
+    python tools/words.py check    print inconsistencies; exit with 1 if there are any
 
-Update keeps all translations whose English text still exists. Only this tool and translators write to
+An update keeps all translations whose English text still exists. Only this tool and translators write to
 nep/locale.
 """
 
@@ -57,11 +57,11 @@ FOREIGN = (
     "options", "positional arguments", "show program's version number and exit",
     "show this help message and exit",
 )  # fmt: skip
-"""Texts of typer and argparse, which also use gettext."""
+"""Texts of typer and argparse, which are translated with gettext, too."""
 FORMATS = {"es": "es_419"}
-"""Languages that use the number format of another locale."""
+"""Locales whose number and date formats a language uses instead of its own."""
 _MADE = dt.datetime(2026, 11, 22, tzinfo=dt.timezone.utc)
-"""Fixed date for headers, so that unchanged texts give unchanged files."""
+"""Fixed date for file headers, so that unchanged texts produce unchanged files."""
 _HEADER = "# All sentences of NEP Studio; made by tools/words.py (docs/translate.md)."
 
 
@@ -73,7 +73,7 @@ class Key(NamedTuple):
 
 
 def template(root: Path = ROOT) -> Catalog:
-    """Return a catalogue of all texts in the sources."""
+    """Create a catalogue of all texts in the sources."""
     # imported here because hatch_build.py runs with only the build requirements installed
     from nep.cli.app import docstrings  # noqa: PLC0415
 
@@ -109,7 +109,7 @@ def _marked(
 
 
 def sentences_of_robots(root: Path) -> Iterator[tuple[str, str]]:
-    """Yield (English, file) of the texts in robot descriptions shipped with Studio."""
+    """Yield (English text, file) for the robot descriptions shipped with Studio."""
     from app.blocks.toolbox.catalogue import has_words  # noqa: PLC0415 - as above
 
     for path in sorted((root / "resources" / "robots").glob("*.tm.jsonld")):
@@ -141,7 +141,7 @@ def _of_description(value: object, *, is_inside: bool) -> Iterator[str]:
 
 
 def keys(catalog: Catalog) -> set[Key]:
-    """Return the entries of a catalogue without its header."""
+    """Return the keys of a catalogue's entries, without the header."""
     return {Key(each.context or None, _ids(each.id)) for each in catalog if each.id}
 
 
@@ -164,7 +164,7 @@ def po_file(folder: Path, language: str) -> Path:
 
 
 def languages(folder: Path) -> list[str]:
-    """Return the languages with translations."""
+    """Return the sorted codes of languages that have a .po file."""
     return sorted(path.parents[1].name for path in folder.glob(f"*/LC_MESSAGES/{DOMAIN}.po"))
 
 
@@ -176,7 +176,7 @@ def read(path: Path, language: str | None = None) -> Catalog:
 
 
 def write(catalog: Catalog, path: Path) -> None:
-    """Write a .po or .pot file sorted by the English text, so that diffs are minimal."""
+    """Write a .po or .pot file sorted by the English text, which keeps diffs small."""
     catalog.creation_date = _MADE
     for entry in catalog:
         entry.flags.discard("python-format")  # Babel misinterprets texts such as "%A is known"
@@ -187,14 +187,14 @@ def write(catalog: Catalog, path: Path) -> None:
 
 
 def extract(folder: Path = LOCALE) -> Catalog:
-    """Write the template with all texts."""
+    """Write the template with all texts and return it."""
     made = template()
     write(made, pot_file(folder))
     return made
 
 
 def update(folder: Path = LOCALE) -> None:
-    """Update all files from the sources."""
+    """Update the template and all translations from the sources, and compile them."""
     made = extract(folder)
     for language in languages(folder):
         catalog = read(po_file(folder, language), language)
@@ -204,7 +204,7 @@ def update(folder: Path = LOCALE) -> None:
 
 
 def add(language: str, folder: Path = LOCALE) -> None:
-    """Add a language with all texts untranslated."""
+    """Create the .po file of a new language, with all texts untranslated."""
     about = f"# NEP Studio in '{language}'; see docs/translate.md."
     catalog = Catalog(
         locale=language, header_comment=about, project="NEP Studio", creation_date=_MADE, fuzzy=False
@@ -214,7 +214,7 @@ def add(language: str, folder: Path = LOCALE) -> None:
 
 
 def compile_all(folder: Path = LOCALE) -> None:
-    """Write the generated files: compiled languages, the pseudo-language, and facts about them."""
+    """Write the generated files: compiled languages, the pseudo-language, and languages.json."""
     known: dict[str, Mapping[str, object]] = {ENGLISH: {"name": "English", "share": 1.0}}
     for language in languages(folder):
         catalog = read(po_file(folder, language), language)
@@ -225,7 +225,7 @@ def compile_all(folder: Path = LOCALE) -> None:
 
 
 def compile_pseudo(folder: Path = LOCALE) -> None:
-    """Write the pseudo-language, which exists only on developers' computers."""
+    """Write the pseudo-language, which is not part of a release."""
     _write_mo(pseudo_catalog(read(pot_file(folder))), po_file(folder, PSEUDO).with_suffix(".mo"))
 
 
@@ -259,7 +259,10 @@ def _json(value: Mapping[str, object]) -> str:
 
 
 def facts(language: str, catalog: Catalog) -> dict[str, object]:
-    """Return the formats of a language from Unicode's CLDR, so that programs don't need Babel."""
+    """Return name, completeness and formats of a language.
+
+    The formats are from Unicode's CLDR and stored in languages.json, so that programs don't need Babel.
+    """
     locale = Locale.parse(FORMATS.get(language, language))
     entries = [each for each in catalog if each.id]
     signs = locale.number_symbols["latn"]
@@ -295,12 +298,12 @@ def _date_part(found: re.Match[str]) -> str:
 
 
 def is_done(string: str | Sequence[str] | None) -> bool:
-    """Return whether all plural forms are translated."""
+    """Return True if all plural forms are translated."""
     return all(_ids(string)) and bool(string)
 
 
 def pseudo_catalog(pot: Catalog) -> Catalog:
-    """Return a catalogue with all texts in the pseudo-language."""
+    """Create a catalogue with all texts in the pseudo-language."""
     made = Catalog(project="NEP Studio", creation_date=_MADE, fuzzy=False)
     for entry in pot:
         if entry.id:
@@ -310,7 +313,7 @@ def pseudo_catalog(pot: Catalog) -> Catalog:
 
 
 def check(folder: Path = LOCALE) -> list[str]:
-    """Return a message for each inconsistency."""
+    """Return a message for each inconsistency between sources, template and translations."""
     made, pot = template(), read(pot_file(folder))
     wrong = [
         f"'{_shown(key)}' is {place}; run 'python tools/words.py update'"
