@@ -1,4 +1,4 @@
-"""Block editor's web page as a widget, and the messages between window and page.
+"""Widget with the web page of the block editor, and the messages between window and page.
 
-`view` is the widget, `bridge` the calls in both directions; the page itself is `app/blocks/editor/`.
+`view` has the widget, `bridge` the calls in both directions; the page itself is `app/blocks/editor/`.
 """

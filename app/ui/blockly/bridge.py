@@ -1,6 +1,6 @@
-"""Messages between the window and the page of the block editor over one QWebChannel.
+"""Messages between the window and the page of the block editor over a QWebChannel.
 
-One ordered channel in each direction.
+The channel delivers messages in order in each direction.
 """
 
 from __future__ import annotations
@@ -14,12 +14,12 @@ from app.core.storage import deep_json
 
 Json = dict[str, object]
 COPIED = '{"nepStudio":'
-"""Prefix of copied blocks (`clipboard.ts`)."""
+"""Prefix of copied blocks in the clipboard's text (`clipboard.ts`)."""
 MAX_COPIED_CHARS = 5_000_000
 
 
 class BlocklyBridge(QObject):
-    """Object ``bridge`` of the page. The page calls slots; signals notify the view."""
+    """QWebChannel object ``bridge`` of the page. The page calls its slots; its signals notify the view."""
 
     told = Signal(str, str)  # to the page: a command and its JSON
     came_up = Signal()
@@ -28,21 +28,22 @@ class BlocklyBridge(QObject):
     block_chosen = Signal(str)
     answered = Signal(int, str)  # token of a flush, workspace as JSON
     went_wrong = Signal(str)
-    field_opened = Signal()  # the requested field has the focus
-    try_asked = Signal(str)  # a stack to try, as JSON
-    block_focused = Signal(bool)  # whether a block has the focus
-    command_wanted = Signal(str)  # a window command about variables or the picture of the blocks
-    drawn = Signal(int, str)  # token of a picture, the picture; "" for none
-    values_watched = Signal(str)  # variables whose values the page shows, as JSON: [id, …]
+    field_opened = Signal()  # field requested by a command has the focus
+    try_asked = Signal(str)  # script to try, as JSON
+    block_focused = Signal(bool)  # True if a block has the focus
+    command_wanted = Signal(str)  # id of a window command, for variables or the picture of the blocks
+    drawn = Signal(int, str)  # token of a picture, the picture as text; "" if there are no blocks
+    values_watched = Signal(str)  # ids of the variables whose values the page shows, as JSON list
     sensors_offered = Signal(str)  # sensors in the open toolbox as JSON: [[robot, sensor], …]
-    wanted = Signal(str)  # a button of the empty canvas was pressed: "robot", "examples"
-    pinned = Signal(bool)  # whether the flyout should stay open
+    wanted = Signal(str)  # name of the pressed button of the empty canvas: "robot" or "examples"
+    pinned = Signal(bool)  # True if the flyout stays open after a block was dragged out of it
     removed = Signal(int)  # number of blocks that the user deleted at once
-    # blocks of that tab are dragged outside the page, at x, y; False: no longer
+    # True with x, y while blocks of this tab are dragged outside the page; False when they return
     carried_out = Signal(int, int, bool, str)
-    carried_seen = Signal(str, float)  # their image: a PNG as `data:`, and its pixels per page pixel
-    let_go_outside = Signal(int, int)  # they were dropped there
-    # number of blocks brought into this tab: "moved", "copied", "added"; from which tab
+    # picture of the dragged blocks: a PNG as `data:` URL, and its device pixels per page pixel
+    carried_seen = Signal(str, float)
+    let_go_outside = Signal(int, int)  # position where the blocks were dropped outside the page
+    # number of blocks brought into this tab, "moved", "copied" or "added", and key of their former tab
     carried_over = Signal(int, str, str)
     backpack_asked = Signal(str)  # backpack operation as JSON (`backpack.ts`)
 
@@ -51,12 +52,12 @@ class BlocklyBridge(QObject):
         self._begin = begin
 
     def send_command(self, command: str, payload: object) -> None:
-        """Send a command to the page, which doesn't reply."""
+        """Send a command to the page. The page sends no reply."""
         self.told.emit(command, deep_json.dumps(payload, ascii=True))
 
     @Slot(result=str)
     def beginning(self) -> str:
-        """Return what the page needs before its first painting: theme, language, motion."""
+        """Return the theme, language and motion settings that the page needs before its first paint."""
         return deep_json.dumps(self._begin(), ascii=True)
 
     @Slot()
@@ -129,14 +130,14 @@ class BlocklyBridge(QObject):
 
     @Slot(str)
     def copy(self, blocks: str) -> None:
-        """Put copied blocks on the system clipboard as text."""
+        """Copy serialized blocks to the system clipboard as text."""
         QGuiApplication.clipboard().setText(blocks)
 
     @Slot(result=str)
     def copied(self) -> str:
-        """Return copied blocks on the system clipboard.
+        """Return the serialized blocks on the system clipboard.
 
-        "" for anything else, which the page must not read.
+        Return "" for other contents, which the page must not read.
         """
         text = QGuiApplication.clipboard().text()
         return text if text.startswith(COPIED) and len(text) <= MAX_COPIED_CHARS else ""

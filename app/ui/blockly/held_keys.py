@@ -1,4 +1,4 @@
-"""Keys pressed before the page is ready for them, held until it is."""
+"""Buffer for key presses that arrive before the page is ready for them."""
 
 from __future__ import annotations
 
@@ -11,9 +11,10 @@ _ELSEWHERE = (QEvent.Type.MouseButtonPress, QEvent.Type.FocusOut)
 
 
 class HeldKeys:
-    """Holds keys between a command that focuses a field and the page's reply.
+    """Holds key presses between a command that focuses a field and the page's reply.
 
-    Commands and keys take different ways to the page, and keys are faster: letters typed immediately after
+    Commands and keys reach the page by different channels, and keys are faster: letters typed immediately
+    after
     *Find a block* would arrive while the page is still busy, and go to its canvas.
     """
 
@@ -23,12 +24,12 @@ class HeldKeys:
         self._kept: list[QEvent] | None = None
 
     def hold(self) -> None:
-        """Hold all keys from now on."""
+        """Start to hold all key presses."""
         if self._kept is None:
             self._kept = []
 
     def keeps(self, event: QEvent) -> bool:
-        """Return whether this event is held. A click or loss of focus releases the held keys."""
+        """Return True if the event was held. A click or loss of focus releases the held keys."""
         if self._kept is None:
             return False
         if event.type() in _KEYS:
@@ -39,7 +40,7 @@ class HeldKeys:
         return False
 
     def let_go(self) -> None:
-        """Send the held keys to the page, in order."""
+        """Send the held keys to the page in the order they were pressed."""
         kept, self._kept = self._kept or [], None
         for event in kept:
             keyboard = self._keyboard()
@@ -47,5 +48,5 @@ class HeldKeys:
                 QCoreApplication.sendEvent(keyboard, event)
 
     def forget(self) -> None:
-        """Discard the held keys: the page they were typed for is gone."""
+        """Discard the held keys because the page they were typed for no longer exists."""
         self._kept = None

@@ -1,4 +1,4 @@
-"""Host of the block editor's web page: off the record, isolated, without remote content.
+"""Host of the block editor's web page, with an off-the-record profile and without access to the network.
 
 The host creates and styles the page, restarts it when its process dies, and receives its function keys.
 """
@@ -80,29 +80,29 @@ class BlocklyWeb:
         channel.registerObject("bridge", bridge)
         self.page.setWebChannel(channel)
         self.view.setPage(self.page)
-        # Children are deleted in the order of their adoption; a profile must outlive its pages.
+        # Qt deletes children in the order of their adoption; a profile must outlive its pages.
         profile.setParent(owner)
 
     def start(self) -> None:
-        """Load the editor, also again after the web process was killed."""
+        """Load the editor; also used to reload it after its process was killed."""
         self.page.load(QUrl(PAGE))
 
     def close(self) -> None:
-        """Delete the view and its page, then the profile, in the event loop."""
+        """Schedule deletion of the view, its page and then the profile in the event loop."""
         self.view.deleteLater()
         self._profile.deleteLater()
 
     def keyboard(self) -> QObject | None:
-        """Return the widget that receives the keys while the page has the focus."""
+        """Return the widget that receives key presses while the page has the focus."""
         return proxy_of(self.view)
 
 
 class BlocklyHost(QWidget):
-    """Widget of the page, which is created at the first show and restarted whenever its process dies."""
+    """Container of the page, which is created on the first show and restarted whenever its process dies."""
 
     ready = Signal()  # the page is loaded (again, after its process died)
-    recovered = Signal()  # its process had died: every behaviour is restored, without undo
-    key_pressed = Signal(str)  # a function key pressed in the page that isn't a shortcut of the window
+    recovered = Signal()  # the page's process died and every behaviour was restored, without its undo stack
+    key_pressed = Signal(str)  # function key pressed in the page that isn't a shortcut of the window
 
     def __init__(self, parent: QWidget | None, language: str) -> None:
         super().__init__(parent)
@@ -133,11 +133,14 @@ class BlocklyHost(QWidget):
 
     @property
     def web(self) -> BlocklyWeb | None:
-        """Page's view, None until the first show. For tools and tests."""
+        """Web view, or None before the first show. For tools and tests."""
         return self._web
 
     def set_theme(self, tokens: Mapping[str, object], dark: bool) -> None:
-        """Set the design tokens: the whole file, or `Theme.blockly_tokens()`. Keeps program and undo."""
+        """Set the design tokens: the parsed token file, or `Theme.blockly_tokens()`.
+
+        Program and undo stack are kept.
+        """
         self._theme = {"tokens": dict(tokens), "dark": dark}
         if isinstance(tokens.get("reducedMotion"), bool):
             self.set_reduced_motion(bool(tokens["reducedMotion"]))
@@ -146,7 +149,7 @@ class BlocklyHost(QWidget):
         self._send_command("theme", self._theme)
 
     def set_reduced_motion(self, reduced: bool) -> None:
-        """Set a steady glow instead of an animated one."""
+        """Replace the animated glow of running blocks with a steady one."""
         if reduced != self._reduced_motion:
             self._reduced_motion = reduced
             self._send_command("motion", {"reduced": reduced})
@@ -154,15 +157,15 @@ class BlocklyHost(QWidget):
     # -- for the view -----------------------------------------------------------------------------
 
     def _page_came(self) -> None:
-        # Overridden: the page is loaded and has no state yet.
+        # Overridden by subclasses: the page is loaded and has no state yet.
         ...
 
     def _page_went(self) -> None:
-        # Overridden: the page and its state are lost.
+        # Overridden by subclasses: the page and its state are lost.
         ...
 
     def _send_command(self, command: str, payload: object) -> None:
-        # Without a page nothing is sent; `_page_came` sends everything to a later one.
+        # Commands without a page are dropped; `_page_came` sends the complete state to a later page.
         if self._up:
             self._bridge.send_command(command, payload)
 
@@ -180,7 +183,7 @@ class BlocklyHost(QWidget):
     def showEvent(self, event: QShowEvent) -> None:
         super().showEvent(event)
         if self._web is None:
-            QTimer.singleShot(0, self, self._make_page)  # the window responds to the user first
+            QTimer.singleShot(0, self, self._make_page)  # let the window respond to the user first
 
     def eventFilter(self, watched: QObject, event: QEvent) -> bool:
         if event.type() == QEvent.Type.ChildAdded:
@@ -191,11 +194,11 @@ class BlocklyHost(QWidget):
             self._send_command("keyboard", None)
         overrides = event.type() == QEvent.Type.ShortcutOverride and self._on_block
         if overrides and _is_help(cast("QKeyEvent", event)):
-            event.accept()  # on a block, F1 is the block's help: the window's F1 doesn't get it
+            event.accept()  # on a block, F1 shows the block's help instead of the window's
             return True
         if event.type() == QEvent.Type.KeyPress:
             key = cast("QKeyEvent", event)
-            # A shortcut of the window was handled before a key press arrives here.
+            # A shortcut of the window is handled before the key press arrives here.
             if key.key() in _FUNCTION_KEYS and key.modifiers() == Qt.KeyboardModifier.NoModifier:
                 if self._on_block and _is_help(key):
                     self._send_command("help", None)
@@ -219,20 +222,20 @@ class BlocklyHost(QWidget):
         self._web.start()
 
     def _close_page(self) -> None:
-        # Deletes the page before its profile, whatever the interpreter's order at exit.
+        # Deletes the page before its profile, whatever order the interpreter uses at exit.
         web, self._web, self._up = self._web, None, False
         if web is not None:
             web.close()
 
     def _apply_theme(self, web: BlocklyWeb) -> None:
-        # Styles outside the page: background before the first painting, text size.
+        # Styles outside the page's control: background before the first paint, text size.
         web.page.setBackgroundColor(self._background())
         tokens = cast("Mapping[str, object]", self._theme["tokens"])
         percent = tokens.get("textPercent")
         web.view.setZoomFactor(percent / 100 if isinstance(percent, int | float) else 1.0)
 
     def _watch_keys(self) -> None:
-        # The web engine creates the widget that receives the keys, again with each process.
+        # The web engine creates the widget that receives keys, and a new one for each process.
         keyboard = self._web.keyboard() if self._web is not None else None
         if self._web is not None:
             self._web.view.setAcceptDrops(False)

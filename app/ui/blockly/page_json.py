@@ -1,4 +1,4 @@
-"""Parsing of JSON from the block editor's page. Malformed input gives an empty value."""
+"""Parsers for JSON from the block editor's page. Malformed input results in an empty value."""
 
 from __future__ import annotations
 
@@ -10,18 +10,18 @@ from nep.text import bounded_str
 
 
 def texts(text: str) -> tuple[str, ...]:
-    """Return the strings of a list."""
+    """Return the strings of a JSON list."""
     return tuple(map(bounded_str, _list(text)))
 
 
 def pairs(text: str) -> tuple[tuple[str, str], ...]:
-    """Return pairs of strings, such as robot and sensor, of a list of lists."""
+    """Return the pairs of strings, such as robot and sensor, of a JSON list of lists."""
     found = (each for each in _list(text) if isinstance(each, list) and len(each) == 2)
     return tuple((bounded_str(first), bounded_str(second)) for first, second in found)
 
 
 def data_url(text: str) -> bytes:
-    """Return the bytes of a base64 ``data:`` URL."""
+    """Return the decoded bytes of a base64 ``data:`` URL."""
     try:
         return b64decode(text.partition(",")[2].encode("ascii", "replace"))
     except binascii.Error:

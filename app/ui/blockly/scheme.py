@@ -1,7 +1,7 @@
-"""URL scheme of the block editor's page: ``app://blocks/…`` from the resources, and nothing else.
+"""URL scheme ``app://blocks/…``, which serves the block editor's page from the resources and nothing else.
 
 `register_scheme` must run before the first view or profile is created. Qt recommends to call it before the
-QApplication; this module is not imported so early, because Qt WebEngine takes long to load.
+QApplication is created; it is called later because importing Qt WebEngine takes long.
 """
 
 from __future__ import annotations
@@ -104,14 +104,17 @@ class SchemeHandler(QWebEngineUrlSchemeHandler):
 
 
 class RequestBlocker(QWebEngineUrlRequestInterceptor):
-    """Blocks all requests except for local content. Blocked ones are recorded for tests."""
+    """Request interceptor that blocks everything except local content.
+
+    Blocked requests are recorded for tests.
+    """
 
     def __init__(self, parent: QObject | None = None) -> None:
         super().__init__(parent)
         self.blocked: list[str] = []
 
     def interceptRequest(self, info: QWebEngineUrlRequestInfo) -> None:
-        info.block(True)  # first, so that an exception here can't let it through
+        info.block(True)  # blocked first, so that an exception below can't let the request through
         if info.requestUrl().scheme() in ALLOWED:
             info.block(False)
             return

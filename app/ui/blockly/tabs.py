@@ -1,4 +1,4 @@
-"""State of the behaviours in the block editor, with or without a loaded page."""
+"""State of the open behaviours in the block editor, independent of whether the page is loaded."""
 
 from __future__ import annotations
 
@@ -9,19 +9,19 @@ from app.core.documents.workspace_json import EMPTY, WorkspaceJson
 
 @dataclass
 class Tab:
-    """Behaviour: its newest program, and the run state of its blocks."""
+    """State of one behaviour: its newest program, and the run state of its blocks."""
 
     key: str
     program: WorkspaceJson
     generation: int
-    in_page: bool = False  # the page has it, with undo, zoom and scroll position
+    in_page: bool = False  # loaded in the page, with undo stack, zoom and scroll position
     states: dict[str, object] = field(default_factory=dict)
 
 
 class Tabs:
-    """Open behaviours, one of them shown.
+    """Open behaviours, exactly one of which is shown.
 
-    The first one has the key "" and is empty: a placeholder until a real one is opened.
+    The first tab has the key "" and is an empty placeholder until a real behaviour is opened.
     """
 
     def __init__(self) -> None:
@@ -33,9 +33,10 @@ class Tabs:
         return self._tabs.get(key)
 
     def show(self, key: str, program: WorkspaceJson) -> str | None:
-        """Show a tab; ``program`` is used the first time.
+        """Show a tab. ``program`` is used only if the tab is new.
 
-        Return the key of a removed placeholder, or None.
+        Returns:
+            The key of the placeholder if it was removed, else None.
         """
         before = self.shown
         self.shown = self._tabs.get(key) or self._make(key, program)
@@ -45,26 +46,29 @@ class Tabs:
         return ""
 
     def close(self, key: str) -> bool:
-        """Remove a tab; return whether it existed."""
+        """Remove a tab. Return False if it doesn't exist."""
         gone = self._tabs.pop(key, None)
         if gone is not None and gone is self.shown:
             self.shown = self._make("", WorkspaceJson.of(EMPTY))
         return gone is not None
 
     def replace(self, program: WorkspaceJson) -> None:
-        """Replace the program of the shown tab; pending edits of the old one no longer count."""
+        """Replace the program of the shown tab. Pending edits of the old program will be ignored."""
         self._generations += 1
         self.shown.generation = self._generations
         self.shown.program = program
         self.shown.states.clear()
 
     def edited(self, key: str, generation: int) -> Tab | None:
-        """Return the tab of an edit; None when it was closed or its program replaced meanwhile."""
+        """Return the tab that an edit belongs to, or None.
+
+        It is None if the tab was closed or its program replaced in the meantime.
+        """
         tab = self._tabs.get(key)
         return tab if tab is not None and tab.generation == generation else None
 
     def page_gone(self) -> None:
-        """Mark all tabs as not loaded: the page is lost."""
+        """Mark all tabs as not loaded because the page was lost."""
         for tab in self._tabs.values():
             tab.in_page = False
 

@@ -1,7 +1,7 @@
 """Block editor widget.
 
-The view always knows the newest program. Its page may be loaded late (at the first show) or die (its process
-can be killed): its state is then sent again.
+The view always has the newest program. Its page is loaded on the first show, and its process may die; a new
+page receives the complete state.
 """
 
 from __future__ import annotations
@@ -23,34 +23,37 @@ from nep import i18n
 _PIXELS_PER_INCH = 96.0  # CSS pixels
 _EDGE_INCH = 0.45
 PAGE_EDITS = {"cut": "Cut", "copy": "Copy", "paste": "Paste", "selectAll": "SelectAll"}
-"""Edit commands of the page's fields, by `QWebEnginePage.WebAction` name."""
+"""Actions of `QWebEnginePage.WebAction` for editing text fields of the page, by command."""
 TYPES = "(e => !!e && (e.isContentEditable || /^(INPUT|TEXTAREA)$/.test(e.tagName)))(document.activeElement)"
-"""Script: whether a field of the page has the focus."""
+"""JavaScript expression that is true if a text field of the page has the focus."""
 
 
 class BlocklyView(BlocklyHost):
-    """Shows and edits behaviours, one at a time, each in its tab.
+    """Editor of behaviours, which shows one at a time, each in its own tab.
 
-    All methods may be called at any time, also before the first show. Before the first `show_tab` there is
+    All methods may be called at any time, also before the page is loaded. Before the first `show_tab` there
+    is
     one behaviour, with the key "".
     """
 
-    changed = Signal(str, object)  # a tab's key and its newest program (WorkspaceJson), 150 ms after an edit
-    history_changed = Signal(bool, bool)  # can undo, can redo: of the shown tab
-    block_selected = Signal(str)  # a block's id; "" when nothing is selected
-    wanted = Signal(str)  # a button of the empty canvas was pressed: "robot", "examples"
-    try_asked = Signal(str)  # a stack to try, as JSON (`app.blocks.compiler.stack`)
-    sensors_offered = Signal(tuple)  # (robot, sensor) of each one in the open toolbox
-    command_wanted = Signal(str)  # a window command: "variable.rename:ID"
-    values_watched = Signal(tuple)  # variables (ids) whose values the page shows
-    toolbox_pinned = Signal(bool)  # whether the flyout should stay open
+    changed = Signal(str, object)  # key of a tab and its newest program (WorkspaceJson), 150 ms after an edit
+    history_changed = Signal(bool, bool)  # can undo, can redo; in the shown tab
+    block_selected = Signal(str)  # id of the selected block; "" if none is selected
+    wanted = Signal(str)  # name of the pressed button of the empty canvas: "robot" or "examples"
+    try_asked = Signal(str)  # script to try, as JSON (`app.blocks.compiler.stack`)
+    sensors_offered = Signal(tuple)  # (robot, sensor) of each sensor block in the open flyout
+    command_wanted = Signal(str)  # id of a window command such as "variable.rename:ID"
+    values_watched = Signal(tuple)  # ids of the variables whose values the page shows
+    toolbox_pinned = Signal(bool)  # True if the flyout stays open after a block was dragged out of it
     blocks_deleted = Signal(int)  # number of blocks deleted at once in the shown tab
-    # blocks are dragged outside the page, at a screen position (QPoint), from that tab; None: no longer
+    # position on the screen (QPoint) while blocks of that tab are dragged outside the page, None when they
+    # return
     block_carried = Signal(object, str)
-    carried_seen = Signal(bytes, float)  # their image: a PNG, and its pixels per screen pixel
-    # they were dropped there; without `bring_blocks` they stay where they were
+    # picture of the dragged blocks: a PNG, and its device pixels per screen pixel
+    carried_seen = Signal(bytes, float)
+    # position where blocks were dropped outside the page; without `bring_blocks` they return to their place
     block_dropped = Signal(QPoint)
-    # number of blocks brought into the shown tab: "moved", "copied" or "added"; from which tab
+    # number of blocks brought into the shown tab, "moved", "copied" or "added", and key of their former tab
     blocks_brought = Signal(int, str, str)
     backpack_asked = Signal(str)  # backpack operation as JSON: `BackpackKeeper`
 
@@ -91,18 +94,18 @@ class BlocklyView(BlocklyHost):
 
     @property
     def workspace(self) -> Mapping[str, object]:
-        """Newest program of the shown tab; use `flush` to include the last 150 ms."""
+        """Newest program of the shown tab. Edits of the last 150 ms may be missing; see `flush`."""
         return self._tabs.shown.program.blocks
 
     def workspace_of(self, key: str) -> Mapping[str, object] | None:
-        """Return the newest program of a tab; None when it doesn't exist."""
+        """Return the newest program of a tab, or None if there is no such tab."""
         tab = self._tabs[key]
         return tab.program.blocks if tab is not None else None
 
     def show_tab(self, key: str, workspace: Mapping[str, object]) -> None:
-        """Show the behaviour with this key, with its own undo, zoom and scroll position.
+        """Show the behaviour with this key, with its own undo stack, zoom and scroll position.
 
-        ``workspace`` is used the first time; later the tab's own state.
+        ``workspace`` is used only if the tab is new.
         """
         gone = self._tabs.show(key, WorkspaceJson.of(workspace))
         self._send_tab()
@@ -110,7 +113,7 @@ class BlocklyView(BlocklyHost):
             self._send_command("close", gone)
 
     def close_tab(self, key: str) -> None:
-        """Close a behaviour and discard its undo. If it was shown, an empty one replaces it."""
+        """Close a tab and discard its undo stack. If it was shown, an empty behaviour replaces it."""
         was_shown = key == self._tabs.shown.key
         if self._tabs.close(key):
             if was_shown:
@@ -118,24 +121,25 @@ class BlocklyView(BlocklyHost):
             self._send_command("close", key)
 
     def load(self, workspace: Mapping[str, object]) -> None:
-        """Load another program into the shown tab.
+        """Replace the program of the shown tab with another document.
 
-        Clears its undo; pending edits of the old program are discarded.
+        Clears the undo stack and discards pending edits of the old program.
         """
         self._tabs.replace(WorkspaceJson.of(workspace))
         self._tabs.shown.in_page = False
         self._send_tab()
 
     def change(self, workspace: Mapping[str, object]) -> None:
-        """Change the shown tab's program as one edit that can be undone; `changed` is not emitted."""
+        """Change the program of the shown tab as one undoable edit; `changed` is not emitted."""
         self._tabs.shown.program = WorkspaceJson.of(workspace)
         self._send_command("change", workspace)
 
     def flush(self, done: Callable[[WorkspaceJson], None]) -> None:
-        """Request the newest program of the shown tab.
+        """Fetch pending edits of the shown tab, then call `done` with the newest program.
 
-        `done` is called once, also if the page is missing or dies. Other tabs were flushed when they were
-        left.
+        `done` is called exactly once, even if the page is not loaded or dies. Other tabs have no pending
+        edits: they
+        were flushed when another tab was shown.
         """
         if not self._up:
             done(self._tabs.shown.program)
@@ -145,9 +149,9 @@ class BlocklyView(BlocklyHost):
         self._bridge.send_command("flush", self._tokens)
 
     def picture(self, kind: str, white: bool, done: Callable[[bytes], None]) -> None:
-        """Create a "png" or "svg" of all blocks of the shown tab, with a white or transparent background.
+        """Render all blocks of the shown tab as "png" or "svg", on a white or transparent background.
 
-        `done` is called once, with b"" without blocks or page.
+        `done` is called exactly once, with b"" if there are no blocks or no page.
         """
         if not self._up:
             done(b"")
@@ -157,9 +161,9 @@ class BlocklyView(BlocklyHost):
         self._bridge.send_command("picture", {"token": self._tokens, "kind": kind, "white": white})
 
     def pdf(self, title: str, date: str, layout: QPageLayout, done: Callable[[bytes], None]) -> None:
-        """Create a PDF of all blocks of the shown tab, with the title on each page.
+        """Render all blocks of the shown tab as a PDF with the title on each page.
 
-        `done` is called once, with b"" without blocks or page.
+        `done` is called exactly once, with b"" if there are no blocks or no page.
         """
         if not self._up:
             done(b"")
@@ -189,14 +193,15 @@ class BlocklyView(BlocklyHost):
         self._bridge.send_command("pages", {"token": token, "title": title, "date": date, **settings})
 
     def set_toolbox_pinned(self, pinned: bool | None) -> None:
-        """Set whether the flyout stays open, or closes after each use; None: depending on the space."""
+        """Set whether the flyout stays open after use. None decides by the available space."""
         self._pinned = pinned
         self._send_command("pin", pinned)
 
     def set_definitions(self, definitions: Mapping[str, object]) -> None:
-        """Set the result of `app.blocks.editor_definitions`. Equal definitions cost nothing.
+        """Set the block definitions (`app.blocks.editor_definitions`). Equal definitions are ignored.
 
-        Keeps the program, its undo and an open category; waits while a block is being dragged.
+        The program, its undo stack and the open category are kept. The change is deferred while a block is
+        dragged.
         """
         if definitions == self._definitions:
             return
@@ -206,33 +211,33 @@ class BlocklyView(BlocklyHost):
     # -- state of the shown tab's blocks ----------------------------------------------------------
 
     def highlight(self, ids: Sequence[str]) -> None:
-        """Highlight exactly these blocks; may be called 30 times a second."""
+        """Highlight exactly these blocks. Fast enough for 30 calls per second."""
         self._show("highlight", list(ids))
 
     def mark_stopped(self, ids: Sequence[str]) -> None:
-        """Outline the blocks at which the program was stopped."""
+        """Outline the blocks at which the program stopped."""
         self._show("stopped", list(ids))
 
     def set_errors(self, errors: Mapping[str, str]) -> None:
-        """Outline these blocks with an error each: id -> sentence."""
+        """Show an error at each of these blocks, as a map from block id to sentence."""
         self._show("errors", dict(errors))
 
     def set_warnings(self, warnings: Mapping[str, str]) -> None:
-        """Show a warning at each of these blocks: id -> sentence."""
+        """Show a warning at each of these blocks, as a map from block id to sentence."""
         self._show("warnings", dict(warnings))
 
     def show_value(self, id: str, words: str) -> None:
-        """Show a value at a block, also in the open toolbox, until the next click."""
+        """Show a value at a block of the program or the flyout until the next click."""
         self._send_command("value", [id, words])
 
     def set_absent(self, ids: Sequence[str]) -> None:
-        """Show these blocks grey and dashed: their robot is not connected."""
+        """Show these blocks dimmed and dashed because their robot is not connected."""
         self._show("absent", list(ids))
 
     def set_live_values(self, values: Mapping[str, str], old: Collection[str] = ()) -> None:
-        """Set the values of sensor blocks, by block id or by ``<robot>/<property>[/<field>]``.
+        """Set the displayed values of sensor blocks, by block id or by ``<robot>/<property>[/<field>]``.
 
-        Not an edit. Values whose key is in ``old`` are stale and shown faint.
+        This is not an edit of the program. Values whose key is in ``old`` are stale and shown dimmed.
         """
         live: Json = {"values": dict(values), "old": sorted(old)}
         if live != self._live:
@@ -240,7 +245,7 @@ class BlocklyView(BlocklyHost):
             self._send_command("live", self._live)
 
     def set_variable_values(self, values: Mapping[str, Mapping[str, object]]) -> None:
-        """Set the values of the variables that the page shows: by id, as `VariableValue.to_json`."""
+        """Set the displayed values of variables, as a map from id to `VariableValue.to_json`."""
         if values != self._values:
             self._values = dict(values)
             self._send_command("values", self._values)
@@ -250,9 +255,11 @@ class BlocklyView(BlocklyHost):
         self._send_command("variable", dict(edit))
 
     def set_alarms(self, alarms: Mapping[str, tuple[str, str]]) -> None:
-        """Set problems of robots in the toolbox: name -> status of its dot, sentence.
+        """Set the problems of robots shown in the toolbox.
 
-        Other robots have the dot for connected or not.
+        Args:
+            alarms: Status of the dot and sentence by robot name. Other robots have a dot for connected or
+                disconnected.
         """
         states: Json = {name: {"status": status, "words": words} for name, (status, words) in alarms.items()}
         if states != self._alarms:
@@ -260,22 +267,31 @@ class BlocklyView(BlocklyHost):
             self._send_command("alarms", states)
 
     def set_backpack(self, items: Sequence[Mapping[str, object]]) -> None:
-        """Set the content of the backpack, newest first: ``{"id", "at", "block"}`` of each."""
+        """Set the contents of the backpack, newest first, as maps with ``id``, ``at`` and ``block``."""
         self._backpack = [dict(item) for item in items]
         self._send_command("backpack", self._backpack)
 
     def set_first_step(self, first: str, robot: bool) -> None:
-        """Set the hint of an empty canvas to drag the block ``first`` there; ``robot``: one is connected."""
+        """Show a hint on the empty canvas to drag the block ``first`` there.
+
+        Args:
+            first: Type of the block.
+            robot: True if a robot is connected.
+        """
         state: Json = {"first": first, "robot": robot}
         if state != self._first_step:
             self._first_step = state
             self._send_command("begin", state)
 
     def point_at(self, block: str, name: str = "", then: str = "") -> None:
-        """Highlight the category of a block type, then the block; "" ends that.
+        """Highlight the category of a block type, then the block; "" ends the highlighting.
 
-        ``name`` is its label, ``then`` the hint where to put it. It ends automatically when such a block is
-        added.
+        The highlighting also ends when a block of this type is added.
+
+        Args:
+            block: Type of the block.
+            name: Label of the block.
+            then: Hint where to put the block.
         """
         wanted: Json | None = {"block": block, "name": name, "then": then} if block else None
         self._pointed = None if self._up else wanted
@@ -284,15 +300,15 @@ class BlocklyView(BlocklyHost):
     # -- commands ---------------------------------------------------------------------------------
 
     def undo(self) -> None:
-        """Undo the last edit."""
+        """Undo the last edit in the shown tab."""
         self._send_command("undo", None)
 
     def undo_deletion(self) -> None:
-        """Restore the last deleted blocks, whatever was done since."""
+        """Restore the blocks that were deleted last, even if other edits followed."""
         self._send_command("undelete", None)
 
     def bring_blocks(self) -> None:
-        """Move the last dragged blocks from their tab into the shown one."""
+        """Move the blocks dragged last from their tab into the shown one."""
         self._send_command("bring", None)
 
     def give_blocks_back(self) -> None:
@@ -300,20 +316,20 @@ class BlocklyView(BlocklyHost):
         self._send_command("giveBack", None)
 
     def redo(self) -> None:
-        """Redo."""
+        """Redo the edit that was undone last in the shown tab."""
         self._send_command("redo", None)
 
     def edit(self, what: str) -> None:
         """Apply "copy", "cut", "paste" or "duplicate" to the selected block, and focus the page.
 
-        No effect when the page has the focus, because it has handled the key.
+        Has no effect if the page already has the focus, because the page has handled the key itself.
         """
         if self.web is not None and not self._has_focus():
             self.setFocus()
             self._send_command("edit", what)
 
     def edit_from_menu(self, what: str) -> None:
-        """Apply "cut", "copy", "paste" or "selectAll" in the page's focused field, else to blocks."""
+        """Apply "cut", "copy", "paste" or "selectAll" to the page's focused text field, else to blocks."""
         if self.web is None:
             return
         page = self.web.page
@@ -352,7 +368,7 @@ class BlocklyView(BlocklyHost):
         self._ask_for("search")
 
     def show_help(self) -> None:
-        """Show the help of the focused block, if any."""
+        """Show the help of the focused block, if there is one."""
         self._send_command("help", None)
 
     def show_block(self, id: str) -> None:

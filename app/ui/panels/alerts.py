@@ -1,4 +1,4 @@
-"""Alerts panel: present problems of network and robots, each with its next step."""
+"""Alerts panel: current problems of the network and the robots, each with a suggested next step."""
 
 from __future__ import annotations
 

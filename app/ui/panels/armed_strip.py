@@ -1,4 +1,4 @@
-"""Switch that arms sending, and the confirmation for topics of robots."""
+"""Strip with the switch that arms sending, and the confirmation for topics that move robots."""
 
 from __future__ import annotations
 
@@ -23,16 +23,16 @@ ARMED_MINUTES = (1, 5, 15, 60)
 
 
 def left_words(seconds: float) -> str:
-    """Format the remaining time as "3:48"."""
+    """Format a remaining time in minutes and seconds, such as "3:48"."""
     whole = math.ceil(seconds)
     return f"{whole // 60}:{whole % 60:02d}"
 
 
 class ArmedStrip(QWidget):
-    """Strip at the top of each panel that can send."""
+    """Strip at the top of every panel that can send messages."""
 
     for_replay = False
-    """True: its targets can be sent while a recording is shown."""
+    """Set to True in subclasses whose targets can be sent while a recording is shown."""
 
     def __init__(self, context: PanelContext) -> None:
         super().__init__()
@@ -82,7 +82,7 @@ class ArmedStrip(QWidget):
         return self._context.session.acting
 
     def refresh(self) -> None:
-        """Show switch, targets and counts."""
+        """Update the switch, the targets and the counts."""
         acting = self.acting
         arming, question = acting.arming, acting.question
         left, replaying = left_words(arming.left_s), self._context.session.is_replaying
@@ -111,19 +111,19 @@ class ArmedStrip(QWidget):
         self.update()
 
     def off_words(self) -> str:
-        """Return the text of the strip while sending is off."""
+        """Return the text shown while sending is disarmed."""
         return _("Sending is off")
 
     def arm(self) -> str:
-        """Arm sending; return a sentence if that is not possible, else ""."""
+        """Arm sending. Return the reason if that is not possible, else ""."""
         return self.acting.arm()
 
     def more_words(self) -> str:
-        """Return a summary of the sent messages, for panels that don't show it themselves."""
+        """Return a summary of the sent messages; panels that show it themselves override this."""
         return ""
 
     def token_words(self, target: Target) -> str:
-        """Return the text of a target's token."""
+        """Return the text of the token that represents a target."""
         return target.name
 
     def _show_tokens(self, targets: tuple[Target, ...]) -> None:
@@ -163,7 +163,7 @@ class ArmedStrip(QWidget):
 
 
 class ArmedMinutes(Menu):
-    """Menu of the time after which sending is disarmed."""
+    """Menu to choose the time after which sending is disarmed."""
 
     def __init__(self, theme: Theme, parent: QWidget, acting: SessionActing) -> None:
         super().__init__(theme, parent, _("Stays armed for"))
@@ -182,7 +182,7 @@ class ArmedMinutes(Menu):
         self._acting.armed_s = minutes * 60.0
 
     def entry(self) -> QAction:
-        """Return the menu's action with the current choice checked."""
+        """Return the action that opens this menu, with the current choice checked."""
         for count, action in self._choices.items():
             action.setChecked(round(self._acting.armed_s / 60) == count)
         return self.menuAction()

@@ -1,4 +1,4 @@
-"""Base class of panels, their registration (`Panel`) and their access to the window (`PanelContext`).
+"""Base class of panels (`PanelWidget`), their description (`Panel`) and window access (`PanelContext`).
 
 A panel is one dockable view of the session. `PanelWidget.refresh` is called 30 times a second while the panel
 is visible and must return at once when the data is unchanged. Panels don't import each other; they reach the
@@ -29,7 +29,7 @@ ANY_TYPE = "*"
 
 
 class ShowToast(Protocol):
-    """Callable that shows a toast for some seconds."""
+    """Signature of the function that shows a toast for some seconds."""
 
     def __call__(
         self,
@@ -75,7 +75,7 @@ class PanelContext:
 
 @dataclass(frozen=True, slots=True)
 class Hindrance:
-    """Reason within a panel why new data is hidden, with a button that resolves it.
+    """Reason why a panel does not show new data, with a button that resolves it.
 
     Attributes:
         sentence: The reason.
@@ -91,7 +91,7 @@ class Hindrance:
 
 
 def paused_hindrance(panel: str, go_on: Callable[[], object]) -> Hindrance:
-    """Return the hindrance of a paused panel; `panel` is its title."""
+    """Return the hindrance of a paused panel; `panel` is its title, and `go_on` resumes it."""
     return Hindrance(
         _("{panel} is paused and doesn't show new data.").format(panel=panel),
         "",
@@ -101,7 +101,7 @@ def paused_hindrance(panel: str, go_on: Callable[[], object]) -> Hindrance:
 
 
 def filter_hindrance(panel: str, words: str, clear: Callable[[], object]) -> Hindrance:
-    """Return the hindrance of a panel whose filter contains `words`; `panel` is its title."""
+    """Return the hindrance of a panel with a filter; `words` is the filter's text and `panel` the title."""
     return Hindrance(
         _("{panel} only shows entries with “{words}”.").format(panel=panel, words=words),
         "",
@@ -111,7 +111,7 @@ def filter_hindrance(panel: str, words: str, clear: Callable[[], object]) -> Hin
 
 
 def numbered(title: str, number: int) -> str:
-    """Return a numbered title, such as "Plot 2"; number 1 is left out."""
+    """Return a numbered title, such as "Plot 2"; the number 1 is left out."""
     return title if number < 2 else _("{panel} {number}").format(panel=title, number=number)
 
 
@@ -146,7 +146,7 @@ class PanelWidget(QWidget):
 
     title_changed = Signal()
     shows_pictures = False
-    """True: `refresh` is called 60 times a second, so that no frame of a 30 fps video is skipped."""
+    """True if `refresh` should run 60 times a second, so that no frame of a 30 fps video is skipped."""
 
     def __init__(self, context: PanelContext, title: str) -> None:
         super().__init__()
@@ -163,7 +163,7 @@ class PanelWidget(QWidget):
         self.theme.changed.connect(self.theme_changed)
 
     def show_one_of(self, *pages: QWidget) -> QStackedWidget:
-        """Fill the panel without margins with a stack of `pages`; the first one is visible.
+        """Fill the panel, without margins, with a stack of `pages`; the first one is visible.
 
         Return the stack.
         """
@@ -195,15 +195,15 @@ class PanelWidget(QWidget):
         return [*self.chips, *self.header]
 
     def replaces_title(self) -> QWidget | None:
-        """Return a widget that replaces title and subtitle in the title bar, or None."""
+        """Return a widget to show instead of title and subtitle, or None."""
         return None
 
     def more_actions(self) -> Sequence[QAction]:
-        """Return the panel's own actions in the "more" menu, placed above those of the dock."""
+        """Return the panel's actions for the "more" menu, where they precede those of the dock."""
         return ()
 
     def set_title(self, title: str, subtitle: str | None = None) -> None:
-        """Set title and subtitle (None keeps the subtitle); emit `title_changed` only if they differ."""
+        """Set title and subtitle, and emit `title_changed` if they differ. None keeps the subtitle."""
         wanted = (title, self._subtitle if subtitle is None else subtitle)
         if wanted != (self._title, self._subtitle):
             self._title, self._subtitle = wanted
@@ -214,9 +214,9 @@ class PanelWidget(QWidget):
         """Show the current state of the session; called 30 times a second while the panel is visible."""
 
     def badge(self) -> tuple[str, str] | None:
-        """Return count and status for the tab while another panel covers this one; None without anything new.
+        """Return count and status for the tab while another panel covers this one; None if nothing is new.
 
-        Called on every tick while the panel shares its dock, so it must be cheap when nothing changed.
+        Called on every tick while the panel shares its dock, so it must return quickly when nothing changed.
         """
         return None
 
@@ -226,7 +226,7 @@ class PanelWidget(QWidget):
         self.theme_changed()
 
     def theme_changed(self) -> None:
-        """Update after a change of colours, fonts or density."""
+        """Update the panel after the theme's colours, fonts or density changed."""
         self.update()
 
     def text_font(self) -> QFont:
@@ -238,7 +238,7 @@ class PanelWidget(QWidget):
         return round(self.theme.scaled(self.theme.size("row", self.density)))
 
     def source_changed(self) -> None:
-        """Reset the panel after the session switched between live network and recording."""
+        """Reset the panel after the session switched between the live network and a recording."""
 
     def show_topic(self, name: str) -> None:
         """Show a topic; only for panels that accept topics."""
@@ -248,19 +248,19 @@ class PanelWidget(QWidget):
         return False
 
     def hindrances(self) -> Sequence[Hindrance]:
-        """Return the panel's own reasons for hiding new data, such as pause or filter."""
+        """Return the reasons within this panel why new data is hidden, such as pause or filter."""
         return ()
 
     def waits_for(self) -> str:
-        """Return the topic of which no message has arrived yet; empty when the panel waits for none."""
+        """Return the topic from which no message has arrived yet; "" if the panel is not waiting for one."""
         return ""
 
     def why(self, topic: str = "") -> EmptyAction:
-        """Return the action that opens the connection doctor for a topic, or for any topic ("")."""
+        """Return the action that opens the connection doctor for a topic; "" stands for any topic."""
         return EmptyAction(_("Why do I see nothing?"), lambda: self.context.why(self, topic), "stethoscope")
 
     def save_state(self) -> dict[str, object]:
-        """Return the state to save in the layout (JSON values)."""
+        """Return the panel's state for the saved layout, as JSON values."""
         return {}
 
     def restore_state(self, state: Mapping[str, object]) -> None:
@@ -271,7 +271,7 @@ class PanelWidget(QWidget):
         return ()
 
     def suspend(self) -> None:
-        """Suspend the panel's watches after it has been hidden for a while; its contents stay."""
+        """Suspend the panel's watches after it has been hidden for a while. Its contents stay visible."""
         for look in self.suspendables():
             if look is not None:
                 look.suspend()

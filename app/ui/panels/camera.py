@@ -1,4 +1,4 @@
-"""Camera panel: the robot's camera with boxes around detected objects."""
+"""Camera panel: images of the robot's camera with boxes around detected objects."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from app.core.robots.robot_link import RobotLink
 
 REFRESH_INTERVAL_S = 0.1
-"""Refresh period of everything that doesn't arrive with a picture or detection, such as the rate."""
+"""Interval of updates that are not triggered by a new image or detection, such as the frame rate."""
 
 
 class CameraPanel(OneRobotPanel):
@@ -36,7 +36,7 @@ class CameraPanel(OneRobotPanel):
         super().__init__(context, _("Camera"))
         self._topic = ""
         self._stream: ImageStream | None = None
-        # never shortened: the topic next to it is elided instead
+        # has a fixed width: the topic next to it is elided instead
         self.rate = SteadyLabel("body", "textSecondary", least=110)
         self.header = [self.rate]
         self._rates = RateWords()
@@ -71,7 +71,7 @@ class CameraPanel(OneRobotPanel):
             and len(seen) == len(self._seen)
             and all(map(is_, seen, self._seen))
         ):
-            return  # polled 60 times a second, mostly without a new picture
+            return  # called 60 times a second, mostly without a new image
         self.view.show_image(self._stream, boxes_on(link, self._topic))
         silent = silent_s is not None and silent_s > SILENT_AFTER_S
         sentence = self._rates.of(self._stream)
@@ -82,13 +82,13 @@ class CameraPanel(OneRobotPanel):
         self._seen, self._size, self._looks_s = seen, size, now + REFRESH_INTERVAL_S
 
     def _seen_now(self, link: RobotLink, silent_s: float | None) -> tuple[object, ...]:
-        # Identity matters: unchanged items must be the same objects as in the last call.
+        # Unchanged items must be the identical objects of the last call.
         found = (link.values.get(name) for name in self._detecting)
         picture = self._stream.picture if self._stream is not None else None
         return (picture, None if silent_s is None else int(silent_s * 2), *found)
 
     def wanted_robot(self) -> RobotLink | None:
-        """Return the chosen robot if it has a camera, else the first connected robot with one."""
+        """Return the chosen robot if it has a camera, else the first connected robot with a camera."""
         fleet = self.session.fleet
         shown = fleet.current
         there = [shown, *fleet.connected] if shown is not None and shown.connected else fleet.connected

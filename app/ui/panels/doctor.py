@@ -1,4 +1,4 @@
-"""Connection doctor panel: why no messages arrive, for one topic or any; each finding has a next step.
+"""Connection doctor panel: reasons why messages of a topic, or of any topic, don't arrive, with next steps.
 
 `app.core.network.doctor` checks the network in the background. Causes within Studio itself, such as an open
 recording or a paused panel, are checked on every refresh.
@@ -28,19 +28,19 @@ from nep.programs.doctor import Finding, in_order, report
 STATUS = {"error": "error", "warning": "warn", "info": "info", "ok": "ok"}
 BAD_SEVERITIES = frozenset({"error", "warning"})
 WAIT_REPORT_S = 2.0
-"""Time after which a panel that waits for a topic is reported."""
+"""Waiting time in s after which a panel without messages is reported."""
 MAX_TOPICS = 500
 """Maximum number of topics in the list of missing topics."""
 
 
 @dataclass(frozen=True, slots=True)
 class NextStep:
-    """Next step of a finding: text and action of its button."""
+    """Button of a finding: its text and action."""
 
     words: str
     run: Callable[[], object]
     fixes: bool = True
-    """True: the step fixes the problem, so the doctor checks again afterwards."""
+    """True if the step fixes the problem; the doctor then runs its checks again."""
 
 
 class DoctorPanel(PanelWidget):
@@ -103,7 +103,7 @@ class DoctorPanel(PanelWidget):
     # -- display ------------------------------------------------------------------------------------------
 
     def begin_for(self, asker: PanelWidget | None) -> None:
-        """Include the reasons of this panel; the caller has already passed its topic to the doctor."""
+        """Include findings about this panel. The caller sets the topic of the doctor before."""
         if self._asker is not None:
             self._asker.destroyed.disconnect(self._forget_asker)
         self._asker = asker
@@ -134,7 +134,7 @@ class DoctorPanel(PanelWidget):
         is_new = doctor.looked_s is None or doctor.told_of != doctor.missed
         if so_far is None and doctor.looked_s is None:
             return
-        self._own = own  # earlier findings stay until the next check is done
+        self._own = own  # earlier findings stay visible until the next check is done
         found = self._all(own, so_far if so_far is not None and is_new else doctor.findings)
         if found != self.shown or told != self._told:
             self._told = told
@@ -167,7 +167,7 @@ class DoctorPanel(PanelWidget):
         yield from self._waiting()
 
     def _waiting(self) -> Iterator[Hindrance]:
-        # Except for the missing topic: the other findings are about it.
+        # Without the missing topic, which the other findings are about.
         missed, now = self.session.doctor.missed, time.monotonic()
         shown = self.context.panels() if self.session.replay is None else ()
         waiting = {(panel, topic) for panel in shown if (topic := panel.waits_for()) and topic != missed}

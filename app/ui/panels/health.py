@@ -1,4 +1,4 @@
-"""Health panel: state of a robot, its most important problem, and the next step."""
+"""Health panel: state of a robot, its most severe problem, and the suggested next step."""
 
 from __future__ import annotations
 
@@ -63,7 +63,7 @@ class HealthRow(QWidget):
         self._said.setSpacing(10 if beside else 0)
 
     def show_fact(self, fact: HealthFact) -> None:
-        """Show a fact."""
+        """Show the icon, title and text of a fact."""
         if fact == self.fact:
             return
         self.fact = fact
@@ -75,7 +75,7 @@ class HealthRow(QWidget):
 
 
 class HealthPanel(OneRobotPanel):
-    """Health of the robot shown."""
+    """Panel with the health of one robot."""
 
     def __init__(self, context: PanelContext) -> None:
         super().__init__(context, _("Health"))
@@ -172,4 +172,4 @@ def _whole_age(age_s: float) -> str:
 
 
 PANEL = Panel("health", lazy("Health"), "heart", (), HealthPanel)
-"""Health panel: responses, reported state and way of stopping of a robot."""
+"""Panel with a robot's responses, its reported state and its way of stopping."""

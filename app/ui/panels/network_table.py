@@ -1,4 +1,4 @@
-"""Base class of tables with rows of Studio's own network and of other networks."""
+"""Base class of tables that combine the rows of Studio's own network and of other networks."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ Row = TypeVar("Row")
 
 
 class NetworkTable(TablePanel[Row]):
-    """Table panel whose line `networks`, below the table, reports unreachable networks."""
+    """Table panel with a line below the table that reports unreachable networks."""
 
     def __init__(self, context: PanelContext, words: TableWords, icon: str) -> None:
         super().__init__(context, words, icon)
@@ -38,7 +38,10 @@ class NetworkTable(TablePanel[Row]):
         return bool(self.session.networks.chosen)
 
     def show_networks(self) -> None:
-        """Report unreachable networks, and show the network column if there are several networks."""
+        """Update the line with unreachable networks.
+
+        The network column is shown if there are several networks.
+        """
         self.networks.set_sentences([lost_words(each) for each in self.session.networks.chosen])
         if self._networks_seen != len(self.session.networks.chosen):
             self._networks_seen = len(self.session.networks.chosen)
@@ -49,7 +52,7 @@ class NetworkTable(TablePanel[Row]):
 
 
 class NetworkLine(QWidget):
-    """Line below the table with unreachable networks and a button to their settings."""
+    """Line with the unreachable networks and a button to their settings."""
 
     def __init__(self, theme: Theme, run: Callable[[str], None]) -> None:
         super().__init__()
@@ -71,14 +74,14 @@ class NetworkLine(QWidget):
         self.hide()
 
     def set_sentences(self, sentences: Sequence[str]) -> None:
-        """Show each sentence on a line of its own; hidden if all are empty."""
+        """Show the sentences, one per line; the widget is hidden if all are empty."""
         said = "\n".join(filter(None, sentences))
         self.words.setText(said)
         show_when(self, bool(said))
 
 
 def own_everywhere(nodes: Iterable[str]) -> bool:
-    """Return True if all nodes are Studio's own on another network; ROS names them after the process."""
+    """Return True if all nodes are Studio's own on another network. ROS names nodes after the process."""
     process = f"{NODE_NAME}_{os.getpid()}_"
     names = [name.lstrip("/") for name in nodes]
     return bool(names) and all(name == NODE_NAME or name.startswith(process) for name in names)

@@ -17,7 +17,7 @@ class NoRobot:
         self._coming: tuple[str, ...] = ()
 
     def set_starting(self, coming: tuple[str, ...]) -> None:
-        """Report the robots being started; call on every refresh without a robot."""
+        """Set the robots that are being started; call on every refresh without a robot."""
         if coming == self._coming:
             return
         self._coming = coming

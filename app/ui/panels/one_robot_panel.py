@@ -1,4 +1,4 @@
-"""Base class of panels that show one robot."""
+"""Base class of panels that show one robot at a time."""
 
 from __future__ import annotations
 
@@ -15,11 +15,12 @@ if TYPE_CHECKING:
 
 
 class OneRobotPanel(PanelWidget):
-    """Panel of one robot: the one chosen by the person, else the first.
+    """Panel of one robot: the one that the user chose, else the first.
 
-    A robot that disconnects stays visible until another one is available. Calls `fleet_changed` when robots
-    connect, disconnect or are chosen, `show_robot` when another robot is to be shown, and `refresh_robot` on
-    every refresh.
+    A robot that disconnects stays visible until another one is available. The base class calls
+    `fleet_changed`
+    when robots connect, disconnect or are chosen, `show_robot` when another robot has to be shown, and
+    `refresh_robot` on every refresh.
     """
 
     def __init__(self, context: PanelContext, title: str) -> None:
@@ -32,7 +33,8 @@ class OneRobotPanel(PanelWidget):
     def showEvent(self, event: QShowEvent) -> None:
         super().showEvent(event)
         if self.session.fleet.revision != self._revision:
-            self.refresh()  # before painting: otherwise the empty state would flash until the next tick
+            # before the first paint: otherwise the empty state would flash until the next tick
+            self.refresh()
 
     def refresh(self) -> None:
         fleet = self.session.fleet
@@ -45,7 +47,7 @@ class OneRobotPanel(PanelWidget):
         self.refresh_robot(fleet.link(self._robot) if self._robot else None)
 
     def turn_to(self, link: RobotLink) -> None:
-        """Switch to this robot and watch its topics."""
+        """Show another robot and watch its topics."""
         self.dispose()
         self._robot, self._shown, self._revision = link.name, self.key_of(link), self.session.fleet.revision
         self._watch = self.session.fleet.look_at(link.name)
@@ -59,17 +61,17 @@ class OneRobotPanel(PanelWidget):
         return fleet.current or fleet.link(self._robot)
 
     def key_of(self, link: RobotLink) -> object:
-        """Return the properties that determine the panel's widgets; a change calls `show_robot` again."""
+        """Return a value that changes when the panel's widgets must be rebuilt by `show_robot`."""
         return link.name
 
     def fleet_changed(self) -> None:
-        """Update after robots connected, disconnected or were chosen."""
+        """Called after robots connected, disconnected or were chosen."""
 
     def show_robot(self, link: RobotLink) -> None:
-        """Build the widgets for this robot."""
+        """Build the widgets for a robot."""
 
     def refresh_robot(self, link: RobotLink | None) -> None:
-        """Show the robot's current state; None before the first robot."""
+        """Show the current state of the robot; None before the first robot connected."""
 
     def suspendables(self) -> Iterable[Suspendable | None]:
         return (self._watch,)

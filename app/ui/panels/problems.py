@@ -1,4 +1,4 @@
-"""Problems panel: errors and warnings of the behaviour, updated as it is edited."""
+"""Problems panel: errors and warnings of the behaviour, updated during editing."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ NO_PROBLEMS = lazy("No problems.\nIf something needs fixing, it appears here.")
 
 
 class ProblemRow(QWidget):
-    """Row of a problem: icon, block, sentence with its subject in bold, and buttons that fix it."""
+    """Row of a problem: icon, block, sentence with its subject in bold, and buttons with fixes."""
 
     pressed = Signal(str)
     fix = Signal(str)
@@ -113,7 +113,7 @@ class ProblemRow(QWidget):
 
 
 class ProblemsPanel(PanelWidget):
-    """List of problems of the active behaviour, with their number."""
+    """Panel with the problems of the active behaviour and their number."""
 
     def __init__(self, context: PanelContext) -> None:
         super().__init__(context, _("Problems"))
@@ -163,12 +163,12 @@ class ProblemsPanel(PanelWidget):
             self._show(found)
 
     def _missing(self, document: Document) -> list[Robot]:
-        # As described in the behaviour, else as last seen on the network.
+        # As described in the behaviour, else as last reported on the network.
         seen = {link.name: link.robot for link in self.session.fleet.links if not link.connected}
         return list({**seen, **{robot.name: robot for robot in document.absent}}.values())
 
     def _show(self, found: tuple[Listed, ...]) -> None:
-        # Existing rows are reused, so that they keep the focus.
+        # Existing rows are reused, so that they don't lose the focus.
         kept = {row.line: row for row in self.rows}
         held = False
         for line, row in kept.items():

@@ -13,14 +13,17 @@ from nep.system.plugins import discover
 
 
 class PanelRegistry(Mapping[str, Panel]):
-    """Panels by name. Lazy, because the start page needs no panel and importing all modules takes time."""
+    """Mapping of panel names to panels, imported on first access.
+
+    The start page needs no panel, and importing all modules takes time.
+    """
 
     @cached_property
     def _found(self) -> Mapping[str, Panel]:
         return discover(panels.__name__, "PANEL", Panel)
 
     def steps(self) -> Sequence[Callable[[], object]]:
-        """Return callables that import the panels one module at a time, a few milliseconds each."""
+        """Return callables that import the panel modules one by one, which takes a few milliseconds each."""
         names = [info.name for info in pkgutil.iter_modules(panels.__path__, f"{panels.__name__}.")]
         return [*(partial(importlib.import_module, name) for name in names), lambda: self._found]
 

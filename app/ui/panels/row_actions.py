@@ -1,4 +1,4 @@
-"""Context menu actions of topics, services and nodes, shared by all lists and diagrams."""
+"""Context menu actions of topics, services and nodes, shared by all tables and diagrams."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from nep.i18n import _
 
 
 class RowAction(NamedTuple):
-    """Entry of a row's context menu."""
+    """Action in a row's context menu."""
 
     words: str
     icon: str
@@ -23,14 +23,14 @@ class RowAction(NamedTuple):
 
 
 def filled(menu: Menu, theme: Theme, actions: Iterable[RowAction]) -> Menu:
-    """Add the actions to the menu and return it."""
+    """Add actions to a menu and return the menu."""
     for action in actions:
         menu.addAction(theme.icon(action.icon), action.words, action.run)
     return menu
 
 
 def topic_actions(context: PanelContext, key: str) -> list[RowAction]:
-    """Return the actions of a topic; `key` is its name with network (`key_of`)."""
+    """Return the actions for a topic; `key` is its name with the network (`key_of`)."""
     network, name = split_key(key)
     actions = [
         RowAction(_("Show messages"), "list-tree", lambda: show_messages(context, key)),
@@ -49,7 +49,7 @@ def topic_actions(context: PanelContext, key: str) -> list[RowAction]:
 
 
 def service_actions(context: PanelContext, name: str) -> list[RowAction]:
-    """Return the actions of a service of Studio's own network."""
+    """Return the actions for a service of Studio's own network."""
     return [
         RowAction(_("Call service"), "play", lambda: context.run(f"service.call:{name}")),
         copies(context, name),
@@ -57,7 +57,7 @@ def service_actions(context: PanelContext, name: str) -> list[RowAction]:
 
 
 def node_actions(context: PanelContext, network: str, name: str) -> list[RowAction]:
-    """Return the actions of a node; `network` is "" for Studio's own."""
+    """Return the actions for a node; `network` is "" for Studio's own network."""
     actions: list[RowAction] = []
     if not network:
         actions.append(RowAction(_("New alarm"), "bell", lambda: context.run(f"alarm.node:{name}")))
@@ -65,7 +65,7 @@ def node_actions(context: PanelContext, network: str, name: str) -> list[RowActi
 
 
 def copies(context: PanelContext, name: str) -> RowAction:
-    """Return the action that copies a name."""
+    """Return the action that copies a name to the clipboard."""
 
     def copy() -> None:
         QGuiApplication.clipboard().setText(name)
@@ -75,12 +75,12 @@ def copies(context: PanelContext, name: str) -> RowAction:
 
 
 def show_messages(context: PanelContext, key: str) -> None:
-    """Show the messages of a topic and clear its mark as new."""
+    """Show the messages of a topic. The topic then no longer counts as new."""
     context.session.mark_seen(key)
     context.open_topic(key)
 
 
 def has_fields(context: PanelContext, key: str) -> bool:
-    """Return False if the topic has no fields to plot (images)."""
+    """Return True unless the topic contains images, which have no fields to plot."""
     topic = context.session.topic(key)
     return topic is None or topic.codec != "image"

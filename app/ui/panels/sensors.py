@@ -45,7 +45,7 @@ class SensorRow(QWidget):
         self.setAccessibleName(self.title)
 
     def show_value(self, value: object, now: float) -> None:
-        """Show the newest value; repaints only if the text changes."""
+        """Show the newest value. Repaints only if the text changes."""
         reading = reading_of(self.sensor, value)
         if value is True:
             self._yes_s = now
@@ -87,7 +87,7 @@ class SensorRow(QWidget):
 
 
 class SensorsPanel(OneRobotPanel):
-    """Sensors of the robot shown."""
+    """Panel with the sensors of one robot."""
 
     def __init__(self, context: PanelContext) -> None:
         super().__init__(context, _("Live sensors"))
@@ -133,7 +133,7 @@ class SensorsPanel(OneRobotPanel):
             self.empty.set_texts(title, _("The robot's description has no sensors."))
 
     def _fit_rows(self) -> None:
-        # Shows whole rows only; scrolling moves by rows.
+        # Scrolls by rows, so that only whole rows are visible.
         if not self.rows:
             return
         room = self.height() - self._column.contentsMargins().top()
@@ -160,7 +160,7 @@ class SensorsPanel(OneRobotPanel):
 
 
 def _shown(link: RobotLink) -> list[Sensor]:
-    # All sensors but images; the most relevant ones first.
+    # All sensors except images, with the most relevant first.
 
     def rank(sensor: Sensor) -> int:
         words = f"{sensor.name} {sensor.title}".casefold()

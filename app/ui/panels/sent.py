@@ -1,4 +1,4 @@
-"""Sent panel: log of published messages, calls, replays and clicks, with their sender and result."""
+"""Sent panel: log of published messages, service calls, replays and clicks, with sender and result."""
 
 from __future__ import annotations
 
@@ -27,25 +27,25 @@ ASKERS = {
     "image": ("mouse-pointer-click", lazy("Image")),
     "switch": ("triangle-alert", lazy("Studio")),
 }
-"""Icon and name of each sender."""
+"""Icon and name of each kind of sender."""
 MAX_TIP_CHARS = 1000
 STATE_UPDATE_TICKS = 6  # refreshes at 30 Hz
 
 
 def clock_words(record: SentRecord) -> str:
-    """Return the time of the last occurrence."""
+    """Format the time of the last send as HH:MM:SS."""
     return time.strftime("%H:%M:%S", time.localtime(record.at_s))
 
 
 def line_of(record: SentRecord) -> str:
-    """Format an entry as a line for the clipboard."""
+    """Format a log entry as a line for the clipboard."""
     asker = _(ASKERS[record.asker][1])
     often = f"{grouped(record.count)} \u00d7 " if record.count > 1 else ""
     return " ".join(filter(None, (clock_words(record), f"[{asker}]", record.name, often + record.words)))
 
 
 class SentPanel(PanelWidget):
-    """Table of sent messages with context menu, and their number below."""
+    """Panel with the table of log entries and their number below."""
 
     def __init__(self, context: PanelContext) -> None:
         super().__init__(context, _("Sent"))
@@ -154,17 +154,17 @@ class SentPanel(PanelWidget):
     # -- user actions -------------------------------------------------------------------------------------
 
     def repeat(self) -> None:
-        """Repeat the selected entry if its target is armed."""
+        """Send the selected entry again if its target is armed."""
         record = self.chosen()
         why_not = self.acting.repeat(record.number) if record is not None else ""
         if why_not:
             self.context.toast(why_not)
         if self.acting.question is not None:
-            self.context.run("panel:publish")  # the panel that asks for confirmation
+            self.context.run("panel:publish")  # this panel asks for confirmation
         self.refresh()
 
     def copy(self) -> None:
-        """Copy the selected entry."""
+        """Copy the selected entry to the clipboard."""
         record = self.chosen()
         if record is not None:
             self._to_clipboard(line_of(record), _("Copied the line"))
@@ -179,7 +179,7 @@ class SentPanel(PanelWidget):
         self.refresh()
 
     def show_row(self, key: str) -> None:
-        """Show the messages of an entry's topic, or its service."""
+        """Show the topic or the service of an entry in its panel."""
         record = self.acting.sent.get(int(key))
         if record is None or not record.name:
             return

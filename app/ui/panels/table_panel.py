@@ -1,4 +1,4 @@
-"""Base class of panels that consist of one table with a filter in the title bar and an empty state."""
+"""Base class of panels with one table, a filter in the title bar and an empty state."""
 
 from __future__ import annotations
 
@@ -26,21 +26,24 @@ Row = TypeVar("Row")
 
 @dataclass(frozen=True)
 class TableWords:
-    """Texts of a table panel, each marked with `lazy`, such as "Topics" and "Filter topics"."""
+    """Texts of a table panel, such as "Topics" and "Filter topics", each wrapped in `lazy`."""
 
     title: str
     filter: str
     nothing_fits: str
     clear_the_filter: str
     not_recorded: str = ""
-    """Empty state while a recording is open; "" for tables that don't depend on the source."""
+    """Text of the empty state while a recording is open; "" for tables that don't depend on the source."""
 
 
 class TablePanel(PanelWidget, Generic[Row]):
     """Panel with one table. Subclasses implement `make_model`, `make_table`, `rebuild` and `open_row`.
 
-    `pages` holds the table and `empty`, the empty state; `show_table` switches between them. `line` separates
-    the table from `foot`, a short text below it.
+    Attributes:
+        pages: Stack of the table and the empty state; `show_table` switches between them.
+        empty: Empty state.
+        line: Separator between the table and `foot`.
+        foot: Short text below the table.
     """
 
     def __init__(self, context: PanelContext, words: TableWords, icon: str) -> None:
@@ -84,11 +87,11 @@ class TablePanel(PanelWidget, Generic[Row]):
         raise NotImplementedError
 
     def open_row(self, key: str) -> None:
-        """Open the row with this key; called after a click or Enter."""
+        """Open the row with this key; called on a click or Enter."""
         raise NotImplementedError
 
     def row_actions(self, key: str) -> Sequence[RowAction]:
-        """Return the actions of a row's context menu; empty for no menu."""
+        """Return the actions for a row's context menu; empty for no menu."""
         return (RowAction(_("Show"), "eye", lambda: self.open_row(key)),)
 
     def menu_of(self, key: str) -> Menu | None:
@@ -103,11 +106,11 @@ class TablePanel(PanelWidget, Generic[Row]):
             menu.popup(at)
 
     def filter_words(self) -> list[str]:
-        """Return the words of the filter; a row must contain all of them."""
+        """Return the words of the filter. Matching rows contain all of them."""
         return self.filter.text().casefold().split()
 
     def show_table(self, any_rows: bool, filtered: bool) -> None:
-        """Show the table, or the empty state that fits `filtered`."""
+        """Show the table if there are `any_rows`, else the empty state, which depends on `filtered`."""
         self.pages.setCurrentIndex(0 if any_rows else 1)
         self.doctor.setVisible(not any_rows and not filtered)
         if any_rows:
@@ -131,7 +134,7 @@ class TablePanel(PanelWidget, Generic[Row]):
             self.say_empty()
 
     def missed_topic(self) -> str:
-        """Return the topic typed into the filter if it does not exist, else ""."""
+        """Return the topic that was typed into the filter but does not exist, else ""."""
         return ""
 
     def hindrances(self) -> list[Hindrance]:

@@ -1,4 +1,4 @@
-"""Variables panel: variables of the behaviour with their live or final values."""
+"""Variables panel: variables of the behaviour with their current or final values."""
 
 from __future__ import annotations
 
@@ -30,16 +30,19 @@ WORDS = TableWords(
     clear_the_filter=lazy("Clear the filter to see all variables."),
 )
 CHANGE_MARK_S = 0.8
-"""Duration in s of the mark on new values."""
+"""Time in s for which a new value is highlighted."""
 INDENT = 19
 MAX_WITHOUT_FILTER = 8
-"""Number of variables up to which the filter is hidden."""
+"""Maximum number of variables for which the filter is hidden."""
 ICONS = {"number": "hash", "text": "quote", "boolean": "toggle-left", "list": "list", "other": "braces"}
 
 
 @dataclass(frozen=True, slots=True)
 class VariableRow:
-    """Row of a variable, or of a list item (counted from 1); `value` is None before the first run."""
+    """Row of a variable, or of an item of a list.
+
+    Items are counted from 1; `value` is None before the first run.
+    """
 
     variable: Variable
     value: VariableValue | None
@@ -55,7 +58,7 @@ class VariableRow:
 
     @property
     def words(self) -> str:
-        """Value as short text."""
+        """Value formatted as short text."""
         if self.value is None:
             return ""
         if self.item:
@@ -67,7 +70,7 @@ class VariableRow:
 
 
 def name_cell(row: VariableRow) -> Cell:
-    """Return the variable's name with the icon of its type; lists have an arrow."""
+    """Return the cell with the variable's name and the icon of its type; lists have an arrow."""
     if row.item:
         return Cell(str(row.item), role="textTertiary", indent=INDENT)
     kind = row.value.kind if row.value is not None else ""
@@ -79,7 +82,7 @@ def name_cell(row: VariableRow) -> Cell:
 
 
 def value_cell(row: VariableRow) -> Cell:
-    """Return the value, marked while new and grey after the run has ended."""
+    """Return the cell with the value, highlighted while new and grey after the run has ended."""
     if row.fresh and not row.item:
         return Cell(row.words, role="changed", tint="changedTint")
     return Cell(row.words, role="textSecondary" if row.over else "text")
@@ -103,7 +106,7 @@ def rows_of(
     fresh: Collection[str] = (),
     over: bool = False,
 ) -> list[VariableRow]:
-    """Return the rows in sort order; each list in `opened` (ids) is followed by its first items."""
+    """Return the rows in sort order. Each list whose id is in `opened` is followed by its first items."""
     rows: list[VariableRow] = []
     heads = [
         VariableRow(each, values.get(each.id), each.id in opened, fresh=each.id in fresh, over=over)
@@ -120,7 +123,7 @@ def rows_of(
 
 
 class VariablesPanel(TablePanel[VariableRow]):
-    """Table of variables; their context menu has the actions."""
+    """Panel with the table of variables. Actions are in the context menu of a variable."""
 
     def __init__(self, context: PanelContext) -> None:
         super().__init__(context, WORDS, "variable")
@@ -129,7 +132,7 @@ class VariablesPanel(TablePanel[VariableRow]):
         self.add.clicked.connect(lambda: context.run("variable.new"))
         self.when = ElidedLabel("body", "textSecondary")
         self.header = [self.when, self.filter, self.add]
-        self.table.horizontalHeader().hide()  # not needed for name and value, and the panel is low
+        self.table.horizontalHeader().hide()  # name and value need no header, and the panel is low
         self.table.setContextMenuPolicy(Qt.ContextMenuPolicy.CustomContextMenu)
         self.table.customContextMenuRequested.connect(self._show_menu)
         column = QVBoxLayout(self)
@@ -144,7 +147,7 @@ class VariablesPanel(TablePanel[VariableRow]):
         self._variables: tuple[Variable, ...] = ()
         self._seen: tuple[object, ...] = ()
         self._values: Mapping[str, VariableValue] = {}
-        self._fresh: dict[str, float] = {}  # time of the change, by variable
+        self._fresh: dict[str, float] = {}  # time of the last change, by variable
 
     def make_model(self) -> TableModel[VariableRow]:
         return TableModel(COLUMNS, lambda row: row.key)
@@ -199,7 +202,7 @@ class VariablesPanel(TablePanel[VariableRow]):
         if any_rows or filtered:
             super().show_table(any_rows, filtered)
             self.doctor.hide()
-        else:  # independent of the master
+        else:  # the empty state does not depend on the master
             self.pages.setCurrentIndex(1)
             self.say_empty()
 

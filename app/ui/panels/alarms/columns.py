@@ -30,7 +30,10 @@ def moment(seconds: float) -> dt.datetime:
 
 
 def state_words(rule: AlarmRule, state: AlarmState, now_s: float) -> tuple[str, str, str | None]:
-    """Return text, status and icon of an alarm's chip; None for the icon of the status."""
+    """Return text, status and icon of an alarm's state chip.
+
+    An icon of None stands for the default icon of the status.
+    """
     seen = seen_words(rule.condition, state.seen)
     match state.phase:
         case "faulty":
@@ -57,7 +60,10 @@ def state_words(rule: AlarmRule, state: AlarmState, now_s: float) -> tuple[str, 
 
 
 def note_words(rule: AlarmRule, state: AlarmState, alarms: SessionAlarms, now: dt.datetime) -> str:
-    """Return the note next to the chip: result of the actions, trigger count or time of the last trigger."""
+    """Return the text next to the state chip.
+
+    It is the result of the actions, the trigger count or the time of the last trigger.
+    """
     parts = []
     retry_s = alarms.alarms.retry_in_s(rule.id)
     last = alarms.history.last(rule.id)
@@ -87,7 +93,12 @@ def _uncapital(words: str) -> str:
 def history_columns(
     condition: Callable[[AlarmRecord], str], now: Callable[[], dt.datetime]
 ) -> tuple[Column[AlarmRecord], ...]:
-    """Return the columns of the history; `condition` returns the severity of a record's alarm."""
+    """Return the columns of the history table.
+
+    Args:
+        condition: Returns the severity of a record's alarm.
+        now: Returns the current time.
+    """
 
     def when(record: AlarmRecord) -> Cell:
         then = moment(record.at_s)
@@ -119,7 +130,7 @@ def history_columns(
 
 
 def deeds_words(record: AlarmRecord) -> str:
-    """Return the executed actions, such as "restart_lidar did not answer, sound"."""
+    """Format the executed actions of a record, such as "restart_lidar did not answer, sound"."""
     if record.was_snoozed and not record.deeds:
         return _("none, snoozed")
     return ", ".join(deed.words for deed in record.deeds)

@@ -1,4 +1,4 @@
-"""Alarms panel: list of rules, their states, and the history."""
+"""Alarms panel: rules, their states, and the history of triggered alarms."""
 
 from __future__ import annotations
 
@@ -250,11 +250,11 @@ class AlarmsPanel(PanelWidget):
     # -- user actions -------------------------------------------------------------------------------------
 
     def begin(self) -> None:
-        """Create an alarm and ask for its topic."""
+        """Add an alarm and open the field for its topic."""
         self.edit(self.alarms.new(AlarmCondition("silent", for_s=2.0)).id, "subject")
 
     def edit(self, rule_id: str, slot: str) -> None:
-        """Scroll to an alarm and open one of its slots; with "" only set the focus."""
+        """Scroll to an alarm and open one of its slots; with an empty slot only focus the alarm."""
         self._show_rules()
         self._seen = ()
         self._fresh = rule_id if slot == "limit" else ""
@@ -297,7 +297,7 @@ class AlarmsPanel(PanelWidget):
             self.field.leave(keeps_focus=False)
         condition = rule.condition
         if part.role in {"value", "limit"} and condition.name and self._peek is None:
-            # its newest message supplies field names and values to offer
+            # field names and values to offer come from the newest message
             self._peek = self.session.watch(condition.name)
         self.field = SlotField(
             self.theme,
@@ -319,7 +319,8 @@ class AlarmsPanel(PanelWidget):
         if made is None:
             return False
         if part.role == "limit" and self._fresh == rule.id:
-            made, self._fresh = replace(made, is_on=True), ""  # it was disabled until its limit was entered
+            # a new alarm stays disabled until its limit is entered
+            made, self._fresh = replace(made, is_on=True), ""
         if made != rule:
             self._save_rule(made)
         return True

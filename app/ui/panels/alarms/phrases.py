@@ -1,4 +1,4 @@
-"""Alarm rules as sentences with slots, and parsing of their values. No widgets."""
+"""Conversion of alarm rules to sentences with slots, and parsers for typed slot values. Independent of Qt."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from nep.text import quotable
 
 PartKind = Literal["word", "slot", "dashed"]
 CHOICES = frozenset({"kind", "add"})
-"""Slots that are chosen from a menu; the others are typed."""
+"""Roles of slots whose value is chosen from a menu; other slots have a text field."""
 
 _TEMPLATES: Mapping[str, str] = {
     "silent": lazy("When {subject} is {kind} for {time}"),
@@ -65,7 +65,7 @@ MENU_WORDS: Sequence[Sequence[tuple[str, str]]] = (
     ),
     (("leaves", lazy("A node leaves")), ("comes", lazy("A node joins"))),
 )
-"""Alarm kinds grouped as in the menu."""
+"""Alarm kinds with their labels, in the groups of the menu."""
 SLOT_NAMES: Mapping[str, str] = {
     "subject": lazy("Subject"),
     "value": lazy("Value"),
@@ -122,7 +122,10 @@ _DEFAULTS: Mapping[str, tuple[Scalar, float]] = {
 
 @dataclass(frozen=True, slots=True)
 class PhrasePart:
-    """Word or slot of an alarm's sentence. `key` identifies slots, such as "subject" or "action:0"."""
+    """Word or slot of an alarm's sentence.
+
+    `key` identifies a slot, such as "subject" or "action:0".
+    """
 
     key: str
     text: str
@@ -132,7 +135,7 @@ class PhrasePart:
 
     @property
     def role(self) -> str:
-        """Purpose of the slot: `key` without the index of the action."""
+        """Role of the slot: `key` without the index of the action."""
         return self.key.partition(":")[0]
 
     @property
@@ -142,7 +145,7 @@ class PhrasePart:
 
 
 def parts_of(rule: AlarmRule, icon: str = "braces") -> list[PhrasePart]:
-    """Return the words and slots of a rule; `icon` is that of the topic's type."""
+    """Return the words and slots of a rule's sentence; `icon` is the icon of the topic's type."""
     condition = rule.condition
     parts: list[PhrasePart] = []
     for words, hole, _spec, _conversion in Formatter().parse(_(_TEMPLATES[condition.kind])):
@@ -209,12 +212,12 @@ def _action_parts(place: int, action: AlarmAction) -> list[PhrasePart]:
 
 
 def payload_text(payload: object) -> str:
-    """Return a payload as one line of JSON."""
+    """Format a payload as one line of JSON."""
     return json.dumps(payload, ensure_ascii=False)
 
 
 def typed_now(rule: AlarmRule, part: PhrasePart) -> str:
-    """Return the initial text of the field of a slot."""
+    """Return the initial text of the field for a slot."""
     condition = rule.condition
     match part.role:
         case "subject":
@@ -234,7 +237,7 @@ def typed_now(rule: AlarmRule, part: PhrasePart) -> str:
 
 
 def taken(rule: AlarmRule, part: PhrasePart, text: str) -> AlarmRule | None:
-    """Return the rule with `text` in a slot, or None if the text is invalid."""
+    """Return a copy of the rule with `text` as the value of a slot, or None if the text is invalid."""
     condition, text = rule.condition, text.strip()
     match part.role:
         case "subject":
@@ -263,7 +266,7 @@ _INVALID = object()
 
 
 def read_limit(condition: AlarmCondition, text: str) -> object:
-    """Parse a limit: a number for kinds that need one, else JSON, else the text itself."""
+    """Parse a limit: a number for conditions that need one, else JSON, else the text itself."""
     if condition.kind in NUMBER_KINDS:
         figures, *words = text.replace("%", " ").split() or [""]
         if any(each[0].isdigit() for each in words):
@@ -296,14 +299,17 @@ def read_time(text: str) -> float | None:
 
 
 def with_action(rule: AlarmRule, place: int, action: AlarmAction | None) -> AlarmRule:
-    """Return the rule with its action at an index replaced, appended, or removed (None)."""
+    """Return a copy of the rule with another action at an index.
+
+    An `action` of None removes the one at the index; an index after the last one appends.
+    """
     actions = [*rule.actions]
     actions[place : place + 1] = [] if action is None else [action]
     return replace(rule, actions=tuple(actions))
 
 
 def with_kind(rule: AlarmRule, kind: str) -> AlarmRule:
-    """Return the rule with another kind; limit, duration and name are kept where they apply."""
+    """Return a copy of the rule with another kind; limit, duration and name are kept where they apply."""
     condition = rule.condition
     if kind == condition.kind:
         return rule
@@ -322,7 +328,7 @@ def with_kind(rule: AlarmRule, kind: str) -> AlarmRule:
 
 
 def rejection_of(part: PhrasePart, rule: AlarmRule) -> str:
-    """Return what a slot accepts, for a text that it rejected."""
+    """Return a sentence with the values that a slot accepts, to show after an invalid text."""
     match part.role:
         case "limit" if rule.condition.kind in NUMBER_KINDS:
             return _(SEPARATORS)

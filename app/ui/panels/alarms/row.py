@@ -1,4 +1,4 @@
-"""Row of one alarm: switch, sentence, state, snooze and more."""
+"""Row of one alarm: switch, sentence, state chip, snooze button and menu."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from nep.programs.alarms.sentences import condition_words
 
 
 class AlarmRow(QWidget):
-    """Row of one alarm. Signals of slots carry their `PhrasePart`."""
+    """Row of one alarm. Signals that concern a slot carry its `PhrasePart`."""
 
     switched = Signal(bool)
     slot_pressed = Signal(object)
@@ -70,7 +70,7 @@ class AlarmRow(QWidget):
         column.addWidget(Separator(self._theme))
 
     def show_rule(self, rule: AlarmRule, icon: str, *, snoozed: bool) -> None:
-        """Show the rule; unchanged slots keep the keyboard focus."""
+        """Show a rule. Widgets of unchanged slots are kept, so that they don't lose the focus."""
         said = condition_words(rule.condition)
         self.setAccessibleName(said)
         self.switch.setAccessibleName(_("Enable: {condition}").format(condition=said))
@@ -124,7 +124,7 @@ class AlarmRow(QWidget):
         return slot
 
     def show_state(self, words: str, status: str, icon: str | None, note: str) -> None:
-        """Show the state in the chip, and a note."""
+        """Show the state chip and the note next to it."""
         self.chip.set(words, status, icon)
         if self.note.text() != note:
             self.note.setText(note)

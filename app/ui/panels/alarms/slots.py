@@ -1,4 +1,4 @@
-"""Editable words of an alarm's sentence and the field to type their values."""
+"""Slots in an alarm's sentence: buttons, and the text field for their values."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ FIELD_WIDTH = 240
 
 
 class AlarmSlot(PaintedButton):
-    """Button for a word of the sentence; Delete and Backspace remove an action."""
+    """Button that represents a word of the sentence; Delete and Backspace remove an action."""
 
     shortens = True
     removed = Signal()
@@ -91,10 +91,13 @@ class AlarmSlot(PaintedButton):
 
 
 class SlotField(QLineEdit):
-    """Line edit above a slot, with completion. Enter and Tab accept the text, Esc cancels.
+    """Text field over a slot, with completion. Enter and Tab accept the text, Esc cancels.
 
-    `take` receives the text and returns False if it is invalid; the field then stays, outlined in red, with
-    the sentence `rejection`. `row` is the parent, because the field is taller than the `slot`.
+    Args:
+        take: Receives the text and returns False if it is invalid. The field then stays open, outlined in
+            red,
+            with the sentence `rejection`.
+        row: Parent widget, because the field is taller than the `slot`.
     """
 
     ended = Signal()

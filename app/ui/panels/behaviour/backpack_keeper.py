@@ -1,4 +1,4 @@
-"""Connection of the block editor's backpack to its file."""
+"""Storage of the block editor's backpack in a file shared by all Studios of the user."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ POLL_TICKS = 30  # refreshes at 30 Hz: changes of another Studio appear within a
 
 
 class Shows(Protocol):
-    """Part of the editor that shows the backpack."""
+    """Part of the block editor that displays the backpack."""
 
     backpack_asked: SignalInstance
 
@@ -26,10 +26,11 @@ class Shows(Protocol):
 
 
 class BackpackKeeper:
-    """Handles the page's requests about the backpack.
+    """Executes the page's requests about the backpack.
 
-    A request is JSON with "do": put (blocks, count, notes), remove (id), empty or look. Every
-    change can be undone from its toast.
+    A request is a JSON object with the operation in ``do``: put (with ``blocks``, ``count``, ``notes``),
+    remove
+    (with ``id``), empty or look. Every change can be undone from its toast.
     """
 
     def __init__(self, context: PanelContext, backpack: Backpack, editor: Shows) -> None:
@@ -40,13 +41,13 @@ class BackpackKeeper:
         self.reload_if_changed()
 
     def tick(self) -> None:
-        """Poll for changes by another Studio; call on every refresh."""
+        """Check for changes by another Studio; call on every refresh."""
         self._ticks += 1
         if self._ticks % POLL_TICKS == 0:
             self.reload_if_changed()
 
     def reload_if_changed(self) -> None:
-        """Reload the backpack if its file changed and show it."""
+        """Reload and show the backpack if its file changed."""
         self._backpack.reload_if_changed()
         self._show()
 
@@ -77,7 +78,7 @@ class BackpackKeeper:
             self._take_out(self._backpack.empty, emptied=True)
 
     def _put(self, blocks: Sequence[Mapping[str, object]], count: int, *, left: bool) -> None:
-        # `left`: the selection contained notes, which the backpack doesn't store.
+        # `left` is True if the selection contained notes, which the backpack doesn't store.
         made: list[Packed] = []
         if blocks and self._try(lambda: made.extend(self._backpack.put(blocks))):
             words = ngettext(

@@ -1,4 +1,4 @@
-"""Dragging of blocks out of the page and onto the tabs of other behaviours."""
+"""Drag and drop of blocks from the page onto the tabs of other behaviours."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ OPACITY = 0.85
 
 
 class Carrier(Protocol):
-    """Part of the editor that blocks are dragged out of."""
+    """Part of the block editor from which blocks are dragged."""
 
     block_carried: SignalInstance
     carried_seen: SignalInstance
@@ -33,9 +33,9 @@ class Carrier(Protocol):
 
 
 class CarriedPicture(QWidget):
-    """Picture of the dragged blocks at the mouse, because the page can't paint outside itself.
+    """Picture of the dragged blocks at the mouse pointer. The page can't paint outside itself.
 
-    An overlay of `window` that ignores the mouse; hidden until it has position and picture.
+    An overlay of `window` that is transparent for mouse events; hidden until it has a position and a picture.
     """
 
     def __init__(self, window: QWidget) -> None:
@@ -47,7 +47,10 @@ class CarriedPicture(QWidget):
         self.hide()
 
     def set_picture(self, data: bytes, ratio: float) -> None:
-        """Set the picture: PNG data with `ratio` pixels per page pixel. Ignored after the drag ended."""
+        """Set the picture: PNG data with `ratio` device pixels per page pixel.
+
+        Ignored after the drag ended.
+        """
         picture = QPixmap()
         if self._place is None or not picture.loadFromData(data):
             return
@@ -57,7 +60,7 @@ class CarriedPicture(QWidget):
         self.move_to(self._place)
 
     def move_to(self, place: QPoint | None) -> None:
-        """Move to a position on the screen; None ends the drag."""
+        """Move the picture to a position on the screen; None ends the drag."""
         self._place = place
         if place is None:
             self._picture = QPixmap()
@@ -78,12 +81,15 @@ class CarriedPicture(QWidget):
 
 
 class CarriedBlocks:
-    """Highlights the tab under blocks dragged out of the page, and drops them there.
+    """Highlights the tab under blocks that are dragged out of the page, and drops the blocks there.
 
-    A tab opens after the mouse has stayed on it for a while, and the drag continues on its page. A drop on
-    "+" creates a behaviour; a drop elsewhere returns the blocks. Near an end of the tab bar the tabs scroll.
+    A tab opens after the mouse has hovered over it for a while, and the drag continues on its page. A drop on
+    "+"
+    creates a behaviour; a drop elsewhere returns the blocks. Near an end of the tab bar the tabs scroll.
 
-    `flush` calls back once the newest edits have arrived; `show` shows the current behaviour at once.
+    Args:
+        flush: Fetches pending edits, then calls back.
+        show: Shows the current behaviour at once.
     """
 
     def __init__(
@@ -196,7 +202,7 @@ class CarriedBlocks:
 
 
 def brought_words(count: int, how: str, name: str) -> str:
-    """Return the toast after blocks were "moved", "copied" or "added" to a behaviour; count 0 is a note."""
+    """Return the toast text after blocks were "moved", "copied" or "added"; `count` 0 stands for a note."""
     if not count:
         words = _("Moved the note to {name}") if how == "moved" else _("Copied the note to {name}")
     elif how == "moved":

@@ -12,7 +12,7 @@ SILENT = "silent"
 
 
 class KnownValues(Protocol):
-    """Known state of a robot (`app.core.robots.robot_link.RobotLink`)."""
+    """Sensor values of a robot, as provided by `app.core.robots.robot_link.RobotLink`."""
 
     @property
     def robot(self) -> Robot: ...
@@ -31,9 +31,11 @@ class RobotLookup(Protocol):
 
 
 def live_words(fleet: RobotLookup, sensors: Iterable[tuple[str, str]]) -> tuple[dict[str, str], set[str]]:
-    """Return texts by ``<robot>/<sensor>`` or ``<robot>/<sensor>/<field>``, and the keys that are stale.
+    """Return the texts for sensor blocks, and the keys of stale ones.
 
-    Values are stale when the robot is silent. A disconnected robot has none.
+    Keys are ``<robot>/<sensor>`` or ``<robot>/<sensor>/<field>``. Values are stale while the robot is silent;
+    a
+    disconnected robot has none.
     """
     words: dict[str, str] = {}
     old: set[str] = set()

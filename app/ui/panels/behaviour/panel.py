@@ -44,7 +44,7 @@ ALARM_STATES = frozenset({NOT_STOPPED, STOPPING, "silent"})
 WAIT_WORDS = lazy("Loading blocks.")
 WAIT_UNTIL_S = 0.5
 START_COMMANDS = {"robot": "robots.virtual", "examples": "help.examples"}
-"""Commands of the buttons on an empty canvas."""
+"""Window commands of the buttons on an empty canvas."""
 _PLACEHOLDER = re.compile(r"\([^()]*\)")  # placeholders in the help, such as "(robot) say (text)"
 Json = Mapping[str, object]
 
@@ -107,7 +107,7 @@ class Editor(Protocol):
 
 
 def blockly(parent: QWidget) -> Editor:
-    """Create the real editor; called when the panel is first shown."""
+    """Create the real block editor; called when the panel is first shown."""
     # Importing Qt WebEngine takes about 200 ms.
     from app.ui.blockly.view import BlocklyView  # noqa: PLC0415
 
@@ -116,7 +116,7 @@ def blockly(parent: QWidget) -> Editor:
 
 
 class BehaviourPanel(PanelWidget):
-    """The active behaviour as blocks (to edit) or Python (to read)."""
+    """Panel with the active behaviour as editable blocks or read-only Python."""
 
     def __init__(self, context: PanelContext, make_editor: Callable[[QWidget], Editor] = blockly) -> None:
         super().__init__(context, _("Behaviour"))
@@ -201,7 +201,7 @@ class BehaviourPanel(PanelWidget):
         editor.set_first_step(pgettext("block", "when started"), robot)
 
     def show_current(self) -> None:
-        """Show the active tab at once, without waiting for the next tick."""
+        """Show the active behaviour at once instead of on the next tick."""
         if self.editor is not None and self.editor.is_ready:
             self._bar.tabs.show_tabs(
                 tab_facts(self.session.documents, self.session.runs), self.session.document.key
@@ -283,7 +283,7 @@ class BehaviourPanel(PanelWidget):
         self.context.toast(_("Copied “{command}”").format(command=command))
 
     def _program_changed(self, program: Program) -> None:
-        # Connected to the session: updates absent blocks, sensors and the program's text.
+        # Connected to signals of the session; updates absent blocks, sensors and the program's text.
         if self.editor is not None:
             self.editor.set_absent(program.absent)
         self._sensors = tuple(program.sensors)
@@ -339,7 +339,7 @@ class BehaviourPanel(PanelWidget):
     # -- user actions -------------------------------------------------------------------------------------
 
     def set_mode(self, mode: str) -> None:
-        """Show "blocks" or "python"."""
+        """Switch to "blocks" or "python"."""
         self.mode = mode
         self._bar.show_mode(mode)
         self.pages.setCurrentIndex(1 if mode == "python" else 0)
@@ -347,12 +347,12 @@ class BehaviourPanel(PanelWidget):
             self.flush(lambda: self.program.show_program(self.session.document.program().source))
 
     def copy_program(self) -> None:
-        """Copy the program's text to the clipboard."""
+        """Copy the Python program to the clipboard."""
         QGuiApplication.clipboard().setText(self.program.toPlainText())
         self.context.toast(_("Copied the program"))
 
     def flush(self, done: Callable[[], None]) -> None:
-        """Fetch edits that the editor has not sent yet (it debounces them by 150 ms), then call `done`."""
+        """Fetch pending edits, which the editor debounces by 150 ms, then call `done`."""
         if self.editor is None:
             done()
             return
@@ -396,14 +396,14 @@ class BehaviourPanel(PanelWidget):
             self.editor.pdf(title, date, layout, done)
 
     def find_blocks(self, *, to_add: bool) -> None:
-        """Open the search in the toolbox (`to_add`), or the search in the behaviour."""
+        """Open the search in the toolbox (if `to_add`) or in the behaviour."""
         self.set_mode("blocks")
         if self.editor is not None:
             self.setFocus(Qt.FocusReason.ShortcutFocusReason)
             (self.editor.open_search if to_add else self.editor.open_find)()
 
     def point_at(self, block: str) -> None:
-        """Point at the block of this type in the toolbox and at its destination; "" ends that."""
+        """Highlight the block of this type in the toolbox and the place where it belongs; "" ends that."""
         if self.editor is None:
             return
         if not block:
@@ -419,7 +419,7 @@ class BehaviourPanel(PanelWidget):
         self.editor.point_at(block, name, then)
 
     def show_block(self, block: str) -> None:
-        """Show the blocks view with this block centred."""
+        """Switch to the blocks view and centre this block."""
         self.set_mode("blocks")
         if self.editor is not None:
             self.editor.show_block(block)
@@ -432,7 +432,7 @@ class BehaviourPanel(PanelWidget):
             self.session.tabs.edited(document, was_blank=was_blank)
 
     def rename_tab(self, key: str) -> None:
-        """Start to edit the name of a tab."""
+        """Start in-place editing of a tab's name."""
         self._bar.tabs.edit(key)
 
     def _why_not_named(self, key: str, name: str) -> str:
@@ -463,7 +463,7 @@ class BehaviourPanel(PanelWidget):
 class BlocksWait:
     """Loading message in the middle of `place`.
 
-    It appears only after half a second, so that fast loading doesn't flicker. `clock` returns seconds.
+    Shown only after half a second, so that fast loading doesn't flicker. `clock` returns seconds.
     """
 
     def __init__(self, place: QWidget, clock: Callable[[], float] = time.monotonic) -> None:
@@ -476,7 +476,7 @@ class BlocksWait:
         self.words.hide()
 
     def report(self, *, ready: bool) -> None:
-        """Report the page's readiness; call on every refresh."""
+        """Show or hide the message, depending on whether the page is ready; call on every refresh."""
         now = self._clock()
         if ready:
             self._since = None
@@ -491,7 +491,7 @@ class BlocksWait:
 
 
 def alarms_of(links: Iterable[RobotLink]) -> dict[str, tuple[str, str]]:
-    """Return icon and text for the toolbox of robots that may be moving or don't answer."""
+    """Return toolbox icon and text, by name, for robots that may be moving or don't reply."""
     return {
         link.name: (ROBOT_STATUS[link.state], link.state_words)
         for link in links
@@ -500,7 +500,7 @@ def alarms_of(links: Iterable[RobotLink]) -> dict[str, tuple[str, str]]:
 
 
 def tab_facts(documents: Iterable[Document], runs: Runs) -> list[TabFacts]:
-    """Return the facts that the tabs of behaviours show."""
+    """Return the data of each tab."""
     shown = list(documents)
     found = []
     for document, title in zip(shown, told_apart([(each.name, each.path) for each in shown]), strict=True):

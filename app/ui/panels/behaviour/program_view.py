@@ -71,6 +71,6 @@ class ProgramView(QPlainTextEdit):
             bar.setValue(place)
 
     def line_with(self, words: str) -> int:
-        """Return the number of the first line that contains `words`, counted from 1; 0 if none does."""
+        """Return the 1-based number of the first line that contains `words`, or 0."""
         found = self.document().find(QRegularExpression(QRegularExpression.escape(words)))
         return found.blockNumber() + 1 if not found.isNull() else 0

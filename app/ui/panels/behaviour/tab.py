@@ -33,7 +33,7 @@ SLOT_WIDTH = 18  # place of the unsaved dot or, on hover, the close button
 
 @dataclass(frozen=True)
 class TabFacts:
-    """Facts that a tab shows."""
+    """Data that a tab displays."""
 
     key: str
     name: str
@@ -41,12 +41,15 @@ class TabFacts:
     runs: bool = False
     tip: str = ""
     plain_name: str = ""
-    """Name to edit, without the folder that distinguishes equal names."""
+    """Name in the rename field, without the folder that distinguishes equal names."""
     has_file: bool = False
 
 
 class BehaviourTab(PaintedButton):
-    """Tab of one behaviour. An amber dot instead of the icon: running; a small dot: not saved."""
+    """Tab of one behaviour.
+
+    An amber dot in place of the icon means running, a small dot means unsaved changes.
+    """
 
     chosen = Signal()
     close_pressed = Signal()
@@ -62,7 +65,7 @@ class BehaviourTab(PaintedButton):
         self.setMouseTracking(True)
 
     def show_facts(self, facts: TabFacts, current: bool) -> bool:
-        """Show the facts; return True if the width of the tab changed."""
+        """Update the tab. Return True if its width changed."""
         if facts == self.facts and current == self.isChecked():
             return False
         wider = facts.name != self.facts.name or current != self.isChecked() or facts.runs != self.facts.runs

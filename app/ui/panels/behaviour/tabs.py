@@ -1,4 +1,4 @@
-"""Title bar of the behaviour panel: tabs, "+", undo, redo, and the switch between Blocks and Python."""
+"""Title bar of the behaviour panel: tabs, "+", undo, redo, and the Blocks/Python switch."""
 
 from __future__ import annotations
 
@@ -20,13 +20,13 @@ GAP = 4
 NAME_WIDTH = 180  # width of the name field
 SCROLL_MARGIN, SCROLL_STEP = 32, 8  # px
 NEW = "+"
-"""Stands for the "+" button in place of a tab's key."""
+"""Value that represents the "+" button where a tab's key is expected."""
 
 
 class BehaviourTabs(QWidget):
-    """Tab bar with "+". Tabs shrink when space is short, then scroll with the wheel.
+    """Tab bar with a "+" button. Tabs shrink when space is short, then scroll with the wheel.
 
-    While some tabs are scrolled out of view, a button lists all of them.
+    While some tabs are scrolled out of view, a button opens a list of all tabs.
     """
 
     chosen = Signal(str)
@@ -42,7 +42,7 @@ class BehaviourTabs(QWidget):
         self._current = ""
         self._left = 0.0
         self.why_not: Callable[[str, str], str] = lambda _key, _name: ""
-        """Returns why a tab (key) can't have a name, or ""."""
+        """Returns the reason why the tab with this key can't have a name, or ""."""
         self.field: NameField | None = None
         self._edited = ""
         self.tabs: dict[str, BehaviourTab] = {}
@@ -102,7 +102,7 @@ class BehaviourTabs(QWidget):
     # -- drops of blocks ----------------------------------------------------------------------------------
 
     def target_at(self, place: QPoint) -> str:
-        """Return the key of the tab at a screen position, `NEW` for "+", or ""."""
+        """Return the drop target at a screen position: the key of a tab, `NEW` for "+", or ""."""
         if not self.isVisible():
             return ""
         here = self.mapFromGlobal(place)
@@ -113,7 +113,7 @@ class BehaviourTabs(QWidget):
         return next((key for key, tab in self.tabs.items() if tab.geometry().contains(here)), "")
 
     def scroll_at(self, place: QPoint) -> bool:
-        """Scroll while a drag is near an end of the bar; return True if the tabs moved."""
+        """Scroll if a drag is near an end of the bar. Return True if the tabs moved."""
         here, room = self.mapFromGlobal(place), self._room.geometry()
         if not self.isVisible() or not room.contains(here):
             return False
@@ -127,7 +127,7 @@ class BehaviourTabs(QWidget):
         return self._left != before
 
     def aim(self, key: str) -> None:
-        """Highlight the drop target: a tab's key, `NEW` for "+", or "" for none."""
+        """Highlight a drop target: the key of a tab, `NEW` for "+", or "" for none."""
         for each, tab in self.tabs.items():
             tab.set_aimed(each == key)
         self.add.set_aimed(key == NEW)
@@ -135,7 +135,7 @@ class BehaviourTabs(QWidget):
     # -- renaming -----------------------------------------------------------------------------------------
 
     def edit(self, key: str) -> None:
-        """Edit the name of a tab in place."""
+        """Start in-place editing of a tab's name."""
         if key not in self.tabs:
             return
         self._end_edit()
@@ -302,7 +302,7 @@ class BehaviourTabs(QWidget):
 
 
 class BehaviourTitle(QWidget):
-    """Replacement of the panel's title: tabs and buttons."""
+    """Tabs and buttons that replace the panel's title."""
 
     def __init__(self, theme: Theme) -> None:
         super().__init__()
@@ -328,7 +328,7 @@ class BehaviourTitle(QWidget):
         row.addWidget(self.mode)
 
     def show_mode(self, mode: str) -> None:
-        """Show undo and redo for the blocks, copy for the program."""
+        """Show the buttons of a mode: undo and redo for blocks, copy for the program."""
         self.mode.set_value(mode)
         self.undo.setVisible(mode == "blocks")
         self.redo.setVisible(mode == "blocks")

@@ -54,7 +54,7 @@ _ROOT = QModelIndex()
 
 
 def line_of(record: ConsoleRecord, level: str = "") -> str:
-    """Format a record as a log line for the clipboard, with `level` in place of its own if given."""
+    """Format a record as a log line for the clipboard; a given `level` replaces the record's own."""
     moment = time.localtime(record.stamp_s)
     clock = f"{time.strftime('%H:%M:%S', moment)}.{int(record.stamp_s % 1 * 1000):03d}"
     logger = f" [{record.logger}]" if record.logger else ""
@@ -62,7 +62,7 @@ def line_of(record: ConsoleRecord, level: str = "") -> str:
 
 
 def tip_of(record: ConsoleRecord) -> str:
-    """Return the tooltip: full text, time, level, and the place in the source that logged the record."""
+    """Return the tooltip of a record: full text, time, level, and source location of the log call."""
     where = "  ".join(part for part in (record.logger, record.place) if part)
     clock = time.strftime("%H:%M:%S", time.localtime(record.stamp_s))
     said = f"{record.text}\n{clock} {_level_words(record)}"
@@ -70,7 +70,7 @@ def tip_of(record: ConsoleRecord) -> str:
 
 
 def first_line(text: str) -> str:
-    """Return the first line of a text with the number of further lines."""
+    """Return the first line of a text, followed by the number of omitted lines."""
     first, _end, rest = text.partition("\n")
     if not rest:
         return first
@@ -84,7 +84,7 @@ def _level_words(record: ConsoleRecord) -> str:
 
 
 class RecordFilter:
-    """Predicate for records: level, node ("" for all) and words that the record must contain."""
+    """Filter for records by level, node ("" for all) and words."""
 
     def __init__(self, levels: frozenset[str], node: str, words: str) -> None:
         self._levels, self._node, self._words = levels, node, words.casefold().split()
@@ -99,7 +99,7 @@ class RecordFilter:
 
 
 class ConsoleModel(QAbstractListModel):
-    """Filtered records, newest first: new rows are inserted at the top, evicted ones leave at the bottom."""
+    """List model of the records that match a filter, newest first."""
 
     def __init__(self) -> None:
         super().__init__()
@@ -120,14 +120,14 @@ class ConsoleModel(QAbstractListModel):
         return plain.tip(tip_of(record)) if role == Qt.ItemDataRole.ToolTipRole else None
 
     def show_all(self, records: Sequence[ConsoleRecord], wanted: Callable[[ConsoleRecord], bool]) -> None:
-        """Reset the model to the matching records; `records` are sorted oldest first."""
+        """Reset the model; `records` are sorted oldest first, and `wanted` is the filter."""
         self.beginResetModel()
         self._records = deque(record for record in records if wanted(record))
         self._newest = records[-1].number if records else 0
         self.endResetModel()
 
     def follow(self, records: Sequence[ConsoleRecord], wanted: Callable[[ConsoleRecord], bool]) -> int:
-        """Add new matching records, remove evicted ones and return the number of rows added."""
+        """Add new matching records and remove evicted ones. Return the number of rows added."""
         if not records or records[-1].number < self._newest or records[0].number > self._newest + 1:
             self.show_all(records, wanted)
             return len(self._records)
@@ -160,7 +160,7 @@ class ConsoleModel(QAbstractListModel):
 
 
 class LineDelegate(QStyledItemDelegate):
-    """Paints one record: time, level (icon and name), origin, text.
+    """Delegate that paints a record: time, level (icon and name), origin, text.
 
     Time and level are aligned in columns; the text directly follows the origin.
     """
@@ -206,7 +206,7 @@ class LineDelegate(QStyledItemDelegate):
             rect.setLeft(part.right() + 7)
 
     def columns(self, record: ConsoleRecord, width: float) -> dict[str, float]:
-        """Return the parts before the text with their widths, for a row of this width.
+        """Return the widths of the parts before the text, for a row of the given width.
 
         When space is short, the logger is left out first, then the level's name (the icon stays), then the
         time. The tooltip contains everything.
@@ -238,7 +238,7 @@ class LineDelegate(QStyledItemDelegate):
 class LineList(QListView):
     """List view of the records.
 
-    Key ``/`` emits `find_wanted`; `resized` is emitted on a change of geometry.
+    The key ``/`` emits `find_wanted`; `resized` is emitted on a change of geometry.
     """
 
     find_wanted = Signal()
@@ -266,7 +266,7 @@ class LineList(QListView):
 
 
 class FindWords(SearchField):
-    """Field of the words to find. Down moves the focus to the list; Esc clears and hides the field."""
+    """Search field of the console. Down moves the focus to the list; Esc clears and hides the field."""
 
     left = Signal()
 

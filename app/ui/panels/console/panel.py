@@ -1,4 +1,4 @@
-"""Console panel: log records of Studio and of programs, newest first."""
+"""Console panel: log records of Studio, programs and robots, newest first."""
 
 from __future__ import annotations
 
@@ -185,13 +185,13 @@ class ConsolePanel(PanelWidget):
     # filters
 
     def set_level(self, level: str) -> None:
-        """Set the lowest level: "debug", "all" (without debug), "warn" or "error"."""
+        """Set the minimum level: "debug", "all" (everything but debug), "warn" or "error"."""
         if level in SHOWN_LEVELS:
             self.level = level
             self._name_filter()
 
     def set_node(self, node: str) -> None:
-        """Show only records of one node; "" for all."""
+        """Show only the records of one node; "" for all nodes."""
         self.node = node
         self._name_filter()
 
@@ -203,7 +203,7 @@ class ConsolePanel(PanelWidget):
         self.set_level("all")
 
     def clear(self) -> None:
-        """Delete all records."""
+        """Delete all stored records."""
         self.session.shown_console.clear()
         self.refresh()
 

@@ -1,3 +1,3 @@
-"""First steps panel: six steps, each checked off when blocks and run show that it is done."""
+"""First steps panel: a tutorial of six steps, which are checked off by observing blocks and runs."""
 
 from app.ui.panels.first_steps.panel import PANEL as PANEL

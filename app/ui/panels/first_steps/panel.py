@@ -85,7 +85,7 @@ class StepRow(QWidget):
         row.addLayout(text, 1)
 
     def show_state(self, state: str) -> None:
-        """Show the step as "done", "next" or "later"."""
+        """Show the step in the state "done", "next" or "later"."""
         self.mark.state = state
         paint.show_when(self.hint, state == "next")
         paint.show_when(self.button, state == "next")
@@ -96,7 +96,7 @@ class StepRow(QWidget):
         self.mark.update()
 
     def show_hint(self, *, loose: bool) -> None:
-        """Show where to find the block or, if `loose`, that it must be attached to the script."""
+        """Show where to find the block. If `loose`, say that it must be attached to the script."""
         self.hint.setText(spoken(LOOSE_HINT if loose else self.step.hint))
 
     def paintEvent(self, _event: QPaintEvent) -> None:
@@ -109,16 +109,16 @@ class StepRow(QWidget):
 
 
 def spoken(text: str) -> str:
-    """Return a step's text with the names of its blocks filled in."""
+    """Return the text of a step with the names of its blocks filled in."""
     return _(text).format(
         start=pgettext("block", "when started"), say=pgettext("robot", "say"), turn=pgettext("robot", "turn")
     )
 
 
 class FirstStepsPanel(PanelWidget):
-    """Six steps to a robot that speaks, turns and stops. Completed steps are saved in the settings.
+    """Tutorial of six steps to a robot that speaks, turns and stops. Progress is saved in the settings.
 
-    `clock` returns seconds; the hint appears by itself after 20 s without progress.
+    `clock` returns seconds; the hint appears automatically after 20 s without progress.
     """
 
     def __init__(self, context: PanelContext, clock: Callable[[], float] = time.monotonic) -> None:
@@ -158,7 +158,7 @@ class FirstStepsPanel(PanelWidget):
         return (self._again,)
 
     def following(self) -> Lesson | None:
-        """Return the next step, or None when all are done."""
+        """Return the next step, or None after the last one."""
         return next((step for step in STEPS if step.id not in self.done), None)
 
     # -- checking -----------------------------------------------------------------------------------------
@@ -232,7 +232,7 @@ class FirstStepsPanel(PanelWidget):
     # -- user actions -------------------------------------------------------------------------------------
 
     def show_me(self, step: Lesson) -> None:
-        """Point at the block or button of the step."""
+        """Highlight the block or button of a step."""
         self._pointed_for = step.id
         if step.id == "robot":
             self.context.run("robots.virtual")
@@ -253,7 +253,7 @@ class FirstStepsPanel(PanelWidget):
         self.context.run("point.block:-")
 
     def start_again(self) -> None:
-        """Start again on a new page; existing blocks are left alone."""
+        """Restart the tutorial in a new behaviour; existing blocks are not changed."""
         self.done = frozenset()
         self._waits_since = None
         self._keep()

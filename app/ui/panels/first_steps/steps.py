@@ -1,4 +1,4 @@
-"""The six first steps and the check for their completion."""
+"""Definition of the six first steps, and detection of completed ones."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ Script = tuple[tuple[str, str], ...]
 
 @dataclass(frozen=True)
 class Lesson:
-    """One step.
+    """Step of the tutorial.
 
     Attributes:
         text: Sentence with ``{names}`` of blocks.
@@ -62,7 +62,7 @@ STEPS: tuple[Lesson, ...] = (
 
 @dataclass(frozen=True)
 class Built:
-    """Result of `built_in`: ids of "say" blocks below "when started", and True for a "turn" block.
+    """Result of `built_in`: ids of "say" blocks below "when started", and True if there is a "turn" block.
 
     `loose` has the type suffixes of blocks that occur only in scripts without an event.
     """
@@ -75,7 +75,10 @@ class Built:
 
 @dataclass(frozen=True)
 class Now:
-    """Present state. `ran` has the ids of blocks that have run; `stopped` is True after Stop."""
+    """Current state of blocks and run.
+
+    `ran` has the ids of blocks that have run; `stopped` is True after Stop.
+    """
 
     can_speak: bool = False
     built: Built = field(default_factory=Built)
@@ -84,7 +87,12 @@ class Now:
 
 
 def built_in(workspace: Mapping[str, object], others: Collection[str] = ()) -> Built:
-    """Return what a person has built; `others` are the ids of blocks that came with an example."""
+    """Return the tutorial's blocks that a workspace contains.
+
+    Args:
+        workspace: Program of the behaviour.
+        others: Ids of blocks to ignore because they came with an example.
+    """
     started: list[Script] = []
     loose: list[Script] = []
     is_started = False
@@ -108,7 +116,7 @@ def _has(scripts: Sequence[Script], end: str) -> bool:
 def shown_by(now: Now, done: Collection[str]) -> frozenset[str]:
     """Return the ids of completed steps; steps in `done` stay completed.
 
-    Stop counts only after a run with a turn, so that it can't be completed by chance.
+    Stop counts only after a run with a turn, so that the step can't be completed by chance.
     """
     found = set(done)
     if now.can_speak:

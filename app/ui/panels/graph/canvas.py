@@ -33,11 +33,11 @@ ZOOM_STEP = 1.2
 MARGIN = 20.0
 PAN_STEP = 60.0
 CLICK_TOLERANCE = 4.0
-"""Maximum mouse movement of a click, in px."""
+"""Mouse movement in px up to which a press counts as a click."""
 MAX_UPDATES_PER_TICK = 250
-"""Nodes and lines updated per tick."""
+"""Maximum number of nodes and lines updated per tick."""
 MAX_AREAS = 60
-"""Above this number of changed areas, their bounding rectangle is repainted instead."""
+"""Number of changed areas above which their bounding rectangle is repainted instead."""
 _ARROWS: dict[int, Arrow] = {
     Qt.Key.Key_Left: "left",
     Qt.Key.Key_Right: "right",
@@ -49,14 +49,21 @@ PANEL_KEYS = {Qt.Key.Key_G: "g", Qt.Key.Key_H: "h", Qt.Key.Key_S: "s", Qt.Key.Ke
 
 
 class GraphCanvas(QWidget):
-    """Canvas that shows one scene. It keeps its viewport when the scene changes, unless everything is shown.
+    """Canvas of one scene. The viewport is kept when the scene changes, unless the whole graph is fitted.
 
-    Signals: `chosen` (selection, or None), `opened` (key of a topic to inspect), `entered` (focus the card),
-    `toggled` (group to expand or collapse), `quiet_wanted` (group whose quiet nodes to show), `letter` (key
-    for the panel), `moved` (viewport changed), `menu_wanted` (selection and screen position of a context
-    menu).
+    Signals:
+        chosen: Selection, or None.
+        opened: Key of a topic to inspect.
+        entered: The card should get the focus.
+        toggled: Group to expand or collapse.
+        quiet_wanted: Group whose quiet nodes should be shown.
+        letter: Key press for the panel.
+        moved: The viewport changed.
+        menu_wanted: Selection and screen position of a context menu.
 
-    `describe` returns the selection as text for screen readers, `tip` the tooltip of a topic.
+    Args:
+        describe: Returns the selection as text for screen readers.
+        tip: Returns the tooltip of a topic.
     """
 
     chosen = Signal(object)
@@ -100,7 +107,7 @@ class GraphCanvas(QWidget):
     # -- display ------------------------------------------------------------------------------------------
 
     def show_scene(self, scene: GraphScene | None) -> None:
-        """Show another graph, or the same graph with another layout."""
+        """Show another graph, or the same graph in another layout."""
         self.scene = scene
         if self.choice is not None and not self._is_there(self.choice):
             self.choose(None)
@@ -118,14 +125,17 @@ class GraphCanvas(QWidget):
         return (graph.node(choice.key) if choice.kind == "node" else graph.line_of(choice.key)) is not None
 
     def renew_soon(self) -> None:
-        """Schedule an update of the visible figures; `renew` performs it."""
+        """Schedule a refresh of the rates and counts on visible items; `renew` performs it."""
         if self.scene is not None:
             self._waiting = self.scene.items_in(self.visible())
 
     def renew(self, figures: FiguresOf) -> int:
-        """Update the figures of the next `MAX_UPDATES_PER_TICK` visible items and repaint only changed areas.
+        """Update the rates and counts of the next `MAX_UPDATES_PER_TICK` visible items.
 
-        Return the number of repainted areas. Called on every tick, so that no call takes long.
+        Only changed areas are repainted. Called on every tick, therefore each call is short.
+
+        Returns:
+            The number of repainted areas.
         """
         scene = self.scene
         if scene is None or not self._waiting:
@@ -146,7 +156,7 @@ class GraphCanvas(QWidget):
         return len(areas)
 
     def choose(self, choice: GraphChoice | None, *, by_key: bool = False) -> None:
-        """Select an item, or nothing; a selection by key is scrolled into view and announced."""
+        """Select an item, or None for nothing. A selection by key is scrolled into view and announced."""
         if choice == self.choice:
             return
         self.choice = choice
@@ -166,7 +176,7 @@ class GraphCanvas(QWidget):
         return QRectF(left_top.x(), left_top.y(), self.width() / self.scale, self.height() / self.scale)
 
     def show_all(self) -> None:
-        """Fit the whole graph into the view (at most 100 %); it stays fitted until the next pan or zoom."""
+        """Fit the whole graph into the view (at most 100 %). It stays fitted until the next pan or zoom."""
         self._shows_all = True
         if self.scene is None or self.scene.bounds.isEmpty():
             return
@@ -368,7 +378,7 @@ class GraphCanvas(QWidget):
         return (group[0].key, group[1]) if group is not None else None
 
     def open_group(self, key: str) -> bool:
-        """Expand a group that is drawn as one box; return False for other nodes."""
+        """Expand a group that is collapsed to one box; return False for other nodes."""
         node = self.scene.graph.node(key) if self.scene is not None else None
         if node is None or node.kind != "group":
             return False
@@ -426,7 +436,7 @@ class GraphCanvas(QWidget):
 
 
 class GraphOverview(QWidget):
-    """Overview with a frame around the visible part; a click centres the view there."""
+    """Overview map with a frame around the visible part; a click centres the view there."""
 
     def __init__(self, theme: Theme, canvas: GraphCanvas) -> None:
         super().__init__(canvas)

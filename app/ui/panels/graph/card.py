@@ -1,4 +1,4 @@
-"""Card of the selected topic, service or node in the graph, with figures and next steps."""
+"""Card with details and next steps of the topic, service or node selected in the graph."""
 
 from __future__ import annotations
 
@@ -26,15 +26,15 @@ if TYPE_CHECKING:
 
 WIDTH = 316
 MAX_ROWS = 40
-"""Maximum number of listed publishers, subscribers or topics; the number of omitted ones is shown."""
+"""Maximum number of listed publishers, subscribers or topics; the number of further ones is shown."""
 
 Row = tuple[str, str, tuple[str, ...]]
-"""Key to select on click ("" for none), name, and figures."""
+"""Row of a table: key to select on click ("" for none), name, and values."""
 
 
 @dataclass(frozen=True, slots=True)
 class CardTable:
-    """Table with a title; `columns` are the headers of the figures."""
+    """Table with a title; `columns` are the headers of the value columns."""
 
     title: str
     columns: tuple[str, ...]
@@ -44,7 +44,7 @@ class CardTable:
 
 @dataclass(frozen=True, slots=True)
 class CardFigure:
-    """Large figure with a note and an optional curve."""
+    """Number in large type with a note and an optional curve."""
 
     title: str
     value: str
@@ -64,7 +64,7 @@ class CardContent:
     tables: tuple[CardTable, ...] = ()
     foot: str = ""
     topic: str = ""
-    """Topic opened by *Inspect*; "" to hide the button."""
+    """Key of the topic that *Inspect* opens; "" hides the button."""
     has_fields: bool = False
     """True if the messages have fields to plot."""
     alarm: str = ""
@@ -72,10 +72,15 @@ class CardContent:
 
 
 class GraphCard(QWidget):
-    """Shows a `CardContent`; unchanged parts are left as they are.
+    """Displays a `CardContent`. Parts that didn't change are not rebuilt.
 
-    Signals: `closed`, `inspected`, `plotted` and `record_wanted` (topic), `warned` (command that creates an
-    alarm), `chose` (kind and key of an item). `steps` holds the buttons.
+    Signals:
+        closed: The card was closed.
+        inspected: Topic to inspect.
+        plotted: Topic to plot.
+        record_wanted: Topic to record.
+        warned: Command that creates an alarm.
+        chose: Kind and key of an item to select.
     """
 
     closed = Signal()
@@ -145,7 +150,7 @@ class GraphCard(QWidget):
         return head
 
     def first_stop(self) -> QWidget:
-        """Return the widget to focus on entry: the first row, else *Inspect*, else the close button."""
+        """Return the widget that gets the focus first: a row, else *Inspect*, else the close button."""
         rows = [row.button for table in self._tables for row in table.rows]
         first = next((button for button in rows if button.isVisibleTo(self)), None)
         return first or (self.inspect if self.inspect.isVisibleTo(self) else self.close_button)
@@ -167,7 +172,7 @@ class GraphCard(QWidget):
             self.record_wanted.emit(self.content.topic)
 
     def show_content(self, content: CardContent | None) -> None:
-        """Show the contents; None hides the card."""
+        """Show a card, or hide it if `content` is None."""
         if content == self.content:
             return
         before, self.content = self.content, content
@@ -224,7 +229,7 @@ def _shape(content: CardContent) -> object:
 
 
 class _FigureBox(QWidget):
-    """Large figure with title, note and curve."""
+    """Number in large type with title, note and curve."""
 
     def __init__(self, theme: Theme) -> None:
         super().__init__()
@@ -265,7 +270,7 @@ class _TableRow:
 
 
 class _Table(QWidget):
-    """Table of clickable names with figures to their right."""
+    """Table of clickable names with values to their right."""
 
     def __init__(self, theme: Theme, table: CardTable, chose: Callable[[str, str], object]) -> None:
         super().__init__()
@@ -303,7 +308,7 @@ class _Table(QWidget):
 
 @dataclass(frozen=True, slots=True)
 class CardFacts:
-    """Sources of a card's facts.
+    """Sources of the information on a card.
 
     Attributes:
         topic_of: Return a topic by key.
@@ -433,7 +438,10 @@ def _row(facts: CardFacts, entry: str, figures: tuple[str, ...]) -> Row:
 
 
 def node_card(node: DrawnNode, services: Sequence[tuple[str, bool]], facts: CardFacts) -> CardContent | None:
-    """Return a node's card; `services` are those that it offers (True) or calls (False)."""
+    """Return a node's card.
+
+    `services` maps services to True if the node offers them, False if it calls them.
+    """
     entry = node.entry
     if entry is None:
         return None
@@ -479,7 +487,7 @@ def _topics_of(title: str, network: str, names: Sequence[str], facts: CardFacts)
 
 
 def clock_words(view: GraphView | None) -> str:
-    """Return the largest uncertainty of the computers' clock offsets; "" if none was measured."""
+    """Format the largest uncertainty of the computers' clock offsets; "" if none was measured."""
     if view is None:
         return ""
     known = [node.clock_uncertainty_ns for node in view.nodes.values() if node.clock_uncertainty_ns]

@@ -1,4 +1,4 @@
-"""Painting of a graph scene, on the screen or to a file."""
+"""Painter of a graph scene, on the screen or to a file."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from app.ui.widgets import paint
 CHOSEN_WIDTH = 2.25
 DIM_OPACITY = 0.3
 MIN_TEXT_PX = 6.0
-"""Text below this size is not painted, because it would be illegible."""
+"""Font height in px below which text is not painted, because it would be illegible."""
 
 
 def paint_scene(
@@ -26,13 +26,18 @@ def paint_scene(
     *,
     rings: bool = False,
 ) -> None:
-    """Paint the part of the scene within `clip` at `scale`; `rings` adds focus rings for the keyboard."""
+    """Paint the part of the scene within `clip` at `scale`.
+
+    Args:
+        chosen: Selected item, which is highlighted.
+        rings: Also paint focus rings, for keyboard use.
+    """
     painter.setRenderHint(QPainter.RenderHint.Antialiasing)
     _Painting(scene, painter, clip, scale, chosen, rings=rings).paint()
 
 
 class _Painting:
-    """One paint pass: colours, and the ends of the selected line."""
+    """State of one paint pass: colours, and the ends of the selected line."""
 
     def __init__(
         self,
@@ -196,7 +201,7 @@ class _Painting:
             self._words(item, "textDisabled" if node.is_gone else "textSecondary" if faint else "text")
 
     def _other_side(self, rect: QRectF, joins: str, edge: QColor) -> None:
-        # The part of a bridge that names the other network.
+        # Right part of a bridge, with the name of the other network.
         theme, painter = self.theme, self.painter
         part = QRectF(rect.right() - JOIN, rect.top() + 1, JOIN - 1, rect.height() - 2)
         paint.box(painter, part, theme.radius("small"), theme.colour("sunken"))

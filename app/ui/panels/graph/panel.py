@@ -1,4 +1,4 @@
-"""Graph panel: nodes in groups, topics and services as lines with their rates."""
+"""Graph panel: nodes in groups, with topics and services as lines between them."""
 
 from __future__ import annotations
 
@@ -68,18 +68,18 @@ from nep.i18n import _, lazy, ngettext
 SVG = FileKind(lazy("An image that stays sharp at any size"), ".svg")
 DOT = FileKind(lazy("Graph for other programs"), ".dot")
 MAX_AT_ONCE = 500
-"""Lines above which building and first painting of a scene are spread over two ticks."""
+"""Number of lines above which building and first painting of a scene are spread over two ticks."""
 CARD_BESIDE_WIDTH = 700
-"""Minimum width in px (at 100 % text size) for the card at the side; below it, the card is at the bottom."""
+"""Minimum width in px (at 100 % text size) for a card at the side; below it, the card is at the bottom."""
 QUIET_UPDATE_TICKS = 30
-"""Refreshes at 30 Hz: quiet nodes are determined once a second."""
+"""Refreshes (at 30 Hz) between checks for quiet nodes."""
 MAX_MENU_TOPICS = 20
-"""Maximum number of topics in a line's menu; the cards of its nodes list all."""
+"""Maximum number of topics in a line's menu; the cards of its nodes list all of them."""
 GROUPS: tuple[GroupBy, ...] = ("computer", "robot", "nothing")
 
 
 class GraphPanel(PanelWidget):
-    """Graph with a toolbar above and the card of the selected item at the side."""
+    """Panel with the graph, a toolbar above it, and the card of the selected item at the side."""
 
     def __init__(self, context: PanelContext) -> None:
         super().__init__(context, _("Graph"))
@@ -495,7 +495,7 @@ class GraphPanel(PanelWidget):
             self.context.toast(_("Saved {name}").format(name=path.name))
 
     def picture(self) -> bytes:
-        """Return the whole graph as SVG in the current colours; b"" if it is empty."""
+        """Return the whole graph as SVG in the colours of the theme; b"" if it is empty."""
         scene = self.canvas.scene
         if scene is None or not scene.nodes:
             return b""

@@ -30,18 +30,18 @@ from app.ui.widgets import paint
 CORNER_RADIUS = 10.0
 ARROW_LENGTH, ARROW_WIDTH = 9.0, 8.0
 LINE_MARGIN = 14.0
-"""Margin around lines for arrows and thick pens."""
+"""Margin in px around lines, to include arrows and thick pens."""
 CELL_SIZE = (160.0, 48.0)
 LABEL_FIGURE_CHARS = 7
-"""Characters reserved in a label for its figure."""
+"""Characters reserved in a label for the rate."""
 MIN_TEXT_PX = 7.0
-"""Text below this size is not painted, because it would be illegible."""
+"""Font height in px below which text is not painted, because it would be illegible."""
 TINY_SCALE = 0.2
-"""Below this scale thousands of lines are visible, so figures and line widths are left out."""
+"""Scale below which rates and line widths are left out, because thousands of lines are visible."""
 HIT_TOLERANCE_PX = 6.0
 """Maximum distance of a click from a line, in px."""
 JOIN = 48.0
-"""Width of the part of a bridge that names the other network."""
+"""Width in px of the right part of a bridge, which names the other network."""
 
 
 FiguresOf = Callable[[GraphLine], LineFigures]
@@ -49,7 +49,7 @@ FiguresOf = Callable[[GraphLine], LineFigures]
 
 @dataclass(slots=True)
 class NodeItem:
-    """Painted box of a node, with the texts painted last."""
+    """Box of a node with its texts."""
 
     node: DrawnNode
     rect: QRectF
@@ -62,7 +62,7 @@ class NodeItem:
 
 @dataclass(slots=True)
 class LineItem:
-    """Painted line: its routes, and the rectangle of its label once placed, if there was room."""
+    """Line between two boxes: its routes, and the rectangle of its label if there was room for it."""
 
     line: GraphLine
     ways: dict[tuple[str, str], Sequence[Place]]
@@ -75,7 +75,7 @@ class LineItem:
     _arrows: list[QPolygonF] | None = None
     _plain: list[QPolygonF] | None = None
 
-    # Created on first paint: all paths of a large graph at once would block the window.
+    # Created on first paint: creating all paths of a large graph at once would block the window.
 
     def path(self) -> QPainterPath:
         """Return the routes with rounded corners."""
@@ -92,7 +92,7 @@ class LineItem:
         return self._arrows
 
     def plain(self) -> list[QPolygonF]:
-        """Return the routes with sharp corners, for small scales."""
+        """Return the routes with sharp corners, which are painted faster at small scales."""
         if self._plain is None:
             self._plain = [QPolygonF([QPointF(*at) for at in points]) for points in self.ways.values()]
         return self._plain
@@ -100,7 +100,7 @@ class LineItem:
 
 @dataclass(slots=True)
 class GroupItem:
-    """Painted group; `quiet` is the rectangle of the number of hidden nodes."""
+    """Frame of a group; `quiet` is the rectangle of the text with the number of hidden nodes."""
 
     group: GraphGroup
     rect: QRectF
@@ -109,7 +109,11 @@ class GroupItem:
 
 
 class GraphScene:
-    """Geometry of one graph, computed once; `renew` updates its figures. `host` is this computer's name."""
+    """Geometry of one graph, computed once; `renew` updates rates and counts.
+
+    Args:
+        host: Name of this computer.
+    """
 
     def __init__(
         self, theme: Theme, graph: NodeGraph, layout: GraphLayout, sizes: LayoutSizes, host: str
@@ -178,7 +182,7 @@ class GraphScene:
         return [*nodes, *(item for item in self.lines if item.bounds.intersects(area))]
 
     def renew(self, item: NodeItem | LineItem, figures: FiguresOf, *, with_words: bool) -> QRectF | None:
-        """Update the figures of one item and return the area to repaint, or None if nothing changed.
+        """Update rates and counts of one item. Return the area to repaint, or None if nothing changed.
 
         The label of a line is placed on the first call with `with_words`.
         """
@@ -202,7 +206,7 @@ class GraphScene:
         return area
 
     def complete(self, figures: FiguresOf) -> None:
-        """Update all items at once, for an exported picture."""
+        """Update the rates and counts of all items at once, for an exported picture."""
         every: list[NodeItem | LineItem] = [*self.nodes.values(), *self.lines]
         for item in every:
             self.renew(item, figures, with_words=True)
@@ -218,7 +222,7 @@ class GraphScene:
         return found
 
     def dim(self, words: Sequence[str]) -> None:
-        """Fade items that don't contain all `words`, except for nodes connected to matching topics."""
+        """Fade the items that lack one of `words`. Nodes connected to matching topics stay."""
         bright = {
             key for key, item in self.nodes.items() if all(word in _haystack(item.node) for word in words)
         }
@@ -242,21 +246,24 @@ class GraphScene:
 
     @staticmethod
     def has_figures(scale: float) -> bool:
-        """Return False for scales at which lines are 1 px wide without arrows and figures."""
+        """Return False for scales at which lines are drawn 1 px wide, without arrows and rates."""
         return scale >= TINY_SCALE
 
     def has_words(self, scale: float) -> bool:
-        """Return True if the small text is legible at this scale."""
+        """Return True for scales at which the small text is legible."""
         return scale * self.small_font.pixelSize() >= MIN_TEXT_PX
 
     # -- hit testing --------------------------------------------------------------------------------------
 
     def node_at(self, at: QPointF) -> DrawnNode | None:
-        """Return the node at a point of the scene."""
+        """Return the node at a point in scene coordinates, or None."""
         return next((item.node for item in self.nodes.values() if item.rect.contains(at)), None)
 
     def group_at(self, at: QPointF) -> tuple[GraphGroup, bool] | None:
-        """Return the group at a point: True for its title, False for its number of quiet nodes."""
+        """Return the group at a point, or None.
+
+        The bool is True for its title, False for its number of quiet nodes.
+        """
         for item in self.groups:
             if item.quiet is not None and item.quiet.contains(at):
                 return item.group, False
@@ -266,7 +273,7 @@ class GraphScene:
         return None
 
     def line_at(self, at: QPointF, scale: float) -> LineItem | None:
-        """Return the line whose label is at the point, or the nearest line within reach."""
+        """Return the line whose label is at the point, else the nearest line within `HIT_TOLERANCE_PX`."""
         labelled = (item for item in self.lines if item.label is not None and item.label.contains(at))
         found = next(labelled, None)
         if found is not None:
@@ -372,7 +379,7 @@ def _haystack(node: DrawnNode) -> str:
 
 
 class _TakenRoom:
-    """Index of occupied rectangles in grid cells, because thousands of labels are placed."""
+    """Spatial index of occupied rectangles, so that thousands of labels can be placed without overlap."""
 
     def __init__(self, rects: Iterable[QRectF]) -> None:
         self._cells: dict[tuple[int, int], list[QRectF]] = {}

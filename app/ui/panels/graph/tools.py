@@ -50,11 +50,11 @@ class GraphTools(QWidget):
         self.show_choices(GraphChoices())
 
     def words(self) -> list[str]:
-        """Return the words of the filter; items that lack one of them are faded."""
+        """Return the words of the filter. Items that lack one of them are faded."""
         return self.filter.text().casefold().split()
 
     def show_choices(self, choices: GraphChoices) -> None:
-        """Show the current choices."""
+        """Update the buttons to the current choices."""
         self.group.set_value(choices.group_by)
         self.quiet.setChecked(choices.hides_quiet)
         self.services.setChecked(choices.shows_services)
@@ -68,12 +68,12 @@ class GraphTools(QWidget):
             self.quiet.set_word(_("Hide quiet nodes"))
 
     def say_scale(self, scale: float) -> None:
-        """Show the zoom."""
+        """Show the zoom level."""
         self.scale.setText(f"{number(scale * 100, '.0f')} %")
 
 
 class GraphLegend(QWidget):
-    """Legend of lines and edges, in one row."""
+    """Legend of line styles and border styles, in one row."""
 
     def __init__(self, theme: Theme) -> None:
         super().__init__()
@@ -92,7 +92,7 @@ class GraphLegend(QWidget):
 
 
 class _Entry(QWidget):
-    """Sample of a line or edge with its text."""
+    """Legend entry: a sample with its text."""
 
     SIGN = 36.0
 

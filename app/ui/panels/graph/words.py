@@ -1,4 +1,4 @@
-"""Texts of nodes, groups and lines in the graph, and the width of lines."""
+"""Texts of nodes, groups and lines in the graph, and the line widths."""
 
 from __future__ import annotations
 
@@ -15,10 +15,10 @@ from nep.i18n import _, ngettext, number, pgettext
 
 BRIDGE_PREFIX = "bridge-"
 MAX_NAMED_TOPICS = 2
-"""Maximum number of topic names in a line's label; further ones are counted."""
+"""Maximum number of topic names in a line's label; further topics are counted."""
 MIN_WIDTH, MAX_WIDTH, WIDTH_STEPS = 1.25, 3.0, 7
 MIN_WIDTH_BPS, WIDTH_DECADES = 100.0, 5.0
-"""Lines are thin up to 100 B/s and thickest from 10 MB/s."""
+"""Bandwidth of the thinnest lines, and the decades up to the thickest: 100 B/s to 10 MB/s."""
 ICONS = {
     "studio": "app-window",
     "behaviour": "blocks",
@@ -35,7 +35,7 @@ FindTopic = Callable[[str], "Topic | None"]
 
 @dataclass(frozen=True, slots=True)
 class LineFigures:
-    """Label and width (px) of a line; `lost` has the loss ratio by box of the subscriber."""
+    """Label and width (px) of a line; `lost` maps the box of a subscriber to its loss ratio."""
 
     words: str
     width: float
@@ -43,7 +43,7 @@ class LineFigures:
 
 
 def node_icon(node: DrawnNode) -> str:
-    """Return the icon of a node's kind."""
+    """Return the name of the icon for a node's kind."""
     if node.page is not None:
         return node.page.icon
     return "camera" if node.has_pictures and node.kind == "program" else ICONS[node.kind]
@@ -59,7 +59,10 @@ def node_name(node: DrawnNode, host: str) -> str:
 
 
 def node_line(node: DrawnNode) -> str:
-    """Return the second line of a node, such as "Python, 4.1 %", "this window", "gone 4 s" or "41 nodes"."""
+    """Return the second line in a node's box.
+
+    Examples are "Python, 4.1 %", "this window", "gone 4 s" and "41 nodes".
+    """
     entry = node.entry
     if entry is None:
         return _members(node.members, node.quiet)
@@ -91,7 +94,7 @@ def _members(members: int, quiet: int) -> str:
 
 
 def quiet_words(group: GraphGroup) -> str:
-    """Return the number of hidden quiet nodes of a group."""
+    """Return the text with the number of hidden quiet nodes of a group."""
     return ngettext("{count} quiet node", "{count} quiet nodes", group.quiet).format(
         count=grouped(group.quiet)
     )
@@ -119,12 +122,12 @@ def counts_words(graph: NodeGraph) -> str:
 
 
 def group_note(group: GraphGroup) -> str:
-    """Return the note next to a group's name: its computer's address, or the number of web pages."""
+    """Return the note next to a group's name: the address of its computer, or the number of web pages."""
     return grouped(group.members) if group.key == WEB_GROUP else group.address
 
 
 def group_name(key: str, host: str) -> str:
-    """Return the name of a group by its key; `host` is this computer."""
+    """Return the displayed name of a group; `host` is the name of this computer."""
     kind, _colon, name = key.partition(":")
     if kind == "network":
         known = kind_named(name)
@@ -141,8 +144,10 @@ def line_figures(
 ) -> LineFigures:
     """Return label, width and losses of a line.
 
-    `hertz` are the calls per second of services, where known. `box_of` returns the box of a node's entry, ""
-    if it is not drawn.
+    Args:
+        topic_of: Returns a topic by key.
+        hertz: Calls per second by service, where known.
+        box_of: Returns the box of a node's entry, or "" if it is not drawn.
     """
     names = line_name(line.topics)
     if line.kind == "service":
@@ -156,7 +161,7 @@ def line_figures(
 
 
 def _losses(topics: Sequence[Topic], box_of: Callable[[str], str]) -> tuple[tuple[str, float], ...]:
-    # Per subscriber, the worst ratio of the line's topics.
+    # The worst loss ratio of the line's topics, for each subscriber.
     found: dict[str, float] = {}
     for topic in topics:
         for each in topic.info.subscribers if topic.info is not None else ():
@@ -173,14 +178,14 @@ def known_figure(value: float | None) -> float | None:
 
 
 def line_name(topics: Sequence[str]) -> str:
-    """Return the names of a line's topics; more than `MAX_NAMED_TOPICS` are summarized by their number."""
+    """Return the names of a line's topics, or their number if there are more than `MAX_NAMED_TOPICS`."""
     named = " ".join(split_key(topic)[1] for topic in topics[:MAX_NAMED_TOPICS])
     more = len(topics) - MAX_NAMED_TOPICS
     return _("{names} and {count} more").format(names=named, count=more) if more > 0 else named
 
 
 def short_rate(rate_hz: float) -> str:
-    """Format a rate as "52/s", "0.5/s" or "2/min"; lower rates are "0/s"."""
+    """Format a rate such as "52/s", "0.5/s" or "2/min"; lower rates are "0/s"."""
     if rate_hz >= 9.95:
         return f"{grouped(round(rate_hz))}/s"
     if rate_hz >= 0.095:
@@ -189,7 +194,7 @@ def short_rate(rate_hz: float) -> str:
 
 
 def line_width(bytes_per_s: float) -> float:
-    """Return the width of a line in px, quantized so that small changes cause no repaint."""
+    """Return the line width in px for a bandwidth, quantized so that small changes cause no repaint."""
     if not bytes_per_s > MIN_WIDTH_BPS:
         return MIN_WIDTH
     share = min(1.0, math.log10(bytes_per_s / MIN_WIDTH_BPS) / WIDTH_DECADES)

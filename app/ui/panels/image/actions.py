@@ -1,4 +1,4 @@
-"""Actions on an image, shared by title bar, menus and keys."""
+"""Actions on an image, shared by the title bar, menus and keys."""
 
 from __future__ import annotations
 
@@ -15,7 +15,10 @@ from nep.i18n import _, lazy
 
 @dataclass(frozen=True)
 class PictureRow:
-    """Description of an action; the first key is shown in menus, `above` adds a separator before it."""
+    """Definition of an action.
+
+    The first key is shown in menus; `above` adds a separator before the action.
+    """
 
     name: str
     words: str
@@ -44,7 +47,7 @@ ROWS: tuple[PictureRow, ...] = (
 
 
 class PictureActions(QObject):
-    """QActions of `ROWS` for one view; `own` implements those that the view doesn't have."""
+    """QActions of `ROWS` for one view; `own` implements those that `PictureView` lacks."""
 
     def __init__(self, theme: Theme, view: ZoomablePicture, own: Mapping[str, Callable[[], object]]) -> None:
         super().__init__(view)
@@ -88,12 +91,12 @@ class PictureActions(QObject):
         return list(self._listed)
 
     def set_enabled(self, there: bool) -> None:
-        """Enable the actions if an image is shown."""
+        """Enable the actions if `there` is True (an image is shown), else disable them."""
         for action in self._by_name.values():
             action.setEnabled(there)
 
     def show_checks(self) -> None:
-        """Check the actions of active flips."""
+        """Check the flip actions that are active."""
         self["across"].setChecked(self._view.place.flipped_across)
         self["down"].setChecked(self._view.place.flipped_down)
 

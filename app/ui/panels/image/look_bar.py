@@ -19,7 +19,7 @@ from app.ui.widgets.inputs.slider import Track
 from nep.i18n import _, lazy
 
 SLIDER_STEPS = 100
-"""Steps of a slider to each side of its neutral middle."""
+"""Slider steps on each side of the neutral middle."""
 MAP_NAMES = {
     "grey": lazy("Grey"),
     "viridis": lazy("Viridis"),
@@ -31,16 +31,17 @@ MAP_NAMES = {
 
 
 class _EndEdit(NumberEdit):
-    """Number field that shows numbers as short as possible."""
+    """Number field that formats its value as briefly as possible."""
 
     def written(self, value: float) -> str:
         return f"{value:.7g}"
 
 
 class LookBar(QWidget):
-    """Bar of image settings; emits `changed` with the new `PictureLook`.
+    """Bar of display settings; emits `changed` with the new `PictureLook`.
 
-    `picture` returns the image shown.
+    Args:
+        picture: Returns the image shown.
     """
 
     changed = Signal(object)

@@ -1,4 +1,4 @@
-"""Topics whose annotations are drawn over an image."""
+"""Overlay topics, whose annotations are drawn over an image."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ MAX_OVERLAYS = 8
 
 
 def may_draw(topic: Topic) -> bool:
-    """Return True if the topic's type or name indicates annotations for images."""
+    """Return True if type or name of the topic suggest that it contains annotations for images."""
     if topic.codec not in {"json", "msgpack"}:
         return False
     return (
@@ -27,7 +27,7 @@ def may_draw(topic: Topic) -> bool:
 
 
 class Overlays:
-    """Overlay topics chosen by the person; each is watched while the panel is visible."""
+    """Overlay topics chosen by the user; each is watched while the panel is visible."""
 
     def __init__(self, session: Session) -> None:
         self._session = session
@@ -40,13 +40,13 @@ class Overlays:
         return tuple(self._watches)
 
     def choices(self) -> list[str]:
-        """Return the keys of available overlay topics, and of chosen ones even if they are gone."""
+        """Return the keys of available overlay topics, and of chosen ones even if they no longer exist."""
         every = (*self._session.topics, *self._session.networks.topics)
         there = [topic.key for topic in every if topic.gone_s is None and may_draw(topic)]
         return [*there, *(key for key in self._watches if key not in there)]
 
     def choose(self, topic: str, shown: bool) -> None:
-        """Show or hide the annotations of a topic; at most `MAX_OVERLAYS` are shown."""
+        """Show or hide the annotations of a topic. At most `MAX_OVERLAYS` topics can be shown."""
         if shown and topic not in self._watches and len(self._watches) < MAX_OVERLAYS:
             self._watches[topic] = self._session.watch_shown(topic)
         elif not shown and topic in self._watches:
@@ -54,14 +54,14 @@ class Overlays:
             self._drawn.pop(topic, None)
 
     def begin_anew(self) -> None:
-        """Watch the same topics after a change of the source."""
+        """Watch the chosen topics in the new source after the source changed."""
         chosen = self.chosen
         self.close()
         for topic in chosen:
             self.choose(topic, shown=True)
 
     def on(self, width: int, height: int) -> tuple[Drawn, ...]:
-        """Return the annotations for an image of this size in px; each message is decoded once."""
+        """Return the annotations for an image of this size in px. Each message is decoded once."""
         found: list[Drawn] = []
         for key in self._watches:
             topic = self._session.topic(key)

@@ -39,7 +39,7 @@ MAX_PLACES = 200
 
 
 class ImagePanel(PanelWidget):
-    """Image stream of one topic: the first available one until the person chooses another."""
+    """Panel with the image stream of one topic: the first available one until the user chooses another."""
 
     shows_pictures = True
 
@@ -124,7 +124,7 @@ class ImagePanel(PanelWidget):
         self.header = [self.fit, self.tune, self.layers, self.freeze, self.keep]
 
     def topics(self) -> list[str]:
-        """Return the keys of available image topics; those of other networks come last."""
+        """Return the keys of available image topics, with those of other networks last."""
         every = (*self.session.topics, *self.session.networks.topics)
         return [topic.key for topic in every if topic.codec == CODEC and topic.gone_s is None]
 
@@ -152,7 +152,7 @@ class ImagePanel(PanelWidget):
         self._leave_stream()
         self._stream, self._revision = None, (-1, -1)
         self.overlays.begin_anew()
-        plays = self.session.replay is not None  # Space controls the replay then
+        plays = self.session.replay is not None  # Space plays and pauses the replay in this case
         self.actions_of["freeze"].setShortcut(QKeySequence() if plays else QKeySequence(Qt.Key.Key_Space))
         if topic:
             self.show_topic(topic)
@@ -261,7 +261,7 @@ class ImagePanel(PanelWidget):
             self.job.save(message)
 
     def save_sequence(self) -> None:
-        """Record further images; for a recording, open the export of its images."""
+        """Record the following images; if a recording is open, show the export of its images instead."""
         replay = self.session.replay
         if replay is None:
             self.context.run(f"record.topic:{self._topic}")

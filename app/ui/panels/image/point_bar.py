@@ -1,4 +1,4 @@
-"""Bar above an image for publishing the points that are clicked."""
+"""Bar above an image to publish the coordinates of clicks."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ TOPIC_WIDTH_PX, MAX_TOPIC_LENGTH = 130, 200
 
 
 class PointStrip(ArmedStrip):
-    """Arming switch that also arms the topic of this panel's points."""
+    """Arming strip that also arms the target topic of this panel."""
 
     def __init__(self, context: PanelContext, arm: Callable[[], str], said: Callable[[], str]) -> None:
         self._arm, self._said = arm, said
@@ -45,10 +45,10 @@ class PointStrip(ArmedStrip):
 
 
 class PointBar(QWidget):
-    """Publishes clicks in `view` while it is on, armed by this panel, and no recording is open.
+    """Publishes the clicks in `view` while the bar is on and armed by this panel, and no recording is open.
 
-    Only the panel's own switch or button arms it: a restored layout sends nothing, even if its topic is armed
-    elsewhere. `left` is emitted when the person closes the bar.
+    Only the panel's own switch or button arms the bar: a restored layout sends nothing, even if its topic is
+    armed elsewhere. `left` is emitted when the user closes the bar.
     """
 
     left = Signal()
@@ -58,7 +58,7 @@ class PointBar(QWidget):
         self._context, self._view, self._acting = context, view, context.session.acting
         self._pictures = ""
         self.is_on = False
-        # turn of the switch and target for which this panel is armed
+        # armed for this turn of the switch and this target
         self._armed: tuple[int, Target] | None = None
         self.count = self.heard = 0
         theme = context.theme
@@ -118,7 +118,7 @@ class PointBar(QWidget):
         )
 
     def refresh(self) -> None:
-        """Update the bar; clicks are accepted only while they are published."""
+        """Update the bar. Clicks are accepted only while they can be published."""
         self._view.takes_clicks = self.is_armed
         if not self.is_on:
             return
@@ -128,7 +128,7 @@ class PointBar(QWidget):
         self.strip.refresh()
 
     def show_pictures(self, key: str) -> None:
-        """Set the topic of the images; the target follows."""
+        """Set the topic of the images; the target topic is derived from it."""
         if key != self._pictures:
             self._pictures = key
             self._view.forget_click()
@@ -136,7 +136,7 @@ class PointBar(QWidget):
             self._changed()
 
     def _changed(self) -> None:
-        # Another target must be armed again.
+        # Another target has to be armed again.
         self._disarm()
         self.count = self.heard = 0
         try:
@@ -159,7 +159,7 @@ class PointBar(QWidget):
     # -- user actions -------------------------------------------------------------------------------------
 
     def turn(self, on: bool) -> None:
-        """Show or hide the bar; publishing still requires arming."""
+        """Show or hide the bar. Clicks are not published before the bar is armed as well."""
         if on != self.is_on:
             self.is_on = on
             self.setVisible(on)
@@ -168,7 +168,7 @@ class PointBar(QWidget):
             self.refresh()
 
     def arm(self) -> str:
-        """Arm the topic, after a confirmation if it moves a robot; return the reason on failure."""
+        """Arm the target topic; ask for confirmation if it moves a robot. Return the reason on failure."""
         if self.problem.text():
             return self.problem.text()
         arming, target = self._acting.arming, self.target
@@ -220,11 +220,11 @@ class PointBar(QWidget):
     # -- saved state --------------------------------------------------------------------------------------
 
     def saved(self) -> dict[str, object]:
-        """Return the state for the layout; armed is never saved."""
+        """Return the state for the layout, without the armed state."""
         return {"on": self.is_on, "topic": self.topic.text().strip(), "type": self.kind.value}
 
     def restore(self, saved: object) -> None:
-        """Restore the state from `saved`; invalid entries are ignored and nothing is armed."""
+        """Restore a state returned by `saved`. Invalid entries are ignored, and nothing is armed."""
         if not isinstance(saved, Mapping):
             return
         topic, kind = saved.get("topic"), saved.get("type")
@@ -236,6 +236,6 @@ class PointBar(QWidget):
         self.turn(saved.get("on") is True)
 
     def dispose(self) -> None:
-        """Disarm before the panel is closed."""
+        """Disarm the bar; called before the panel is closed."""
         self._view.forget_click()
         self._disarm()

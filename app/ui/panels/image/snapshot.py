@@ -1,4 +1,4 @@
-"""Saving and copying of images in a background thread, because a large one takes longer than a frame."""
+"""Saving and copying of images in a background thread, because a large image takes longer than a frame."""
 
 from __future__ import annotations
 
@@ -21,13 +21,13 @@ if TYPE_CHECKING:
 
 POLL_MS = 30
 Made = Path | QImage | str
-"""Path of the saved file, the image, or an error sentence."""
+"""Result of a job: path of the saved file, the image for the clipboard, or an error sentence."""
 
 
 class SnapshotJob(QObject):
-    """One snapshot at a time. Its thread uses no Qt class but QImage; signals are emitted on the GUI thread.
+    """Saves or copies one image at a time in a thread, and emits the result on the GUI thread.
 
-    `folder` returns the folder for files.
+    QImage is the only Qt class used in the thread. `folder` returns the folder for files.
     """
 
     saved = Signal(str)  # path of the file
@@ -45,20 +45,20 @@ class SnapshotJob(QObject):
 
     @property
     def busy(self) -> bool:
-        """True while a snapshot is in progress or its result not yet reported."""
+        """True while a job is running or its result has not been emitted."""
         return self._thread is not None
 
     def save(self, message: Message) -> None:
-        """Save the image as PNG; ignored while another snapshot is in progress."""
+        """Save the image as PNG; ignored while `busy`."""
         folder = self._folder()
         self._start(lambda: snapshots.save(message, folder))
 
     def copy(self, message: Message) -> None:
-        """Decode the image at its original size; ignored while another snapshot is in progress."""
+        """Copy the image at its original size to the clipboard; ignored while `busy`."""
         self._start(lambda: QImage.fromData(png_of(message)))
 
     def wait(self) -> None:
-        """Wait up to two seconds for the thread without reporting the result; called on close."""
+        """Wait up to 2 s for the thread without emitting the result; called on close."""
         self._timer.stop()
         if self._thread is not None:
             self._thread.join(2.0)
@@ -72,7 +72,7 @@ class SnapshotJob(QObject):
             self._timer.start()
 
     def _do(self, work: Callable[[], Made]) -> None:
-        # Runs in the background thread; any error becomes a sentence.
+        # Runs in the background thread. Exceptions are returned as a sentence.
         try:
             made: Made = work()
         except NepError as error:

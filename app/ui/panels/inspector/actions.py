@@ -26,14 +26,14 @@ FIND_KEY = QKeyCombination(Qt.KeyboardModifier.ControlModifier, Qt.Key.Key_F)
 
 
 class InspectorActions(QObject):
-    """Actions to copy, find, plot and compare. Keys are active within `panel`.
+    """Actions to copy, find, plot and compare. Their keys work within `panel`.
 
     Args:
-        shown: Return the message shown.
-        value: Return its decoded payload.
-        find: Focus the find field.
-        toast: Report a completed action.
-        plot: Plot a field by its path.
+        shown: Returns the message shown.
+        value: Returns its decoded payload.
+        find: Focuses the find field.
+        toast: Shows a confirmation.
+        plot: Plots a field by its path.
     """
 
     def __init__(
@@ -75,7 +75,7 @@ class InspectorActions(QObject):
             self._actions.append(action)
 
     def eventFilter(self, watched: QObject, event: QEvent) -> bool:
-        # Ctrl+F finds in the panel; otherwise the window's shortcut would find blocks.
+        # Ctrl+F finds in the panel; without this shortcut the window's would search the blocks.
         if isinstance(event, QKeyEvent) and event.keyCombination() == FIND_KEY:
             if event.type() == QEvent.Type.ShortcutOverride:
                 event.accept()
@@ -90,18 +90,18 @@ class InspectorActions(QObject):
         return list(self._actions)
 
     def set_enabled(self, there: bool) -> None:
-        """Enable the actions if the tree shows a message."""
+        """Enable the actions if the tree shows a message, else disable them."""
         for action in self._actions:
             action.setEnabled(there)
 
     def copy_value(self) -> None:
-        """Copy the selected value."""
+        """Copy the selected value to the clipboard."""
         node = self._chosen()
         if node is not None:
             self._copied(plain_words(node.value), _("Copied {path}").format(path=node.path))
 
     def copy_path(self) -> None:
-        """Copy the path of the selected value."""
+        """Copy the field path of the selected value to the clipboard."""
         node = self._chosen()
         if node is not None:
             self._copied(node.path, _("Copied the path {path}").format(path=node.path))
@@ -116,7 +116,10 @@ class InspectorActions(QObject):
             self._toast(_("{path} is not a number, text or boolean").format(path=node.path))
 
     def copy_message(self) -> None:
-        """Copy the whole message: JSON payloads unchanged, others converted to JSON."""
+        """Copy the whole message to the clipboard.
+
+        JSON payloads are copied unchanged, others are converted to JSON.
+        """
         message = self._shown()
         if message is None:
             return

@@ -27,11 +27,11 @@ if TYPE_CHECKING:
 
 NOTHING, LARGE, TREE, RAW, TABLE = range(5)
 MODES = {TREE: "tree", TABLE: "table", RAW: "raw"}
-"""Pages that show a message, with the names of their modes."""
+"""Pages that show a message, mapped to the names of their modes."""
 
 
 class CompareStrip(QWidget):
-    """Strip above the tree while messages are compared: reference, summary, filter for changes."""
+    """Strip above the tree during a comparison: reference message, summary, and filter for changes."""
 
     only_changed = Signal(bool)
 
@@ -49,18 +49,21 @@ class CompareStrip(QWidget):
         self.hide()
 
     def set_summary(self, compared_with: str, counts: Counts, whole: bool) -> None:
-        """Show the summary, such as ``Previous message: 3 changed, 1 added``."""
+        """Show a summary such as ``Previous message: 3 changed, 1 added``.
+
+        `whole` is False if the counts are incomplete.
+        """
         said = _("{compared_with}: {changes}")
         self.words.setText(said.format(compared_with=compared_with, changes=changes_words(counts, whole)))
         self.setAccessibleDescription(self.words.text())
 
 
 class InspectorBody(QWidget):
-    """Widgets below the title bar.
+    """Contents of the inspector below its title bar.
 
     Args:
-        looked_through: Return the value and index that the find bar searches.
-        toast: Report a completed action.
+        looked_through: Returns the value and the index that the find bar searches.
+        toast: Shows a confirmation.
     """
 
     def __init__(
@@ -122,7 +125,7 @@ class InspectorBody(QWidget):
         return self.pages.currentIndex()
 
     def show_page(self, page: int, *, comparing: bool) -> None:
-        """Show a page and the widgets that belong to it."""
+        """Show a page with the widgets that belong to it."""
         sentence = self.sentence.text() if page == RAW else ""
         self.sentence.setText(sentence)
         self.sentence.setVisible(bool(sentence))
@@ -136,7 +139,7 @@ class InspectorBody(QWidget):
             self.mode.set_value(MODES[page])
 
     def say_waiting(self, topic: str, published: bool, why: EmptyAction) -> None:
-        """Show that no message has arrived yet; `why` opens the connection doctor."""
+        """Show the empty state of a topic without a message yet; `why` opens the connection doctor."""
         if published:
             words = _("The next message on {topic} appears here.")
         else:
@@ -148,7 +151,7 @@ class InspectorBody(QWidget):
             self.empty.set_actions([why])
 
     def say_unread(self, topic: str, reason: str, why: EmptyAction) -> None:
-        """Show why messages of the topic can't be decoded."""
+        """Show the reason why messages of the topic can't be decoded."""
         words = _("{topic}: {reason}.").format(topic=topic, reason=reason)
         if words != self._waiting:
             self._waiting = words
@@ -165,7 +168,7 @@ class InspectorBody(QWidget):
             self.empty.set_actions([EmptyAction(_("Choose a topic"), choose, "list")])
 
     def say_large(self, size_bytes: int, words: str, read: Callable[[], object] | None = None) -> None:
-        """Show that the message is large; `read` decodes it on request."""
+        """Show that the message is large, with a button that calls `read` to decode it."""
         self.large.set_texts(_("Message of {size}").format(size=size_words(size_bytes)), words)
         if read is None:
             self.large.set_actions([])

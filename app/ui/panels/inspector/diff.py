@@ -1,4 +1,4 @@
-"""Difference of two messages, level by level; lists are compared by index."""
+"""Comparison of two messages, level by level; lists are compared by index."""
 
 from __future__ import annotations
 
@@ -14,8 +14,8 @@ from nep.i18n import _, lazy, ngettext
 
 Mark = Literal["", "changed", "added", "removed"]
 Key = str | int
-MAX_CHILDREN = 5000  # children of one value checked for changes
-MAX_VALUES = 20_000  # values of a message counted
+MAX_CHILDREN = 5000  # maximum number of a value's children that are checked for changes
+MAX_VALUES = 20_000  # maximum number of a message's values that are counted
 Part = tuple[Key, object, object, Mark]
 Counts = dict[Mark, int]
 MARK_WORDS: Mapping[Mark, str] = {
@@ -26,7 +26,7 @@ MARK_WORDS: Mapping[Mark, str] = {
 
 
 class _Nothing:
-    """Sentinel for an absent value, distinct from null."""
+    """Sentinel for a missing value, distinct from null."""
 
     def __init__(self, words: str) -> None:
         self._words = words
@@ -42,7 +42,7 @@ MISSING: Final = _Nothing("missing")
 
 
 def differs(before: object, after: object) -> bool:
-    """Return True if a value changed. NaN equals NaN; 1 and true differ, as in JSON."""
+    """Return True if two values differ. NaN equals NaN; 1 and true differ, as in JSON."""
     if before is after or (before != before and after != after):  # noqa: PLR0124
         return False
     if is_container(before) and is_container(after):
@@ -51,7 +51,7 @@ def differs(before: object, after: object) -> bool:
 
 
 def mark_of(value: object, base: object) -> Mark:
-    """Return how a value differs from its counterpart in the base message."""
+    """Return the kind of difference between a value and its counterpart in the base message."""
     if base is OFF:
         return ""
     if base is MISSING:
@@ -66,9 +66,11 @@ def parts_of(
 ) -> tuple[list[Part], int]:
     """Return the first `count` children of a value, and the total number of children.
 
-    A child is key, value, base value and mark. Removed children follow the present ones, with their old
+    A child consists of key, value, base value and mark. Removed children follow the present ones, with their
+    old
     values. All children of an added value are added, all of a removed one removed (`mark` is the parent's).
-    With `changes_only` the first `MAX_CHILDREN` are compared.
+    With
+    `changes_only` the first `MAX_CHILDREN` are compared.
     """
     if mark in {"added", "removed"} or not is_container(base) or _kind(base) != _kind(value):
         whole: Mark = "removed" if mark == "removed" else "added"
@@ -81,7 +83,7 @@ def parts_of(
 
 
 def count_changes(value: object, base: object, most: int = MAX_VALUES) -> tuple[Counts, bool]:
-    """Count changed, added and removed values; the bool is False if the count is incomplete.
+    """Count changed, added and removed values. The bool is False if the count is incomplete.
 
     Added or removed containers count once. At most `most` values are compared, and only the beginning of long
     lists.
@@ -105,7 +107,7 @@ def count_changes(value: object, base: object, most: int = MAX_VALUES) -> tuple[
 
 
 def changes_words(counts: Counts, whole: bool = True) -> str:
-    """Return ``3 changed, 1 added`` or ``no difference``; "at least" precedes an incomplete count."""
+    """Format counts as ``3 changed, 1 added`` or ``no difference``, with "at least" if `whole` is False."""
     said = ", ".join(_count_words(mark, count) for mark, count in counts.items() if count)
     if not said:
         return _("no difference") if whole else _("no difference at the start of long lists")
@@ -121,7 +123,7 @@ def _count_words(mark: Mark, count: int) -> str:
 
 
 def _compared(value: object, base: object) -> Iterator[Part]:
-    # Lazy: callers may need only the first children.
+    # Lazy, because callers may need only the first children.
     if isinstance(value, Mapping) and isinstance(base, Mapping):
         before = {str(key): key for key in base}
         for key, below in value.items():
@@ -149,16 +151,17 @@ def _kind(value: object) -> str:
 
 
 def _same(before: object, after: object) -> bool:
-    # Equal at every depth; true is not 1 and the order of keys is ignored. Lazy containers compare their JSON
-    # texts.
+    # Equality at every depth, in which true is not 1 and the order of keys is ignored. Lazy containers
+    # compare
+    # their JSON texts.
     if isinstance(before, (LazyList, LazyObject)) and isinstance(after, (LazyList, LazyObject)):
         return before == after
     return size_of(before) == size_of(after) and _written(before) == _written(after)
 
 
 def _written(value: object) -> object:
-    # Equality of the serialized form is that of JSON; returns the value itself if it is not serializable
-    # (bytes in msgpack).
+    # The serialized form compares as JSON does; values that JSON lacks (bytes in msgpack) are returned
+    # unchanged.
     try:
         return orjson.dumps(value, option=orjson.OPT_SORT_KEYS | orjson.OPT_NON_STR_KEYS)
     except (TypeError, RecursionError):

@@ -24,7 +24,7 @@ Path = tuple[str | int, ...]
 
 
 def find_in_text(index: JsonIndex, words: str, most: int = MAX_MATCHES) -> list[int]:
-    """Return the offsets of `words` in a large JSON text; ASCII letters match in any case."""
+    """Return the offsets of `words` in a large JSON text. ASCII letters match in any case."""
     text, wanted = bytes(index.data).lower(), words.encode().lower()
     found: list[int] = []
     at = text.find(wanted) if wanted else -1
@@ -50,7 +50,7 @@ class FindField(SearchField):
         return self._count
 
     def show_count(self, words: str) -> None:
-        """Show the number of matches within the field."""
+        """Show a text such as ``2 of 111`` in the field."""
         if words != self._count:
             self._count = words
             room = round(paint.width_of(self._theme.font("small"), words)) + 6 if words else 0
@@ -80,15 +80,19 @@ class FindField(SearchField):
 
 
 class FindBar(QWidget):
-    """Find field with count and arrows. Emits `found` with the path of a match.
+    """Find bar with the field, the number of matches and arrows. Emits `found` with the path of a match.
 
-    Matches belong to one message: call `forget` for a new message; the next step then searches again and
-    continues at the same position. `source` returns the message shown, with the index of a large one.
+    Matches belong to one message. Call `forget` when the message changes; the next step then searches again
+    and
+    continues at the same position.
+
+    Args:
+        source: Returns the message shown, and the index of a large message.
     """
 
     found = Signal(object)
     queried = Signal(str)
-    """Query (text that begins with ``$``), or "" when it is no longer a query."""
+    """Query (text that begins with ``$``), or "" after the text is no longer a query."""
 
     def __init__(self, theme: Theme, source: Callable[[], tuple[object, JsonIndex | None]]) -> None:
         super().__init__()
@@ -115,11 +119,11 @@ class FindBar(QWidget):
 
     @property
     def matches(self) -> list[Path] | list[int]:
-        """Matches so far: paths, or offsets in a large text."""
+        """Matches found so far: paths, or offsets in a large text."""
         return self._matches or []
 
     def search(self, words: str) -> None:
-        """Search for words and go to the first match; text that begins with ``$`` is a query."""
+        """Search for words and select the first match. Text that begins with ``$`` is a query."""
         self._place = -1
         self._matches = []
         is_query = self.is_query
@@ -137,7 +141,7 @@ class FindBar(QWidget):
             self.step(1)
 
     def forget(self) -> None:
-        """Discard the matches because another message is shown."""
+        """Discard the matches because the message changed."""
         self._matches = None
 
     @property
@@ -146,7 +150,7 @@ class FindBar(QWidget):
         return self.field.text().startswith("$")
 
     def step(self, by: int) -> None:
-        """Go to the next match (1) or the previous one (-1)."""
+        """Select the next match (1) or the previous one (-1)."""
         words = self.field.text()
         if not words or self.is_query:
             return
@@ -182,7 +186,7 @@ class FindBar(QWidget):
         self.mark(wrong=wrong)
 
     def mark(self, *, wrong: bool) -> None:
-        """Mark the field as having no match or an invalid query."""
+        """Show whether the field has no match or an invalid query (`wrong`)."""
         self.field.setProperty("wrong", "true" if wrong else "false")
         self.field.style().unpolish(self.field)
         self.field.style().polish(self.field)

@@ -1,4 +1,4 @@
-"""Footer of the inspector: path of the selected value, facts of the message, legend."""
+"""Footer of the inspector: path of the selected value, properties of the message, legend."""
 
 from __future__ import annotations
 
@@ -22,20 +22,23 @@ if TYPE_CHECKING:
     from nep.messages.message import Message
 
 _MIN_SHOWN_LATENCY_S = 0.0001
-"""Latencies below the last displayed digit are not shown as zero."""
+"""Smaller latencies are left out, because they would be displayed as zero."""
 
 
 def message_facts(
     message: Message, since_ns: int = 0, network: NetworkKind | None = None, *, recorded: bool = False
 ) -> str:
-    """Return the facts of a message, such as ``seq 18 204   412 B   latency 0.6 ms``.
+    """Format the properties of a message, such as ``seq 18 204   412 B   latency 0.6 ms``.
 
-    Facts are those of the time of arrival; unknown ones are omitted. The latency of messages from other
-    computers is corrected by the clock offset and has an uncertainty (``3.2 ms ± 0.4 ms``). Figures that a
-    foreign `network` does not report are named.
+    Unknown properties are omitted. The latency of messages from other computers is corrected by the clock
+    offset
+    and shown with its uncertainty (``3.2 ms ± 0.4 ms``).
 
-    A latched message sent before `since_ns`, the start of the subscription, shows its age instead of a
-    latency, and a recorded message its time of day.
+    Args:
+        message: Message with the properties measured on arrival.
+        since_ns: Start of the subscription; a latched message sent before shows its age instead of a latency.
+        network: Foreign network, or None. Properties that it does not report are named.
+        recorded: Show the time of day instead of the latency.
     """
     facts = [size_words(message.size_bytes)]
     if message.seq is not None:
@@ -77,7 +80,7 @@ def _untold(message: Message, network: str) -> Iterator[str]:
 
 
 class Legend(QWidget):
-    """Legend of the bar at the left of changed rows."""
+    """Legend of the coloured bars at the left of changed rows."""
 
     WORDS = lazy("changed")
 
@@ -102,7 +105,7 @@ class Legend(QWidget):
 
 
 class Footer(QWidget):
-    """Path of the selected value with copy buttons; below it, the facts of the message."""
+    """Footer with the path of the selected value, copy buttons, and the properties of the message below."""
 
     def __init__(self, theme: Theme) -> None:
         super().__init__()
@@ -128,16 +131,16 @@ class Footer(QWidget):
             rows.addLayout(row)
 
     def show_path(self, path: str) -> None:
-        """Show the path of the selected value; "" for no selection."""
+        """Show the path of the selected value; "" if nothing is selected."""
         self.path.setText(path)
         self.path.setToolTip(plain.tip(path))
         for button in (self.copy_value, self.copy_path, self.plot):
             button.setEnabled(bool(path))
 
     def clear(self) -> None:
-        """Clear the path before another topic is shown."""
+        """Clear the path; called before another topic is shown."""
         self.show_path("")
 
     def show_facts(self, facts: str) -> None:
-        """Show the facts of a message."""
+        """Show the properties of a message."""
         self.facts.setText(facts)

@@ -1,4 +1,4 @@
-"""Hex view: offset, bytes and printable text; only visible lines are formatted."""
+"""Hex view of a message: offset, bytes and printable text. Only visible lines are formatted."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ MARGIN = 12
 
 
 def hex_line(data: memoryview, offset: int, count: int) -> tuple[str, str, str]:
-    """Return offset, hex bytes and text of one line, with dots for unprintable bytes."""
+    """Return offset, hex bytes and text of one line. Unprintable bytes are dots in the text."""
     part = bytes(data[offset : offset + count])
     text = "".join(chr(byte) if 32 <= byte < 127 else "·" for byte in part)
     return f"{offset:04x}", part.hex(" "), text
@@ -33,7 +33,7 @@ class HexView(QAbstractScrollArea):
         self.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
 
     def show_bytes(self, data: memoryview | bytes) -> None:
-        """Show these bytes and keep the scroll position."""
+        """Show other bytes. The scroll position is kept."""
         self._data = memoryview(data)
         self._arrange()
         self.viewport().update()

@@ -1,4 +1,4 @@
-"""History strip of the inspector, to go back through the messages of a topic."""
+"""History strip of the inspector, for viewing earlier messages of a topic."""
 
 from __future__ import annotations
 
@@ -16,13 +16,13 @@ from nep.i18n import _
 from nep.messages.message import Message
 
 UPDATE_TICKS = 6
-"""Refreshes (at 30 Hz) between updates of the figures."""
+"""Refreshes (at 30 Hz) between updates of the message count."""
 
 
 class HistoryStrip(QWidget):
-    """Collects the messages of a topic, and selects the newest or an earlier one.
+    """Collects the messages of a topic, and selects the newest or an earlier one for display.
 
-    `moved` is emitted when the person selects another message; `at` is its number, None for the newest.
+    `moved` is emitted when the user selects another message; `at` is its number, None for the newest.
     """
 
     moved = Signal()
@@ -56,7 +56,7 @@ class HistoryStrip(QWidget):
         self.hide()
 
     def begin(self, feed: SeriesFeed, topic: str) -> None:
-        """Start to collect messages of a topic; a different topic clears the history."""
+        """Start to collect messages. A different topic clears the history."""
         self.pause()
         if topic != self._topic:
             self.kept.rewind()
@@ -66,13 +66,13 @@ class HistoryStrip(QWidget):
             feed.join(topic, self.kept, deep=False)
 
     def pause(self) -> None:
-        """Stop collecting until the next `begin`; collected messages stay."""
+        """Stop to collect messages until the next `begin`. Collected messages are kept."""
         if self._feed is not None:
             self._feed.leave(self._topic, self.kept)
             self._feed = None
 
     def forget(self) -> None:
-        """Stop and clear the history because the source changed."""
+        """Stop to collect messages and clear the history, because the source changed."""
         self.pause()
         self._topic = ""
         self.kept.rewind()
@@ -80,34 +80,39 @@ class HistoryStrip(QWidget):
         self.refresh(at_once=True)
 
     def selected_message(self) -> Message | None:
-        """Return the selected message; None for the newest, or if it has been evicted."""
+        """Return the selected message; None if the newest is selected or the message has been evicted."""
         return self.kept.at(self.at) if self.at is not None else None
 
     def before(self) -> Message | None:
-        """Return the message before the selected one, if available."""
+        """Return the message before the selected one, or None if it is not available."""
         return self.kept.at(self.at - 1) if self.at is not None else None
 
     def step(self, by: int) -> None:
-        """Move the selection by a number of messages; past the end, follow the newest again."""
+        """Move the selection by a number of messages. Past the end, the newest message is followed again."""
         if not len(self.kept):
             return
         wanted = (self.at if self.at is not None else self.kept.end - 1) + by
         self.go(None if wanted >= self.kept.end else self.kept.nearest(wanted))
 
     def go(self, number: int | None) -> None:
-        """Select a message by number; None follows the newest."""
+        """Select a message by its number; None follows the newest."""
         if number != self.at:
             self.at = number
             self.refresh(at_once=True)
             self.moved.emit()
 
     def follow(self) -> None:
-        """Deselect a message that lies in the future after the source has seeked back."""
+        """Select the newest message if the source was seeked back to before the selected one."""
         if self.at is not None and self.at >= self.kept.end:
             self.at = None
 
     def refresh(self, *, at_once: bool = False, beside: bool = False) -> None:
-        """Update the strip; call on every refresh. `beside` is True if other parts are repainted anyway."""
+        """Update the strip; call on every refresh.
+
+        Args:
+            at_once: Update without waiting for `UPDATE_TICKS`.
+            beside: True if other parts of the panel are repainted in this refresh anyway.
+        """
         self._ticks += 1
         self.follow()
         kept = self.kept

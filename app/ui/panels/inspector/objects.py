@@ -36,16 +36,16 @@ from nep.i18n import _, ngettext
 from nep.messages.fields import path_text
 
 SORT_INTERVAL_S = 1.0
-"""Interval of re-sorting, so that rows with changing values stay readable."""
+"""Interval in s between re-sorts; rows with changing values stay readable in between."""
 CHAR_WIDTH, MIN_COLUMN_WIDTH, MAX_COLUMN_WIDTH = 8, 56, 220
 """Width of a character, and limits of a column's width, in px."""
 COLUMN_PADDING = 24
 
 
 class ObjectsView(QWidget):
-    """Table with a line above it: path of the list, number of rows, choice of another list, copy.
+    """Table with a line above it: path of the list, number of rows, choice of another list, copy button.
 
-    `revealed` is emitted with the path of an object to show in the tree.
+    `revealed` is emitted with the path of an object to select in the tree.
     """
 
     revealed = Signal(object)
@@ -100,11 +100,14 @@ class ObjectsView(QWidget):
         self._drop_table()
 
     def want(self, steps: Steps) -> None:
-        """Show the list at this path, or the nearest list above it, in this and later messages."""
+        """Select the list to show in this and later messages.
+
+        Without a list at this path, the nearest list above it is shown.
+        """
         self._wanted = steps
 
     def show_message(self, value: object, now: float) -> None:
-        """Show the wanted list of a message, else its first list; `now` is monotonic time in s."""
+        """Show the selected list of a message, or its first list; `now` is monotonic time in s."""
         self._value = value
         steps = self._find(value)
         if steps != self._steps:
@@ -115,7 +118,7 @@ class ObjectsView(QWidget):
         self.choose.setVisible(True)
 
     def show_found(self, found: Iterable[tuple[str, object]], now: float) -> None:
-        """Show the objects that a query matched."""
+        """Show the objects found by a query; `now` is monotonic time in s."""
         self._value, self._steps = None, None
         rows = rows_found(found)
         self._show(rows, len(rows), "", now)
@@ -150,7 +153,7 @@ class ObjectsView(QWidget):
         self.words.setText(f"{path}   {words}" if path else words)
 
     def _put(self, rows: list[ObjectRow], now: float) -> None:
-        # Keeps the previous order; re-sorts once a second.
+        # Keeps the previous order except for one re-sort per second.
         table = self.table
         if table is None:
             return
@@ -195,7 +198,7 @@ class ObjectsView(QWidget):
             self.table, self._columns = None, ()
 
     def copy_csv(self) -> None:
-        """Copy the table as CSV in display order."""
+        """Copy the table to the clipboard as CSV, in display order."""
         if self.table is not None:
             QGuiApplication.clipboard().setText(table_csv("#", self._columns, self._model.rows()))
             count = len(self._model.rows())
@@ -231,7 +234,7 @@ class ObjectsView(QWidget):
 
 
 class _ObjectModel(TableModel[ObjectRow]):
-    """Table model that returns its rows in display order."""
+    """Table model that provides its rows in display order."""
 
     def rows(self) -> list[ObjectRow]:
         return list(self._rows.shown)
@@ -276,6 +279,6 @@ def _role(value: object) -> str:
 
 
 def _width(head: str, words: Sequence[str]) -> int:
-    # From the header with its sort arrow and the first rows.
+    # Computed from the header with its sort arrow and the first rows.
     letters = max([len(head) + 2, *(len(each) for each in words[:20])])
     return min(MAX_COLUMN_WIDTH, max(MIN_COLUMN_WIDTH, letters * CHAR_WIDTH + COLUMN_PADDING))

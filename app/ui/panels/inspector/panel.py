@@ -37,12 +37,12 @@ if TYPE_CHECKING:
     from nep.messages.message import Message
 
 MAX_EXPANDED_ROWS = 24
-FADE_HZ = 7.0  # slower than message updates, which paint the marks too
+FADE_HZ = 7.0  # lower than the rate of message updates, which paint the marks too
 BEFORE, PINNED = lazy("Previous message"), lazy("Pinned message")
 
 
 class InspectorPanel(PanelWidget):
-    """Message of one topic as tree, table or bytes, with changes, path and facts."""
+    """Panel with the message of one topic as tree, table or bytes."""
 
     def __init__(self, context: PanelContext) -> None:
         super().__init__(context, _("Inspector"))
@@ -50,14 +50,14 @@ class InspectorPanel(PanelWidget):
         self._topic = ""
         self._watch: Watch | None = None
         self._shown: Message | None = None
-        self._allowed: Message | None = None  # large message that the person asked to decode
-        self._reading: Reading | None = None  # source of the tree's contents
+        self._allowed: Message | None = None  # large message that the user asked to decode
+        self._reading: Reading | None = None  # decoded message in the tree
         self._raw_wanted = self._table_wanted = False
         self._since_ns = 0  # start of the subscription
         self._pace, self._fades = ReadingPace(), ReadingPace(burst=1, hz=FADE_HZ)
         self._facts_of: tuple[Message | None, str] = (None, "")
         self._value: object = None
-        self._before: object = OFF  # previous value of the same topic
+        self._before: object = OFF  # previous value of the topic, for comparison
         self._pinned: object = OFF
         self._pinned_words = ""
         self.reader = Reader()
@@ -163,7 +163,7 @@ class InspectorPanel(PanelWidget):
         self._show_fading(taken=taken)
 
     def _show_fading(self, *, taken: bool) -> None:
-        # A message just shown has painted its marks already.
+        # A message that was just shown has painted its marks already.
         if taken:
             self._fades.spend(self.clock())
         elif self.body.page == TREE and self.tree.fading() and self._fades.may(self.clock()):
@@ -174,7 +174,7 @@ class InspectorPanel(PanelWidget):
         self.refresh()
 
     def _show_none_yet(self) -> None:
-        # For a playhead before the topic's first message.
+        # The playhead is before the topic's first message.
         self.reader.forget()
         self._shown = self._allowed = self._reading = None
         self._value, self._before = None, OFF
@@ -203,8 +203,8 @@ class InspectorPanel(PanelWidget):
             self._show_read(read_at_once(message))
 
     def _read_elsewhere(self, message: Message) -> None:
-        # Decodes in the reader's thread; the old contents stay until then.
-        if self.history.at is not None:  # the person waits for exactly this message
+        # Decoded in the reader's thread; the old contents are shown until then.
+        if self.history.at is not None:  # the user waits for exactly this message
             self.reader.ask(message)
         elif not self.reader.ask_at_leisure(message, self.clock()):
             return
@@ -234,7 +234,7 @@ class InspectorPanel(PanelWidget):
         self._page(TABLE if self._table_wanted else TREE)
 
     def _facts(self, message: Message) -> str:
-        # Cached per message: latency and age are those of its arrival.
+        # Cached per message, because latency and age are those at its arrival.
         if message is not self._facts_of[0]:
             kind = kind_named(split_key(self._topic)[0])
             recorded = self.session.replay is not None
@@ -288,7 +288,7 @@ class InspectorPanel(PanelWidget):
         self._page(LARGE)
 
     def _read_large(self) -> None:
-        # Also freezes the panel: the next message would replace this one.
+        # Also freezes the panel, because the next message would replace this one.
         if self._shown is not None:
             self._allowed = self._shown
             self.freeze.setChecked(True)
@@ -317,12 +317,12 @@ class InspectorPanel(PanelWidget):
 
     @property
     def holds(self) -> bool:
-        """True if a fixed message is shown: frozen, or selected in the history."""
+        """True if the message shown does not change: frozen, or selected in the history."""
         return self.frozen or self.history.at is not None
 
     @property
     def comparing(self) -> bool:
-        """True if the tree shows differences to another message."""
+        """True if the tree shows the differences to another message."""
         return (self.compare.isChecked() or self.pin.isChecked()) and not self.query.asking
 
     def waits_for(self) -> str:
@@ -390,7 +390,7 @@ class InspectorPanel(PanelWidget):
             drag_field(self.tree, self._topic, path, press=lambda key: self.context.run(f"key:{key}"))
 
     def _whole(self) -> object:
-        # A query or the table may show only parts of it.
+        # A query or the table may show only parts of the message.
         shows_parts = self.query.asking or self._table_wanted
         return self._value if shows_parts else self.model.value()
 
@@ -475,7 +475,7 @@ class InspectorPanel(PanelWidget):
 def chip_words(
     topic: Topic | None, frozen: bool, *, recorded: bool = False, earlier: bool = False
 ) -> tuple[str, str, str]:
-    """Return text, status and icon of the chip for the state of the topic and the panel."""
+    """Return text, status and icon of the chip that shows the state of topic and panel."""
     if frozen:
         return pgettext("message", "frozen"), "off", "snowflake"
     if earlier:

@@ -1,4 +1,4 @@
-"""Query strip of the inspector; queries are evaluated in a background thread."""
+"""Query strip of the inspector. Queries are evaluated in a background thread."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from app.ui.widgets.paint import show_when
 from nep.i18n import ngettext
 
 LOAD_DIVISOR = 4
-"""Inverse of the maximum load: after a slow query, wait so that it uses at most a quarter of a core."""
+"""Inverse of the share of a core that queries may use; the pause after a slow query is chosen accordingly."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -38,7 +38,7 @@ def _answer(asked: _Asked) -> _Answered:
 
 
 class QueryStrip(QWidget):
-    """Shows ``12 found`` or the syntax error; hidden without a query."""
+    """Strip with the number of results, such as ``12 found``, or the syntax error. Hidden without a query."""
 
     def __init__(self) -> None:
         super().__init__()
@@ -57,11 +57,11 @@ class QueryStrip(QWidget):
 
     @property
     def asking(self) -> bool:
-        """True if a query was entered, even an invalid one."""
+        """True if a query was entered, even if its syntax is invalid."""
         return bool(self._typed)
 
     def set_query(self, text: str) -> bool:
-        """Set the query, "" for none; return False if its syntax is invalid."""
+        """Set the query, or remove it (""). Return False if its syntax is invalid."""
         self._typed, self._query = text, None
         self._worker.forget()
         self._not_before = 0.0
@@ -75,11 +75,14 @@ class QueryStrip(QWidget):
         return not sentence
 
     def ask(self, value: object) -> None:
-        """Queue a message for evaluation; `take` returns the answer."""
+        """Queue a message for evaluation; `pop_answer` returns the result."""
         self._value, self._due = value, True
 
     def pop_answer(self, now: float) -> QueryAnswer | None:
-        """Return a new answer once, or None; call on every refresh with monotonic time."""
+        """Return the result of the last evaluation once, else None.
+
+        Call on every refresh; `now` is monotonic time in s.
+        """
         done = self._worker.pop_result()
         if done is not None:
             self._not_before = now + (LOAD_DIVISOR - 1) * done.took_s
@@ -90,13 +93,13 @@ class QueryStrip(QWidget):
         return done.answer if done is not None else None
 
     def forget(self) -> None:
-        """Discard pending work because another topic is shown."""
+        """Discard pending evaluations because another topic is shown."""
         self._worker.forget()
         self._value, self._due = None, False
         self._set_status("", wrong=False)
 
     def show_on(self, *, tree: bool) -> None:
-        """Show the strip if the tree is visible and there is text."""
+        """Show the strip if the tree is visible and the strip has text."""
         self._on_tree = tree
         show_when(self, tree and bool(self.words.text()))
 
@@ -111,7 +114,7 @@ class QueryStrip(QWidget):
 
 
 def found_words(answer: QueryAnswer) -> str:
-    """Return ``12 found``, and the reason if the result is incomplete."""
+    """Format the number of results, such as ``12 found``, with the reason if the result is incomplete."""
     count = len(answer.found)
     said = ngettext("{count} found.", "{count} found.", count).format(count=count)
     return f"{said} {answer.cut}".rstrip()

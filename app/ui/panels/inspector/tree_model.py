@@ -1,7 +1,8 @@
-"""Lazy tree model of a decoded message: nodes are created when visible and reused for later messages.
+"""Lazy tree model of a decoded message.
 
-Expanded nodes and scroll position therefore persist, and changed values are marked with the time of the
-change. With a base message, every node is marked by its difference.
+Nodes are created when they become visible and reused for later messages. Expanded nodes and the scroll
+position therefore persist, and each changed value has the time of its change. If there is a base message,
+every node has its difference to that message.
 """
 
 from __future__ import annotations
@@ -26,10 +27,13 @@ _ROOT = QModelIndex()
 
 @dataclass(slots=True, eq=False)
 class TreeNode:
-    """Value of the message. `children` is None until loaded.
+    """Node in the tree of a message's values.
 
-    `base` is the value to compare with (`OFF`: none), `mark` the difference, and `total` the number of
-    children once they were loaded.
+    Attributes:
+        children: None until they are loaded.
+        base: Value to compare with, or `OFF`.
+        mark: Kind of difference between `value` and `base`.
+        total: Number of children, 0 until they are loaded.
     """
 
     key: str | int
@@ -60,14 +64,14 @@ class TreeNode:
 
 
 def field_of(node: TreeNode) -> str:
-    """Return the field path for a plot (for a list of numbers, of all elements), or ""."""
+    """Return the field path to plot, or "". For a list of numbers the path stands for all elements."""
     kind = kind_of_value(node.value)
     every: tuple[Step, ...] = (ALL,) if kind == "list" else ()
     return str(FieldPath((*steps_of(node), *every))) if kind is not None else ""
 
 
 def steps_of(node: TreeNode) -> tuple[str | int, ...]:
-    """Return the keys and indices from the message to a value, also for results of a query."""
+    """Return the keys and indices that lead from the message to a value; for results of a query too."""
     steps: list[str | int] = []
     above: TreeNode | None = node
     while above is not None and above.parent is not None:
@@ -77,7 +81,7 @@ def steps_of(node: TreeNode) -> tuple[str | int, ...]:
 
 
 class TreeModel(QAbstractItemModel):
-    """Tree model with one column; `set_value` updates existing rows with the next message."""
+    """Item model with one column; `set_value` updates existing rows with the values of the next message."""
 
     def __init__(self) -> None:
         super().__init__()
@@ -112,7 +116,7 @@ class TreeModel(QAbstractItemModel):
 
     def canFetchMore(self, parent: Index) -> bool:
         node = self.node(parent)
-        # A view may ask while rows are being changed; it asks again afterwards.
+        # A view may call this while rows are being changed, and calls it again afterwards.
         return parent.column() <= 0 and not self._changing and len(node.children or ()) < self._size(node)
 
     def fetchMore(self, parent: Index) -> None:
@@ -160,10 +164,11 @@ class TreeModel(QAbstractItemModel):
         self.endResetModel()
 
     def set_value(self, value: object, now: float, base: object = OFF, *, changes_only: bool = False) -> None:
-        """Show the next message; changed values are marked with `now` (monotonic time in s).
+        """Update the tree to the next message; `now` is the change time of changed values (monotonic, s).
 
-        A message that is not a container becomes one row called ``value``. The first message marks nothing.
-        With a `base`, every node is marked by its difference, and `changes_only` omits equal ones.
+        A message that is not a container becomes one row called ``value``. No value of the first message
+        counts as
+        changed. With a `base`, every node gets its difference, and `changes_only` omits equal nodes.
         """
         first = not self._root.children
         shown = _as_container(value)
@@ -177,7 +182,7 @@ class TreeModel(QAbstractItemModel):
             self._changing = False
 
     def _size(self, node: TreeNode) -> int:
-        # In a comparison, an unloaded node returns only zero or nonzero.
+        # In a comparison, the count of an unloaded node is only known to be zero or not.
         if node.base is OFF:
             return size_of(node.value)
         return node.total if node.children is not None else size_of(node.value) or size_of(node.base)
@@ -229,14 +234,14 @@ class TreeModel(QAbstractItemModel):
         if len(parts) <= first:
             return
         fresh = [_made(node, row, parts[row]) for row in range(first, len(parts))]
-        before, self._changing = self._changing, True  # receivers of the signals must not fetch the same rows
+        before, self._changing = self._changing, True  # receivers of the signals must not load the same rows
         self.beginInsertRows(self.index_of(node), first, len(parts) - 1)
         node.children.extend(fresh)
         self._changing = before
         self.endInsertRows()
 
     def _fit(self, node: TreeNode, loaded: list[TreeNode], parts: Sequence[Part]) -> None:
-        # Nodes that stay keep their expanded state.
+        # Nodes that still exist keep their expanded state.
         wanted = [part[0] for part in parts]
         keep = set(wanted)
         for row in range(len(loaded) - 1, -1, -1):
@@ -266,7 +271,7 @@ class TreeModel(QAbstractItemModel):
         self.layoutChanged.emit()
 
     def reveal(self, path: Sequence[str | int]) -> QModelIndex:
-        """Return the index of a value, loading its parents; invalid if it is not there."""
+        """Return the index of a value, loading its parents; an invalid index if there is no such value."""
         node = self._root
         for key in path:
             keys: list[str | int] = keys_of(node.value, size_of(node.value))

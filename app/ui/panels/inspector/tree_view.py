@@ -1,4 +1,4 @@
-"""Tree view of the inspector: keys, values, and fading marks of changes."""
+"""Tree view of the inspector: keys, values, and fading highlights of changes."""
 
 from __future__ import annotations
 
@@ -44,7 +44,7 @@ def mixed(under: QColor, over: QColor, share: float) -> QColor:
 
 
 class _Height(QStyledItemDelegate):
-    """Delegate for the row height; the view paints everything else."""
+    """Delegate that sets the row height; the view paints everything else."""
 
     def __init__(self, view: TreeView) -> None:
         super().__init__(view)
@@ -55,9 +55,10 @@ class _Height(QStyledItemDelegate):
 
 
 class TreeView(QTreeView):
-    """Tree of one message; `dragged` is emitted when a value is dragged.
+    """Tree of one message; `dragged` is emitted when the user drags a value.
 
-    `clock` is that of the change times.
+    Args:
+        clock: Returns the time in the time base of the nodes' change times.
     """
 
     dragged = Signal(object)
@@ -83,24 +84,24 @@ class TreeView(QTreeView):
         self.setMouseTracking(True)
 
     def share_changed(self, node: TreeNode) -> float:
-        """Return the intensity of a node's change mark: 1 for a fresh change, 0 after the fade."""
+        """Return the intensity of a node's highlight: 1 for a fresh change, 0 after the fade."""
         if node.mark:
             return 1.0
         if node.changed_s is None or node.base is not OFF:
             return 0.0
         fade_s = self.theme.duration("changedFade") / 1000
         age = self._clock() - node.changed_s
-        if fade_s <= 0:  # reduced motion: shown for a second instead of fading
+        if fade_s <= 0:  # reduced motion: highlighted for a second instead of fading
             return 1.0 if age < 1.0 else 0.0
         return max(0.0, 1.0 - age / fade_s)
 
     def fading(self) -> bool:
-        """Return True if a mark may still be fading, so that the view must be repainted."""
+        """Return True if a highlight may still be fading, so that the view has to be repainted."""
         changed = self._tree.changed_at_s
         return changed is not None and self._clock() - changed < 1.2
 
     def expand_small(self, rows: int) -> None:
-        """Expand small containers, upper levels first, while at most `rows` rows are visible."""
+        """Expand small containers, upper levels first, as long as at most `rows` rows are visible."""
         waiting, shown = [QModelIndex()], self._tree.rowCount()
         while waiting:
             above = waiting.pop(0)

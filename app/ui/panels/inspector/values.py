@@ -1,4 +1,4 @@
-"""Decoded values for the inspector: keys, one-line texts, search and clipboard."""
+"""Access to decoded values for the inspector: keys, one-line texts, search and clipboard."""
 
 from __future__ import annotations
 
@@ -44,12 +44,12 @@ def values_of(value: object, count: int) -> list[object]:
 
 
 def size_of(value: object) -> int:
-    """Return the number of children."""
+    """Return the number of children of a container."""
     return len(value) if is_container(value) else 0  # type: ignore[arg-type]
 
 
 def words_of(value: object) -> str:
-    """Return a value as one line: quoted text, size of containers, first bytes of binary data."""
+    """Format a value as one line: quoted text, size of containers, first bytes of binary data."""
     if value is None:
         return "null"
     if isinstance(value, bool):
@@ -69,7 +69,7 @@ def words_of(value: object) -> str:
 
 
 def search(value: object, words: str, limit: int = SEARCH_LIMIT) -> Iterator[tuple[str | int, ...]]:
-    """Yield the paths of keys and values that contain `words` (any case), in tree order.
+    """Yield the paths of keys and values that contain `words` (in any case), in tree order.
 
     At most `limit` values are checked.
     """
@@ -89,7 +89,7 @@ def search(value: object, words: str, limit: int = SEARCH_LIMIT) -> Iterator[tup
 
 
 def plain_words(value: object) -> str:
-    """Return a value for the clipboard: text unchanged, others as JSON."""
+    """Format a value for the clipboard: text unchanged, others as JSON."""
     if isinstance(value, str):
         return value
     if isinstance(value, (bytes, bytearray, memoryview)):
@@ -100,7 +100,7 @@ def plain_words(value: object) -> str:
 
 
 def read_at_once(message: Message) -> Reading:
-    """Decode a small message, or the summary of an image, on the GUI thread."""
+    """Decode a small message, or the summary of an image, on the calling (GUI) thread."""
     if message.codec != "image":
         return read(message)
     try:
@@ -110,7 +110,7 @@ def read_at_once(message: Message) -> Reading:
 
 
 def payload_or(message: Message, otherwise: object) -> object:
-    """Return the decoded payload, or `otherwise` if it is invalid or too large to decode here."""
+    """Return the decoded payload, or `otherwise` if it is invalid or too large for the GUI thread."""
     if message.size_bytes > LARGE_BYTES or message.codec == "image":
         return otherwise
     found = read(message)
@@ -118,7 +118,7 @@ def payload_or(message: Message, otherwise: object) -> object:
 
 
 def image_summary(message: Message) -> Mapping[str, object]:
-    """Return encoding, shape and size of an image, without pixels."""
+    """Return encoding, shape and size of an image without decoding its pixels."""
     shape = message.extension.get("shape")
     if shape is None:
         shape = list(getattr(message.payload, "shape", ()))

@@ -1,4 +1,4 @@
-"""Nodes panel: nodes with their topics, parameters and figures.
+"""Nodes panel: table of nodes with their topics, parameters and statistics.
 
 `rows` has the columns and texts.
 """

@@ -42,7 +42,7 @@ CHANGING_COLUMNS = frozenset({"cpu"})
 
 
 class NodesPanel(NetworkTable[NodeRow]):
-    """Table of nodes, with facts and parameters of the selected node below."""
+    """Panel with the table of nodes; below it, details and parameters of the selected node."""
 
     def __init__(self, context: PanelContext) -> None:
         super().__init__(context, WORDS, "network")

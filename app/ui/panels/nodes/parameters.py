@@ -1,4 +1,4 @@
-"""Parameters of the selected node: live values, each of which can be changed."""
+"""Parameters of the selected node with their current values, which can be changed."""
 
 from __future__ import annotations
 
@@ -32,7 +32,10 @@ LINE, CHOICE = range(2)
 
 
 def allowed_words(parameter: ShownParameter) -> str:
-    """Return the allowed values, such as "0 to 2", "walk, run or crawl", "read only"; "" for any value."""
+    """Describe the allowed values of a parameter, such as "0 to 2", "walk, run or crawl" or "read only".
+
+    Return "" if every value is allowed.
+    """
     if parameter.read_only:
         return _("read only")
     if parameter.choices:
@@ -47,7 +50,7 @@ def allowed_words(parameter: ShownParameter) -> str:
 
 
 class ParametersPart(QWidget):
-    """Table of parameters, with an editor of the selected one below."""
+    """Table of parameters with an editor for the selected one below it."""
 
     def __init__(self, theme: Theme, parameters: NodeParameters) -> None:
         super().__init__()
@@ -142,7 +145,7 @@ class ParametersPart(QWidget):
             self.model.set_rows(parameters.all)
             self._show_chosen()
             self._fades_until = self.clock() + 2 * CHANGE_MARK_S
-        if self.clock() < self._fades_until:  # repaint while marks of changes fade
+        if self.clock() < self._fades_until:  # repaint while highlights of changes fade
             self.table.tell_visible_changed()
 
     def _title(self) -> str:
@@ -252,7 +255,7 @@ class ParametersPart(QWidget):
 
 
 class ValueField(QLineEdit):
-    """Field of a value. Return sets it, Esc restores the current value."""
+    """Text field for a value. Return sets the parameter, Esc restores its current value."""
 
     def __init__(self, theme: Theme, take: Callable[[], object], leave: Callable[[], object]) -> None:
         super().__init__()

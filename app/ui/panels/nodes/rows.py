@@ -1,4 +1,4 @@
-"""Rows of the table of nodes: nodes and, when expanded, their topics."""
+"""Rows of the nodes table: nodes and, below an expanded node, its topics."""
 
 from __future__ import annotations
 
@@ -55,12 +55,12 @@ class NodeRow:
 
     @property
     def is_pattern(self) -> bool:
-        """True if the node subscribes to a pattern instead of a single topic."""
+        """True if the row's node subscribes to a pattern instead of a single topic."""
         return self.way == SUBSCRIBES and is_pattern(self.topic)
 
     @property
     def topic_key(self) -> str:
-        """Key of the topic among those of all networks."""
+        """Key of the topic, including its network."""
         return key_of(self.node.network, self.topic)
 
 
@@ -82,9 +82,9 @@ def rows_of(
 
 
 def limits_of(node: NodeEntry) -> str:
-    """Return the limits of an original program or foreign network, or the purpose of a bridge.
+    """Describe the limitations of an original program or foreign network, or the purpose of a bridge.
 
-    Empty for native nodes.
+    Return "" for native nodes.
     """
     kind = kind_named(node.network)
     if kind is not None:
@@ -99,7 +99,7 @@ def limits_of(node: NodeEntry) -> str:
 
 
 def lack_of_parameters(node: NodeEntry) -> str:
-    """Return why a node has no parameters; "" if it has some."""
+    """Return the reason why a node has no parameters; "" if it has some."""
     if node.has_parameters or node.is_original or node.gone_s is not None:
         return ""
     kind = kind_named(node.network)
@@ -111,7 +111,7 @@ def lack_of_parameters(node: NodeEntry) -> str:
 
 
 def facts_of(node: NodeEntry) -> str:
-    """Return place and start of a node in one line, for tables too narrow for those columns."""
+    """Format place and start time of a node in one line, for tables too narrow for those columns."""
     parts = [node.name]
     if node.host:
         here = node.host == platform.node()
@@ -131,7 +131,7 @@ def _ink(row: NodeRow, role: str) -> str:
 
 
 def name_cell(row: NodeRow) -> Cell:
-    """Return the node's name with its arrow, bold while new; topics are indented."""
+    """Return the cell with a node's name and arrow, bold while the node is new; topics are indented."""
     gone = row.node.gone_s is not None
     if row.topic:
         return Cell(row.topic, role=_ink(row, "text"), mono=True, struck=gone, indent=INDENT, middle=True)
@@ -141,7 +141,7 @@ def name_cell(row: NodeRow) -> Cell:
 
 
 def generation_cell(row: NodeRow) -> Cell:
-    """Return the node's kind (native, original, bridge); for a topic, its direction and rate."""
+    """Return the cell with a node's kind (native, original, bridge), or a topic's direction and rate."""
     if row.topic:
         rate = row.rate(row.topic_key) if row.rate is not None and row.way == PUBLISHES else ""
         said = _("publishes {rate}/s").format(rate=rate) if rate else _(row.way)
@@ -157,7 +157,7 @@ def generation_cell(row: NodeRow) -> Cell:
 
 
 def cpu_cell(row: NodeRow) -> Cell:
-    """Return the CPU share, the time since the node left, or "not reported" for its network."""
+    """Return the cell with the CPU share, the time since the node left, or "not reported"."""
     kind = kind_named(row.node.network)
     if row.topic or row.node.gone_s is not None or kind is None or kind.tells_figures:
         return _of_node(_cpu)(row)
@@ -249,7 +249,7 @@ COLUMNS: tuple[Column[NodeRow], ...] = (
 
 
 def columns(own: Callable[[NodeEntry], bool]) -> tuple[Column[NodeRow], ...]:
-    """Return the columns; nodes for which `own` returns True are never marked as new."""
+    """Return the columns. Nodes for which `own` returns True are never shown as new."""
 
     def named(row: NodeRow) -> Cell:
         cell = name_cell(row)

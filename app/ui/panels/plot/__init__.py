@@ -1,6 +1,6 @@
-"""Plot panel: numbers and states over time, expressions of them, and one curve against another.
+"""Plot panel: numbers and states over time, formulas of fields, and one curve against another.
 
-`canvas` draws curves, `lanes` states, `legend` is the table below and `tools` the toolbar. Everything else is
+`canvas` draws curves, `lanes` states, `legend` is the table below and `tools` the toolbar. The package is
 imported when the first plot opens, because pyqtgraph and numpy take 200 ms.
 """
 

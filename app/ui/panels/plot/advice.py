@@ -1,4 +1,4 @@
-"""Line above the legend with the reason why a curve has no data."""
+"""Line above the legend that explains why a curve has no data."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from nep.i18n import _
 
 
 class PlotAdvice(QWidget):
-    """Line with a hint; hidden while all curves have data. `ask` opens the connection doctor for a topic."""
+    """Line with a hint, hidden while all curves have data. `ask` opens the connection doctor for a topic."""
 
     def __init__(self, theme: Theme, ask: Callable[[str], object]) -> None:
         super().__init__()
@@ -35,11 +35,11 @@ class PlotAdvice(QWidget):
         row.addWidget(self.why, 0, Qt.AlignmentFlag.AlignTop)
 
     def text(self) -> str:
-        """Return the hint, or ""."""
+        """Return the text of the hint, or ""."""
         return self._words.text()
 
     def show_for(self, curves: Curves, shown: Sequence[ShownCurve]) -> None:
-        """Show the hint for these curves, if there is one."""
+        """Show the hint that applies to these curves, or hide the line."""
         said = next(filter(None, (curves.advice(each.curve) for each in shown)), "")
         empty = [each for each in shown if not said and not _has_any(each)]
         topics = sorted(topics_of(empty[0].curve.source)) if shown and len(empty) == len(shown) else []

@@ -1,8 +1,8 @@
-"""Canvas of curves over time: pyqtgraph for axes and lines, cursors painted on top.
+"""Canvas of curves over time. pyqtgraph draws axes and lines; cursors are painted on top.
 
 The time axis counts seconds relative to its right end (`TimeView.anchor_s`). While the plot follows live data
-the anchor moves but the axis stays, so it isn't repainted. pyqtgraph's mouse handling is replaced: wheel
-zooms time, Ctrl+wheel values, dragging pans, a double click shows everything.
+the anchor moves but the axis does not, so it isn't repainted. pyqtgraph's mouse handling is replaced: the
+wheel zooms time, Ctrl+wheel zooms values, dragging pans, a double click shows everything.
 """
 
 from __future__ import annotations
@@ -41,23 +41,26 @@ from nep.i18n import _, number
 
 AXIS_WIDTH, AXIS_HEIGHT = 54, 24
 FLAG = QSize(22, 19)
-FLAG_SPACE = 24  # px, space for the flags of the cursors
+FLAG_SPACE = 24  # px, reserved for the flags of the cursors
 ZOOM_STEP = 1.2
 MIN_WINDOW_S, MAX_WINDOW_S = 1e-4, 1e9
 MAX_ANTIALIASED_POINTS = 3000
-"""Number of points above which antialiasing is invisible and expensive."""
+"""Number of points above which antialiasing is turned off, because it is invisible and expensive."""
 DENSE_LINE_MARKS, DENSE_TRAVEL_RATIO = 5, 5.0
 TICK_SPACING_X, TICK_SPACING_Y = 84, 34  # minimum distance of ticks in px
 LABEL_OVERHANG = 60
 FARTHEST = 1e300
-"""Limit of drawn values; larger ones would overflow in the axis calculations."""
+"""Absolute value above which values are clipped, because they would overflow in the axis calculations."""
 HIT_WIDTH_PX = 10  # px
 BETWEEN_ALPHA = 0.045
 
 
 @dataclass(slots=True)
 class ValueRange:
-    """Range of a value axis; `held` after a zoom by the person, `is_new` until the first values."""
+    """Range of a value axis.
+
+    `held` is True after the user zoomed; `is_new` until the first values arrive.
+    """
 
     low: float = 0.0
     high: float = 1.0
@@ -65,7 +68,10 @@ class ValueRange:
     is_new: bool = True
 
     def fit(self, low: float, high: float) -> bool:
-        """Fit the range with margins, unless it already fits well; return True if it changed."""
+        """Adjust the range to values, with margins, unless it fits them well already.
+
+        Return True if it changed.
+        """
         if self.held or not (math.isfinite(low) and math.isfinite(high)):
             return False
         span = high - low
@@ -79,14 +85,14 @@ class ValueRange:
 
 
 class TimeAxis(pg.AxisItem):  # type: ignore[misc]  # pyqtgraph is untyped
-    """Seconds before the time at the right end, whose clock time is shown there."""
+    """Axis of seconds before the time at the right end, where the time of day is shown."""
 
     def __init__(self) -> None:
         super().__init__("bottom")
         self.clock = ""
 
     def boundingRect(self) -> QRectF:
-        # pyqtgraph omits labels that exceed the bounding rectangle, such as the clock at the edge.
+        # pyqtgraph omits labels that exceed the bounding rectangle, such as the time of day at the edge.
         return QRectF(super().boundingRect()).adjusted(-LABEL_OVERHANG, 0, LABEL_OVERHANG, 0)
 
     def tickSpacing(self, least: float, most: float, size: float) -> list[tuple[float, float]]:
@@ -116,7 +122,7 @@ def readable(
 
 
 def time_words(value_s: float, spacing_s: float) -> str:
-    """Return the label of a time tick, in s or min relative to the right end."""
+    """Format the label of a time tick, in s or min relative to the right end."""
     if spacing_s >= 60:
         words = _("{minutes} min").format(minutes=number(round(abs(value_s) / 60, 3)))
     else:
@@ -126,7 +132,7 @@ def time_words(value_s: float, spacing_s: float) -> str:
 
 
 def axis_words(value: float, spacing: float) -> str:
-    """Return the label of a value tick."""
+    """Format the label of a value tick."""
     if value and not 1e-4 <= abs(spacing) < 1e6:
         return number(value, ".3g").replace("-", MINUS)
     digits = max(0, math.ceil(-math.log10(abs(spacing)) - 1e-9)) if spacing else 0
@@ -134,10 +140,11 @@ def axis_words(value: float, spacing: float) -> str:
 
 
 class PlotCanvas(pg.GraphicsView):  # type: ignore[misc]
-    """Canvas of curves and cursors; emits signals for mouse actions.
+    """Canvas of curves and cursors. Emits signals for mouse actions.
 
     `begin_s` and `end_s` are the visible range in the time base of all series; `anchor_s` is the origin of
-    the axis.
+    the
+    axis.
     """
 
     zoomed = Signal(float, float)  # factor, time at the mouse in s
@@ -152,10 +159,11 @@ class PlotCanvas(pg.GraphicsView):  # type: ignore[misc]
         self.theme = theme
         self.begin_s, self.end_s, self.anchor_s = -60.0, 0.0, 0.0
         self.cursors: dict[str, float] = {}
-        self.marks: list[tuple[ShownCurve, float, float]] = []  # curve, time, value
+        # (curve, time, value) of the marks that identify dense lines
+        self.marks: list[tuple[ShownCurve, float, float]] = []
         self.mouse_s: float | None = None
         self.painted_s = 0.0  # accumulated processor time of painting
-        # like `marks`, on dense lines, which have no dashes
+        # like `marks`, at fixed times on dense lines, which have no dashes
         self.signs: list[tuple[ShownCurve, float, float]] = []
         self._lines: dict[str, pg.PlotCurveItem] = {}
         self._held: tuple[str, QPointF] | None = None
@@ -201,7 +209,7 @@ class PlotCanvas(pg.GraphicsView):  # type: ignore[misc]
         return self.theme.font("caption")
 
     def restyle(self) -> None:
-        """Apply the theme's colours, fonts and sizes."""
+        """Apply the theme's colours, fonts and sizes to the canvas."""
         theme = self.theme
         grid = theme.colour("controlBorder" if theme.high_contrast else "grid")
         for name in ("bottom", "left", "right"):
@@ -227,11 +235,11 @@ class PlotCanvas(pg.GraphicsView):  # type: ignore[misc]
 
     @property
     def columns(self) -> int:
-        """Width of the curves in px."""
+        """Number of pixel columns of the curves' area."""
         return max(16, round(self.area.width()))
 
     def x_of(self, time_s: float, area: QRectF | None = None) -> float:
-        """Return the x coordinate of a time; pass `area` to avoid computing it again."""
+        """Return the x coordinate of a time. Pass `area` if it is known, to avoid computing it again."""
         area = area or self.area
         return area.left() + (time_s - self.begin_s) / (self.end_s - self.begin_s) * area.width()
 
@@ -272,7 +280,7 @@ class PlotCanvas(pg.GraphicsView):  # type: ignore[misc]
         elif item.getViewBox() is not view:
             item.getViewBox().removeItem(item)
             view.addItem(item, ignoreBounds=True)
-        # dashes and antialiasing of dense lines are invisible but would dominate the cost
+        # dashes and antialiasing are invisible on dense lines but would dominate the cost
         dense = self._is_dense(line, right=curve.right)
         item.setData(
             line.times - self.anchor_s,
@@ -282,7 +290,7 @@ class PlotCanvas(pg.GraphicsView):  # type: ignore[misc]
         )
 
     def _is_dense(self, line: Line, *, right: bool) -> bool:
-        # Many points, or steep oscillations.
+        # True for many points, and for steep oscillations.
         if len(line.times) > MAX_ANTIALIASED_POINTS or not line.is_whole:
             return True
         shown = self.ranges["right" if right else "left"]
@@ -329,7 +337,10 @@ class PlotCanvas(pg.GraphicsView):  # type: ignore[misc]
             self.time_axis.update()
 
     def hold_values(self, factor: float = 1.0, shift: float = 0.0) -> None:
-        """Zoom the value axes by `factor` or shift them by a share of their range, until `release_values`."""
+        """Zoom the value axes by `factor`, or shift them by a share of their range.
+
+        Holds them until `release_values`.
+        """
         for shown in self.ranges.values():
             middle, half = (shown.low + shown.high) / 2, (shown.high - shown.low) / 2 * factor
             middle += shift * 2 * half
@@ -338,7 +349,7 @@ class PlotCanvas(pg.GraphicsView):  # type: ignore[misc]
         self.values_changed.emit()
 
     def release_values(self) -> None:
-        """Return to automatic value ranges."""
+        """Return to automatic ranges of the value axes."""
         for shown in self.ranges.values():
             shown.held, shown.is_new = False, True
         self.values_changed.emit()
@@ -400,7 +411,7 @@ class PlotCanvas(pg.GraphicsView):  # type: ignore[misc]
             paint.words(painter, box, words, font, self.theme.colour("text"), paint.CENTRE)
 
     def _cursor_at(self, place: QPointF) -> str | None:
-        # Hit test of flags and lines.
+        # Hit test of the cursors' flags and lines.
         for name, time_s in reversed(self.cursors.items()):
             x = self.x_of(time_s)
             if self._flag(x).adjusted(-4, -4, 4, 4).contains(place):
@@ -479,7 +490,7 @@ class PlotCanvas(pg.GraphicsView):  # type: ignore[misc]
 
 
 def distance_words(distance_s: float) -> str:
-    """Format the distance of A and B, such as "12 ms", "7.5 s" or "3 min"."""
+    """Format the time between cursors A and B, such as "12 ms", "7.5 s" or "3 min"."""
     if distance_s < 1:
         return f"{number(distance_s * 1000, '.3g')} ms"
     return (

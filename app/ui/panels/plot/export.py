@@ -1,4 +1,4 @@
-"""Export of a plot: values as CSV in a background thread, or an image as PNG or SVG."""
+"""Export of a plot: values as CSV, written in a background thread, or an image as PNG or SVG."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ LEGEND_ROW_HEIGHT = 22
 
 
 class CsvWriter:
-    """Background thread that writes one CSV file; `columns` must not be modified meanwhile."""
+    """Background thread that writes one CSV file. `columns` must not be modified meanwhile."""
 
     def __init__(self, path: Path, columns: Sequence[CsvColumn], origin_ns: int) -> None:
         self.path = path
@@ -66,7 +66,7 @@ class CsvWriter:
         return self._done
 
     def close(self) -> None:
-        """Wait some seconds for completion, then abort and remove the partial file."""
+        """Wait some seconds for the thread, then abort it and remove the partial file."""
         self._thread.join(CLOSE_TIMEOUT_S)
         self._given_up.set()
         self._thread.join(CLOSE_TIMEOUT_S)
@@ -75,7 +75,8 @@ class CsvWriter:
 class PlotPicture:
     """Image of a plot: canvas, lanes and the names of the curves.
 
-    `parts` are size and painter, from the top.
+    Args:
+        parts: Size and painter function of each part, from the top.
     """
 
     def __init__(
@@ -116,7 +117,7 @@ class PlotPicture:
             top += row
 
     def png(self) -> bytes:
-        """Return the image as PNG with twice the screen resolution."""
+        """Return the image as PNG with two pixels per unit."""
         image = QImage(self.size * PNG_SCALE, QImage.Format.Format_RGB32)
         if image.isNull():
             raise OSError(errno.ENOMEM, _("not enough memory"))
@@ -147,9 +148,11 @@ class PlotPicture:
 
 
 class PlotExport:
-    """Asks for a file, exports the plot and reports the result in a toast.
+    """Exports a plot: asks for a file, writes it and reports the result in a toast.
 
-    `parts` returns the parts of the image, `shown` the visible range in s.
+    Args:
+        parts: Returns the parts of the image.
+        shown: Returns the visible range in s.
     """
 
     def __init__(
@@ -163,7 +166,7 @@ class PlotExport:
         self._writer: CsvWriter | None = None
 
     def menu(self, parent: QWidget) -> Menu:
-        """Return the menu of formats."""
+        """Return the menu of export formats."""
         menu = Menu(self._context.theme, parent)
         menu.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
         for kind in (CSV, PNG, SVG):
@@ -172,7 +175,7 @@ class PlotExport:
         return menu
 
     def ask_where(self, kind: FileKind) -> None:
-        """Ask for a file and export the plot in a format."""
+        """Ask for a file and export the plot in the format `kind`."""
         suggestion = Path.home() / f"{_('Plot')}{kind.ending}"
         kinds = [kind, *(each for each in (CSV, PNG, SVG) if each is not kind)]
         self._context.files.save_as(_("Export the plot"), suggestion, kinds, self.write)
@@ -209,6 +212,6 @@ class PlotExport:
         self._context.toast(said)
 
     def close(self) -> None:
-        """Wait for a running export."""
+        """Wait for a running export to finish."""
         if self._writer is not None:
             self._writer.close()

@@ -34,7 +34,7 @@ class StateLanes(QWidget):
         theme.changed.connect(self.updateGeometry)
 
     def show_curves(self, curves: Sequence[ShownCurve]) -> None:
-        """Show the states of these curves, eight at most; the legend lists all."""
+        """Show the states of these curves, at most eight; the legend lists all."""
         count = len(self.curves)
         self.curves = curves[:MAX_LANES]
         if len(self.curves) != count:
@@ -52,7 +52,10 @@ class StateLanes(QWidget):
         return QSize(60, self.sizeHint().height())
 
     def boxes(self) -> Iterator[tuple[ShownCurve, StateRun, QRectF]]:
-        """Yield curve, run and rectangle of each visible run; for booleans only those that are true."""
+        """Yield curve, run of equal values and rectangle of each visible run.
+
+        For booleans, only the runs of true are included.
+        """
         canvas, area = self._canvas, self._canvas.area
         for row, curve in enumerate(self.curves):
             states = curve.curve.states
@@ -62,7 +65,7 @@ class StateLanes(QWidget):
             is_yes_or_no = states.words(canvas.begin_s, canvas.end_s) <= {"true", "false"}
             without = ("false",) if is_yes_or_no else ()
             pixel_s = (canvas.end_s - canvas.begin_s) / canvas.columns
-            painted = -1.0  # right edge painted so far: one box per pixel is enough
+            painted = -1.0  # right edge of the last box: one box per pixel is enough
             for run in states.runs(canvas.begin_s, canvas.end_s, step_s=pixel_s / 2, without=without):
                 left = max(area.left(), canvas.x_of(run.begin_s))
                 right = min(area.right(), canvas.x_of(run.end_s))
@@ -80,7 +83,7 @@ class StateLanes(QWidget):
         painter.end()
 
     def paint_lanes(self, painter: QPainter) -> None:
-        """Paint all lanes with their top left corner at the origin."""
+        """Paint all lanes, with the origin at the top left corner."""
         theme, area = self._theme, self._canvas.area
         font = theme.font("code")
         painter.setRenderHint(QPainter.RenderHint.Antialiasing)

@@ -21,7 +21,7 @@ from nep.i18n import _, lazy, ngettext, pgettext
 
 
 class LegendFigures:
-    """Statistics of curves within a time range, computed on demand."""
+    """Statistics of curves within a time range, computed on request."""
 
     def __init__(self) -> None:
         self.begin_s = self.end_s = 0.0
@@ -29,19 +29,19 @@ class LegendFigures:
         self._kept: dict[str, Figures] = {}
 
     def look_at(self, begin_s: float, end_s: float, cursors: tuple[float, float] | None) -> None:
-        """Set the time range and the times of cursors A and B."""
+        """Set the time range, and the times of cursors A and B."""
         self.begin_s, self.end_s, self.cursors = begin_s, end_s, cursors
         self._kept.clear()
 
     def of(self, shown: ShownCurve) -> Figures:
-        """Return minimum, maximum and mean."""
+        """Return minimum, maximum and mean of a curve."""
         found = self._kept.get(shown.name)
         if found is None:
             found = self._kept[shown.name] = shown.curve.samples.figures(self.begin_s, self.end_s)
         return found
 
     def at_cursor(self, shown: ShownCurve, which: int) -> float | str | None:
-        """Return the value at cursor A (0) or B (1)."""
+        """Return a curve's value at cursor A (0) or B (1)."""
         if self.cursors is None:
             return None
         time_s = self.cursors[which]
@@ -52,7 +52,7 @@ class LegendFigures:
 
 
 class _Cells:
-    """Cells of each column."""
+    """Factory of the cells of each column."""
 
     def __init__(self, figures: LegendFigures, is_gone: Callable[[ShownCurve], bool]) -> None:
         self.figures, self._is_gone = figures, is_gone
@@ -125,7 +125,7 @@ class _Cells:
 def columns(
     figures: LegendFigures, has_cursors: Callable[[], bool], is_gone: Callable[[ShownCurve], bool]
 ) -> tuple[Column[ShownCurve], ...]:
-    """Return the columns of the legend; those of A and B are shown only with cursors."""
+    """Return the columns of the legend. Those for cursors A and B are hidden without cursors."""
     cells = _Cells(figures, is_gone)
     between = {"figures": True, "when": has_cursors}
     return (
@@ -169,7 +169,7 @@ class LegendTable(TableView[ShownCurve]):
             self._popup(shown, self.visualRect(index).bottomLeft())
 
     def _enter(self, key: str) -> None:
-        # Enter opens the menu; a click does so only on the stroke.
+        # Enter opens the menu; a click does so only on the sample of the line.
         if self.keyboard:
             index = self._model.index_of(key)
             shown = self._model.row_at(index)
@@ -188,7 +188,7 @@ class LegendTable(TableView[ShownCurve]):
         elif shown is not None and event.key() == Qt.Key.Key_H and not event.modifiers():
             self.hide_or_show(shown)
         elif event.text().isprintable() and event.text().strip() != "/" and event.text():
-            event.ignore()  # keys of the plot panel
+            event.ignore()  # handled by the plot panel
         else:
             super().keyPressEvent(event)
 
@@ -239,7 +239,7 @@ class LegendTable(TableView[ShownCurve]):
 
 
 def next_look(there: Sequence[ShownCurve]) -> CurveLook:
-    """Return a style that no other curve has, as long as one is free."""
+    """Return a style that no other curve has, or a repeated one if all are in use."""
     colours = [shown.look.colour % len(COLOURS) for shown in there]
     patterns = [shown.look.pattern % 4 for shown in there]
     colour = min(range(len(COLOURS)), key=lambda each: (colours.count(each), each))

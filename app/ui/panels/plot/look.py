@@ -1,4 +1,4 @@
-"""Styles of curves, which differ in colour, dash and mark, so that colour is never the only distinction."""
+"""Styles of curves. They differ in colour, dash and mark, so that colour is never the only distinction."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from nep.i18n import lazy
 
 LINE_WIDTH = 1.75
 COLOURS = (lazy("Blue"), lazy("Orange"), lazy("Green"), lazy("Pink"), lazy("Yellow"), lazy("Violet"))
-"""Names of the theme's curve colours, in their order."""
+"""Names of the theme's curve colours, in the order of the theme."""
 DASHES: tuple[tuple[float, ...], ...] = ((), (6, 4), (2, 4), (12, 4))
 """Dash patterns in px; the first one is solid."""
 LANE_FILL_ALPHA, LANE_EDGE_ALPHA = 0.20, 0.55
@@ -21,7 +21,7 @@ LANE_FILL_ALPHA, LANE_EDGE_ALPHA = 0.20, 0.55
 
 @dataclass(frozen=True, slots=True)
 class CurveLook:
-    """Style: index of a theme colour and of a pattern (dash and mark)."""
+    """Style of a curve: index of a theme colour and of a pattern (dash and mark)."""
 
     colour: int
     pattern: int
@@ -31,7 +31,7 @@ class CurveLook:
         return theme.series(self.colour)
 
     def pen(self, theme: Theme, *, is_dense: bool = False) -> QPen:
-        """Return the line's pen; for dense lines it is solid and thin, which is faster to paint."""
+        """Return the pen of the line; for dense lines it is solid and thin, which is faster to paint."""
         pen = QPen(self.ink(theme), 1.0 if is_dense else LINE_WIDTH)
         pen.setCosmetic(True)
         dash = DASHES[self.pattern % len(DASHES)]
@@ -41,7 +41,7 @@ class CurveLook:
         return pen
 
     def paint_mark(self, painter: QPainter, theme: Theme, centre: QPointF, size: float = 8.0) -> None:
-        """Paint the mark (disc, square, triangle or diamond) with an outline."""
+        """Paint the mark (disc, square, triangle or diamond) of the style with an outline."""
         half = size / 2
         painter.setPen(QPen(theme.colour("panel"), 1))
         painter.setBrush(self.ink(theme))
@@ -62,7 +62,7 @@ class CurveLook:
 
 @dataclass(frozen=True, slots=True)
 class Stroke:
-    """Sample of a curve's line and mark for a table cell, or the box of a state."""
+    """Table cell with a sample of a curve's line and mark, or of a state's box."""
 
     look: CurveLook
     is_state: bool
@@ -84,7 +84,7 @@ class Stroke:
 
 
 def paint_state(painter: QPainter, theme: Theme, box: QRectF, look: CurveLook) -> None:
-    """Paint the box of a state."""
+    """Paint the box of a state in the style `look`."""
     fill, edge = look.ink(theme), look.ink(theme)
     fill.setAlphaF(LANE_FILL_ALPHA)
     edge.setAlphaF(1.0 if theme.high_contrast else LANE_EDGE_ALPHA)

@@ -1,4 +1,4 @@
-"""Frame rate control of plots: redraw as data moves, within a share of a processor core."""
+"""Frame rate control of plots: redraw as often as data moves, within a share of a processor core."""
 
 from __future__ import annotations
 
@@ -12,17 +12,17 @@ DRAW_EVERY = (2, 8)
 DRAWING_SHARE = 0.08
 """Maximum share of a processor core for drawing."""
 AVERAGE_WEIGHT = 0.1
-"""Weight of the moving average: thread clocks can have a resolution of only 16 ms."""
+"""Weight of a new measurement in the moving average. Thread clocks can have a resolution of only 16 ms."""
 
 
 class Painted(Protocol):
-    """Widget painted after drawing; `painted_s` accumulates its processor time in s."""
+    """Widget that is painted after drawing; `painted_s` accumulates its processor time in s."""
 
     painted_s: float
 
 
 class DrawingPace:
-    """Measures the cost of drawing and determines the interval until the next drawing."""
+    """Measures the cost of drawing and computes the interval until the next drawing."""
 
     def __init__(self) -> None:
         self.drawing_s = 0.0
@@ -41,6 +41,6 @@ class DrawingPace:
         self.drawing_s += AVERAGE_WEIGHT * (seconds - self.drawing_s)
 
     def every(self, pixel_s: float) -> int:
-        """Return the interval in refreshes; no shorter than the time in which data moves by a pixel."""
+        """Return the interval in refreshes: at least the time in which data moves by a pixel (`pixel_s`)."""
         least, most = DRAW_EVERY
         return round(min(most, max(least, pixel_s * 30, self.drawing_s / DRAWING_SHARE * 30)))

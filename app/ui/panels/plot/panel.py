@@ -56,7 +56,7 @@ MAX_ROWS, MAX_TABLE_RATIO = 6, 0.32
 
 
 class PlotPanel(PanelWidget):
-    """One plot. It continues to collect data while hidden."""
+    """Panel with one plot. Data is collected while the panel is hidden too."""
 
     def __init__(self, context: PanelContext) -> None:
         super().__init__(context, _("Plot"))
@@ -132,7 +132,7 @@ class PlotPanel(PanelWidget):
         self.setFocusProxy(self.canvas)
 
     def _make_lower(self) -> QWidget:
-        # The part below the toolbar, shown with at least one curve.
+        # The part below the toolbar, shown if there is at least one curve.
         self.drawings = QStackedWidget()
         self.drawings.addWidget(self.canvas)
         self.drawings.addWidget(self.xy)
@@ -168,7 +168,7 @@ class PlotPanel(PanelWidget):
         self.canvas.field_dropped.connect(self.plot_field)
 
     def source_changed(self) -> None:
-        """Plot the same fields of the new source."""
+        """Plot the same fields from the new source."""
         kept = self.save_state()
         self.tools.add.dispose()
         self.curves.close()
@@ -185,7 +185,7 @@ class PlotPanel(PanelWidget):
     # -- curves -------------------------------------------------------------------------------------------
 
     def plot_field(self, topic: str, path: str) -> None:
-        """Add a field of a topic; with an empty path, ask for the field."""
+        """Add a curve for a field of a topic; with an empty path, ask for the field."""
         if not path:
             self.add.ask(f"{topic}.")
             return
@@ -218,7 +218,7 @@ class PlotPanel(PanelWidget):
         self._changed()
 
     def remove(self, name: str) -> None:
-        """Remove a curve; the toast offers to undo it."""
+        """Remove a curve; the toast offers to undo the removal."""
         found = next((each for each in self.shown if each.name == name), None)
         if found is None:
             return
@@ -265,7 +265,7 @@ class PlotPanel(PanelWidget):
             self._show_figures()
 
     def _soon(self) -> None:
-        # Also redraws while paused.
+        # Called to redraw while paused, too.
         self._due = True
 
     def _range(self) -> tuple[float, float]:
@@ -415,7 +415,7 @@ class PlotPanel(PanelWidget):
         self._show_figures()
 
     def _step_cursor(self, steps: int) -> bool:
-        # In samples of the first visible curve.
+        # Moves the cursor by samples of the first visible curve.
         time_s = self.canvas.cursors.get(self._last_cursor)
         first = next((each for each in self.shown if not each.hidden and len(each.curve.samples)), None)
         if time_s is None or first is None:
@@ -458,7 +458,7 @@ class PlotPanel(PanelWidget):
         return (self.canvas.begin_s + self.canvas.end_s) / 2
 
     def _arrow(self, steps: int) -> None:
-        # Moves the cursor or, without one, the time range.
+        # Moves the cursor or, if there is none, the time range.
         if not self._step_cursor(steps):
             self._move(steps * (self.canvas.end_s - self.canvas.begin_s) / 20)
 
@@ -467,7 +467,7 @@ class PlotPanel(PanelWidget):
         self._choose_span("all")
 
     def _put_here(self, name: str) -> None:
-        # Under the mouse, or in the middle if the mouse is elsewhere.
+        # Places the cursor under the mouse, or in the middle if the mouse is elsewhere.
         here = self.canvas.mouse_s
         self._put_cursor(name, self._middle_s() if here is None else here)
 
@@ -518,7 +518,7 @@ class PlotPanel(PanelWidget):
     _listed: Sequence[QAction] = ()
 
     def _picture_parts(self) -> list[tuple[QSize, Callable[[QPainter, QRectF], object]]]:
-        # From the top.
+        # Parts of the image, from the top.
         self._draw()
         canvas, xy, lanes = self.canvas, self.xy, self.lanes
 

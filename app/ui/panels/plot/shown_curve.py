@@ -1,4 +1,4 @@
-"""Curve as displayed (axis, style, visibility) and formatting of its values."""
+"""Display settings of a curve (axis, style, visibility) and formatting of its values."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ MINUS = "\u2212"
 
 @dataclass(slots=True, eq=False)
 class ShownCurve:
-    """Displayed curve; `right` selects the right axis."""
+    """Curve with its display settings; `right` selects the right axis."""
 
     curve: Curve
     look: CurveLook
@@ -27,7 +27,7 @@ class ShownCurve:
 
     @property
     def name(self) -> str:
-        """Expression as typed; also the key of the curve."""
+        """Expression as typed by the user; also the key of the curve."""
         return self.curve.text
 
     def saved(self) -> dict[str, object]:
@@ -46,7 +46,7 @@ class ShownCurve:
 
 
 def look_of(saved: Mapping[str, object], otherwise: CurveLook) -> CurveLook:
-    """Return the style from a layout; invalid values are replaced by those of `otherwise`."""
+    """Return the style saved in a layout. Invalid values are replaced by those of `otherwise`."""
     colour, pattern = saved.get("colour"), saved.get("pattern")
     return CurveLook(
         colour % 6 if isinstance(colour, int) else otherwise.colour,
@@ -55,7 +55,7 @@ def look_of(saved: Mapping[str, object], otherwise: CurveLook) -> CurveLook:
 
 
 def value_words(value: object) -> str:
-    """Format a value for the legend; "" for a missing one."""
+    """Format a value for the legend; "" for None."""
     if value is MISSING or value is None:
         return ""
     if isinstance(value, bool):

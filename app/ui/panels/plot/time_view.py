@@ -1,4 +1,4 @@
-"""Visible time range of a plot: latest seconds, everything, or a held range."""
+"""Visible time range of a plot: the latest seconds, everything, or a fixed range."""
 
 from __future__ import annotations
 
@@ -6,12 +6,15 @@ from dataclasses import dataclass
 
 MIN_SPAN_S, MAX_SPAN_S = 1e-4, 1e8
 SPANS: tuple[tuple[str, float], ...] = (("12", 12.0), ("60", 60.0), ("300", 300.0), ("all", 0.0))
-"""Choices of the range in s; 0 is everything."""
+"""Available lengths of the range, by choice, in s; 0 shows everything."""
 
 
 @dataclass(slots=True)
 class TimeView:
-    """Range of `span_s` seconds that ends at the newest message or at `held_s`; everything if `is_all`."""
+    """Time range of `span_s` seconds that ends at the newest message or at `held_s`.
+
+    If `is_all` is True, it contains all data.
+    """
 
     span_s: float = 60.0
     is_all: bool = False
@@ -23,14 +26,14 @@ class TimeView:
         return self.held_s is None
 
     def visible_range(self, oldest_s: float, newest_s: float) -> tuple[float, float]:
-        """Return the visible range for data in a range."""
+        """Return the visible range, given the range of available data."""
         end_s = newest_s if self.held_s is None else self.held_s
         if self.is_all:
             return min(oldest_s, end_s - MIN_SPAN_S), end_s
         return end_s - self.span_s, end_s
 
     def hold(self, shown: tuple[float, float]) -> None:
-        """Hold a range while data continues to arrive."""
+        """Fix the range at `shown` while data continues to arrive."""
         self.span_s, self.is_all, self.held_s = _bounded(shown[1] - shown[0]), False, shown[1]
 
     def go_on(self) -> None:
@@ -38,7 +41,7 @@ class TimeView:
         self.held_s = None
 
     def choose(self, span_s: float) -> None:
-        """Set the length in s, 0 for everything; a held range keeps its end."""
+        """Set the length in s, 0 for everything. A fixed range keeps its end."""
         self.is_all = span_s <= 0
         if span_s > 0:
             self.span_s = span_s
@@ -52,11 +55,11 @@ class TimeView:
             self.held_s = at_s + share * span_s
 
     def move(self, by_s: float, shown: tuple[float, float]) -> None:
-        """Shift the range by seconds and hold it."""
+        """Shift the range by seconds and fix it there."""
         self.hold((shown[0] + by_s, shown[1] + by_s))
 
     def chosen(self) -> str:
-        """Return the choice that equals the current range, or ""."""
+        """Return the key of the choice in `SPANS` that equals the current range, or ""."""
         if self.is_all:
             return "all"
         return next((value for value, span_s in SPANS if span_s == self.span_s), "")

@@ -1,4 +1,4 @@
-"""Toolbar of the plot with the field to add curves: Tab completes, Enter adds.
+"""Toolbar of the plot, and the field to add curves: Tab completes, Enter adds.
 
 While the field has the focus, topics are subscribed to (except images and those with a high data rate), so
 that it can offer their fields with current values.
@@ -41,7 +41,7 @@ EXAMPLES = ("difference({})", "derivative({})", "integral({})", "mean({}, 2 s)")
 
 
 class FieldOffers:
-    """Fields of topics, subscribed to while the person adds a curve."""
+    """Fields that can be plotted, read from topics that are subscribed to while the user adds a curve."""
 
     def __init__(self, session: Session) -> None:
         self._session = session
@@ -112,9 +112,10 @@ class _Matches(QWidget):
 
 
 class AddCurve(SearchField):
-    """Field to add a curve; emits `wanted` with the expression and True for the right axis.
+    """Field to add a curve; emits `wanted` with the expression, and True for the right axis.
 
-    `plotted` returns the existing curves, which can be used in expressions.
+    Args:
+        plotted: Returns the existing curves, which can be used in expressions.
     """
 
     icon_name = "plus"
@@ -175,7 +176,7 @@ class AddCurve(SearchField):
             self._matches.hide()
 
     def ask(self, text: str) -> None:
-        """Focus the field with this text, ready to be continued."""
+        """Focus the field with a text that the user can continue."""
         self.setText(text)
         self.setFocus(Qt.FocusReason.ShortcutFocusReason)
         if text.endswith("."):
@@ -183,7 +184,7 @@ class AddCurve(SearchField):
         self._search()
 
     def complain(self, sentence: str) -> None:
-        """Show why the text is not a valid curve; the text stays."""
+        """Show the reason why the text is not a valid curve; the text is kept."""
         self.sentence = sentence
         self.setProperty("wrong", "true" if sentence else "false")
         self.style().unpolish(self)
@@ -339,7 +340,7 @@ SPAN_WORDS = {"12": lazy("12 s"), "60": lazy("1 min"), "300": lazy("5 min"), "al
 
 
 class PlotTools(QWidget):
-    """Toolbar; wraps in a narrow panel. `plotted` returns the existing curves."""
+    """Toolbar that wraps in a narrow panel. `plotted` returns the existing curves."""
 
     def __init__(self, theme: Theme, session: Session, plotted: Callable[[], Iterable[str]]) -> None:
         super().__init__()
@@ -367,7 +368,7 @@ class PlotTools(QWidget):
             row.addWidget(widget)
 
     def fit(self, curves: int, numbers: int) -> None:
-        """Show the tools that apply to this number of curves, `numbers` of them numeric."""
+        """Show the tools that apply to this number of curves, `numbers` of which are numeric."""
         for widget in self._when_there:
             paint.show_when(widget, curves > 0)
         paint.show_when(self.states, curves > numbers)

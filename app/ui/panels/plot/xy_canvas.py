@@ -1,4 +1,4 @@
-"""XY plot of one curve against another: equal scales, older parts fade, an arrow marks the newest point."""
+"""Plot of one curve against another: equal scales, older parts fade, an arrow marks the newest point."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ Path = tuple[ShownCurve, ShownCurve, Floats, Floats, Floats]
 def path_of(
     across: ShownCurve, up: ShownCurve, begin_s: float, end_s: float
 ) -> tuple[Floats, Floats, Floats]:
-    """Return times, x and y of two curves at the times of the first one, at most `MAX_POINTS` points."""
+    """Return times, x and y of the path, at the times of the first curve and at most `MAX_POINTS` points."""
     samples = across.curve.samples
     first, end = samples.places(begin_s, end_s)
     step = max(1, math.ceil((end - first) / MAX_POINTS))

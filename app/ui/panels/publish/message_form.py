@@ -1,4 +1,4 @@
-"""Form of a message: name, topic, type, placeholders, JSON with error checking, and send buttons."""
+"""Form to edit a message: name, topic, type, placeholders, JSON with error checking, and send buttons."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ MAX_COMPLETIONS = 500
 
 
 class TopicEdit(QLineEdit):
-    """Field of a topic's name with completion."""
+    """Text field for the name of a topic, with completion."""
 
     def __init__(self, theme: Theme) -> None:
         super().__init__()
@@ -60,16 +60,19 @@ class TopicEdit(QLineEdit):
         self.setCompleter(completer)
 
     def offer(self, names: Sequence[str]) -> None:
-        """Set the completions."""
+        """Set the names offered as completions."""
         some = list(names[:MAX_COMPLETIONS])
         if some != self._offered.stringList():
             self._offered.setStringList(some)
 
 
 class MessageForm(QWidget):
-    """Form of a message; `changed` has the edited message, the other signals are requests.
+    """Form for editing and sending one message.
 
-    `type_of` returns the type of an existing topic, else "".
+    `changed` carries the edited message; the other signals request an action.
+
+    Args:
+        type_of: Returns the message type of an existing topic, or "".
     """
 
     changed = Signal(object)  # KeptMessage
@@ -202,7 +205,7 @@ class MessageForm(QWidget):
     # -- display ------------------------------------------------------------------------------------------
 
     def show_message(self, message: KeptMessage) -> None:
-        """Show a message; fields with an equivalent value keep their text while the person types."""
+        """Show a message. Fields with an equivalent value keep their text while the user types."""
         other = self.message is None or self.message.id != message.id
         if message == self.message:
             return
@@ -222,7 +225,7 @@ class MessageForm(QWidget):
         self._judge()
 
     def _judge(self) -> None:
-        # Checks the text and shows its placeholders.
+        # Validates the text and shows fields for its placeholders.
         message = self.message
         if message is None:
             return
@@ -237,7 +240,7 @@ class MessageForm(QWidget):
             widget.setVisible(bool(self.read.to_fill))
 
     def say_problem(self, problem: str) -> None:
-        """Show why the message can't be sent; "" if it can."""
+        """Show the reason why the message can't be sent; "" if it can."""
         fault = self.read.fault
         words = _("{problem} It can't be sent yet.").format(problem=problem) if problem else ""
         if words != self.sentence.text():
@@ -283,18 +286,18 @@ class MessageForm(QWidget):
         self._edit(msg_type=msg_type)
 
     def put_text(self, text: str) -> None:
-        """Replace the whole text; can be undone."""
+        """Replace the whole text as one undoable edit."""
         self.edit.replace(0, len(self.edit.text()), text)
 
     def make_tidy(self) -> None:
-        """Format the JSON; not possible while it has placeholders."""
+        """Format the JSON text. Has no effect while it contains placeholders."""
         try:
             self.put_text(pretty(self.read.filled({})))
         except NepError as error:
             self.say_problem(str(error))
 
     def put_right(self) -> None:
-        """Apply the fix of the first error."""
+        """Apply the suggested fix of the first error."""
         fault: JsonFault | None = self.read.fault
         if fault is not None and fault.fix is not None:
             self.edit.replace(fault.fix.start, fault.fix.end, fault.fix.text)

@@ -35,7 +35,7 @@ STATE_UPDATE_TICKS = 6  # refreshes at 30 Hz
 
 
 class PublishPanel(PanelWidget):
-    """Panel with the list at the left (at the top in a narrow panel) and the form."""
+    """Panel with the list of messages at the left (at the top if narrow) and the form of the selected one."""
 
     def __init__(self, context: PanelContext) -> None:
         super().__init__(context, _("Publish"))
@@ -88,7 +88,7 @@ class PublishPanel(PanelWidget):
         scroll.setFocusPolicy(Qt.FocusPolicy.NoFocus)
         scroll.column.insertWidget(0, self.form)
         scroll.column.setStretchFactor(self.form, 1)
-        scroll.column.setStretch(scroll.column.count() - 1, 0)  # the form takes all remaining height
+        scroll.column.setStretch(scroll.column.count() - 1, 0)  # the form takes the remaining height
         self._sides = ListBeside(
             self.theme,
             (self.filter, self.list, scroll),
@@ -164,7 +164,7 @@ class PublishPanel(PanelWidget):
             self._say_sending()
 
     def _say_sending(self) -> None:
-        # Texts of the buttons, and the result of sending.
+        # Updates the texts of the buttons and the result of sending.
         message, form, acting = self.message, self.form, self.acting
         if message is None:
             return
@@ -208,7 +208,7 @@ class PublishPanel(PanelWidget):
     # -- user actions -------------------------------------------------------------------------------------
 
     def begin(self, key: str) -> None:
-        """Select a saved message for a topic, or create one from the topic's last message."""
+        """Select a saved message for the topic, or create one from the topic's last message."""
         _network, topic = split_key(key)
         kept = [each for each in self.acting.shelf.messages if topic and each.topic == topic]
         msg_type = self._type_of(topic) or "json"
@@ -226,7 +226,7 @@ class PublishPanel(PanelWidget):
         field.setFocus(Qt.FocusReason.OtherFocusReason)
 
     def take_template(self) -> None:
-        """Insert the topic's next message or, without a publisher, the fields of its type."""
+        """Insert the topic's next message or, without a publisher, a template with the fields of its type."""
         message = self.message
         if message is None:
             return

@@ -1,4 +1,4 @@
-"""List of saved messages with topic and state (sending, invalid, not armed)."""
+"""List of saved messages with their topics and states (sending, invalid, not armed)."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ from nep.i18n import _, lazy
 
 
 def state_cell(message: KeptMessage, acting: SessionActing) -> Cell:
-    """Return the state of a message as a short text with icon."""
+    """Return the cell with the state of a message as text and icon."""
     if acting.outbox.is_going(message.id):
         return Cell(_("{rate}/s").format(rate=rate_words(message.rate_hz)), "dot", "warn")
     fault = None if is_plain(message.msg_type) else read_json(message.text).fault
@@ -36,9 +36,10 @@ def state_cell(message: KeptMessage, acting: SessionActing) -> Cell:
 
 
 class ShelfList(TableView[KeptMessage]):
-    """List of messages; a click selects.
+    """List of saved messages; a click selects one.
 
-    `chosen` has the id, also on keyboard selection; keys send, copy, delete.
+    `chosen` carries the id of the selected message, also for selection by keyboard. Keys send, copy and
+    delete.
     """
 
     chosen = Signal(str)
@@ -69,7 +70,7 @@ class ShelfList(TableView[KeptMessage]):
         self.fit_rows()
 
     def fit_rows(self) -> None:
-        """Scale the row height with the text size."""
+        """Adjust the row height to the text size."""
         self.set_row_height(round(self.theme.scaled(ROW_PX)), large=False)
 
     def _open(self, index: QModelIndex) -> None:

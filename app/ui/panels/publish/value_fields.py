@@ -18,7 +18,7 @@ FIELD_WIDTH_PX = 120
 
 
 class ValueFields(QWidget):
-    """One field per placeholder; `typed` has name and text."""
+    """One text field per placeholder; `typed` carries name and text."""
 
     typed = Signal(str, str)
 
@@ -34,7 +34,7 @@ class ValueFields(QWidget):
         column.addWidget(self._place)
 
     def show_places(self, names: Sequence[str], values: Mapping[str, str]) -> None:
-        """Show fields for these placeholders; existing fields keep their text and focus."""
+        """Show fields for these placeholders. Existing fields keep their text and focus."""
         if list(names) != list(self.fields):
             self._rebuild(names)
         for name, field in self.fields.items():

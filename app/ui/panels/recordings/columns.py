@@ -1,4 +1,4 @@
-"""Columns of the table of recordings: thumbnail, name, note and figures."""
+"""Columns of the table of recordings: thumbnail, name, note, and properties."""
 
 from __future__ import annotations
 
@@ -27,11 +27,11 @@ BADGES = {
     "repaired": (lazy("repaired"), "info", "wrench"),
     "kept": (lazy("last seconds"), "off", "history"),
 }
-"""Badges: text, status, icon."""
+"""Text, status and icon of each badge."""
 
 
 def badge_of(facts: RecordingFacts, being_written: bool) -> str:
-    """Return the key of the badge in `BADGES`, or ""."""
+    """Return the key in `BADGES` of a recording's badge, or ""."""
     if being_written:
         return "recording"
     if facts.problem:
@@ -47,7 +47,7 @@ def badge_of(facts: RecordingFacts, being_written: bool) -> str:
 
 @dataclass(frozen=True)
 class RecordingMark:
-    """Cell content: thumbnail, name with badge, note. Thumbnails are compared by their id."""
+    """Cell with thumbnail, name, badge and note. Thumbnails are compared by identity."""
 
     name: str
     note: str
@@ -110,7 +110,7 @@ class RecordingMark:
 
 
 def cropped(image: QImage) -> QImage:
-    """Crop an image to the aspect ratio of thumbnails, at twice the size for high-DPI screens."""
+    """Crop an image to the aspect ratio of thumbnails, at twice their size for high-DPI screens."""
     wide, high = image.width(), image.height()
     if not wide or not high:
         return image
@@ -122,7 +122,7 @@ def cropped(image: QImage) -> QImage:
 
 
 def note_of(facts: RecordingFacts) -> str:
-    """Return the line below the name: error, note, or the first topics."""
+    """Return the second line of a row: the error, the note, or the names of the first topics."""
     return facts.problem or facts.not_scanned or facts.note or ", ".join(facts.topics[:3])
 
 
@@ -131,7 +131,12 @@ def columns(
     is_written: Callable[[RecordingFacts], bool],
     now: Callable[[], dt.datetime],
 ) -> tuple[Column[RecordingFacts], ...]:
-    """Return the columns; `picture` returns the thumbnail if loaded, `is_written` True during recording."""
+    """Return the columns of the table.
+
+    Args:
+        picture: Returns the thumbnail if it is loaded.
+        is_written: Returns True for the recording in progress.
+    """
 
     def name(facts: RecordingFacts) -> Cell:
         image = picture(facts)

@@ -1,4 +1,4 @@
-"""Details of the selected recording: open, rename, show the file, export all or a part."""
+"""Details of the selected recording: open, rename, show the file, export all or a part of it."""
 
 from __future__ import annotations
 
@@ -40,11 +40,11 @@ FORMAT_WORDS = {
     "csv": lazy("CSV"), "parquet": lazy("Parquet"), "pictures": lazy("Images"), "mp4": lazy("MP4"),
     "mcap": lazy("MCAP"),
 }  # fmt: skip
-"""Names of export formats, by the keys of `nep.recordings.export`."""
+"""Names of the export formats of `nep.recordings.export`."""
 
 
 class RecordingDetails(QWidget):
-    """Details below the table; emits `wants_export` with the format, and `cancelled`."""
+    """Details below the table; emits `wants_export` with the export format, and `cancelled`."""
 
     wants_export = Signal(str)
     cancelled = Signal()
@@ -95,7 +95,7 @@ class RecordingDetails(QWidget):
         self.format.changed.connect(lambda _kind: self._show_part())
         self._recording: Path | None = None
         self.folder: Path | None = None
-        """Target folder chosen by the person; None for the recording's own folder."""
+        """Folder for exports chosen by the user, or None for the folder of the recording."""
         self.into = ElidedLabel("body", "text", least=60)
         self.files = label("", "small", role="textSecondary")
         self.choose = Button(theme, _("Choose"), "folder-open", size="small")
@@ -147,7 +147,7 @@ class RecordingDetails(QWidget):
         return form
 
     def show_facts(self, facts: RecordingFacts, being_written: bool) -> None:
-        """Show a recording and enable the available actions."""
+        """Show the details of a recording and enable the actions that apply to it."""
         self.name.setText(facts.path.stem)
         self._recording = facts.path
         self._say_place()
@@ -167,7 +167,7 @@ class RecordingDetails(QWidget):
         self.delete.setEnabled(not being_written)
 
     def show_strip(self, look: FilmStripLook | None, images: Sequence[QImage | None] = ()) -> None:
-        """Show the time line of another recording, completely selected; None while it is loading."""
+        """Show another recording on the film strip, completely selected; None while it is loading."""
         self.strip.show_look(look, images)
         self.topics.show_patterns((), ())
         self._is_none_chosen = False
@@ -175,12 +175,12 @@ class RecordingDetails(QWidget):
         self._show_part()
 
     def set_folder(self, folder: Path | None) -> None:
-        """Set the target folder; None for the recording's own folder."""
+        """Set the folder for exports; None for the folder of the recording."""
         self.folder = folder
         self._say_place()
 
     def place(self) -> Path | None:
-        """Return the path of the export (a suffix is added if it exists); None without a recording."""
+        """Return the path of the exported file, with a suffix if that exists; None without a recording."""
         if self._recording is None:
             return None
         strip, name = self.strip, self._recording.stem
@@ -253,7 +253,7 @@ class RecordingDetails(QWidget):
         self.part_words.setText(words)
 
     def _say_size(self, look: FilmStripLook | None, part: Part | None) -> None:
-        # An estimate, for topics that the format supports.
+        # Estimated from the topics that the format supports.
         words, count = "", 0
         if look is not None and part is not None:
             names = {

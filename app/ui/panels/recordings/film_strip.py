@@ -1,4 +1,4 @@
-"""Film strip: time line of a recording with images and two handles to select a part."""
+"""Film strip: time line of a recording with images, and two handles to select a part of it."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ UNSELECTED_OPACITY = 0.35
 class StripHandle(QWidget):
     """Handle at one end of the selection.
 
-    Arrow keys move it by 1 s, with Shift by 10 s; `moved` has the shift.
+    Arrow keys move the handle by 1 s, with Shift by 10 s; `moved` carries the shift.
     """
 
     moved = Signal(object)
@@ -66,7 +66,7 @@ class StripHandle(QWidget):
 
 
 class FilmStrip(QWidget):
-    """Film strip of one recording; `changed` is emitted when another part is selected."""
+    """Film strip of one recording; `changed` is emitted when a different part is selected."""
 
     changed = Signal()
 
@@ -77,7 +77,7 @@ class FilmStrip(QWidget):
         self._images: Sequence[QImage | None] = ()
         self.begin_ns = self.end_ns = 0
         self.by_clock = False
-        """True: times are clock times; False: relative to the start of the recording."""
+        """True to show times of day, False to show times relative to the start of the recording."""
         self.begin = StripHandle(theme, self, _("Start of the part"))
         self.end = StripHandle(theme, self, _("End of the part"))
         self.begin.moved.connect(lambda by_ns: self.set_part(self.begin_ns + by_ns, self.end_ns))
@@ -103,13 +103,13 @@ class FilmStrip(QWidget):
             self.set_part(self.look.start_ns, self.look.end_ns)
 
     def set_part(self, begin_ns: int, end_ns: int) -> None:
-        """Select a part; the times are clamped to the recording and to each other."""
+        """Select a part. The times are clamped to the recording and to each other."""
         look = self.look
         if look is None:
             return
         begin_ns = max(look.start_ns, min(begin_ns, look.end_ns))
         end_ns = max(look.start_ns, min(end_ns, look.end_ns))
-        if begin_ns > end_ns:  # a handle stops at the other one
+        if begin_ns > end_ns:  # each handle stops at the other one
             begin_ns, end_ns = (end_ns, end_ns) if begin_ns != self.begin_ns else (begin_ns, begin_ns)
         self.begin_ns, self.end_ns = begin_ns, end_ns
         for handle, at_ns in ((self.begin, begin_ns), (self.end, end_ns)):
@@ -118,13 +118,13 @@ class FilmStrip(QWidget):
         self.changed.emit()
 
     def time_words(self, at_ns: int, *, digits: int) -> str:
-        """Format a time, relative to the start ("6:40.0") or as clock time ("15:08:40.0")."""
+        """Format a time relative to the start ("6:40.0") or as time of day ("15:08:40.0")."""
         if self.by_clock:
             return clock_words(at_ns, digits=digits)
         return span_words(at_ns - (self.look.start_ns if self.look is not None else 0), digits=digits)
 
     def show_clock(self, by_clock: bool) -> None:
-        """Switch between clock times and times relative to the start."""
+        """Switch between times of day and times relative to the start."""
         self.by_clock = by_clock
         self.set_part(self.begin_ns, self.end_ns)
         self.update()
@@ -175,7 +175,7 @@ class FilmStrip(QWidget):
         self._arrange()
 
     def mousePressEvent(self, event: QMouseEvent) -> None:
-        # Moves the nearer handle.
+        # Moves the handle nearest to the mouse.
         if self.look is None or event.button() != Qt.MouseButton.LeftButton:
             return
         x = event.position().x()

@@ -50,7 +50,7 @@ SIDECAR = ".bookmarks.json"
 
 
 class RecordingsPanel(TablePanel[RecordingFacts]):
-    """Table of recordings with the details of the selected one below."""
+    """Panel with the table of recordings and, below it, the details of the selected one."""
 
     def __init__(self, context: PanelContext) -> None:
         self._recordings = context.session.recordings
@@ -141,7 +141,7 @@ class RecordingsPanel(TablePanel[RecordingFacts]):
         self._show_details()
 
     def _now(self, facts: RecordingFacts) -> RecordingFacts:
-        # Figures of a recording in progress come from the recorder.
+        # Size and duration of a recording in progress come from the recorder.
         if not self._is_written(facts):
             return facts
         state = self._recordings.client.state
@@ -252,7 +252,7 @@ class RecordingsPanel(TablePanel[RecordingFacts]):
             self._strips.ask("strip", lambda: _strip(path, self._opener))
 
     def _follow_strip(self) -> None:
-        # Shows a loaded film strip; a loop on the timeline becomes the selected part.
+        # Shows the film strip once it is loaded; a loop on the timeline becomes the selected part.
         made = self._strips.pop_result("strip")
         if made is not None:
             look, images = made
@@ -288,7 +288,7 @@ class RecordingsPanel(TablePanel[RecordingFacts]):
         )
 
     def choose_file(self, path: Path) -> None:
-        """Select a recording as soon as it is listed."""
+        """Select a recording as soon as it appears in the list."""
         self.filter.clear()
         self._wanted = str(path)
         self._ticks = 0
@@ -336,7 +336,7 @@ class RecordingsPanel(TablePanel[RecordingFacts]):
         return True
 
     def _put(self, path: Path, new: Path | None) -> None:
-        # Shown at once; the next scan confirms it.
+        # Shown before the next scan confirms the change.
         files = [
             replace(each, path=new) if each.path == path and new is not None else each
             for each in self._look.files

@@ -19,7 +19,10 @@ from nep.i18n import _
 
 
 class RecordingTable(TableView[RecordingFacts]):
-    """Table in which a click selects; `chosen` has the key of the row, also on keyboard selection."""
+    """Table of recordings in which a click only selects.
+
+    `chosen` carries the key of the row, also for selection by keyboard.
+    """
 
     chosen = Signal(str)
     rename_wanted = Signal(str)
@@ -33,7 +36,7 @@ class RecordingTable(TableView[RecordingFacts]):
         self.selectionModel().currentRowChanged.connect(lambda _new, _old: self._tell_chosen())
 
     def _open(self, index: QModelIndex) -> None:
-        # A click only selects, because opening a recording replaces the source of all panels.
+        # A click doesn't open the recording, because that would replace the source of all panels.
         ...
 
     def _open_row(self, index: QModelIndex) -> None:
@@ -56,7 +59,7 @@ class RecordingTable(TableView[RecordingFacts]):
             super().keyPressEvent(event)
 
     def rename(self, key: str, name: str, take: Callable[[str], bool]) -> None:
-        """Rename a recording in its row."""
+        """Start in-place editing of a recording's name; `take` receives the new name."""
         self.choose(key)
         index = self.currentIndex()
         self.scrollTo(index)

@@ -21,7 +21,7 @@ TABLE_HEIGHT = 150
 
 
 class TopicList(QWidget):
-    """Checklist of topics; `chosen` has the names of all checked topics after a change."""
+    """Checklist of topics; `chosen` carries the names of all checked topics after a change."""
 
     chosen = Signal(list)
 
@@ -90,7 +90,7 @@ class TopicList(QWidget):
         chosen: Collection[str],
         size_of: Callable[[RecordedTopic], float | None],
     ) -> None:
-        """Show the topics with their check marks; `size_of` returns a topic's size in bytes, if known."""
+        """Show the topics with their check marks; `size_of` returns the size of a topic in bytes, or None."""
         self._names, self._size_of = frozenset(chosen), size_of
         if topics is not self._topics:
             self._topics = topics
@@ -117,7 +117,7 @@ class TopicList(QWidget):
         self._choose(self._names ^ {name})
 
     def _choose_shown(self, *, wanted: bool) -> None:
-        # Only topics that match the filter.
+        # Topics that match the filter.
         shown = {topic.name for topic in self._shown()}
         self._choose(self._names | shown if wanted else self._names - shown)
 

@@ -1,4 +1,4 @@
-"""Robot panel: virtual robots in their room, which can be touched, moved and spoken to.
+"""Robot panel: virtual robots in their room. They can be touched, moved and spoken to.
 
 `room_view` is the interactive drawing, `say_bar` the speech field and the menu of simulated events.
 """

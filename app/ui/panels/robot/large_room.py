@@ -1,4 +1,4 @@
-"""Enlarged room over the middle of the window; the run bar with Stop stays accessible above it."""
+"""Enlarged view of the room over the middle of the window. The run bar with Stop stays accessible."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from nep.i18n import _
 
 
 class LargeRoom(QWidget):
-    """Overlay of the window's panels with the room; closed by Esc, its button or a double click.
+    """Overlay with the room that covers the panels; closed by Esc, its button or a double click.
 
     Args:
         panel: Panel within the area to cover.
@@ -61,21 +61,21 @@ class LargeRoom(QWidget):
         self.setFocus(Qt.FocusReason.OtherFocusReason)
 
     def _keep_keys(self, _old: QWidget | None, now: QWidget | None) -> None:
-        # Covered widgets must not get the focus: Esc would not reach this widget, and the editor would change
-        # unseen.
+        # Covered widgets must not get the focus: Esc would not reach the overlay, and the editor would change
+        # invisibly.
         covered = now is not None and self._over.isAncestorOf(now) and not self.isAncestorOf(now)
         if covered and now is not self and self.isVisible():
             self.setFocus(Qt.FocusReason.OtherFocusReason)
 
     def fill_screen(self) -> None:
-        """Toggle full screen mode of the window."""
+        """Toggle the window's full screen mode."""
         window = self.window()
         self.filled = not self.filled
         window.setWindowState(window.windowState() ^ Qt.WindowState.WindowFullScreen)
         self.screen_button.set_word(_("Leave full screen") if self.filled else _("Full screen"))
 
     def dispose(self) -> None:
-        """Close the overlay, leave full screen mode and hand the stage back."""
+        """Close the overlay, leave full screen mode and return the stage to the panel."""
         if self.filled:
             self.fill_screen()
         self._over.removeEventFilter(self)
@@ -107,7 +107,7 @@ class LargeRoom(QWidget):
 
 
 def _middle_of(panel: QWidget) -> QWidget:
-    # Falls back to the window if the panel is not within the workbench.
+    # Returns the window if the panel is not within the workbench.
     around = panel.parentWidget()
     while around is not None and not isinstance(around, QMainWindow):
         around = around.parentWidget()

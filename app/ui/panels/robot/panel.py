@@ -33,7 +33,10 @@ if TYPE_CHECKING:
     from app.core.robots.robot_link import RobotLink
 
 STALE_AFTER_S = 2.0
-"""Silence after which the drawing is stale; virtual robots report their state many times a second."""
+"""Time in s without a state after which the drawing is stale.
+
+Virtual robots publish it many times a second.
+"""
 
 
 ADDED = {
@@ -46,7 +49,7 @@ ADDED = {
 
 
 def things_of(room: Room) -> tuple[Thing, ...]:
-    """Return the drawable things of a room."""
+    """Return the things of a room that can be drawn."""
     return tuple(
         Thing(
             kind_of(thing), thing.x, thing.y, thing.name,
@@ -64,7 +67,7 @@ def radius_of(robot: RobotState) -> float:
 
 
 class RobotPanel(OneRobotPanel):
-    """Panel of a virtual robot; the title is its name."""
+    """Panel with one virtual robot, whose name is the title."""
 
     def __init__(self, context: PanelContext) -> None:
         super().__init__(context, _("Robot"))
@@ -93,7 +96,7 @@ class RobotPanel(OneRobotPanel):
         self.pages = self.show_one_of(self.empty, self.stage)
 
     def _room_tools(self, size: int) -> tuple[IconButton, IconButton]:
-        # One set for the title bar, another for the enlarged room.
+        # Called once for the title bar and once for the enlarged room.
         add = IconButton(self.theme, "plus", _("Add something to the room"), size=size)
         add.clicked.connect(lambda: self._show_room_menu("", None, add))
         reset = IconButton(self.theme, "rotate-cw", _("Reset the robot and its room"), size=size)
@@ -190,7 +193,7 @@ class RobotPanel(OneRobotPanel):
             self.empty.set_actions([show])
 
     def _awaited(self, event: Event, name: str) -> Sequence[str]:
-        # Values from the active behaviour come first.
+        # Values used in the active behaviour come first.
         link, shown = self.session.fleet.link(self._robot), self.session.document
         if link is None:
             return ()
@@ -198,13 +201,13 @@ class RobotPanel(OneRobotPanel):
         return awaited_values((each.workspace for each in documents), link.robot, event, name)
 
     def _switch_sound(self) -> None:
-        # Speech bubbles are shown in any case.
+        # Speech bubbles are shown even if speech is off.
         with suppress(SettingsError):
             self.session.voices.switch(on=not self.session.voices.on)
         self._show_sound()
 
     def _show_sound(self) -> None:
-        # Shows the reason if speech is on but not working.
+        # The reason is shown if speech is on but does not work.
         on, problem = self.session.voices.on, self.session.voices.problem
         if (on, problem) == self._sound_shown:
             return
@@ -219,7 +222,7 @@ class RobotPanel(OneRobotPanel):
     # -- room ---------------------------------------------------------------------------------------------
 
     def _show_room(self, link: RobotLink) -> None:
-        # The robot, others in the same room, and things.
+        # The main robot, others in the same room, and things.
         drawing = link.drawing or {}
         if not RobotState.parse(drawing).shared:
             self.view.show_state(drawing)
@@ -235,7 +238,8 @@ class RobotPanel(OneRobotPanel):
         self.view.show_state(drawing, others, self._things[1])
 
     def _heard_beside(self) -> str:
-        # Speech still playing after its bubble disappeared, or what a robot heard.
+        # Caption of speech that is still playing after its bubble disappeared, or of words that a robot
+        # heard.
         said = self.session.voices.saying
         robots = [(self._robot, self.view.state), *self.view.others]
         if said is not None and said.words not in {state.speech for _name, state in robots}:
@@ -244,7 +248,7 @@ class RobotPanel(OneRobotPanel):
         return _("{robot} heard “{words}”").format(robot=heard[0][0], words=heard[0][1]) if heard else ""
 
     def _others(self, link: RobotLink) -> list[RobotLink]:
-        # Each of the other virtual robots is watched while the panel is visible.
+        # Every other virtual robot is watched while the panel is visible.
         fleet = self.session.fleet
         there = [each for each in fleet.connected if each.virtual and each.name != link.name]
         names = {each.name for each in there}
@@ -269,7 +273,7 @@ class RobotPanel(OneRobotPanel):
             self._change({"reset": True}, name)
 
     def _show_room_menu(self, thing: str, place: QPoint | None, button: QWidget | None = None) -> None:
-        # At a position (context menu), else below a button.
+        # Opens at a position (context menu), or below a button.
         menu = Menu(self.theme, self)
         if thing:
             words = plain.entry(_("Remove {thing}").format(thing=thing))
@@ -293,7 +297,7 @@ class RobotPanel(OneRobotPanel):
             menu.popup(place)
 
     def _add(self, kind: str) -> None:
-        # At a free place in front of the first robot.
+        # Adds a thing at a free place in front of the first robot.
         state = self.view.state
         room = self.session.room.room
         radius = {"ball": 0.3, "person": 0.4, "marker": 0.3}.get(kind, 0.8)
@@ -307,7 +311,7 @@ class RobotPanel(OneRobotPanel):
     # -- enlarged room ------------------------------------------------------------------------------------
 
     def enlarge(self) -> None:
-        """Toggle the enlarged room."""
+        """Show or hide the enlarged room."""
         if self._large is not None:
             self._large.dispose()
             return
@@ -317,7 +321,7 @@ class RobotPanel(OneRobotPanel):
         self.large.set_icon("minimize-2")
 
     def fill_screen(self) -> None:
-        """Toggle the room in full screen mode, with the run bar above it."""
+        """Show or hide the room in full screen mode, with the run bar above it."""
         if self._large is not None and self._large.filled:
             self._large.dispose()
             return
@@ -349,12 +353,13 @@ class RobotPanel(OneRobotPanel):
 
     def resume(self) -> None:
         if self._watch is not None and self._watch.resting:
-            self._told_s = time.monotonic()  # the watch was suspended, so the state is not stale
+            # the watch was suspended, so the age of the state is unknown rather than stale
+            self._told_s = time.monotonic()
         super().resume()
 
 
 def _where_to_look(link: RobotLink) -> str:
-    # Mentions only what the robot has.
+    # Mentions only parts that the robot has.
     images = [sensor.is_image for sensor in link.robot.sensors]
     if True in images and False in images:
         return _("Its camera and sensors show its state.")

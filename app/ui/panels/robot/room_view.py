@@ -28,7 +28,7 @@ from nep.i18n import _
 
 TOUCHABLE = ("head", "left_hand", "right_hand")
 BODY = "body"
-"""Part by which a robot is picked up."""
+"""Name of the part by which a robot is lifted and moved."""
 STALE_COLOUR = QColor(90, 90, 90, 150)
 TOUCH_KEYS = {Qt.Key.Key_H: "head", Qt.Key.Key_L: "left_hand", Qt.Key.Key_R: "right_hand"}
 ARROW_DIRECTIONS = {
@@ -43,22 +43,23 @@ DRAG_DISTANCE_PX = 4
 
 
 def split(part: str) -> tuple[str, str]:
-    """Split a part such as ``Turtle/body`` into robot (empty for the main robot) and part."""
+    """Split a part such as ``Turtle/body`` into robot ("" for the main robot) and part."""
     name, _slash, of = part.rpartition("/")
     return name, of
 
 
 class RoomView(QWidget):
-    """Drawing of a room. Head and hands react to presses; robots and things are dragged over the floor.
+    """Drawing of a room. Heads and hands react to presses; robots and things can be dragged over the floor.
 
     A click on a robot with a bumper presses it. Keys: Tab selects the next item, arrows move it, Space
-    presses a bumper or touches a head while held, H, L and R touch head and hands, Delete removes a thing.
+    presses a
+    bumper or touches a head while held, H, L and R touch head and hands, Delete removes a thing.
     """
 
-    touched = Signal(str, str, bool)  # robot ("": main robot), part, pressed
+    touched = Signal(str, str, bool)  # robot ("" for the main one), part, True if pressed
     moved = Signal(str, float, float)  # thing, x, y in m
     carried = Signal(str, float, float)  # robot, x, y in m
-    held = Signal(str, bool)  # robot, picked up
+    held = Signal(str, bool)  # robot, True if lifted
     bumped = Signal(str, str)  # robot, side of the bumper
     removed = Signal(str)  # thing
     menu_wanted = Signal(str, QPoint)  # thing or "", position on the screen
@@ -80,7 +81,7 @@ class RoomView(QWidget):
         self._hovered: str | None = None
         self.chosen: str | None = None
         self.robot_name = ""
-        """State of the main robot."""
+        """Name of the main robot."""
         self._keys: dict[int, tuple[str, str]] = {}  # part touched by each pressed key
         self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Expanding)
         self.setMinimumSize(160, 120)
@@ -104,7 +105,7 @@ class RoomView(QWidget):
         others: Sequence[tuple[str, Mapping[str, object]]] = (),
         things: tuple[Thing, ...] | None = None,
     ) -> None:
-        """Draw the state of the main robot, other robots, and things (None: those of the state).
+        """Draw the main robot, other robots, and things; None draws the things of the robot's state.
 
         Repeated calls with the same objects are cheap.
         """
@@ -123,14 +124,14 @@ class RoomView(QWidget):
             self.update()
 
     def set_stale(self, stale: bool) -> None:
-        """Mark the robot as stale: drawn grey, without speech."""
+        """Show the robot as stale: drawn in grey, without speech."""
         if stale != self.stale:
             self.stale = stale
             self.setAccessibleDescription(self._described())
             self.update()
 
     def show_heard(self, words: str) -> None:
-        """Show a caption below the drawing for heard words; "" for none."""
+        """Show heard words as a caption below the drawing; "" for none."""
         if words != self.heard:
             self.heard = words
             self.update()
@@ -142,7 +143,7 @@ class RoomView(QWidget):
         return QSize(382, 286)
 
     def place_of(self, part: str) -> QPointF | None:
-        """Return the position of a part in the view, for tests and tools."""
+        """Return the position of a part in the view; for tests and tools."""
         return self._drawing.place_of(part, QRectF(self.rect()), self.state, self.others)
 
     def paintEvent(self, _event: QPaintEvent) -> None:
@@ -168,12 +169,12 @@ class RoomView(QWidget):
         return next(found, None) if part else None
 
     def _robot(self, part: str | None) -> RobotState | None:
-        # The robot that has this part as its body.
+        # Returns the robot that has this part as its body.
         name, of = split(part or "")
         return ({"": self.state} | dict(self.others)).get(name) if of == BODY else None
 
     def _where(self, part: str | None) -> tuple[float, float] | None:
-        # Position in m of a movable item.
+        # Returns the position in m of an item that can be moved.
         found = self._robot(part) or self._thing(part)
         movable = found is not None and (isinstance(found, RobotState) or self._movable(found))
         return (found.x, found.y) if found is not None and movable else None
@@ -182,7 +183,7 @@ class RoomView(QWidget):
         return self.state.shared or thing.kind in {"ball", "person"}
 
     def choices(self) -> list[str]:
-        """Return the items for keyboard selection: robots, then things."""
+        """Return the items that can be selected by keyboard: robots, then things."""
         robots = [BODY, *(f"{name}/{BODY}" for name, _state in self.others)]
         return [*robots, *(thing.name for thing in self.state.objects if thing.name and self._movable(thing))]
 
@@ -260,7 +261,7 @@ class RoomView(QWidget):
     def mouseDoubleClickEvent(self, event: QMouseEvent) -> None:
         part = self._at(event.position())
         if part is not None and (split(part)[1] in TOUCHABLE or self._has_bumper(part)):
-            self.mousePressEvent(event)  # two fast clicks
+            self.mousePressEvent(event)  # second press of a fast double click
         elif event.button() == Qt.MouseButton.LeftButton:
             self.enlarged.emit()
 

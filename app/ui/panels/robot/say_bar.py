@@ -1,4 +1,4 @@
-"""Bar to speak to a virtual robot and to simulate events."""
+"""Bar below the room to speak to a virtual robot and to simulate events."""
 
 from __future__ import annotations
 
@@ -18,16 +18,16 @@ from app.ui.widgets.menus import Menu, drop_below
 from nep.i18n import _
 
 HEARD_EVENT = "heard"
-"""Event of a robot that hears speech."""
+"""Name of the event that a robot publishes when it hears speech."""
 MAX_ENTRIES = 24
 MAX_WIDTH = 720
-"""Maximum width in px, for the enlarged room."""
+"""Maximum width in px, which limits the bar of the enlarged room."""
 Awaited: TypeAlias = Callable[[Event, str], Sequence[str]]
 Happening: TypeAlias = dict[str, object]
 
 
 class SayField(SearchField):
-    """Speech field: Return emits `said`, Down emits `asked` for suggestions."""
+    """Text field for speech. Return emits `said`; Down emits `asked` to show suggestions."""
 
     said = Signal(str)
     asked = Signal()
@@ -63,13 +63,14 @@ class SayField(SearchField):
 
 
 class SayBar(QWidget):
-    """Speech field with suggestions, and the menu of simulated events.
+    """Bar with the speech field, its suggestions, and the menu of simulated events.
 
-    `awaited` returns the values of an event's field that programs are waiting for.
+    Args:
+        awaited: Returns the values of an event's field that programs are waiting for.
     """
 
     said = Signal(str)
-    happened = Signal(object)  # a Happening in the format of a virtual robot's world
+    happened = Signal(object)  # `Happening`, in the format of a virtual robot's world
 
     def __init__(self, theme: Theme, awaited: Awaited) -> None:
         super().__init__()
@@ -94,11 +95,11 @@ class SayBar(QWidget):
         self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Fixed)
 
     def add(self, button: QWidget) -> None:
-        """Add a button at the right."""
+        """Add a button at the right end."""
         self._row.insertWidget(self._row.count() - 1, button)
 
     def show_robot(self, robot: Robot) -> None:
-        """Switch to this robot."""
+        """Switch to another robot."""
         self._robot = robot
         hears = robot.event(HEARD_EVENT) is not None
         words = _("Say something to {robot}").format(robot=robot.name)
@@ -117,7 +118,7 @@ class SayBar(QWidget):
         return self._awaited(event, event.filters[0]) if event is not None and event.filters else ()
 
     def show_words(self) -> None:
-        """Show a menu of awaited words; a choice is spoken at once."""
+        """Show a menu of the words that programs are waiting for; choosing one speaks it."""
         menu = Menu(self._theme, self)
         for word in self.choices():
             menu.addAction(plain.entry(word)).triggered.connect(
@@ -165,7 +166,7 @@ def _entries(event: Event, awaited: Awaited) -> Iterator[tuple[str, str, Happeni
 
 
 def _sentence(event: Event, values: dict[str, str]) -> str:
-    # The text of the block without the robot, such as "Sees something red".
+    # Text of the event's block without the robot, such as "Sees something red".
     words = event.text.partition("%robot")[2].strip() or event.title
     for name, title in values.items():
         words = words.replace(f"%{name}", title)

@@ -28,9 +28,10 @@ RISKS = {"moves": MOVES, "locomotes": MOVES}
 
 
 class ActionCard(Card):
-    """Card of an action; emits `tried` with the input and `cancelled`.
+    """Card of an action. Emits `tried` with the input, and `cancelled`.
 
-    `title_of` returns the title of another action by its name.
+    Args:
+        title_of: Returns the title of another action by its name.
     """
 
     tried = Signal(dict)
@@ -100,7 +101,7 @@ class ActionCard(Card):
             column.addWidget(widget)
 
     def set_folded(self, folded: bool) -> None:
-        """Hide or show the form."""
+        """Collapse or expand the form."""
         self._folded = folded
         self.form.setVisible(not folded and bool(self.action.parameters))
         self.fold.set_icon("chevron-down" if folded else "chevron-up")
@@ -112,7 +113,7 @@ class ActionCard(Card):
         self.summary.setVisible(self._folded)
 
     def set_first(self, first: bool) -> None:
-        """Highlight the card with the focus: accent border and filled Try button."""
+        """Highlight the card, or remove the highlight: accent border and filled Try button."""
         border = "accent" if first else "border"
         if border != self.border:
             self.border = border
@@ -138,7 +139,7 @@ class ActionCard(Card):
         self.tries.setVisible(on)
 
     def _take_back(self, given: Mapping[str, object]) -> None:
-        # Restores the input of an earlier try.
+        # Puts the input of an earlier try into the form.
         self.set_folded(False)
         self.form.set_input(given)
         self.form.show_problems(())
@@ -150,12 +151,12 @@ class ActionCard(Card):
         self.form.show_problems(problems)
 
     def show_tries(self, tries: Sequence[Invocation]) -> None:
-        """Show the latest tries of this action in the history."""
+        """Update the list of the latest tries of this action."""
         self.tries.show_tries(tries)
         self.past.setVisible(bool(self.tries.rows))
 
     def show_invocation(self, invocation: Invocation | None, *, may_move: bool = False) -> None:
-        """Show the state of the latest try; `may_move` is True if the robot may not have stopped."""
+        """Show the state of the latest try. `may_move` is True if the robot may still be moving."""
         self._running = invocation is not None and invocation.running
         can_cancel = self._running and (
             self.action.cancellable or (invocation is not None and invocation.state in ("sent", "accepted"))

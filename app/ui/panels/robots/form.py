@@ -22,14 +22,15 @@ from nep.i18n import _
 
 LABEL_WIDTH = 92
 ROW_GAP = 10
-TALL_ROW = 60  # px; in taller rows the label is centred
+TALL_ROW = 60  # px; in taller rows the label is vertically centred
 
 
 class ActionForm(QWidget):
-    """One row per parameter; advanced ones are shown by "More". Emits `changed` on user changes.
+    """Form with one row per parameter; "More" shows the advanced ones. Emits `changed` on user input.
 
-    `options` returns the values that a property of the robot currently offers; `pictures` is the source of
-    images.
+    Args:
+        options: Returns the values that a property of the robot currently offers.
+        pictures: Source of images.
     """
 
     changed = Signal()
@@ -98,7 +99,7 @@ class ActionForm(QWidget):
     # -- layout -------------------------------------------------------------------------------------------
 
     def _fit(self) -> None:
-        # Labels are beside the controls if all controls fit, else above them.
+        # Labels are beside the controls if all controls fit there, else above them.
         beside = round(self._theme.scaled(LABEL_WIDTH))
         stacked = self.width() < beside + self._grid.horizontalSpacing() + self._control_width()
         self._grid.setColumnMinimumWidth(0, 0 if stacked else beside)
@@ -108,7 +109,7 @@ class ActionForm(QWidget):
                 self._put(2 * place, name, cell)
 
     def _control_width(self) -> int:
-        # Wrapping controls count with their width in one row.
+        # Wrapping controls count with the width that they need for a single row.
         each = [one.widget for one in self.controls.values()]
         in_one_row = (one.sizeHint().width() for one in each if isinstance(one, Segments | ColourChoice))
         return max((*in_one_row, *(one.minimumSizeHint().width() for one in each)), default=0)
@@ -129,7 +130,7 @@ class ActionForm(QWidget):
         self._fit()
 
     def minimumSizeHint(self) -> QSize:
-        # Labels can be placed above the controls.
+        # Minimum width with labels above the controls.
         least = max((cell.minimumSizeHint().width() for _name, cell in self._rows.values()), default=0)
         return QSize(least, super().minimumSizeHint().height())
 
@@ -138,7 +139,7 @@ class ActionForm(QWidget):
         self.changed.emit()
 
     def _left(self, parameter: Parameter) -> None:
-        # Validates when the focus leaves a field, before a try.
+        # Validates when a field loses the focus, so that errors are shown before a try.
         value = self.controls[parameter.name].value()
         wrong = None if value is None else wrong_value(parameter, value)
         said = [] if wrong is None else [wrong]
@@ -155,18 +156,18 @@ class ActionForm(QWidget):
                     widget.setVisible(on)
 
     def input(self) -> dict[str, object]:
-        """Return the input of the action; empty fields are omitted."""
+        """Return the input for the action; empty fields are omitted."""
         given = {name: control.value() for name, control in self.controls.items()}
         return {name: value for name, value in given.items() if value is not None}
 
     def set_input(self, given: Mapping[str, object]) -> None:
-        """Show these values."""
+        """Fill the fields with an input."""
         for name, value in given.items():
             if name in self.controls:
                 self.controls[name].show_value(value)
 
     def show_problems(self, problems: Sequence[InputProblem]) -> None:
-        """Show each error below its parameter, others at the end of the form."""
+        """Show each error below its parameter, and other errors at the end of the form."""
         for parameter in self.action.parameters:
             self._judge(parameter, [each.sentence for each in problems if each.parameter == parameter.name])
         rows = {parameter.name for parameter in self.action.parameters}
@@ -194,7 +195,7 @@ class ActionForm(QWidget):
                 field.style().polish(field)
 
     def summary(self) -> str:
-        """Return a short description of the values, such as "happy, for 2 s"."""
+        """Return a short description of the input, such as "happy, for 2 s"."""
         given = {name: control.value() for name, control in self.controls.items()}
         return input_words(self.action, given, texts=False)
 

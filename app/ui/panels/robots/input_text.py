@@ -1,4 +1,4 @@
-"""Short descriptions of an action's input, such as "happy, for 2 s" or "“Hello”"."""
+"""Short descriptions of the input of an action, such as "happy, for 2 s" or "“Hello”"."""
 
 from __future__ import annotations
 
@@ -13,13 +13,16 @@ MAX_TEXT_LENGTH = 32
 
 
 def input_words(action: Action, given: Mapping[str, object], *, texts: bool = True) -> str:
-    """Return the most important values in the order of the parameters; `texts` includes quoted texts."""
+    """Describe the most important values of an input, in the order of the parameters.
+
+    If `texts` is True, texts are included in quotation marks.
+    """
     found = (_words(parameter, given.get(parameter.name), texts=texts) for parameter in action.parameters)
     return ", ".join(words for words in found if words)
 
 
 def is_unit(title: str, unit: str | None) -> bool:
-    """Return True if the title is just the name of its unit, such as "seconds"."""
+    """Return True if the title of a parameter is just the name of its unit, such as "seconds"."""
     english = UNITS.get(unit or "")
     return english is not None and title in {english, translate("robot", english)}
 

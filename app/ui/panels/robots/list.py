@@ -1,4 +1,4 @@
-"""List of robots at the left of the Robots panel, with help for a missing robot."""
+"""List of robots at the left of the Robots panel, with help for a robot that is not found."""
 
 from __future__ import annotations
 
@@ -31,13 +31,13 @@ LIST_WIDTH = 300
 
 
 def seen_words(seen_s: float, now: dt.datetime | None = None) -> str:
-    """Return "seen today, 8:12", "seen yesterday, 16:20" or "seen 17 November, 16:20"."""
+    """Format when a robot was last seen, such as "seen today, 8:12" or "seen 17 November, 16:20"."""
     now = now or dt.datetime.now().astimezone()
     return dates.seen_words(dt.datetime.fromtimestamp(seen_s, tz=now.tzinfo), now)
 
 
 class RobotItem(PaintedButton):
-    """Row of a robot; `menu_wanted` has the screen position of a context menu."""
+    """Row of a robot; `menu_wanted` carries the screen position for a context menu."""
 
     menu_wanted = Signal(QPoint)
 
@@ -55,14 +55,14 @@ class RobotItem(PaintedButton):
         row.addWidget(self.chip)
 
     def show_link(self, link: RobotLink, seen: str = "") -> None:
-        """Show the robot's state; `seen` replaces the description of a disconnected robot."""
+        """Show the state of a robot; `seen` replaces the description of a disconnected one."""
         where = _("virtual, this computer") if link.virtual else link.robot.title
         away = not link.connected
         self._show(link.state, seen if away and seen else where, away=away)
         self.may_be_forgotten = self._away and not link.virtual
 
     def show_away(self, seen: str) -> None:
-        """Show a robot of an earlier session that is not connected; a click opens its menu."""
+        """Show a robot of an earlier session that is not connected; clicking it opens the context menu."""
         self.setAutoExclusive(False)
         self.setCheckable(False)
         self._show("away", seen, away=True)
@@ -104,9 +104,10 @@ class RobotItem(PaintedButton):
 
 
 class RobotList(QWidget):
-    """List of robots; `chosen` and `forgotten` have a robot's name.
+    """List of robots; `chosen` and `forgotten` carry the name of a robot.
 
-    `run` executes a command by its id.
+    Args:
+        run: Executes a command by its id.
     """
 
     chosen = Signal(str)
@@ -149,7 +150,7 @@ class RobotList(QWidget):
         return len(self.items) + len(self.away)
 
     def show_fleet(self, fleet: Fleet) -> list[str]:
-        """Show the robots of this session, then those of earlier ones; return the names of the former."""
+        """Show the robots of this session, then those of earlier ones. Return the names of the former."""
         self._known = {robot.name: robot for robot in fleet.known.robots}
         links = [link for link in fleet.links if link.connected or link.virtual or link.name in self._known]
         names = [link.name for link in links]
@@ -157,7 +158,7 @@ class RobotList(QWidget):
         return names
 
     def last_seen_text(self, name: str) -> str:
-        """Return when a real robot was last seen, or ""."""
+        """Return the text with the time when a real robot was last last_seen_text, or ""."""
         return seen_words(self._known[name].seen_s) if name in self._known else ""
 
     def _show(self, links: Sequence[RobotLink], away: Sequence[KnownRobot]) -> None:
@@ -201,7 +202,7 @@ class RobotList(QWidget):
             menu.popup(at)
 
     def menu_of(self, item: RobotItem) -> Menu | None:
-        """Return the context menu of a disconnected robot; None for connected and virtual ones."""
+        """Return the context menu of a disconnected robot; None for connected and virtual robots."""
         if not item.may_be_forgotten:
             return None
         menu = Menu(self._theme, self)

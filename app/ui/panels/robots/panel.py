@@ -1,4 +1,4 @@
-"""Robots panel: actions of each robot as forms that can be tried."""
+"""Robots panel: actions of each robot as forms, to try them."""
 
 from __future__ import annotations
 
@@ -47,7 +47,7 @@ PICTURE_CODEC = "image"
 
 
 class RobotHead(QWidget):
-    """Header of the selected robot: name, state and its Stop button."""
+    """Header of the selected robot: name, state and its own Stop button."""
 
     def __init__(self, theme: Theme) -> None:
         super().__init__()
@@ -70,7 +70,7 @@ class RobotHead(QWidget):
 
 
 class SessionPictures:
-    """Image topics and files of the session for forms."""
+    """Image source for forms: image topics of the session, and files."""
 
     def __init__(self, session: Session, files: FileDialogs) -> None:
         self._session, self._files = session, files
@@ -95,16 +95,16 @@ class SessionPictures:
         return made
 
     def ask_file(self, folder: str, take: Callable[[Path], None]) -> None:
-        """Ask for an image file."""
+        """Show the dialog to choose an image file."""
         self._files.open_picture(folder, take)
 
 
 class RobotsPanel(OneRobotPanel):
-    """List of robots with the actions of the selected one."""
+    """Panel with the list of robots and the action cards of the selected one."""
 
     def __init__(self, context: PanelContext) -> None:
         super().__init__(context, _("Robots"))
-        self._names: list[str] = []  # robots in the list
+        self._names: list[str] = []  # names of the robots in the list
         self.cards: dict[str, ActionCard] = {}
         self._cards_of = ""
         self._pictures = SessionPictures(self.session, self.context.files)
@@ -172,7 +172,7 @@ class RobotsPanel(OneRobotPanel):
         self._fit()
 
     def wanted_robot(self) -> RobotLink | None:
-        """Return the robot selected here as long as it is listed, else the shown or the first one."""
+        """Return the robot that was selected here while it is listed, else the shown or the first one."""
         fleet, names = self.session.fleet, self._names
         if self._robot in names:
             return fleet.link(self._robot)
@@ -190,7 +190,7 @@ class RobotsPanel(OneRobotPanel):
             self._no_robot.set_starting(self.session.coming)
 
     def _new(self, what: str, *now: object) -> bool:
-        # True if the value differs from the one shown last.
+        # Returns True if the value differs from the one that was shown last.
         changed = self._seen.get(what) != now
         self._seen[what] = now
         return changed
@@ -203,7 +203,7 @@ class RobotsPanel(OneRobotPanel):
         self.refresh()
 
     def choose(self, name: str) -> None:
-        """Select a robot, here and in all panels of one robot."""
+        """Select a robot, here and in all panels that show one robot."""
         self.session.fleet.choose(name)
         link = self.session.fleet.link(name)
         if link is not None:
@@ -250,7 +250,7 @@ class RobotsPanel(OneRobotPanel):
         self._filter()
 
     def _made_for(self, link: RobotLink) -> bool:
-        # True: the typed input of the cards is kept.
+        # Returns True if the typed input of the cards was kept.
         return self._cards_of == link.name
 
     def _drop_cards(self) -> None:
@@ -262,7 +262,7 @@ class RobotsPanel(OneRobotPanel):
         self._seen = {what: seen for what, seen in self._seen.items() if not what.startswith("card ")}
 
     def _offered(self, link: RobotLink) -> tuple[object, ...]:
-        # A change of the offered values rebuilds the forms.
+        # The forms are rebuilt when the offered values change.
         named = {one.options_from for action in link.robot.actions for one in action.parameters}
         return tuple((name, tuple(self._options(name))) for name in sorted(filter(None, named)))
 
@@ -279,12 +279,12 @@ class RobotsPanel(OneRobotPanel):
                 card.show_tries(tuple(link.tried))
 
     def _options(self, name: str) -> Sequence[str]:
-        # Values offered by a property of the robot.
+        # Values that a property of the robot offers.
         link = self.session.fleet.link(self._robot)
         value = link.values.get(name) if link is not None else None
         if isinstance(value, (list, tuple)):
             self._told[self._robot, name] = [str(item) for item in value]
-        return self._told.get((self._robot, name), [])  # the last known values while the watch is suspended
+        return self._told.get((self._robot, name), [])  # the last known values, while the watch is suspended
 
     def _filter(self) -> None:
         words = self.finder.text().casefold().split()
@@ -299,14 +299,14 @@ class RobotsPanel(OneRobotPanel):
     # -- user actions -------------------------------------------------------------------------------------
 
     def attempt(self, action: str, given: Mapping[str, object]) -> None:
-        """Invoke an action; input errors are shown in its card."""
+        """Start an action; errors in its input are shown in the card."""
         card = self.cards[action]
         try:
             self.session.fleet.invoke(self._robot, action, given)
         except RobotInputError as error:
             card.show_problems(error.problems)
         except MayNotMoveError:
-            card.show_problems(())  # the confirmation is shown by the window
+            card.show_problems(())  # the window shows the confirmation
         except AppError as error:
             card.show_problems((InputProblem("", str(error)),))
         else:
@@ -331,7 +331,7 @@ class RobotsPanel(OneRobotPanel):
         self._fit()
 
     def _fit(self) -> None:
-        # When space is short, the description is hidden first, then the list.
+        # In a narrow panel the description is hidden first, then the list.
         width = self.width() / self.theme.scaled(1.0)
         count = self.list.count
         wide = count > 1 or (count == 1 and width >= LIST_MIN_WIDTH)

@@ -1,4 +1,4 @@
-"""Tries of an action: description of their state, and the list of the latest ones."""
+"""Tries of an action: texts for their states, and the list of the latest ones."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ MAX_SHOWN = 5
 
 
 def field_words(fields: Sequence[DataField], told: Mapping[str, object]) -> str:
-    """Describe the values of fields, such as "0.3 m to go, moved 0.5 m"."""
+    """Format the values of fields, such as "0.3 m to go, moved 0.5 m"."""
     parts = []
     for field in fields:
         value = told.get(field.name)
@@ -53,18 +53,21 @@ def field_words(fields: Sequence[DataField], told: Mapping[str, object]) -> str:
 
 
 def feedback_words(action: Action, feedback: Mapping[str, object]) -> str:
-    """Describe the feedback of a running action, such as "0.3 m to go"."""
+    """Format the feedback of a running action, such as "0.3 m to go"."""
     return field_words(action.feedback, feedback)
 
 
 def output_words(action: Action, output: Mapping[str, object]) -> str:
-    """Describe the output of an action without its duration, which the result contains."""
+    """Format the output of an action, without the duration, which is part of the result."""
     told = [field for field in action.output if not is_unit(field.title, field.unit)]
     return field_words(told, output)
 
 
 def progress_of(action: Action, given: Mapping[str, object], feedback: Mapping[str, object]) -> float | None:
-    """Return the progress from 0 to 1, as reported or derived from requested and remaining amounts."""
+    """Return the progress (0 to 1), as reported or derived from requested and remaining amounts.
+
+    Return None if it is unknown.
+    """
     for name in RATIO_FIELDS:
         share = _number(feedback.get(name))
         if share is not None:
@@ -90,7 +93,7 @@ def progress_of(action: Action, given: Mapping[str, object], feedback: Mapping[s
 
 
 def now_words(action: Action, made: Invocation, title_of: Callable[[str], str]) -> str:
-    """Describe the present state of a running try."""
+    """Describe the current state of a running try."""
     if made.state == "sent":
         return _("sent")
     if made.state == "accepted":
@@ -106,7 +109,7 @@ def now_words(action: Action, made: Invocation, title_of: Callable[[str], str]) 
 
 
 def left_words(made: Invocation) -> str:
-    """Return the remaining time; "" without a limit."""
+    """Format the remaining time; "" if there is no limit."""
     left_s = made.left_s
     if left_s is None or not made.running:
         return ""
@@ -116,7 +119,7 @@ def left_words(made: Invocation) -> str:
 def end_words(made: Invocation, *, may_move: bool = False) -> tuple[str, str, str]:
     """Return text and status of the chip of an ended try, and a sentence or "".
 
-    With `may_move` the robot may still be moving, so the text doesn't say "stopped".
+    If `may_move` is True, the robot may still be moving, so the text doesn't say "stopped".
     """
     took = seconds_words(made.elapsed_s)
     if made.state == "succeeded":
@@ -142,7 +145,7 @@ def _within(share: float) -> float:
 
 
 class TryRow(PaintedButton):
-    """Row of an ended try."""
+    """Row of a try that has ended."""
 
     def __init__(self, theme: Theme, action: Action, made: Invocation) -> None:
         super().__init__(theme)
@@ -203,7 +206,7 @@ class TryList(QWidget):
         self._column.setSpacing(0)
 
     def show_tries(self, tries: Sequence[Invocation]) -> None:
-        """Show the latest tries that have ended."""
+        """Show those of the latest tries that have ended."""
         ended = [made for made in tries if made.action == self._action.name and not made.running][-MAX_SHOWN:]
         ids = tuple(made.id for made in ended)
         if ids == self._shown:

@@ -1,4 +1,4 @@
-"""Services panel: services of the live network, request form, reply, and earlier calls.
+"""Services panel: services of the live network, with request form, reply and earlier calls.
 
 `service_list` has the list, `request_form` the fields of a request, `answer` the reply.
 """

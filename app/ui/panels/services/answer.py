@@ -1,4 +1,4 @@
-"""Reply of a service as table or JSON, or the reason why there is none."""
+"""View of a service's reply as table or JSON, or the reason why there is none."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ class AnswerRow:
 
 
 def answer_rows(answer: object) -> list[AnswerRow]:
-    """Return a reply as rows, children below their parents; at most `MAX_ROWS`."""
+    """Return a reply as at most `MAX_ROWS` rows, with children below their parents."""
     found: list[AnswerRow] = []
     for row in (
         _rows("", 0, "", answer) if _has_parts(answer) else [AnswerRow("", 0, _("reply"), _words(answer))]
@@ -80,7 +80,7 @@ def _words(value: object) -> str:
 
 
 def took_cell(record: CallRecord) -> Cell:
-    """Return state and duration of a call."""
+    """Return the cell with state and duration of a call."""
     match record.state:
         case "waiting":
             return Cell(_("waiting"), "circle-dashed", "textSecondary")
@@ -93,13 +93,13 @@ def took_cell(record: CallRecord) -> Cell:
 
 
 def clock_of(record: CallRecord) -> str:
-    """Return the time of a call, such as "8:41:50"."""
+    """Format the time of a call, such as "8:41:50"."""
     then = dt.datetime.fromtimestamp(record.at_s, tz=dt.timezone.utc).astimezone()
     return then.strftime("%H:%M:%S").lstrip("0")
 
 
 class AnswerView(QWidget):
-    """View of one call: the latest of the selected service, or an earlier one selected in the table."""
+    """View of one call: the latest of the selected service, or an earlier one from the table."""
 
     def __init__(self, theme: Theme, toast: ShowToast) -> None:
         super().__init__()
@@ -161,7 +161,7 @@ class AnswerView(QWidget):
         return self._head
 
     def minimumSizeHint(self) -> QSize:
-        # A wider minimum would clip the values of the reply.
+        # With a wider minimum width the values of the reply would be clipped.
         return QSize(round(self._theme.scaled(MIN_WIDTH_PX)), super().minimumSizeHint().height())
 
     def resizeEvent(self, event: QResizeEvent) -> None:
@@ -172,7 +172,7 @@ class AnswerView(QWidget):
             self._head.setDirection(way)
 
     def show_record(self, record: CallRecord | None, waited_s: float = 0.0) -> None:
-        """Show a call, or None."""
+        """Show a call, or an empty view if `record` is None."""
         if record is not None and record.state == "waiting":
             self.chip.set(_("waiting {time}").format(time=seconds_words(waited_s)), "info", "circle-dashed")
         if record == self.record and record is not None:

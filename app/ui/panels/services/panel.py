@@ -47,7 +47,7 @@ EMPTY_REQUEST = "{}"
 
 
 class ServicesPanel(PanelWidget):
-    """Panel with the list at the left (at the top in a narrow panel) and the selected service."""
+    """Panel with the list of services at the left (at the top if narrow) and the selected service."""
 
     def __init__(self, context: PanelContext) -> None:
         super().__init__(context, _("Services"))
@@ -188,7 +188,7 @@ class ServicesPanel(PanelWidget):
         ):
             scroll.column.insertWidget(place, widget)
             scroll.column.setStretch(place, stretch)
-        scroll.column.setStretch(scroll.column.count() - 1, 0)  # the reply takes all remaining height
+        scroll.column.setStretch(scroll.column.count() - 1, 0)  # the reply takes the remaining height
         return scroll
 
     # -- display ------------------------------------------------------------------------------------------
@@ -278,7 +278,7 @@ class ServicesPanel(PanelWidget):
         return self._texts.get(self._shown, EMPTY_REQUEST)
 
     def _put_text(self, text: str) -> None:
-        # Updates both form and JSON editor.
+        # Updates the form and the JSON editor.
         self._texts[self._shown] = text
         self._is_showing = True
         self.edit.set_text(text)
@@ -305,7 +305,7 @@ class ServicesPanel(PanelWidget):
         return read_json(self.text)
 
     def _problem(self) -> str:
-        # Reason why valid JSON can't be sent.
+        # Reason why the request can't be sent although it is valid JSON.
         if self.way.value == "form" and self.form.problems:
             return next(iter(self.form.problems.values()))
         read = self._read()
@@ -397,7 +397,7 @@ class ServicesPanel(PanelWidget):
         menu.popup(at)
 
     def service_menu(self, service: str) -> list[RowAction]:
-        """Return the actions of a service."""
+        """Return the context menu actions of a service."""
         return [RowAction(_("Call"), "play", self.call), copies(self.context, service)]
 
     def _show_call_menu(self, key: str, at: QPoint) -> None:
@@ -443,7 +443,7 @@ class ServicesPanel(PanelWidget):
 
 
 def _request_cell(record: CallRecord) -> Cell:
-    # One line, such as "name Aiko, pictures 12".
+    # Formats a request in one line, such as "name Aiko, pictures 12".
     try:
         asked = read_json(record.request).filled({})
     except NepError:

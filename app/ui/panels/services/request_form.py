@@ -1,4 +1,4 @@
-"""Form of a service request, generated from the keys and values of the current request."""
+"""Form of a service request, whose fields are derived from the current request's keys and values."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ def kind_of(value: object) -> str:
 
 
 class RequestForm(QWidget):
-    """One field per key of the request; `typed` has the edited request."""
+    """Form with one field per key of the request; `typed` carries the edited request."""
 
     typed = Signal(object)  # a dict
 
@@ -65,11 +65,11 @@ class RequestForm(QWidget):
         column.addStretch(1)
 
     def forget(self) -> None:
-        """Discard the field kinds before the request of another service is shown."""
+        """Discard the kinds of the fields; called before the request of another service is shown."""
         self._kinds, self._request = {}, {}
 
     def show_request(self, request: object) -> None:
-        """Show a request; only objects have fields."""
+        """Show a request. Requests that aren't objects have no fields."""
         given = dict(request) if isinstance(request, Mapping) else {}
         if given == self._request and self._kinds and not self.problems:
             return
@@ -90,7 +90,7 @@ class RequestForm(QWidget):
         self.nothing.setVisible(not given or len(given) > MAX_FIELDS)
 
     def _kind(self, name: str, value: object) -> str:
-        # A float field stays one when an integer is typed, and a JSON field stays one for any value.
+        # A field keeps its kind: a float field when an integer is typed, a JSON field for any value.
         kind, before = kind_of(value), self._kinds.get(name)
         return (
             before if (before is not None and (before, kind) in WIDENING_KINDS) or before == "json" else kind
@@ -152,7 +152,7 @@ class RequestForm(QWidget):
             self._put(name, meant[0])
 
     def _meant(self, name: str, text: str) -> tuple[object] | None:
-        # A tuple with the value; None if the text is invalid.
+        # Returns the value in a tuple, or None if the text is invalid.
         kind = self._kinds[name]
         if kind == "str":
             return (text,)

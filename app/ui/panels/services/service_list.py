@@ -1,4 +1,4 @@
-"""List of available services with the nodes that offer them."""
+"""List of available services with the nodes that serve them."""
 
 from __future__ import annotations
 
@@ -20,19 +20,19 @@ from nep.protocol.service_wire import SURVEY
 
 @dataclass(frozen=True, slots=True)
 class OfferedService:
-    """Service with the names of its servers; the first one receives the calls."""
+    """Service with the names of its servers, the first of which receives the calls."""
 
     name: str
     nodes: tuple[str, ...]
 
     @property
     def said(self) -> str:
-        """Text of the servers, such as "face_tracker"."""
+        """Names of the servers as text, such as "face_tracker"."""
         return listed(list(self.nodes))
 
 
 def offered(view: GraphView | None) -> list[OfferedService]:
-    """Return services sorted by name, without parameter services and surveys."""
+    """Return the services sorted by name, without parameter services and surveys."""
     if view is None:
         return []
     found = []
@@ -44,7 +44,7 @@ def offered(view: GraphView | None) -> list[OfferedService]:
 
 
 def count_words(services: Sequence[OfferedService]) -> str:
-    """Return a summary, such as "6 services of 3 nodes"."""
+    """Format the numbers of services and nodes, such as "6 services of 3 nodes"."""
     if not services:
         return ""
     nodes = len({name for each in services for name in each.nodes})
@@ -54,9 +54,9 @@ def count_words(services: Sequence[OfferedService]) -> str:
 
 
 class ServiceList(TableView[OfferedService]):
-    """List of services; a click selects, Ctrl+Enter calls.
+    """List of services; a click selects one, Ctrl+Enter calls it.
 
-    `chosen` has the name, also on keyboard selection.
+    `chosen` carries the name of the selected service, also for selection by keyboard.
     """
 
     chosen = Signal(str)
@@ -82,7 +82,7 @@ class ServiceList(TableView[OfferedService]):
         self.fit_rows()
 
     def fit_rows(self) -> None:
-        """Scale the row height with the text size."""
+        """Adjust the row height to the text size."""
         self.set_row_height(round(self.theme.scaled(ROW_PX)), large=False)
 
     def _open(self, index: QModelIndex) -> None:

@@ -1,4 +1,4 @@
-"""Timeline panel: contents of an open recording and control of its replay.
+"""Timeline panel: contents of an open recording, and controls of its replay.
 
 `transport` is the row of controls, `canvas` has the ruler and lanes.
 """

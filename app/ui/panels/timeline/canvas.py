@@ -1,4 +1,4 @@
-"""Ruler and lanes of a recording: events, and message density and losses of each topic.
+"""Ruler and lanes of a recording: events, and for each topic the message density and losses.
 
 The lanes are cached in a pixmap; during replay only the playhead is repainted.
 """
@@ -45,7 +45,7 @@ RULER_HEIGHT, LANE_HEIGHT, ROW_HEIGHT = 26, 24, 22
 DENSITY_HEIGHT, TICK_WIDTH = 10, 2
 MIN_ALPHA, MAX_ALPHA = 0.14, 0.76
 SPARSE_PX = 8
-"""Average px per message above which messages are drawn as ticks."""
+"""Average distance in px between messages above which each message is drawn as a tick."""
 LABEL_SPACING_PX = 78
 MAX_BUCKETS = 4000
 GRIP_PX = 6
@@ -57,8 +57,11 @@ ZOOM_PER_WHEEL_UNIT = 1.0015
 class TimelineCanvas(QAbstractScrollArea):
     """Timeline of one replay.
 
-    Signals: `chosen` (topic clicked), `opened` (topic double-clicked), `rename_wanted` (bookmark
-    double-clicked), `menu_wanted` (bookmark and screen position of a context menu).
+    Signals:
+        chosen: Topic that was clicked.
+        opened: Topic that was double-clicked.
+        rename_wanted: Bookmark that was double-clicked.
+        menu_wanted: Bookmark and screen position for a context menu.
     """
 
     chosen = Signal(str)
@@ -91,7 +94,7 @@ class TimelineCanvas(QAbstractScrollArea):
     # -- display ------------------------------------------------------------------------------------------
 
     def show_replay(self, replay: Replay | None) -> None:
-        """Show another recording completely; None for none."""
+        """Show another recording in its full length, or None for none."""
         if self.field is not None:
             self.field.leave()
         self._replay = replay
@@ -102,7 +105,7 @@ class TimelineCanvas(QAbstractScrollArea):
         self.fit()
 
     def move_to(self, position_ns: int, loop: tuple[int, int] | None) -> None:
-        """Move the playhead; the view follows unless the person scrolled away from it."""
+        """Move the playhead. The view follows unless the user scrolled away from it."""
         if (position_ns, loop) == (self._position_ns, self._loop):
             return
         self._position_ns, self._loop = position_ns, loop
@@ -111,13 +114,13 @@ class TimelineCanvas(QAbstractScrollArea):
         self.viewport().update()
 
     def set_scale(self, scale: TimeScale) -> None:
-        """Show another time range."""
+        """Set the visible time range."""
         if scale != self.scale:
             self.scale = scale
             self.renew()
 
     def zoom(self, factor: float, at_ns: int | None = None) -> None:
-        """Scale the time range by `factor` around a time, by default the playhead."""
+        """Scale the visible range by `factor` around a time, by default the playhead."""
         if self.scale is not None:
             self.set_scale(self.scale.zoomed(factor, self._position_ns if at_ns is None else at_ns))
 
@@ -127,13 +130,13 @@ class TimelineCanvas(QAbstractScrollArea):
             self.set_scale(TimeScale.whole(self.scale.first_ns, self.scale.last_ns))
 
     def renew(self) -> None:
-        """Repaint the lanes and request their figures."""
+        """Repaint the lanes and request their message counts."""
         self._lanes = None
         self.want()
         self.viewport().update()
 
     def want(self) -> None:
-        """Request the figures of the visible range from the background thread."""
+        """Request the message counts of the visible range from the background thread."""
         replay, scale = self._replay, self.scale
         if replay is not None and replay.densities is not None and scale is not None:
             buckets = max(1, min(MAX_BUCKETS, round(self._plot().width())))
@@ -163,7 +166,7 @@ class TimelineCanvas(QAbstractScrollArea):
         return self._places(self._plot())(at_ns)
 
     def _places(self, plot: QRectF) -> Callable[[int], float]:
-        # Returned as a closure for speed: each rendering maps thousands of times.
+        # Returns a closure for speed: each rendering maps thousands of times.
         scale, left, wide = self.scale, plot.left(), plot.width()
         if scale is None:
             return lambda _at_ns: left
@@ -259,7 +262,8 @@ class TimelineCanvas(QAbstractScrollArea):
             painter.drawLine(QPointF(x, high - 6), QPointF(x, high))
             from_start = span_words(at_ns - scale.first_ns, digits=digits)
             words = clock_words(at_ns, digits=digits) if self.by_clock else from_start
-            if x + 3 + paint.width_of(font, words) <= plot.right():  # otherwise it would overlap the figures
+            # otherwise it would overlap the text at the right
+            if x + 3 + paint.width_of(font, words) <= plot.right():
                 paint.words(
                     painter, QRectF(x + 3, 0, theme.scaled(LABEL_SPACING_PX), high - 4), words, font, ink
                 )
@@ -274,7 +278,7 @@ class TimelineCanvas(QAbstractScrollArea):
         paint.words(painter, right, _("Lost"), font, tertiary, paint.RIGHT)
 
     def _paint_lanes(self, painter: QPainter, plot: QRectF) -> None:
-        # Bookmarks, and runs and alarms if there are any.
+        # Bookmarks, and the lanes of runs and alarms if there are any.
         theme, replay = self._theme, self._replay
         self._marks = []
         if replay is None:
@@ -381,7 +385,7 @@ class TimelineCanvas(QAbstractScrollArea):
                 painter.drawPolygon(QPolygonF(notch))
 
     def _paint_alarms_of(self, painter: QPainter, plot: QRectF, top: float, topic: str) -> None:
-        # Outlines the time of alarms about this topic.
+        # Outlines the periods of alarms about this topic.
         replay = self._replay
         if replay is None or replay.densities is None:
             return
@@ -453,12 +457,12 @@ class TimelineCanvas(QAbstractScrollArea):
     # -- mouse --------------------------------------------------------------------------------------------
 
     def mark_at(self, at: QPointF) -> LaneMark | None:
-        """Return the mark at a position; of overlapping marks the narrowest."""
+        """Return the mark at a position; of overlapping marks, the narrowest."""
         found = [mark for mark in self._marks if mark.box.contains(at)]
         return min(found, key=lambda mark: mark.box.width(), default=None)
 
     def _grip(self, at: QPointF) -> str:
-        # The part that a press at this position would drag.
+        # Part that is dragged after a press at this position.
         plot = self._plot()
         if not plot.left() - GRIP_PX <= at.x() <= plot.right() + GRIP_PX or self.scale is None:
             return ""
@@ -510,7 +514,7 @@ class TimelineCanvas(QAbstractScrollArea):
             self.opened.emit(topic)
 
     def contextMenuEvent(self, event: QContextMenuEvent) -> None:
-        # For the bookmark under the mouse or, by keyboard, at the playhead.
+        # Context menu of the bookmark under the mouse or, by keyboard, at the playhead.
         bookmark, place = None, event.globalPos()
         if event.reason() == QContextMenuEvent.Reason.Keyboard:
             bookmark = self._replay.bookmark_here() if self._replay is not None else None
@@ -524,7 +528,7 @@ class TimelineCanvas(QAbstractScrollArea):
             event.accept()
 
     def rename(self, bookmark: Bookmark, take: Callable[[str], bool]) -> None:
-        """Rename a bookmark in place; `take` returns False for an invalid name."""
+        """Rename a bookmark in place. `take` returns False for an invalid name."""
         if self.field is not None:
             return
         if self.scale is not None:
@@ -543,11 +547,11 @@ class TimelineCanvas(QAbstractScrollArea):
             self.setFocus(Qt.FocusReason.OtherFocusReason)
 
     def keyPressEvent(self, event: QKeyEvent) -> None:
-        # Leave keys to the panel; a scroll area would consume the arrows.
+        # Leaves keys to the panel; a scroll area would consume the arrow keys.
         event.ignore()
 
     def wheelEvent(self, event: QWheelEvent) -> None:
-        # Zooms above the time axis, scrolls above the names.
+        # Zooms if the mouse is above the time axis, scrolls if above the names.
         x, delta = event.position().x(), event.angleDelta()
         if x < self._plot().left() or self.scale is None:
             super().wheelEvent(event)
@@ -565,7 +569,7 @@ class TimelineCanvas(QAbstractScrollArea):
         return super().viewportEvent(event)
 
     def _tip(self, at: QPointF) -> str:
-        # Of a mark, losses, or an elided name.
+        # Tooltip of a mark, of losses, or of an elided name.
         replay, topic = self._replay, self.topic_at(at.y())
         if replay is None or self.scale is None:
             return ""
@@ -583,7 +587,7 @@ class TimelineCanvas(QAbstractScrollArea):
 
 
 def shades(counts: Sequence[int], peak: int, colour: QColor) -> QImage:
-    """Return a one-line image with one pixel per bucket, more opaque for higher counts."""
+    """Return a one-line image with one pixel per bucket, which is more opaque for higher counts."""
     levels = []
     for level in range(256):
         alpha = 0.0 if level == 0 else MIN_ALPHA + (MAX_ALPHA - MIN_ALPHA) * level / 255

@@ -1,4 +1,4 @@
-"""Lanes above the topics: bookmarks, runs of behaviours, alarms; their marks can be clicked."""
+"""Lanes above the topics for bookmarks, runs of behaviours and alarms. Their marks can be clicked."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ RESULTS = {
     "stopped": ("square", "textSecondary", lazy("stopped")),
     "failed": ("circle-x", "error", lazy("failed")),
 }
-"""Icon, colour and text of a run's result."""
+"""Icon, colour and text for each result of a run."""
 MIN_MARK_WIDTH = 3.0
 """Minimum width of a mark in px."""
 ICON_SIZE, GAP, MIN_TEXT_WIDTH, MAX_NAME_WIDTH, FLAG_SIZE = 13, 4, 34, 160, 8
@@ -37,7 +37,7 @@ ICON_SIZE, GAP, MIN_TEXT_WIDTH, MAX_NAME_WIDTH, FLAG_SIZE = 13, 4, 34, 160, 8
 
 @dataclass(frozen=True, slots=True)
 class LaneMark:
-    """Clickable mark: rectangle, time to seek to, and description."""
+    """Mark that can be clicked: rectangle, time to seek to, and description."""
 
     box: QRectF
     at_ns: int
@@ -46,7 +46,7 @@ class LaneMark:
 
 
 def shown_lanes(replay: Replay | None) -> tuple[str, ...]:
-    """Return the visible lanes: bookmarks, and those that are not empty."""
+    """Return the lanes to show: bookmarks, and the other ones that are not empty."""
     spans = replay.densities.spans if replay is not None and replay.densities is not None else None
     if spans is None:
         return (BOOKMARKS,)
@@ -54,13 +54,13 @@ def shown_lanes(replay: Replay | None) -> tuple[str, ...]:
 
 
 class EventLanes:
-    """Painter of a replay's event lanes within the visible time range. `x_of` maps a time to x."""
+    """Painter of the event lanes within the visible time range. `x_of` maps a time to an x coordinate."""
 
     def __init__(self, theme: Theme, painter: QPainter, plot: QRectF, x_of: Callable[[int], float]) -> None:
         self._theme, self._painter, self._plot, self._x_of = theme, painter, plot, x_of
 
     def paint(self, lane: str, replay: Replay, top: float, high: float) -> list[LaneMark]:
-        """Paint a lane of `NAMES` and return its marks."""
+        """Paint one of the lanes in `NAMES` and return its marks."""
         plot = self._plot
         box = QRectF(plot.left(), top, plot.width(), high)
         spans = replay.densities.spans if replay.densities is not None else None
@@ -78,7 +78,7 @@ class EventLanes:
         return made
 
     def visible_spans(self, spans: Iterable[RecordedSpan]) -> Iterator[RecordedSpan]:
-        """Yield the spans in the visible range, without those that would be hidden by the previous one."""
+        """Yield the spans in the visible range, except for those that the previous one would hide."""
         plot, free = self._plot, -1.0
         for span in spans:
             left, right = self._x_of(span.start_ns), self._x_of(span.end_ns)
@@ -128,7 +128,7 @@ class EventLanes:
         return LaneMark(bar, span.start_ns, run_words(span, start_ns))
 
     def paint_run(self, span: RecordedSpan, bar: QRectF, fill: str, edge: str) -> None:
-        """Paint a run with its name at the left and its result at the right, if they fit."""
+        """Paint a run with its name at the left and its result at the right, as far as they fit."""
         theme, painter = self._theme, self._painter
         paint.box(painter, bar, theme.radius("small"), theme.colour(fill), theme.colour(edge))
         seen = bar.intersected(QRectF(self._plot.left(), bar.top(), self._plot.width(), bar.height()))
@@ -159,7 +159,7 @@ class EventLanes:
     # -- alarms -------------------------------------------------------------------------------------------
 
     def _alarms(self, spans: list[RecordedSpan], box: QRectF, start_ns: int) -> list[LaneMark]:
-        # Each bar has its text up to the next bar.
+        # Each bar has its text at the right, up to the next bar.
         made, theme = [], self._theme
         font, side = theme.font("small"), theme.scaled(ICON_SIZE)
         for place, span in enumerate(spans):
@@ -183,7 +183,7 @@ class EventLanes:
 
 
 def alarm_words(span: RecordedSpan) -> str:
-    """Describe an alarm with its duration if known: "/distance: range is 0.36, below 0.4, 1.2 s"."""
+    """Describe an alarm, with its duration if known: "/distance: range is 0.36, below 0.4, 1.2 s"."""
     name = span.name.rstrip(".")
     name = f"{name[:1].upper()}{name[1:]}"
     if not span.is_over:

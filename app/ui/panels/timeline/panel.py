@@ -1,4 +1,4 @@
-"""Timeline panel: transport controls, ruler, and a lane per topic of the open recording.
+"""Timeline panel: transport controls, ruler, and a lane for each topic of the open recording.
 
 Replayed messages can also be sent to the live network (`sending`).
 """
@@ -30,7 +30,7 @@ ZOOM_FACTOR = 1.5
 
 
 class TimelinePanel(PanelWidget):
-    """Timeline of the open recording, or an empty state."""
+    """Panel with the timeline of the open recording, or an empty state."""
 
     def __init__(self, context: PanelContext) -> None:
         super().__init__(context, _("Timeline"))
@@ -104,7 +104,7 @@ class TimelinePanel(PanelWidget):
         self.canvas.move_to(player.position_ns, player.loop if player.is_looping else None)
 
     def _update_text(self) -> None:
-        # Progress of opening, the error, or how to open a recording.
+        # Shows the progress of opening, the error, or how to open a recording.
         replay = self.session.replay
         status = replay.status if replay is not None else None
         words: tuple[object, ...]
@@ -145,7 +145,7 @@ class TimelinePanel(PanelWidget):
     # -- user actions -------------------------------------------------------------------------------------
 
     def show_topic(self, name: str) -> None:
-        """Select a topic; stepping moves through its messages."""
+        """Select a topic, through whose messages the replay then steps."""
         self._choose(name)
         self.canvas.show_topic(name)
 
@@ -209,7 +209,7 @@ class TimelinePanel(PanelWidget):
         return True
 
     def _next_topic(self, by: int) -> None:
-        # Selects the topic above or below.
+        # Selects the next topic above or below.
         replay = self._shown
         if replay is not None and (topics := list(replay.recorded)):
             place = topics.index(replay.chosen) if replay.chosen in topics else 0
@@ -218,7 +218,7 @@ class TimelinePanel(PanelWidget):
     # -- sending ------------------------------------------------------------------------------------------
 
     def choose_sent(self) -> None:
-        """Show the chooser of topics to send to the live network."""
+        """Show the page to choose topics to send to the live network."""
         replay = self._shown
         if replay is not None and replay.sending is not None:
             counts = {name: topic.message_count for name, topic in replay.recorded.items()}

@@ -1,4 +1,4 @@
-"""Sending of replayed topics to the live network: arming strip and chooser."""
+"""Sending of replayed topics to the live network: arming strip, and page to choose the topics."""
 
 from __future__ import annotations
 
@@ -28,7 +28,10 @@ NAME_WIDTH_PX = 240
 
 
 class ReplayStrip(ArmedStrip):
-    """Arming strip, visible while topics are armed or a confirmation is pending; emits `change_wanted`."""
+    """Arming strip that is visible while topics are armed or a confirmation is pending.
+
+    `change_wanted` is emitted when the user asks to change the topics.
+    """
 
     for_replay = True
     change_wanted = Signal()
@@ -43,7 +46,7 @@ class ReplayStrip(ArmedStrip):
 
     @property
     def sending(self) -> ReplaySending | None:
-        """Sending of the open recording, or None."""
+        """Controller that sends topics of the open recording, or None."""
         replay = self._context.session.replay
         return replay.sending if replay is not None else None
 
@@ -71,7 +74,7 @@ class ReplayStrip(ArmedStrip):
 
 
 class SendRow(NamedTuple):
-    """Row of a recorded topic; `name` is the topic to send to, None if it is not sent."""
+    """Row of a recorded topic; `name` is the name under which it is sent, or None if it is not sent."""
 
     topic: str
     messages: int
@@ -80,11 +83,14 @@ class SendRow(NamedTuple):
 
 
 class SendChooser(QWidget):
-    """Chooser of topics and their target names, in place of the lanes; emits `left` when done."""
+    """Table to choose topics and the names under which they are sent; shown in place of the lanes.
+
+    `left` is emitted when the user is done.
+    """
 
     left = Signal()
     refused = Signal(str)
-    """Reason why the topics could not be armed."""
+    """Emitted with the reason if the topics could not be armed."""
 
     def __init__(self, theme: Theme) -> None:
         super().__init__()
@@ -129,7 +135,7 @@ class SendChooser(QWidget):
         for place, widget in enumerate((self.words, self.table, self.problem, below)):
             scroll.column.insertWidget(place, widget)
         scroll.column.setStretchFactor(self.table, 1)
-        scroll.column.setStretch(scroll.column.count() - 1, 0)  # the table takes all remaining height
+        scroll.column.setStretch(scroll.column.count() - 1, 0)  # the table takes the remaining height
         row = QHBoxLayout(self)
         row.setContentsMargins(0, 0, 0, 0)
         row.addWidget(scroll)
@@ -145,7 +151,7 @@ class SendChooser(QWidget):
         self.table.setFocus(Qt.FocusReason.OtherFocusReason)
 
     def refresh(self) -> None:
-        """Update the chooser after a change."""
+        """Update the table after a change."""
         sending = self._sending
         if sending is None or self._seen == (sending, sending.revision):
             return
@@ -176,7 +182,7 @@ class SendChooser(QWidget):
             self._show_name()
 
     def _show_name(self) -> None:
-        # The name field edits the selected row.
+        # The text field for the name edits the selected row.
         topic = self.table.chosen_key() or ""
         routes = self._sending.routes if self._sending is not None else {}
         name = routes.get(topic, "")

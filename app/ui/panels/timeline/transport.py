@@ -24,7 +24,7 @@ SLOW_RATIO = 0.97
 
 
 class TransportRow(QWidget):
-    """Row that shows a replay's state and controls it."""
+    """Row of controls that shows and changes the state of a replay."""
 
     bookmark_wanted = Signal()
     arm_wanted = Signal()
@@ -68,12 +68,12 @@ class TransportRow(QWidget):
         flow.addWidget(self.nothing)
 
     def show_armed(self, *, is_armed: bool) -> None:
-        """Hide the switch while armed, because the strip below has it."""
+        """Hide the switch while sending is armed, because the strip below has a switch too."""
         self.armed.setVisible(not is_armed)
         self.nothing.setVisible(not is_armed)
 
     def _ask_arming(self) -> None:
-        self.armed.setChecked(False)  # checked once topics are chosen
+        self.armed.setChecked(False)  # becomes checked once topics are chosen
         self.arm_wanted.emit()
 
     def _connect(self) -> None:
@@ -135,12 +135,12 @@ class TransportRow(QWidget):
 
 
 def speed_of(step: int) -> float:
-    """Return the speed of a slider step, from 0.1 at the left over 1 in the middle to 10."""
+    """Return the speed for a slider step: 0.1 at the left end, 1 in the middle, 10 at the right end."""
     return round(SPEED_MIN * exp(log(SPEED_MAX / SPEED_MIN) * step / SPEED_STEPS), 2)
 
 
 def step_of(speed: float) -> int:
-    """Return the slider step nearest to a speed."""
+    """Return the slider step that is nearest to a speed."""
     return round(
         log10(max(SPEED_MIN, min(SPEED_MAX, speed)) / SPEED_MIN) / log10(SPEED_MAX / SPEED_MIN) * SPEED_STEPS
     )

@@ -1,4 +1,4 @@
-"""Topics panel: all topics of the network with their figures.
+"""Topics panel: all topics of the network with their rates, bandwidths and losses.
 
 `columns` has the columns and cells.
 """

@@ -23,20 +23,20 @@ def _ink(topic: Topic, role: str) -> str:
 
 
 def untold(topic: Topic) -> NetworkKind | None:
-    """Return the topic's network if it reports no figures, else None."""
+    """Return the topic's network if it does not report statistics, else None."""
     kind = kind_named(topic.network)
     return kind if kind is not None and not kind.tells_figures else None
 
 
 def name_cell(topic: Topic) -> Cell:
-    """Return the name, bold with a chip while new, struck through when gone."""
+    """Return the cell with the name: bold with a chip while new, struck through when gone."""
     gone = topic.gone_s is not None
     chip = pgettext("topic", "new") if topic.new and not gone else None
     return Cell(topic.name, role=_ink(topic, "text"), mono=True, bold=bool(chip), struck=gone, chip=chip)
 
 
 def network_cell(topic: Topic) -> Cell:
-    """Return the network."""
+    """Return the cell of the Network column."""
     kind = kind_named(topic.network)
     if kind is None:
         return Cell("NEP", role=_ink(topic, "textTertiary"))
@@ -44,40 +44,40 @@ def network_cell(topic: Topic) -> Cell:
 
 
 def type_cell(topic: Topic) -> Cell:
-    """Return icon and last part of the type; the tooltip has the full type."""
+    """Return the cell with icon and last part of the type; the tooltip has the full type."""
     icon = ICONS.get(topic.codec) or ICONS.get(topic.msg_type, "box")
     return Cell(topic.msg_type.rpartition("/")[2], icon, _ink(topic, "textTertiary"))
 
 
 def publishers_cell(topic: Topic) -> Cell:
-    """Return the number of publishers."""
+    """Return the cell with the number of publishers."""
     return Cell(str(topic.publishers), role=_ink(topic, "text"))
 
 
 def subscribers_cell(topic: Topic) -> Cell:
-    """Return the number of subscribers."""
+    """Return the cell with the number of subscribers."""
     return Cell(str(topic.subscribers) if topic.gone_s is None else "", role=_ink(topic, "text"))
 
 
 def nodes_cell(topic: Topic) -> Cell:
-    """Return the names of the publishing nodes."""
+    """Return the cell with the names of the publishing nodes."""
     return Cell(", ".join(topic.publisher_nodes), role=_ink(topic, "textSecondary"))
 
 
 def curve_cell(topic: Topic) -> Cell:
-    """Return the curve of the rate in the last 30 s."""
+    """Return the cell with the curve of the rate in the last 30 s."""
     if topic.rate_hz is None and untold(topic) is not None:
-        return Cell()  # measured while the topic was open
+        return Cell()  # a recorded topic has only the rates measured while it was open
     return Cell(role=_ink(topic, "textSecondary"), curve=tuple(topic.rates))
 
 
 def rate_cell(topic: Topic) -> Cell:
-    """Return the rate in messages per second."""
+    """Return the cell with the rate in messages per second."""
     return Cell(rate_words(topic.rate_hz), role=_ink(topic, "text"))
 
 
 def bandwidth_cell(topic: Topic) -> Cell:
-    """Return the bandwidth; unknown without subscribers."""
+    """Return the cell with the bandwidth, which is unknown without subscribers."""
     if _is_unheard(topic):
         return Cell(bandwidth_words(None), role=_ink(topic, "textDisabled"))
     return Cell(bandwidth_words(topic.bandwidth_Bps), role=_ink(topic, "text"))
@@ -95,16 +95,16 @@ def _bandwidth_tip(topic: Topic) -> str:
 
 
 def age_cell(topic: Topic) -> Cell:
-    """Return the age of the newest message, or the time since the topic disappeared."""
+    """Return the cell with the age of the newest message, or the time since the topic disappeared."""
     if topic.gone_s is not None:
         return Cell(_("gone {seconds} s").format(seconds=int(topic.gone_s)), role="textDisabled")
     return Cell(age_words(topic.age_s), role=_ink(topic, "text"))
 
 
 def loss_cell(topic: Topic) -> Cell:
-    """Return the loss ratio with a warning icon unless zero; blank if unknown.
+    """Return the cell with the loss ratio and, unless it is zero, a warning icon; blank if unknown.
 
-    For networks that report no figures, a note replaces all of them.
+    For networks that report no statistics, a note replaces all values.
     """
     kind = untold(topic)
     if kind is not None and topic.gone_s is None and (topic.rate_hz, topic.age_s, topic.lost) == (None,) * 3:
@@ -139,7 +139,7 @@ def _curve_tip(topic: Topic) -> str:
 
 
 def _shown_tip(topic: Topic) -> str:
-    # Only if messages were dropped before they reached the panels.
+    # Shown only if messages were dropped before they reached the panels.
     if not (topic.dropped or topic.missed):
         return ""
     shown, sent = topic.shown_of
@@ -156,7 +156,7 @@ def _network_tip(topic: Topic) -> str:
 
 
 def _not_told(topic: Topic) -> str:
-    # Empty if publishers report the figure.
+    # Empty for networks whose publishers report the value.
     kind = untold(topic)
     if kind is None:
         return ""
@@ -233,7 +233,7 @@ COLUMNS: tuple[Column[Topic], ...] = (
 
 NETWORK = Column("network", lazy("Network"), 84, network_cell, lambda t: t.network, tip=_network_tip)
 INDENT, CHEVRON = 14, 19
-"""Indentation per level of the tree, and width of a folder's arrow, in px."""
+"""Indentation of each level of the tree, and width of the arrow of a folder, in px."""
 
 
 def _folder_name(folder: TopicFolder) -> Cell:
@@ -286,14 +286,14 @@ FOLDERS: dict[str, FolderColumn] = {
     ),
     "loss": (_folder_loss, lambda _f: None, _folder_loss_tip),
 }  # fmt: skip
-"""Cell, sort key and tooltip of folders by column; other columns are blank."""
+"""Cell, sort key and tooltip of folders, by column. Other columns are blank for folders."""
 
 
 BLANK: FolderColumn = (lambda _f: Cell(), lambda _f: None, None)
 
 
 def _with_folders(column: Column[Topic], of_folder: FolderColumn) -> Column[TreeRow]:
-    # Adapts a column of topics to rows of the tree.
+    # Converts a column for topics to a column for rows of the tree.
     cell, key, tip = of_folder
     of_topic, topic_key, topic_tip = column.cell, column.key, column.tip
 
@@ -319,7 +319,7 @@ def _with_folders(column: Column[Topic], of_folder: FolderColumn) -> Column[Tree
 
 
 OTHERS = tuple(_with_folders(column, FOLDERS.get(column.name, BLANK)) for column in COLUMNS[1:])
-"""Columns without dependence on a panel."""
+"""Columns that are the same in every panel."""
 
 
 def columns(
@@ -328,9 +328,9 @@ def columns(
     """Return the columns.
 
     Args:
-        own: Return True for Studio's own topics, which are never marked as new.
-        several: Return True to show the network column.
-        as_tree: Return True to show only the last part of names, below their folders.
+        own: Returns True for Studio's own topics, which are never shown as new.
+        several: Returns True to show the network column.
+        as_tree: Returns True to show only the last part of names, below their folders.
     """
 
     def named(topic: Topic) -> Cell:

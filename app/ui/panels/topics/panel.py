@@ -1,4 +1,4 @@
-"""Topics panel: all topics of the network with figures reported by their publishers."""
+"""Topics panel: all topics of the network, with statistics reported by their publishers."""
 
 from __future__ import annotations
 
@@ -53,12 +53,12 @@ MAX_CLOSED = 1000
 class TopicsTable(TableView[TreeRow]):
     """Table in which Left and Right collapse and expand folders.
 
-    `fold_wanted` has the key of a row, and True to expand or False to collapse it.
+    `fold_wanted` carries the key of a row, and True to expand or False to collapse it.
     """
 
     fold_wanted = Signal(str, bool)
     folds = False
-    """True while folders are shown; otherwise the keys have their usual meaning."""
+    """True while folders are shown. Otherwise Left and Right have their usual meaning."""
 
     def keyPressEvent(self, event: QKeyEvent) -> None:
         key = self.chosen_key() if self.folds and is_plain(event) else None
@@ -70,7 +70,7 @@ class TopicsTable(TableView[TreeRow]):
 
 
 class TopicsPanel(NetworkTable[TreeRow]):
-    """Table of topics as list or tree, with a filter and a note about the figures."""
+    """Panel with the topics as table or tree, a filter, and a note about the source of the statistics."""
 
     def __init__(self, context: PanelContext) -> None:
         self._closed: set[str] = set()
@@ -104,7 +104,7 @@ class TopicsPanel(NetworkTable[TreeRow]):
         return self.topics_table
 
     def _own(self, topic: Topic) -> bool:
-        # Published by Studio or by virtual robots that it started.
+        # True for topics published by Studio or by virtual robots that it started.
         if topic.network:
             return own_everywhere(topic.publisher_nodes)
         if not topic.publisher_nodes:
@@ -207,7 +207,7 @@ class TopicsPanel(NetworkTable[TreeRow]):
         return self._tree[key] if self._tree is not None and key in self._tree else None
 
     def _fold(self, key: str, is_open: bool | None) -> None:
-        # None toggles. Left on a topic or a collapsed folder selects the parent folder.
+        # None toggles the folder. Left on a topic or a collapsed folder selects the parent folder.
         folder = self._folder(key)
         if folder is None or (is_open is False and not folder.is_open):
             if is_open is False:
@@ -270,7 +270,7 @@ class TopicsPanel(NetworkTable[TreeRow]):
 
 
 def _foot(kinds: Sequence[NetworkKind]) -> str:
-    # Source of the figures.
+    # Note about the source of the statistics.
     untold = [kind.words for kind in kinds if not kind.tells_figures]
     if not untold:
         return _(FOOT)

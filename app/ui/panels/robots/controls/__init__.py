@@ -1,4 +1,4 @@
-"""Controls of a form, one module per kind of parameter; `chooser` selects the control.
+"""Input controls of a form, one module per kind of parameter; `chooser` selects the control.
 
-`base` has the interface used by the form.
+`base` has the interface that the form uses.
 """

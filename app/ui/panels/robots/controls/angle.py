@@ -1,4 +1,4 @@
-"""Dial for an angle of a robot."""
+"""Dial to enter an angle of a robot."""
 
 from __future__ import annotations
 
@@ -20,8 +20,8 @@ WHEEL_NOTCH = 120
 class AngleDial(QWidget):
     """Dial for an angle: drag, wheel (with focus), arrow keys, Page, Home and End.
 
-    A double click sets the default. Seen from above: up is forward, positive angles turn left. With `upright`
-    seen from the robot's left side: forward is left, positive angles point down.
+    A double click sets the default. The dial shows the robot from above: up is forward, positive angles turn
+    left. If `upright`, it shows the robot from its left side: forward is left, positive angles point down.
     """
 
     changed = Signal(float)
@@ -66,7 +66,7 @@ class AngleDial(QWidget):
         return QSize(side, side)
 
     def direction(self, angle_deg: float) -> QPointF:
-        """Return the unit vector on the screen of an angle."""
+        """Return the unit vector of an angle in screen coordinates."""
         turned = math.radians(angle_deg)
         if self._upright:
             return QPointF(-math.cos(turned), math.sin(turned))
@@ -98,7 +98,7 @@ class AngleDial(QWidget):
             self._turn_to(self._angle_at(event.position()))
 
     def _turn_to(self, pointed: float) -> None:
-        # Takes the equivalent angle nearest to the last one, so that full turns accumulate.
+        # Of the equivalent angles, takes the one nearest to the last, so that full turns accumulate.
         last = self._grip if self._grip is not None else self._value
         self._grip = pointed + 360.0 * round((last - pointed) / 360.0)
         self._grip = min(max(self._grip, self._minimum - 90.0), self._maximum + 90.0)
@@ -163,7 +163,7 @@ class AngleDial(QWidget):
         painter.end()
 
     def _paint_sector(self, painter: QPainter, disc: QRectF) -> None:
-        # Sector from forward to the angle; the whole disc from 360°.
+        # Sector from forward to the angle; a full disc from 360°.
         tint = self._theme.colour("selected")
         painter.setPen(Qt.PenStyle.NoPen)
         painter.setBrush(tint)

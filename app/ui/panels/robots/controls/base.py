@@ -1,4 +1,4 @@
-"""Interface of a parameter's control, and helpers shared by controls."""
+"""Interface between a form and the input control of a parameter, with helpers for controls."""
 
 from __future__ import annotations
 
@@ -17,16 +17,16 @@ Tell = Callable[[], None]
 
 
 class Control:
-    """Control of one parameter, composed of functions.
+    """Input control of one parameter, composed of functions.
 
     Args:
         widget: Widget of the control.
-        value: Return the value.
-        show: Show a value.
-        changed: Connect a callback to every change.
-        finished: Connect a callback to the end of editing.
-        sentence: Return the control's own error message, "" if the value is valid.
-        close: Release resources.
+        value: Returns the value.
+        show: Shows a value.
+        changed: Connects a callback to every change.
+        finished: Connects a callback to the end of editing.
+        sentence: Returns the error message that the control shows itself, "" if the value is valid.
+        close: Releases resources.
     """
 
     def __init__(
@@ -54,7 +54,7 @@ class Control:
         self._show(value)
 
     def finished(self, tell: Tell) -> None:
-        """Call `tell` when the person has finished editing."""
+        """Call `tell` whenever the user finishes editing."""
         if self._finished is not None:
             self._finished(tell)
 
@@ -70,14 +70,14 @@ class Control:
 
 
 def connect(signal: object, tell: Tell) -> None:
-    """Connect `tell` to a signal, ignoring its arguments."""
+    """Connect a callback to a signal and ignore the signal's arguments."""
     signal.connect(lambda *_values: tell())  # type: ignore[attr-defined]  # any Qt signal
 
 
 def line_field(theme: Theme, parameter: Parameter) -> QLineEdit:
-    """Return a line edit with context menu and accessible name.
+    """Return a line edit with a context menu and an accessible name.
 
-    It accepts any text, so that invalid input is kept and explained by validation.
+    The line edit accepts any text; invalid input is kept and explained after validation.
     """
     field = QLineEdit()
     EditMenu(theme, field)
@@ -89,5 +89,5 @@ def line_field(theme: Theme, parameter: Parameter) -> QLineEdit:
 
 
 def sentence_case(words: str) -> str:
-    """Return the text with a capital first letter."""
+    """Return the text with its first letter in upper case."""
     return words[:1].upper() + words[1:]

@@ -1,4 +1,4 @@
-"""Selection of the control for a parameter of an action."""
+"""Factory of the input control for a parameter of an action."""
 
 from __future__ import annotations
 
@@ -26,7 +26,11 @@ MAX_SEGMENT_CHARS = 44
 def control_for(
     theme: Theme, parameter: Parameter, options: Sequence[str] = (), pictures: Pictures | None = None
 ) -> Control:
-    """Return the control of a parameter; `options` are values that the robot currently offers for it."""
+    """Return the input control for a parameter.
+
+    Args:
+        options: Values that the robot currently offers for the parameter.
+    """
     if parameter.choices or options:
         return _choice(theme, parameter, options)
     if parameter.kind in NUMBERS:
@@ -73,7 +77,7 @@ def _choice(theme: Theme, parameter: Parameter, options: Sequence[str]) -> Contr
 
 
 def _chosen(values: dict[str, object], key: str) -> object:
-    # 0 is a valid value; "" stands for none.
+    # 0 is a valid value; "" means that there is none.
     return values.get(key, key) if key else None
 
 

@@ -1,4 +1,4 @@
-"""Controls of a colour: named swatches, a hue strip, and a hexadecimal field."""
+"""Input controls for a colour: named swatches, a hue strip, and a field for a hex code."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from app.ui.widgets.flow_layout import Flow
 from nep.i18n import _, lazy
 
 _HEX = re.compile(r"#?([0-9a-fA-F]{6})")
-# Colours of robots' LEDs, thus no theme tokens.
+# Colours of robots' LEDs, therefore not theme tokens.
 LAMP_COLOURS: tuple[tuple[str, str], ...] = (
     ("#ffffff", lazy("white")),
     ("#3ab7ff", lazy("sky blue")),
@@ -55,7 +55,7 @@ class _Swatch(PaintedButton):
 
 
 class ColourSwatches(QWidget):
-    """Swatches with the name of the selected colour."""
+    """Row of colour swatches with the name of the selected colour."""
 
     changed = Signal(str)
 
@@ -91,7 +91,7 @@ class ColourSwatches(QWidget):
         return self._value
 
     def set_value(self, value: str) -> None:
-        """Show a colour without emitting `changed`; invalid text is ignored."""
+        """Select a colour without emitting `changed`; invalid text is ignored."""
         colour = QColor(value)
         if not colour.isValid():
             return
@@ -109,7 +109,7 @@ class ColourSwatches(QWidget):
 
 
 class HueStrip(QWidget):
-    """Strip of hues with lightness decreasing downwards; press, drag or use arrow keys."""
+    """Strip of hues whose lightness decreases downwards. Press, drag or use arrow keys to select."""
 
     changed = Signal(str)
 
@@ -128,7 +128,7 @@ class HueStrip(QWidget):
         return STRIP_SIZE
 
     def show_colour(self, colour: QColor) -> None:
-        """Move the marker to the nearest colour of the strip."""
+        """Move the marker to the colour of the strip that is nearest to `colour`."""
         if colour.hslHueF() >= 0:
             self._hue = colour.hslHueF()
         self._light = min(MAX_LIGHTNESS, max(MIN_LIGHTNESS, colour.lightnessF()))
@@ -192,7 +192,7 @@ class HueStrip(QWidget):
 
 
 class ColourChoice(QWidget):
-    """Swatches with "Other" for the hue strip and a hexadecimal field; invalid text stays in the field."""
+    """Swatches, and "Other" for the hue strip and a field for a hex code. Invalid text stays in the field."""
 
     changed = Signal()
     finished = Signal()
@@ -289,7 +289,7 @@ class ColourChoice(QWidget):
 
 
 def colour_control(theme: Theme, parameter: Parameter) -> Control:
-    """Return the control of a colour parameter."""
+    """Return the input control for a colour parameter."""
     choice = ColourChoice(theme, parameter)
     return Control(
         choice,

@@ -1,4 +1,4 @@
-"""Controls of numbers: slider with field for a limited range, else a field; angles have a dial as well."""
+"""Input controls for numbers: slider and field for a limited range, else a field; a dial for angles."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ PAGE_STEPS = 10
 
 
 def number_control(theme: Theme, parameter: Parameter) -> Control:
-    """Return the control of a number, integer or angle."""
+    """Return the input control for a number, integer or angle."""
     low, high = parameter.minimum, parameter.maximum
     if low is None or high is None or high <= low:
         return _open_number(theme, parameter)
@@ -61,7 +61,7 @@ def number_control(theme: Theme, parameter: Parameter) -> Control:
 
 
 def _value_of(slider: SliderWithUnit, parameter: Parameter) -> object:
-    # The typed text if it differs from the slider, even if it is invalid.
+    # Returns the typed text if it differs from the slider's value, even if it is invalid.
     whole = parameter.kind == "integer"
     typed = slider.field.text()
     if typed != slider.field.written(slider.value):
@@ -70,7 +70,7 @@ def _value_of(slider: SliderWithUnit, parameter: Parameter) -> object:
 
 
 def step_of(parameter: Parameter) -> float:
-    """Return the step of the description, else one that suits the range."""
+    """Return the step from the parameter's description, or one that suits its range."""
     if parameter.step is not None and parameter.step > 0:
         return parameter.step
     span = (parameter.maximum or 0.0) - (parameter.minimum or 0.0)
@@ -80,13 +80,13 @@ def step_of(parameter: Parameter) -> float:
 
 
 def read_number(typed: str, *, whole: bool) -> object:
-    """Parse a typed number; return None for empty text and the text itself if it is invalid."""
+    """Parse a typed number. Return None for empty text, and the text itself if it is invalid."""
     if not typed.strip():
         return None
     try:
         number = parse_number(typed)
     except ValueError:
-        return typed  # validation of the action explains the error
+        return typed  # the action's validation explains the error
     return int(number) if whole and number.is_integer() else number
 
 
@@ -122,7 +122,7 @@ def _beside(dial: AngleDial, slider: SliderWithUnit, name: str) -> QWidget:
 
 
 class OpenNumber(NumberEdit):
-    """Field of a number without limits: arrow keys step, Page steps by ten; may be empty."""
+    """Field for a number without limits: arrow keys step by one, Page keys by ten. May be empty."""
 
     def __init__(self, theme: Theme, parameter: Parameter) -> None:
         self._parameter = parameter

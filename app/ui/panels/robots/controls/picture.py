@@ -1,7 +1,6 @@
-"""Control of an image: a file, the newest image of a topic, or an address, with a thumbnail.
+"""Input control for an image: a file, the newest image of a topic, or an address, with a thumbnail.
 
-Typed addresses are sent unchanged, images in the encoding of
-`app.ui.panels.robots.controls.picture_file.encoded`.
+Typed addresses are sent unchanged; images are sent as encoded by `picture_file.encoded`.
 """
 
 from __future__ import annotations
@@ -36,7 +35,7 @@ THUMBNAIL = QSize(72, 54)
 
 
 class Pictures(Protocol):
-    """Source of images: topics of the session and files."""
+    """Source of images: topics of the session, and files."""
 
     def topics(self) -> Sequence[str]:
         """Return the names of available image topics."""
@@ -45,18 +44,18 @@ class Pictures(Protocol):
         """Subscribe to a topic's images until the stream is closed."""
 
     def ask_file(self, folder: str, take: Callable[[Path], None]) -> None:
-        """Ask for an image file; an empty `folder` stands for the user's pictures folder."""
+        """Show the dialog to choose an image file; an empty `folder` stands for the user's pictures."""
 
 
 class NoPictures:
-    """Source without topics and files."""
+    """Null implementation of `Pictures`, without topics and files."""
 
     def topics(self) -> Sequence[str]:
         """Return no topics."""
         return ()
 
     def stream(self, topic: str) -> ImageStream:
-        """Raise KeyError."""
+        """Raise `KeyError`, because there are no topics."""
         raise KeyError(topic)
 
     def ask_file(self, folder: str, take: Callable[[Path], None]) -> None:
@@ -79,7 +78,7 @@ class Thumbnail(QWidget):
         return self._image
 
     def show_image(self, image: QImage | None) -> None:
-        """Show an image, or the icon."""
+        """Show an image, or the icon if `image` is None."""
         self._image = image
         self.update()
 
@@ -109,7 +108,7 @@ class Thumbnail(QWidget):
 
 
 class PictureChoice(QWidget):
-    """Thumbnail, file name or address, buttons for file and camera; accepts dropped files."""
+    """Thumbnail, file name or address, and buttons for file and camera. Accepts dropped files."""
 
     changed = Signal()
 
@@ -159,13 +158,13 @@ class PictureChoice(QWidget):
         if self._stream is not None:
             self._look()
             if self._stream.awaits_picture:
-                return None  # the last image may predate the suspension of the stream
+                return None  # the last image may have been received before the stream was suspended
         if self._image is not None:
             return encoded(self._image, bare=self._parameter.bare)
         return None if self._stream is not None else self.field.text().strip() or None
 
     def set_value(self, value: object) -> None:
-        """Show an address or file."""
+        """Show an address or a file."""
         self.close_stream()
         self._show_none()
         text = "" if value is None else str(value)
@@ -187,7 +186,7 @@ class PictureChoice(QWidget):
             self.use_file(path)
 
     def use_file(self, path: Path) -> None:
-        """Load an image file; an error is shown with its reason."""
+        """Load an image file; on failure show the reason."""
         self.close_stream()
         self._file = path
         self._image, said = read_picture(path)
@@ -233,7 +232,7 @@ class PictureChoice(QWidget):
         drop_below(menu, self.camera)
 
     def use_topic(self, topic: str) -> None:
-        """Show the images of a topic; Try sends the newest one."""
+        """Show the images of a topic. The newest one is sent with the action."""
         self.close_stream()
         self._show_none()
         self._stream = self._pictures.stream(topic)
@@ -275,7 +274,7 @@ class PictureChoice(QWidget):
 
 
 def _image_in(address: str) -> QImage | None:
-    # From a ``data:`` URL.
+    # Decodes an image from a ``data:`` URL.
     try:
         return image_of(base64.b64decode(address.partition(",")[2]))
     except (ValueError, DecodeError):
@@ -283,7 +282,7 @@ def _image_in(address: str) -> QImage | None:
 
 
 def picture_control(theme: Theme, parameter: Parameter, pictures: Pictures) -> Control:
-    """Return the control of an image parameter."""
+    """Return the input control for an image parameter."""
     choice = PictureChoice(theme, parameter, pictures)
     show: Callable[[object], None] = choice.set_value
     show(parameter.default)

@@ -2,8 +2,8 @@
 
 `nep.messages.image_files` decides by the content which files Qt may decode (JPEG and PNG).
 
-Images are sent as in NEP's JSON messages: ``data:image/jpeg;base64,…``, or plain base64 where the description
-asks for it (``contentEncoding`` without ``format``).
+Images are sent as in NEP's JSON messages: ``data:image/jpeg;base64,…``, or plain base64 if the description
+requires it (``contentEncoding`` without ``format``).
 """
 
 from __future__ import annotations
@@ -23,7 +23,10 @@ MAX_FILE_BYTES = 40_000_000
 
 
 def read_picture(path: Path) -> tuple[QImage | None, str]:
-    """Load an image file with its EXIF orientation; return it, or None and the reason as a sentence."""
+    """Load an image file with its EXIF orientation.
+
+    Return the image, or None and a sentence with the reason.
+    """
     try:
         if not path.is_file() and path.exists():
             return None, _("“{file}” is not a file.").format(file=path.name)
@@ -42,13 +45,13 @@ def read_picture(path: Path) -> tuple[QImage | None, str]:
 
 
 def image_of(data: bytes) -> QImage:
-    """Decode an image within the allocation limit, upright.
+    """Decode an image within the allocation limit and apply its orientation.
 
     Raises:
         DecodeError: The data is not a supported image.
     """
     file = examine(data)
-    # Qt's default of 256 MB is less than the limit checked before
+    # Qt's default of 256 MB is lower than the limit that was checked before
     QImageReader.setAllocationLimit(MAX_BYTES // 1_000_000)
     buffer = QBuffer()
     buffer.setData(bytes(file.data))
@@ -62,7 +65,7 @@ def image_of(data: bytes) -> QImage:
 
 
 def upright(image: QImage, file: ImageFile) -> QImage:
-    """Apply the EXIF orientation, which Qt reads from JPEG only."""
+    """Rotate an image by its EXIF orientation, which Qt reads from JPEG files only."""
     if file.orientation >= 5:
         image = image.transformed(QTransform(0, 1, 1, 0, 0, 0))
     if file.orientation in (2, 3, 6, 7):
@@ -71,7 +74,10 @@ def upright(image: QImage, file: ImageFile) -> QImage:
 
 
 def encoded(image: QImage, *, bare: bool = False) -> str:
-    """Return an image as base64 JPEG, scaled to at most 1280 px on its longer side."""
+    """Return an image as base64 JPEG, scaled to at most 1280 px on its longer side.
+
+    If `bare` is True, the ``data:`` prefix is left out.
+    """
     if max(image.width(), image.height()) > MAX_SIDE_PX:
         keep, smooth = Qt.AspectRatioMode.KeepAspectRatio, Qt.TransformationMode.SmoothTransformation
         image = image.scaled(MAX_SIDE_PX, MAX_SIDE_PX, keep, smooth)

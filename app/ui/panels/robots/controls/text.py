@@ -1,4 +1,4 @@
-"""Controls of texts and lists."""
+"""Input controls for texts and lists."""
 
 from __future__ import annotations
 
@@ -12,11 +12,11 @@ from app.ui.widgets.inputs.fields import LongText
 from nep.i18n import _
 
 MULTILINE_LENGTH = 200
-"""Maximum length from which a text gets several lines."""
+"""Maximum length above which the field for a text has several lines."""
 
 
 def text_control(theme: Theme, parameter: Parameter) -> Control:
-    """Return a field of one or several lines; lists are typed with commas.
+    """Return a field with one or several lines; the items of a list are separated by commas.
 
     Objects, and lists of lists or objects, are typed as JSON.
     """
@@ -71,7 +71,7 @@ def _list(theme: Theme, parameter: Parameter) -> Control:
 
 
 def _given(parameter: Parameter, text: str) -> str | None:
-    # Empty text omits an optional parameter; for a required one validation reports it.
+    # Empty text omits an optional parameter; validation reports a missing required one.
     return text if text or parameter.required else None
 
 
