@@ -1,4 +1,4 @@
-"""Commands that start Studio or one of its modules as a process, also from a frozen build."""
+"""Commands that start Studio or one of its modules in a new process, also from a frozen build."""
 
 from __future__ import annotations
 
@@ -13,25 +13,28 @@ Fate = Literal["", "replaced", "gone"]
 
 
 def module_command(module: str) -> list[str]:
-    """Return the command that runs one of Studio's modules as a process."""
+    """Return the command that runs one of Studio's modules in a new process."""
     if getattr(sys, "frozen", False):
         return [sys.executable, "--module", module]
     return [sys.executable, "-m", module]
 
 
 def studio_command(theme: str | None = None) -> list[str]:
-    """Return the command that starts Studio like this process, without its file arguments."""
+    """Return the command that starts Studio in the same way as this process, without file arguments."""
     own = [sys.executable] if getattr(sys, "frozen", False) else [sys.executable, "-m", "app"]
     return [*own, *(("--theme", theme) if theme is not None else ())]
 
 
 def fresh_environ(environ: Mapping[str, str]) -> dict[str, str]:
-    """Return the environment without the language that `nep.i18n.begin` set, so that the settings apply."""
+    """Return the environment without the language set by `nep.i18n.begin`.
+
+    A new process then uses the language in the settings.
+    """
     return {name: value for name, value in environ.items() if name not in {LANG_VARIABLE, "LANGUAGE"}}
 
 
 class OwnProgram:
-    """Executable of a frozen build, from which modules are still loaded and child processes start."""
+    """Executable file of a frozen build, needed to load modules and start child processes."""
 
     def __init__(self, file: Path | None = None) -> None:
         # By default the executable of a frozen build; without one, nothing is checked.
@@ -40,10 +43,7 @@ class OwnProgram:
         self._initial = self._signature()
 
     def fate(self) -> Fate:
-        """Return what happened to the file since the start.
-
-        "" (unchanged), "replaced" by an update, or "gone".
-        """
+        """Return the state of the executable file: "" (unchanged), "replaced" by an update, or "gone"."""
         now = self._signature()
         if now == self._initial:
             return ""

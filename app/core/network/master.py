@@ -54,13 +54,16 @@ class MasterState:
 
 
 class MasterChange:
-    """Detects a new master. Not thread-safe: use it from the window's thread."""
+    """Detects that another master has replaced the known one.
+
+    Not thread-safe: use it from the window's thread.
+    """
 
     def __init__(self) -> None:
         self._new_epoch = (0, 0.0)
 
     def still(self, known: GraphView | None, view: GraphView, now: float) -> bool:
-        """Return whether ``view`` is of another master than ``known`` and may still lack nodes."""
+        """Return True if ``view`` is of another master than ``known`` and may not contain all nodes yet."""
         if known is None or view.epoch == known.epoch:
             return False
         if self._new_epoch[0] != view.epoch:
@@ -83,7 +86,9 @@ class MasterStart:
         self._thread: threading.Thread | None = None
         self._wait_s, self._retry_at, self._last_reason = AGAIN_S, 0.0, ""
         self.first = False
-        """True if no master ran before this one was started, so that no other node can be registered yet."""
+        """True if no master was running before this one was started, so that no other node can be registered
+        yet.
+        """
 
     @property
     def runs(self) -> bool:
@@ -98,7 +103,7 @@ class MasterStart:
         self._thread.start()
 
     def ensure_running(self) -> None:
-        """Call `ensure` unless the back-off after a failure is still running. Call it repeatedly."""
+        """Call `ensure`, unless the back-off after a failure has not elapsed yet. Call it repeatedly."""
         if self._clock() >= self._retry_at:
             self.ensure()
 

@@ -1,4 +1,4 @@
-"""Nodes of the network with the topics that they publish and subscribe to."""
+"""Nodes of the network, with the topics that they publish and subscribe to."""
 
 from __future__ import annotations
 
@@ -18,12 +18,16 @@ NATIVE = frozenset({"native", GATEWAY})
 class NodeEntry:
     """One node. Unknown values are None or empty; panels leave them blank.
 
-    ``publishes`` and ``subscribes`` are topic names in alphabetical order without duplicates; ``subscribes``
-    includes patterns. ``cpu_ratio`` is the share of one core that its process uses. ``gone_s`` is the time in
-    seconds since the node left, or None while it is registered; the topics of a node that left stay.
-    ``network`` is "" for the native network; ``stale`` is whether that can't be queried now.
-    ``has_parameters`` is whether it declares parameters, ``may_set`` whether others can set them (the network
-    has services).
+    Attributes:
+        publishes: Names of published topics, sorted and unique.
+        subscribes: Names of subscribed topics and patterns, sorted and unique.
+        cpu_ratio: Share of one core that the process uses.
+        gone_s: Seconds since the node left; None while it is registered. The topics of a node that left
+            remain.
+        network: Kind of network; "" for the native one.
+        stale: True if the network can't be queried at the moment.
+        has_parameters: True if the node declares parameters.
+        may_set: True if other nodes can set the parameters, which requires services.
     """
 
     id: str
@@ -46,24 +50,24 @@ class NodeEntry:
 
     @property
     def key(self) -> str:
-        """Identifier of the node among the nodes of all networks."""
+        """Identifier of the node, unique among all networks."""
         return key_of(self.network, self.id)
 
     @property
     def is_original(self) -> bool:
-        """True if it is a program of the original NEP."""
+        """True if the node is a program of the original NEP."""
         return not self.network and self.generation not in NATIVE
 
     @property
     def is_bridge(self) -> bool:
-        """True if it bridges this network with another (see `nep.programs.bridges`)."""
+        """True if the node bridges this network with another one (see `nep.programs.bridges`)."""
         return BRIDGES_TOPIC in self.publishes
 
 
 class Nodes:
     """All nodes in the order of their first appearance. Not thread-safe: use it from the window's thread.
 
-    The gateway's own node is omitted; programs of the original NEP have entries of their own.
+    The gateway's node is omitted; programs of the original NEP have separate entries.
     """
 
     def __init__(self, network: str = "") -> None:
@@ -85,14 +89,14 @@ class Nodes:
         return self._nodes.get(id)
 
     def set_stale(self, stale: bool) -> None:
-        """Mark all nodes as stale while the network can't be queried."""
+        """Set ``stale`` of all nodes: True while the network can't be queried."""
         for node in self._nodes.values():
             if node.stale is not stale:
                 node.stale, node.cpu_ratio = stale, None
                 self.revision += 1
 
     def mark_seen(self, id: str) -> None:
-        """Clear the mark of a node as new."""
+        """Stop highlighting a node as new."""
         node = self._nodes.get(id)
         if node is not None and node.new:
             node.new = False
@@ -110,7 +114,7 @@ class Nodes:
         self.values_revision += 1
 
     def age(self, now: float) -> None:
-        """Update the ages; remove nodes that left more than `GONE_SHOWN_S` ago."""
+        """Update the ages, and remove nodes that left more than `GONE_SHOWN_S` ago."""
         for node in list(self._nodes.values()):
             if node.gone_since is None:
                 continue

@@ -1,4 +1,4 @@
-"""Remote access: whether programs on other computers can reach the master on this one."""
+"""Remote access: lets programs on other computers reach the master on this one."""
 
 from __future__ import annotations
 
@@ -21,14 +21,20 @@ ALERT, NOT_KEPT = "reach", "reach:kept"
 
 @dataclass(frozen=True, slots=True)
 class RemoteAccessChanged:
-    """Reply of the master to the request to listen on ``hosts``; ``sentence`` is the reason if it failed."""
+    """Reply of the master to the request to listen on ``hosts``.
+
+    ``sentence`` is the reason of a failure, or "".
+    """
 
     hosts: tuple[str, ...]
     sentence: str = ""
 
 
 class RemoteAccess:
-    """Switch for remote access. Not thread-safe: use it from the window's thread; requests run in another."""
+    """Switch for remote access. Not thread-safe: use it from the window's thread.
+
+    Requests run in another thread.
+    """
 
     def __init__(
         self,
@@ -46,11 +52,11 @@ class RemoteAccess:
         self._epoch = 0
         self._asking: threading.Thread | None = None
         self.hosts: tuple[str, ...] = ()
-        """Addresses at which the master listens for other computers."""
+        """Addresses on which the master listens for other computers."""
 
     @property
     def is_near(self) -> bool:
-        """True if the master is on this computer; only then its addresses can be changed."""
+        """True if the master is on this computer. Only then can the addresses be changed."""
         return is_loopback(self._address)
 
     @property
@@ -63,11 +69,11 @@ class RemoteAccess:
         return self._here()
 
     def typed_by_others(self, host: str) -> str:
-        """Return the setting that programs on other computers need."""
+        """Return the environment variable that programs on other computers have to set."""
         return f"NEP_MASTER={host}:{self._address.rpartition(':')[2]}"
 
     def listen_at(self, hosts: Sequence[str]) -> None:
-        """Listen for other computers at these addresses, or at none; saved for the next start."""
+        """Make the master listen on these addresses, or on none; saved for the next start."""
         self._request(tuple(hosts))  # first, because shutting others out must not wait for a disk
         try:
             self._settings.set(KEPT, list(hosts))
@@ -90,7 +96,7 @@ class RemoteAccess:
             self._alerts.resolve(NOT_KEPT)
 
     def follow(self, view: GraphView) -> None:
-        """Apply a new graph; a new master gets the saved addresses."""
+        """Apply a new graph. If the master is new, send the saved addresses to it."""
         self.hosts = view.listens
         if view.epoch != self._epoch:
             self._epoch = view.epoch
@@ -137,7 +143,7 @@ class RemoteAccess:
 
 
 def access_words(reach: RemoteAccess) -> tuple[str, str, str | None]:
-    """Return how the status bar shows remote access: icon, text, status."""
+    """Return icon, text and status that the status bar shows for remote access."""
     if reach.hosts:
         return (
             "wifi",

@@ -1,4 +1,4 @@
-"""Sources of messages and graphs: the live network; a recording has the same interface."""
+"""Sources of messages and graphs: the live network, or a recording with the same interface."""
 
 from __future__ import annotations
 
@@ -25,22 +25,22 @@ from nep.protocol.graph_view import GraphView
 
 POLL_S = 0.4
 POLL_PAUSE = 5.0
-"""Where a query of the graph takes long (10 000 topics: 0.4 s), the pause is this multiple of it ..."""
+"""Minimum pause between queries of the graph, as a multiple of their duration (10 000 topics: 0.4 s)."""
 POLL_SLOWEST_S = 3.0
 NODE_NAME = "studio"
 
 _log = logging.getLogger("studio")
 
 Sink = Callable[[str, Sequence[Message]], None]
-"""Function that receives a batch of one topic, oldest first, in a thread of nep."""
+"""Receives a batch of messages of one topic, oldest first, in a thread of nep."""
 NodeSink = Callable[[Sequence[Message]], None]
-"""Function that receives a batch of the subscriber's topic."""
+"""Receives a batch of messages of one subscriber."""
 Job = Callable[[Node], None]
 
 
 @dataclass(frozen=True, slots=True)
 class GraphSeen:
-    """A new graph; ``asked_s`` is the duration of the query."""
+    """Event: a new graph was received; ``asked_s`` is the duration of the query."""
 
     view: GraphView
     asked_s: float
@@ -48,14 +48,14 @@ class GraphSeen:
 
 @dataclass(frozen=True, slots=True)
 class MasterFound:
-    """A master answers at ``address``."""
+    """Event: a master replies at ``address``."""
 
     address: str
 
 
 @dataclass(frozen=True, slots=True)
 class MasterLost:
-    """No master answers at ``address``; ``sentence`` explains it."""
+    """Event: no master replies at ``address``; ``sentence`` explains this."""
 
     address: str
     sentence: str
@@ -63,7 +63,7 @@ class MasterLost:
 
 @dataclass(frozen=True, slots=True)
 class WatchFailed:
-    """Subscribing to a topic failed."""
+    """Event: subscribing to a topic failed; ``sentence`` is the reason."""
 
     topic: str
     sentence: str
@@ -71,7 +71,7 @@ class WatchFailed:
 
 @dataclass(frozen=True, slots=True)
 class JobFailed:
-    """A job on the network failed; ``what`` is as in `Source.submit`, ``sentence`` the reason."""
+    """Event: a job on the network failed; ``what`` is as in `Source.submit`, ``sentence`` the reason."""
 
     what: str
     sentence: str
@@ -83,7 +83,7 @@ class Source(Protocol):
     address: str
 
     def start(self) -> None:
-        """Start; events and messages are passed to the sinks from now on."""
+        """Start to deliver events and messages to the sinks."""
 
     def watch(self, topic: str) -> None:
         """Subscribe to ``topic`` as soon as it exists."""
@@ -94,22 +94,22 @@ class Source(Protocol):
     def submit(self, what: str, job: Job) -> None:
         """Run a job with the node in the source's thread; a failure is reported as `JobFailed`.
 
-        ``what`` is the `lazy` sentence for the report, with the hole ``error``; "" for none.
+        ``what`` is the `lazy` sentence for the report, with the placeholder ``error``; "" reports nothing.
         """
 
     def missed(self) -> Mapping[str, int]:
-        """Return the number of messages lost before they arrived, by topic, since each topic is watched."""
+        """Return the number of lost messages of each topic since it is watched."""
 
     def close(self) -> None:
-        """Stop; returns when the thread has ended."""
+        """Stop the source and wait for its thread."""
 
 
 MakeSource = Callable[[str, Sequence[Sink], Callable[[object], None]], Source]
-"""Creates a source from a master's address, the message sinks, and the event callback."""
+"""Creates a source from the address of a master, the message sinks, and the event callback."""
 
 
 class LiveSource:
-    """Live network of one master.
+    """Source of the live network of one master.
 
     One thread queries the master, subscribes and runs jobs, so that the window never blocks.
     """
@@ -159,7 +159,7 @@ class LiveSource:
         self.submit("", _wake)
 
     def submit(self, what: str, job: Job) -> None:
-        """Queue a job; jobs run in order and wait until a master answers."""
+        """Queue a job. Jobs run in order, and wait until a master replies."""
         self._jobs.put((what, job))
 
     def missed(self) -> Mapping[str, int]:
@@ -170,7 +170,7 @@ class LiveSource:
         return {topic: before.get(topic, 0) + (each.lost or 0) for topic, each in held.items()}
 
     def end(self) -> None:
-        """Signal the thread to end without waiting; `close` waits."""
+        """Signal the thread to stop, without waiting for it; `close` waits."""
         self._closing.set()
         self._jobs.put(None)
 
@@ -180,7 +180,7 @@ class LiveSource:
         return not self._thread.is_alive()
 
     def close(self) -> None:
-        """Stop and wait for the thread (at most 5 s)."""
+        """Stop the thread and wait for it (at most 5 s)."""
         self.end()
         if self._thread.is_alive():
             self._thread.join(timeout=5)
@@ -192,10 +192,7 @@ class LiveSource:
     """Interval of the graph queries."""
 
     def join(self) -> Node:
-        """Create Studio's node.
-
-        Raises: NepError: no master answers.
-        """
+        """Create Studio's node. Raises `NepError` if no master replies."""
         view = view_or_none(self.address, timeout_s=0.5)
         if view is None:
             raise NepError(_("no master responds at {address}").format(address=self.address))

@@ -12,7 +12,7 @@ from app.core.network.topics import Topic, key_of
 
 Number = TypeVar("Number", int, float)
 MAX_DEPTH = 12
-"""Maximum depth of folders; deeper levels stay in the name, because no window is wide enough to indent them.
+"""Maximum depth of folders. Deeper levels remain part of the name, because no window is wide enough for them.
 """
 
 
@@ -25,15 +25,22 @@ def parts_of_name(name: str) -> tuple[str, ...]:
 
 
 def folder_key(network: str, path: str) -> str:
-    """Return the key of the folder with this path; as a pattern it matches every topic in the folder."""
+    """Return the key of the folder with this path.
+
+    As a pattern, the key matches every topic in the folder.
+    """
     return key_of(network, f"{path}*")
 
 
 @dataclass(frozen=True, slots=True)
 class FolderFigures:
-    """Statistics of all existing topics below a folder; None where no topic has a value.
+    """Statistics of all existing topics below a folder; None if no topic has a value.
 
-    ``rate_hz``, ``bandwidth_Bps`` and ``lost`` are sums; ``age_s`` is that of the newest message.
+    Attributes:
+        rate_hz: Sum of the rates.
+        bandwidth_Bps: Sum of the bandwidths.
+        age_s: Age of the newest message.
+        lost: Sum of the lost messages.
     """
 
     rate_hz: float | None = None
@@ -44,10 +51,15 @@ class FolderFigures:
 
 @dataclass(slots=True, eq=False)
 class TopicFolder:
-    """Folder of topics: last part of its path, whole path ("/robot/arm/"), depth and content.
+    """Folder of topics.
 
-    ``topics`` are all topics below, including those in subfolders. ``key`` is unique among topics and folders
-    of all networks. ``is_open`` is whether the folder is expanded.
+    Attributes:
+        name: Last part of the path.
+        path: Whole path, such as "/robot/arm/".
+        deep: Depth in the tree.
+        is_open: True if the folder is expanded.
+        topics: All topics below the folder, including those in subfolders.
+        inside: Direct content of the folder.
     """
 
     name: str
@@ -61,7 +73,7 @@ class TopicFolder:
 
     @property
     def key(self) -> str:
-        """Key among the folders and topics of all networks: "/robot/*", which can't be a topic's name."""
+        """Key among the folders and topics of all networks: "/robot/*", which is no valid topic name."""
         return folder_key(self.network, self.path)
 
     @property
@@ -91,7 +103,7 @@ def _sum(values: Iterable[Number | None]) -> Number | None:
 
 
 class TopicTree:
-    """Topics in the folders of their names; a topic may have the same name as a folder."""
+    """Topics in folders, as given by their names. A topic may have the same name as a folder."""
 
     def __init__(self, topics: Iterable[Topic], closed: Collection[str] = ()) -> None:
         # `closed` are the keys of collapsed folders.
@@ -148,10 +160,11 @@ def folders_above(topic: str, network: str = "") -> list[str]:
 
 
 def fits(words: Iterable[str]) -> Callable[[str, str], bool]:
-    """Return a predicate (name, details) that is true when a topic matches every word, ignoring case.
+    """Return a predicate (name, details) that is True for topics that match every word, ignoring case.
 
-    A word with ``*`` or ``?`` is a pattern for the whole name (``*`` also matches slashes); ``!`` before a
-    word excludes topics that match it; any other word matches anywhere in the details.
+    A word with ``*`` or ``?`` is a pattern for the whole name (``*`` also matches slashes). A word that
+    starts with
+    ``!`` excludes the topics that match the rest. Any other word may occur anywhere in the details.
     """
     wanted: list[tuple[bool, re.Pattern[str] | str]] = []
     for word in words:

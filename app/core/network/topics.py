@@ -17,24 +17,27 @@ GONE_SHOWN_S = 10.0
 RATES_KEPT = 60
 AT_ONCE = 1500
 START_S = 5.0
-"""Time that a publisher has for its first message after a subscription, such as a camera that starts then."""
+"""Time that a publisher has for its first message after a subscription; some cameras start only then."""
 STATISTICS_LATE_S = 6.0
-"""Minimum silence of topics whose counts only the nodes report: nodes of large graphs report every 5 s."""
+"""Minimum silence of topics whose counts are only reported by nodes, which report every 5 s in large graphs.
+"""
 
 
 _BLANK = " "
 
 
 def key_of(network: str, topic: str) -> str:
-    """Return a topic's name among those of all networks: "ros2 /camera"; unchanged for the native one ("").
+    """Return the name of a topic among those of all networks: "ros2 /camera".
 
-    Native topic names contain no blank, so the two can't be confused.
+    Unchanged for the native network ("").
+
+    Names of native topics contain no blank, so keys can't be ambiguous.
     """
     return f"{network}{_BLANK}{topic}" if network else topic
 
 
 def split_key(key: str) -> tuple[str, str]:
-    """Return (network, topic) of a key made by `key_of`."""
+    """Split a key made by `key_of` into network and topic."""
     network, blank, topic = key.partition(_BLANK)
     return (network, topic) if blank else ("", key)
 
@@ -43,17 +46,24 @@ def split_key(key: str) -> tuple[str, str]:
 class Topic:
     """One topic. Unknown statistics are None; panels leave them blank.
 
-    ``rate_hz`` (messages per second) and ``bandwidth_Bps`` (bytes per second) are as reported by the
-    publishers. ``age_s`` is the time since the newest message by its time stamp; ``silent_s`` the time
-    without a message although the topic has subscribers (None without subscribers: some publishers send only
-    to subscribers). ``lost`` is the number of lost messages, ``loss_ratio`` their share of all messages that
-    subscribers should have received. ``gone_s`` is the time in seconds since the topic vanished, or None
-    while it exists.
-
-    Only while the topic is watched, ``newest`` and ``previous`` are kept and ``received``, ``dropped``
-    (discarded before a panel read them) and ``missed`` (sent but not received here) are counted. ``network``
-    is "" for the native network; ``stale`` is whether that can't be queried now. ``counted`` is the rate
-    measured here (messages, bytes per second) for watched topics whose publishers report none.
+    Attributes:
+        rate_hz: Messages per second, as reported by the publishers.
+        bandwidth_Bps: Bytes per second, as reported by the publishers.
+        age_s: Seconds since the time stamp of the newest message.
+        silent_s: Seconds without a message although the topic has subscribers; None without subscribers,
+            because some
+            publishers send only to subscribers.
+        lost: Number of lost messages.
+        loss_ratio: Share of lost messages among all that subscribers should have received.
+        gone_s: Seconds since the topic vanished; None while it exists.
+        newest: Newest message, as `previous` only while the topic is watched.
+        received: Number of messages received while the topic is watched.
+        dropped: Number of messages discarded before a panel read them, while the topic is watched.
+        missed: Number of messages sent but not received here, while the topic is watched.
+        network: Kind of network; "" for the native one.
+        stale: True if the network can't be queried at the moment.
+        counted: Rate measured here (messages and bytes per second), for watched topics whose publishers
+            report none.
     """
 
     name: str
@@ -90,16 +100,16 @@ class Topic:
 
     @property
     def key(self) -> str:
-        """Key of the topic among those of all networks."""
+        """Key of the topic, unique among all networks."""
         return key_of(self.network, self.name)
 
     @property
     def shown_of(self) -> tuple[int, int]:
-        """Number of messages shown by panels and number of messages sent, since the topic is watched."""
+        """Number of messages shown by panels, and number of messages sent, since the topic is watched."""
         return self.received - self.dropped, self.received + self.missed
 
     def facts(self) -> tuple[object, ...]:
-        """Return the values that change rarely; a panel rebuilds its rows when one of them changes."""
+        """Return the values that rarely change; panels rebuild their rows when one of them changes."""
         gone = self.gone_since is not None
         return (self.msg_type, self.codec, self.publisher_nodes, self.new, gone, self.stale)
 
@@ -117,7 +127,7 @@ class Topics:
         self._seen = (-1, -1)
         self._view: GraphView | None = None
         self._clocks: Mapping[str, int] = {}
-        """Clock offset of each node on another computer, to add to its times (ns)."""
+        """Clock offset (ns) of each node on another computer, to be added to times of that node."""
         self._next_index = 0
         self._reported_at = 0.0
         self._hidden: set[str] = set()  # vanished, but still watched
@@ -149,7 +159,7 @@ class Topics:
         return [topic for topic in self.live() if topic.msg_type in msg_types]
 
     def mark_seen(self, name: str) -> None:
-        """Clear the mark of a topic as new."""
+        """Stop highlighting a topic as new."""
         topic = self._topics.get(name)
         if topic is not None and topic.new:
             topic.new = False
@@ -158,8 +168,9 @@ class Topics:
     def update(self, view: GraphView, now: float) -> None:
         """Apply a new graph; ``now`` is monotonic seconds.
 
-        When no node or topic changed, only the statistics are updated; with more than `AT_ONCE` topics they
-        are updated in parts (`age`).
+        If no node or topic changed, only the statistics are updated; those of more than `AT_ONCE` topics in
+        parts, by
+        `age`.
         """
         seen = (view.epoch, view.revision)
         self._clocks = self._clocks_in(view)
@@ -201,13 +212,13 @@ class Topics:
         self._first_graph = False
 
     def forget(self, now: float) -> None:
-        """Mark all topics as vanished: the master is lost."""
+        """Mark all topics as vanished, because the connection to the master was lost."""
         for topic in self._topics.values():
             if topic.gone_since is None:
                 self._vanish(topic, now)
 
     def set_stale(self, stale: bool) -> None:
-        """Mark all topics as stale while the network can't be queried."""
+        """Set ``stale`` of all topics: True while the network can't be queried."""
         for topic in self._topics.values():
             if topic.stale is not stale:
                 topic.stale = stale
@@ -218,7 +229,7 @@ class Topics:
     def count(self, passed_s: float, before: Mapping[str, tuple[int, int]]) -> dict[str, tuple[int, int]]:
         """Measure the rates of watched topics whose publishers report none, over ``passed_s`` seconds.
 
-        ``before`` is the previous return value: messages and bytes that had arrived, by topic.
+        ``before`` is the previous return value: the total number of messages and bytes received, by topic.
         """
         arrived = {
             topic.name: (topic.received, topic.received_bytes)
@@ -237,9 +248,10 @@ class Topics:
         return arrived
 
     def age(self, now: float, now_ns: int) -> None:
-        """Update the ages; remove topics that vanished more than `GONE_SHOWN_S` ago.
+        """Update the ages, and remove topics that vanished more than `GONE_SHOWN_S` ago.
 
-        With more than `AT_ONCE` topics, each call processes the next `AT_ONCE` and updates their statistics.
+        With more than `AT_ONCE` topics, each call processes the next `AT_ONCE` topics and updates their
+        statistics.
         """
         if self._next_index >= len(self._topics):
             self._next_index = 0
@@ -295,7 +307,7 @@ class Topics:
             topic.watched = False
 
     def set_figures(self, figures: Mapping[str, tuple[float | None, int | None]]) -> None:
-        """Set the reported rate (messages per second) and time of the newest message (ns), by topic."""
+        """Set the reported rate (messages per second) and the time of the newest message (ns) by topic."""
         for name, (rate_hz, newest_ns) in figures.items():
             topic = self._topics.get(name)
             if topic is not None:
@@ -305,7 +317,7 @@ class Topics:
         self.values_revision += 1
 
     def rewind(self) -> None:
-        """Discard the newest messages and their times: the replay moved to another time."""
+        """Discard the newest messages and their times, because the replay jumped to another time."""
         for topic in self._topics.values():
             topic.newest = topic.previous = None
             topic.last_stamp_ns = topic.last_received = topic.age_s = None
@@ -409,6 +421,6 @@ def _silence(topic: Topic, now: float, told_at: float) -> float | None:
 
 
 def total_rate_hz(topics: Iterable[TopicInfo]) -> float | None:
-    """Return the total message rate of the topics; None when no publisher reports one."""
+    """Return the total message rate of the topics; None if no publisher reports one."""
     known = [info.rate_hz for info in topics if info.rate_hz is not None]
     return sum(known) if known else None

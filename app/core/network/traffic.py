@@ -1,4 +1,4 @@
-"""Message statistics of the whole network: rate, losses, and messages shown of those watched."""
+"""Statistics of the whole network: message rate, losses, and the share of watched messages that is shown."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ SUM_INTERVAL_S = 0.5
 
 
 class RecentLosses:
-    """Counter of losses in the last 30 s."""
+    """Counter of the losses within the last 30 s."""
 
     def __init__(self) -> None:
         # The first total is the baseline.
@@ -24,9 +24,11 @@ class RecentLosses:
         self._before: int | None = None
 
     def count(self, total: int, now: float) -> int:
-        """Return the losses of the last 30 s.
+        """Return the number of losses within the last 30 s.
 
-        ``total`` is the number of losses ever, ``now`` monotonic seconds.
+        Args:
+            total: Total number of losses so far.
+            now: Monotonic seconds.
         """
         if self._before is not None and total > self._before:
             self._grew.append((now, total - self._before))
@@ -39,9 +41,13 @@ class RecentLosses:
 class Traffic:
     """Statistics of the network and of the watched topics. Not thread-safe: use it from the window's thread.
 
-    ``messages_per_s`` is the rate of all topics as reported by publishers, or None; ``lost_30s`` the messages
-    that any subscriber lost in the last 30 s. ``shown_30s`` of ``sent_30s`` messages on watched topics were
-    passed to panels; the others were dropped because they arrived faster than the window shows them.
+    Attributes:
+        messages_per_s: Rate of all topics as reported by publishers, or None.
+        lost_30s: Messages that any subscriber lost within the last 30 s.
+        sent_30s: Messages sent on watched topics within the last 30 s.
+        shown_30s: Those of `sent_30s` that were passed to panels. The others were dropped, because they
+            arrived faster
+            than the window can show them.
     """
 
     def __init__(self, topics: Topics) -> None:
@@ -56,7 +62,7 @@ class Traffic:
         self.sent_30s = 0
 
     def follow(self, view: GraphView, now: float) -> None:
-        """Apply a new graph; ``now`` is monotonic seconds. Large graphs are summed less often."""
+        """Apply a new graph; ``now`` is monotonic seconds. Large graphs are evaluated less often."""
         self._pending_view = view
         if len(view.topics) <= AT_ONCE:
             self._sum(view, now)
@@ -81,7 +87,7 @@ class Traffic:
     def miss(self, missed: Mapping[str, int], now: float) -> None:
         """Count messages that were lost before they arrived.
 
-        ``missed`` are totals since each topic is watched.
+        ``missed`` is the total number for each topic since it is watched.
         """
         grown = 0
         for name, total in missed.items():

@@ -9,17 +9,17 @@ from typing import Protocol, final
 
 
 class Suspendable(Protocol):
-    """A resource that costs while it is visible: a watch, a stream of images."""
+    """Resource that uses CPU time only while it is visible: a watch or a stream of images."""
 
     def suspend(self) -> None:
-        """Suspend: it can't be seen for now. Idempotent."""
+        """Suspend the resource while it isn't visible. Idempotent."""
 
     def resume(self) -> None:
         """Resume after `rest`. Idempotent."""
 
 
 class Watching(Suspendable, Protocol):
-    """Interface of a `Watch` for code that only holds one."""
+    """Interface of a `Watch` for code that only holds and releases it."""
 
     def close(self) -> None:
         """Close permanently. Idempotent."""
@@ -91,18 +91,18 @@ class Watches:
         return watch
 
     def watched(self, topic: str) -> bool:
-        """Return whether the topic has an active watch."""
+        """Return True if at least one watch of the topic is active."""
         return self._active_counts[topic] > 0
 
     def enter(self, topics: Iterable[str]) -> None:
-        """Count one more active watch. Called by `Watch`."""
+        """Add one to the number of active watches. Called by `Watch`."""
         for topic in topics:
             self._active_counts[topic] += 1
             if self._active_counts[topic] == 1:
                 self._begin(topic)
 
     def leave(self, topics: Iterable[str]) -> None:
-        """Count one less active watch. Called by `Watch`."""
+        """Subtract one from the number of active watches. Called by `Watch`."""
         for topic in topics:
             self._active_counts[topic] -= 1
             if self._active_counts[topic] == 0:
@@ -110,7 +110,7 @@ class Watches:
                 self._end(topic)
 
     def forget(self, topics: Iterable[str]) -> None:
-        """Count a closed watch, which is suspended. Called by `Watch`."""
+        """Release a watch that is closed while suspended. Called by `Watch`."""
         for topic in topics:
             self._open_counts[topic] -= 1
             if self._open_counts[topic] == 0:

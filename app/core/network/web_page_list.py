@@ -1,4 +1,4 @@
-"""Pages that are connected to the web server, those that have just left, and those that are too slow."""
+"""Pages connected to the web server, pages that left recently, and pages that are too slow."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ SLOW_SHOWN_S = 10.0
 
 @dataclass(frozen=True, slots=True)
 class ListedPage:
-    """A page; ``gone_s`` is the time since it left, None while it is connected."""
+    """Web page in the list; ``gone_s`` is the time since it left, None while it is connected."""
 
     page: ConnectedPage
     gone_s: float | None = None
@@ -23,7 +23,7 @@ class ListedPage:
 
 @dataclass(frozen=True, slots=True)
 class SlowTopic:
-    """A topic of which a page has just dropped messages; ``share`` of them in all."""
+    """Topic of which a page has recently dropped messages; ``share`` is the dropped part of all messages."""
 
     page: ConnectedPage
     topic: str
@@ -31,7 +31,7 @@ class SlowTopic:
 
 
 class PageList:
-    """Follows the snapshots of a server. Not thread-safe."""
+    """List of web pages, updated from snapshots of the server. Not thread-safe."""
 
     def __init__(self) -> None:
         self._pages: dict[int, ConnectedPage] = {}
@@ -40,7 +40,7 @@ class PageList:
         self._drops_at: dict[tuple[int, str], float] = {}
         self._now = 0.0
         self.revision = 0
-        """Number of changes of who is connected."""
+        """Counter that increases when a page connects or leaves."""
 
     @property
     def connected(self) -> tuple[ConnectedPage, ...]:
@@ -49,7 +49,7 @@ class PageList:
 
     @property
     def listed(self) -> tuple[ListedPage, ...]:
-        """Connected pages, and for `GONE_SHOWN_S` seconds those that left, in the order of their arrival."""
+        """Pages in order of arrival: connected ones, and those that left in the last `GONE_SHOWN_S` seconds."""
         return tuple(
             ListedPage(page, self._now - self._left_at[id_] if id_ in self._left_at else None)
             for id_, page in self._pages.items()
@@ -57,7 +57,7 @@ class PageList:
 
     @property
     def bytes_per_s(self) -> float:
-        """Bandwidth of all connected pages."""
+        """Total bandwidth of all connected pages."""
         return sum(topic.bytes_per_s for page in self.connected for topic in page.topics)
 
     def update(self, pages: Sequence[ConnectedPage], now: float) -> None:
@@ -79,11 +79,11 @@ class PageList:
         self._note_drops(pages, now)
 
     def clear(self, now: float) -> None:
-        """Apply the end of the server: all pages have left."""
+        """Remove all pages, because the server stopped."""
         self.update((), now)
 
     def slow(self) -> Iterator[SlowTopic]:
-        """Topics of which a connected page dropped messages in the last `SLOW_SHOWN_S` seconds."""
+        """Yield the topics of which a connected page dropped messages in the last `SLOW_SHOWN_S` seconds."""
         for page in self.connected:
             for topic in page.topics:
                 at = self._drops_at.get((page.id, topic.topic))

@@ -1,4 +1,4 @@
-"""Web server of Studio (`nep web`): off at each start, switched on and configured in its sheet."""
+"""Web server of Studio (`nep web`). It is off at each start; the user switches it on in its sheet."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ WebProtocol = Literal["rosbridge", "foxglove"]
 
 
 class RunningServer(Protocol):
-    """Interface of `nep.programs.web.WebServer` that Studio uses."""
+    """Part of the interface of `nep.programs.web.WebServer` that Studio uses."""
 
     port: int
 
@@ -46,7 +46,7 @@ class RunningServer(Protocol):
 
     @property
     def refusals(self) -> tuple[context.Refusal, ...]:
-        """Refused connections, the newest last."""
+        """Rejected connections, the newest last."""
 
     def set_access(self, access: access.Access) -> int:
         """Replace the allowed origins and the token; return the number of pages that this disconnects."""
@@ -55,37 +55,43 @@ class RunningServer(Protocol):
         """Replace the names of robots that pages may move."""
 
     def set_foxglove(self, channels: channels.LiveChannels | None) -> int:
-        """Accept clients of Foxglove's protocol, or with None disconnect them and accept no more."""
+        """Accept clients of the Foxglove protocol; None disconnects them and rejects new ones.
+
+        Returns the number of disconnected pages.
+        """
 
     def set_rosbridge(self, on: bool) -> int:
-        """Accept clients of rosbridge, or disconnect them and accept no more."""
+        """Accept clients of rosbridge, or disconnect them and reject new ones.
+
+        Returns the number of disconnected pages.
+        """
 
     def keep_out(self, page_id: int) -> None:
-        """Disconnect a page and refuse it when it connects again."""
+        """Disconnect a page and reject its further connections."""
 
     def let_in(self, page_id: int) -> None:
-        """Let a page connect again that was kept out."""
+        """Accept connections of a page again that `keep_out` excluded."""
 
     def wait(self, timeout_s: float) -> bool:
-        """Wait for the server's end; return False after ``timeout_s`` seconds."""
+        """Wait until the server has stopped; return False after ``timeout_s`` seconds."""
 
     def close(self) -> None:
-        """Disconnect all pages and end the server."""
+        """Disconnect all pages and stop the server."""
 
 
 StartServer = Callable[["server.WebSettings"], RunningServer]
-"""Starts a server; may block, is called in a background thread, and raises `NepError`."""
+"""Starts a server in a background thread; may block and raises `NepError` on failure."""
 
 
 @dataclass(frozen=True, slots=True)
 class WebServerStarted:
-    """Result of a start: a server, or the sentence that explains why it failed."""
+    """Event: a server was started, or ``sentence`` explains why that failed."""
 
     number: int
     server: RunningServer | None
     sentence: str = ""
     free_port: int = 0
-    """Port to use instead of one that is taken; 0 when the start failed for another reason."""
+    """Free port to use instead of one that is in use; 0 if the start failed for another reason."""
 
 
 def start_server(settings: server.WebSettings) -> RunningServer:
@@ -94,13 +100,18 @@ def start_server(settings: server.WebSettings) -> RunningServer:
 
 
 class WebPages:
-    """The web server and its settings. Not thread-safe: use it from the window's thread.
+    """Web server of Studio and its settings. Not thread-safe: use it from the window's thread.
 
-    `host` is the address of this computer that other computers connect to, or "". `origins` are allowed
-    origins of pages from other computers. `robots` are the names of robots that pages may move. `protocols`
-    are those that are switched on; all share one port, the origins and the token. `kept_out` are pages that
-    were disconnected here, by their ids; they are refused when they connect again. A running server follows
-    changes at once; only another `host` or `port` restarts it. Settings are not saved.
+    A running server applies changes immediately; only a change of `host` or `port` restarts it. The settings
+    are not
+    saved.
+
+    Attributes:
+        host: Address of this computer to which other computers connect, or "".
+        origins: Allowed origins of pages from other computers.
+        robots: Names of the robots that pages may move.
+        protocols: Protocols that are switched on. All share the port, the origins and the token.
+        kept_out: Pages that the user disconnected, by id. Their further connections are rejected.
     """
 
     def __init__(
@@ -112,7 +123,7 @@ class WebPages:
         addresses: Callable[[], tuple[OwnAddress, ...]] = own_addresses,
         clock: Callable[[], float] = time.monotonic,
     ) -> None:
-        """Create it switched off. ``master`` is the address of the master."""
+        """Create the web server, switched off. ``master`` is the address of the master."""
         self.master, self._post_event, self._start = master, post_event, start
         self.addresses, self._clock = addresses, clock
         self._server: RunningServer | None = None
@@ -149,17 +160,17 @@ class WebPages:
 
     @property
     def page_url(self) -> str:
-        """Address of the test page that the server serves, with the token if it requires one."""
+        """Address of the test page on the server, with the token if one is required."""
         return f"http{self.full_url.removeprefix('ws')}" if self.token else f"http://{self.host_and_port}/"
 
     @property
     def local_page_url(self) -> str:
-        """The same for a browser of this computer, whose pages need not be allowed by origin."""
+        """Address of the test page for a browser on this computer, which is allowed from any origin."""
         return self.page_url.replace(f"//{self.host}:", f"//{LOOPBACK}:") if self.host else self.page_url
 
     @property
     def pages(self) -> tuple[context.ConnectedPage, ...]:
-        """Pages that are connected now."""
+        """Currently connected pages."""
         return () if self._server is None else self._server.pages
 
     @property
@@ -174,7 +185,7 @@ class WebPages:
 
     @property
     def listed(self) -> tuple[ListedPage, ...]:
-        """The same, with pages that left a short time ago."""
+        """Pages that were connected at the last `refresh`, and pages that left recently."""
         return self._list.listed
 
     @property
@@ -184,23 +195,26 @@ class WebPages:
 
     @property
     def bytes_per_s(self) -> float:
-        """Bandwidth of all connected pages."""
+        """Total bandwidth of all connected pages."""
         return self._list.bytes_per_s
 
     @property
     def refusals(self) -> tuple[context.Refusal, ...]:
-        """Refused connections and commands, the newest last."""
+        """Rejected connections and commands, the newest last."""
         return () if self._server is None else self._server.refusals
 
     @property
     def is_port_taken(self) -> bool:
-        """Whether the last start failed because another program listens on the port."""
+        """True if the last start failed because another program uses the port."""
         return self.free_port > 0
 
     # ---- switches
 
     def serve(self, protocol: WebProtocol, *, on: bool) -> None:
-        """Switch a protocol on or off; the server starts in the background, and runs while one is on."""
+        """Switch a protocol on or off.
+
+        The server starts in the background when the first one is switched on.
+        """
         self.protocols = self.protocols | {protocol} if on else self.protocols - {protocol}
         if not self.protocols:
             self.switch_off()
@@ -210,7 +224,7 @@ class WebPages:
             self._push()
 
     def switch_off(self) -> None:
-        """Disconnect all pages and end the server in the background."""
+        """Disconnect all pages and stop the server in the background."""
         self._number += 1
         self.state, self.sentence, self.free_port = "off", "", 0
         self.protocols = frozenset()
@@ -220,7 +234,7 @@ class WebPages:
         self._in_thread(lambda: ended.close() if ended is not None else None)
 
     def use_free_port(self) -> None:
-        """Try again, on a port that is free, what failed because the port was taken."""
+        """Retry a start that failed because the port was in use, on a free port."""
         if self.free_port:
             self.port, self.protocols = self.free_port, self._failed
             self._begin()
@@ -228,7 +242,7 @@ class WebPages:
     # ---- settings
 
     def open_to(self, host: str) -> None:
-        """Let other computers connect to an address of this computer, or none with "".
+        """Accept connections of other computers on an address of this computer; "" accepts none.
 
         A running server restarts, which disconnects all pages.
         """
@@ -243,42 +257,42 @@ class WebPages:
             self._begin()
 
     def new_token(self) -> int:
-        """Replace the token; return the number of pages that this disconnects."""
+        """Generate a new token; return the number of pages that this disconnects."""
         return self.set_token(access.new_token())
 
     def set_token(self, token: str) -> int:
-        """Require another token; return the number of pages that this disconnects."""
+        """Set the required token; return the number of pages that this disconnects."""
         self.token = token
         return self._push()
 
     def add_origin(self, text: str) -> None:
-        """Allow an origin. Raises `NepError` for a malformed one."""
+        """Allow an origin. Raises `NepError` if the origin is malformed."""
         self.set_origins((*self.origins, access.checked_origin(text)))
 
     def set_origins(self, origins: Sequence[str]) -> None:
-        """Allow exactly these well-formed origins, without duplicates."""
+        """Replace the allowed origins, which must be well-formed; duplicates are removed."""
         self.origins = tuple(dict.fromkeys(origins))
         self._push()
 
     def set_robots(self, names: Sequence[str]) -> None:
-        """Set `robots`, without duplicates."""
+        """Replace the names of the robots that pages may move; duplicates are removed."""
         self.robots = tuple(dict.fromkeys(names))
         self._push()
 
     def keep_out(self, page: context.ConnectedPage) -> None:
-        """Disconnect a page, and refuse it until `let_in` or the end of the server."""
+        """Disconnect a page, and reject its connections until `let_in` is called or the server stops."""
         if self._server is not None:
             self._server.keep_out(page.id)
             self.kept_out[page.id] = page
 
     def let_in(self, page_id: int) -> None:
-        """Let a page connect again that was kept out."""
+        """Accept connections of a page again that `keep_out` excluded."""
         self.kept_out.pop(page_id, None)
         if self._server is not None:
             self._server.let_in(page_id)
 
     def starter_page(self) -> str:
-        """Return the HTML of a page to start from, which connects to this server."""
+        """Return the HTML of a template page that connects to this server."""
         return served_pages.starter_page(self.full_url)
 
     def _push(self) -> int:
@@ -293,7 +307,7 @@ class WebPages:
     # ---- following the server
 
     def started(self, event: WebServerStarted) -> None:
-        """Apply the result of a start; closes the server if the switch was changed meanwhile."""
+        """Apply the result of a start. Closes the server if it was switched off or restarted meanwhile."""
         if event.number != self._number:
             if event.server is not None:
                 self._in_thread(event.server.close)
@@ -306,11 +320,11 @@ class WebPages:
             self._push()  # what was changed during the start
 
     def refresh(self) -> None:
-        """Take a snapshot of the connected pages."""
+        """Update `connected` and `listed` from the server."""
         self._list.update(self.pages, self._clock())
 
     def check(self) -> None:
-        """Detect a server that ended by itself, and take a snapshot. Called once a second."""
+        """Detect that the server stopped unexpectedly, and call `refresh`. Called once a second."""
         if self._server is not None and self._server.wait(0):
             self._server, self.state, self.protocols = None, "off", frozenset()
             self.kept_out.clear()
@@ -318,7 +332,7 @@ class WebPages:
         self.refresh()
 
     def close(self) -> None:
-        """End the server and its threads; waits at most `END_WAIT_S` seconds."""
+        """Stop the server and its threads; waits at most `END_WAIT_S` seconds."""
         self.switch_off()
         if self._thread is not None:
             self._thread.join(END_WAIT_S)
@@ -373,7 +387,7 @@ class WebPages:
 
 
 def _port_taken(port: int) -> tuple[str, int]:
-    """Return the sentence that says which program has the port, and the next free port."""
+    """Return a sentence about the program that uses the port, and the next free port."""
     holder = processes.describe(processes.listening().get(port))
     if holder is None:
         sentence = _("Port {port} is in use by another program, perhaps rosbridge.").format(port=port)

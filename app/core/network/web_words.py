@@ -1,4 +1,4 @@
-"""Sentences about the web server: the status bar, addresses, refusals, and the command for a terminal."""
+"""Texts about the web server: status bar, addresses, rejected connections, and the command for a terminal."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ NextStep = Literal["", "allow origin", "choose robots", "let in"]
 
 @dataclass(frozen=True, slots=True)
 class PageNode:
-    """What the graph shows of a page: its title, "192.168.1.30, Chrome", and its icon."""
+    """Description of a page in the graph: its title, its address and browser, and its icon."""
 
     title: str
     where: str
@@ -33,9 +33,12 @@ class PageNode:
 
 @dataclass(frozen=True, slots=True)
 class WebNotice:
-    """Sentence about a refusal or a slow page, and the button that helps; ``value`` is what it allows.
+    """Message about a rejected connection or a slow page, with a button.
 
-    Notices with the same ``key`` are about the same thing.
+    Attributes:
+        key: Equal for messages about the same problem.
+        next_step: Action of the button.
+        value: Argument of the action: the origin, robot or page concerned.
     """
 
     key: tuple[str, ...]
@@ -46,19 +49,19 @@ class WebNotice:
 
 
 def is_wireless(own: OwnAddress) -> bool:
-    """Return whether an address is one of a Wi-Fi interface, judging by the interface's name."""
+    """Return True if an address belongs to a Wi-Fi interface, judging by the name of the interface."""
     return own.interface.casefold().startswith(_WIRELESS)
 
 
 def address_words(own: OwnAddress) -> str:
-    """Say "Wi-Fi 192.168.1.20" or "192.168.1.20 (eth0)"."""
+    """Format an address of this computer: "Wi-Fi 192.168.1.20" or "192.168.1.20 (eth0)"."""
     if is_wireless(own):
         return _("Wi-Fi {address}").format(address=own.host)
     return f"{own.host} ({own.interface})" if own.interface else own.host
 
 
 def host_words(web: WebPages) -> str:
-    """Name the address that other computers connect to; "" when only this computer can."""
+    """Format the address to which other computers connect; "" if only this computer can connect."""
     if not web.host:
         return ""
     own = next((each for each in web.addresses() if each.host == web.host), OwnAddress(web.host, ""))
@@ -66,9 +69,9 @@ def host_words(web: WebPages) -> str:
 
 
 def web_status(web: WebPages, network: str) -> tuple[str, str, str | None]:
-    """Return icon, words and status for the status bar; no words while the server is off.
+    """Return icon, text and status for the status bar; the text is empty while the server is off.
 
-    ``network`` is what `host_words` returned when the server was opened.
+    ``network`` is the result of `host_words` from the time when the server was opened to other computers.
     """
     if web.state != "on":
         return "", "", None
@@ -82,33 +85,33 @@ def web_status(web: WebPages, network: str) -> tuple[str, str, str | None]:
 
 
 def page_name(page: ConnectedPage) -> str:
-    """Return what a page is called: its title; a program without one is called by its library."""
+    """Return the display name of a page: its title; for a program without title, the library that it uses."""
     is_named = page.title and page.title != page.name
     return page.title if is_named else page.client or page.origin or page.name
 
 
 def where_words(page: ConnectedPage) -> str:
-    """Say "192.168.1.30, Chrome"."""
+    """Format address and browser of a page: "192.168.1.30, Chrome"."""
     client = page.client if page.client != page_name(page) else ""
     return ", ".join(filter(None, (page.address, client)))
 
 
 def page_icon(page: ConnectedPage) -> str:
-    """Return the icon of a tablet, a phone, a computer's browser, or a program."""
+    """Return the icon of a page: a tablet, phone, browser or program."""
     if page.device:
         return "smartphone" if page.device == "phone" else "tablet"
     return "monitor" if page.origin else "terminal"
 
 
 def page_nodes(web: WebPages) -> dict[str, PageNode]:
-    """Return what the graph shows of connected pages, by the names of their nodes."""
+    """Return the description of each connected page in the graph, by the name of its node."""
     return {
         page.name: PageNode(page_name(page), where_words(page), page_icon(page)) for page in web.connected
     }
 
 
 def terminal_command(web: WebPages, platform: str = sys.platform) -> str:
-    """Return the command that starts the same server without Studio."""
+    """Return the terminal command that starts the same server without Studio."""
     words = ["nep", "web"]
     if web.port != DEFAULT_PORT:
         words += ["--port", str(web.port)]
@@ -126,7 +129,10 @@ def terminal_command(web: WebPages, platform: str = sys.platform) -> str:
 
 
 def notices(web: WebPages, dismissed: Collection[tuple[str, ...]] = ()) -> tuple[WebNotice, ...]:
-    """Return what a person should know, newest first: refusals that were not allowed since, slow pages."""
+    """Return the messages to show, newest first.
+
+    They are about slow pages, and rejected connections that are still not allowed.
+    """
     found: dict[tuple[str, ...], WebNotice] = {}
     for notice in (*_refused(web), *_slow(web)):
         if notice.key not in dismissed:
@@ -181,7 +187,7 @@ def _slow(web: WebPages) -> Iterator[WebNotice]:
 
 
 def share_words(share: float) -> str:
-    """Say "0.3 %"; a small share that isn't 0 is "under 0.1 %"."""
+    """Format a share in percent: "0.3 %"; a very small one as "under 0.1 %"."""
     if 0 < share < 0.0005:
         return _("under {share}").format(share=number(0.001, ".1%").replace("%", " %"))
     return number(share, ".1%").replace("%", " %")

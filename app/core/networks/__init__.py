@@ -1,5 +1,5 @@
-"""Networks other than the native one that the user chose to show: ROS 1, ROS 2, zenoh.
+"""Networks that the user chose to show in addition to the native one: ROS 1, ROS 2, zenoh.
 
-`kinds` describes them and the limits of each, `source` joins one in a thread of its own, `networks` is
-their state in the session.
+`kinds` describes the kinds of networks and their limits, `source` joins a network in a background thread, and
+`networks` holds their state in the session.
 """

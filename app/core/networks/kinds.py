@@ -1,4 +1,4 @@
-"""Kinds of networks that Studio can show beside its own: names, addresses, available statistics."""
+"""Kinds of networks that Studio can show in addition to its own: names, addresses, available statistics."""
 
 from __future__ import annotations
 
@@ -15,12 +15,18 @@ _TEXT_OF_ROS = "std_msgs/String"
 
 @dataclass(frozen=True, slots=True)
 class NetworkKind:
-    """Kind of network. ``name`` is the name of nep's back end, ``words`` the product name.
+    """Supported kind of network.
 
-    ``place`` describes its address and ``hint`` gives advice, both marked with `lazy`; ``example`` is the
-    default address. ``tells_figures`` is whether its nodes report rates, losses and CPU use. ``codec``
-    returns a topic's codec where the graph has a more general one; ``reads`` the type to subscribe with.
-    ``qos`` is the quality of service that is compatible with most publishers.
+    Attributes:
+        name: Name of nep's back end.
+        words: Product name.
+        place: Label of the address field (a `lazy` text).
+        example: Default address.
+        hint: Advice for the user (a `lazy` text).
+        tells_figures: True if the nodes report rates, losses and CPU use.
+        codec: Returns the codec of a topic, where that of the graph is too general.
+        reads: Returns the message type to subscribe with.
+        qos: Quality of service that is compatible with most publishers.
     """
 
     name: str
@@ -34,12 +40,12 @@ class NetworkKind:
     qos: str = ""
 
     def checked(self, address: str) -> str:
-        """Return the address in the back end's form. Raises `NepError` if it is invalid."""
+        """Return the address in the form of the back end. Raises `NepError` if the address is invalid."""
         return backend_named(self.name).master(address.strip() or self.example)
 
     @property
     def not_known(self) -> str:
-        """Explanation of a missing value: "not known on ROS 2"."""
+        """Explanation of a missing value, such as "unknown on ROS 2"."""
         return _("unknown on {network}").format(network=self.words)
 
 

@@ -1,4 +1,4 @@
-"""Live network as part of `app.core.session.Session`."""
+"""Part of `app.core.session.Session` that represents the live network."""
 
 from __future__ import annotations
 
@@ -14,7 +14,10 @@ from nep.protocol.graph_view import GraphView
 
 @dataclass(slots=True)
 class LiveNetwork:
-    """State of the live network, also while a recording is shown; used by robots, Stop, alarms and health."""
+    """State of the live network, which is updated even while a recording is shown.
+
+    Used by robots, Stop, alarms and health.
+    """
 
     topics: Topics
     nodes: Nodes

@@ -1,4 +1,4 @@
-"""Networks that the user chose to show beside the native one, and their state."""
+"""Networks shown in addition to the native one, and their state."""
 
 from __future__ import annotations
 
@@ -19,9 +19,9 @@ from nep.errors import NepError
 from nep.i18n import _
 
 KEPT = "networks"
-"""Setting with the shown networks: addresses by kind."""
+"""Setting that stores the address of each shown network."""
 LOOK_COMMAND = "network.look"
-"""Window command for choosing the networks."""
+"""Window command that opens the choice of networks."""
 COUNT_INTERVAL_S = 1.0
 
 NetworkState = Literal["off", "looking", "there", "lost"]
@@ -40,25 +40,25 @@ class NetworkSource(Protocol):
         """Unsubscribe from a topic."""
 
     def end(self) -> None:
-        """Signal the thread to end without waiting."""
+        """Signal the thread to stop, without waiting for it."""
 
     @property
     def has_ended(self) -> bool:
         """True if the thread has ended."""
 
     def close(self) -> None:
-        """Stop and wait for the thread."""
+        """Stop the thread and wait for it."""
 
 
 MakeNetwork = Callable[[NetworkKind, str, Sequence[Sink], Callable[[object], None]], NetworkSource]
-"""Creates the source of a network of this kind and address."""
+"""Creates the source of a network from its kind, address, sinks and event callback."""
 
 
 @dataclass(frozen=True, slots=True)
 class NetworkEvent:
     """Event of a network's source.
 
-    ``number`` identifies the source, as a stopped one may still send events.
+    ``number`` identifies the source, because a stopped source may still send events.
     """
 
     kind: str
@@ -67,9 +67,12 @@ class NetworkEvent:
 
 
 class OtherNetwork:
-    """State of one network. ``state`` is "off" until it is chosen; ``sentence`` is why it is "lost".
+    """State of one network.
 
-    ``unread`` maps watched topics that can't be read to the reason.
+    Attributes:
+        state: "off" while the network isn't shown.
+        sentence: Reason if `state` is "lost".
+        unread: Reason for each watched topic that can't be read.
     """
 
     def __init__(self, kind: NetworkKind) -> None:
@@ -80,7 +83,7 @@ class OtherNetwork:
         self.forget()
 
     def forget(self) -> None:
-        """Reset the state."""
+        """Reset the state to that of a network that isn't shown."""
         self.state: NetworkState = "off"
         self.sentence = ""
         self.topics, self.nodes = Topics(network=self.kind.name), Nodes(self.kind.name)
@@ -94,7 +97,7 @@ class OtherNetwork:
         return self.source is not None
 
     def apply(self, event: object, now: float) -> None:
-        """Apply an event of its source."""
+        """Apply an event of the network's source."""
         match event:
             case GraphSeen():
                 self.state, self.sentence = "there", ""
@@ -114,7 +117,7 @@ class OtherNetwork:
                 pass
 
     def age(self, now: float, now_ns: int) -> None:
-        """Update the ages; once a second, measure rates that publishers don't report."""
+        """Update the ages. Once a second, also measure the rates that publishers don't report."""
         self.topics.age(now, now_ns)
         self.nodes.age(now)
         if self._counted_at is None or now - self._counted_at >= COUNT_INTERVAL_S:
@@ -125,7 +128,7 @@ class OtherNetwork:
 class Networks:
     """All kinds of networks, shown or not. Not thread-safe: use it from the window's thread.
 
-    Each shown network has a thread of its own.
+    Each shown network has its own thread.
     """
 
     def __init__(
@@ -178,13 +181,13 @@ class Networks:
         return [node for network in self.chosen for node in network.nodes]
 
     def topic(self, key: str) -> Topic | None:
-        """Return the topic with this key; None when it is native or unknown."""
+        """Return the topic with this key; None if it is native or unknown."""
         name, topic = split_key(key)
         network = self._networks.get(name)
         return network.topics.get(topic) if network is not None else None
 
     def unread(self, key: str) -> str:
-        """Return why a watched topic can't be read, or ""."""
+        """Return why a watched topic can't be read; "" if it can."""
         name, topic = split_key(key)
         network = self._networks.get(name)
         return network.unread.get(topic, "") if network is not None else ""
@@ -204,7 +207,9 @@ class Networks:
     def choose(self, name: str, address: str) -> None:
         """Show the network of this kind at this address, also after the next start.
 
-        Raises: NepError: the address is invalid. SettingsError: the choice can't be saved.
+        Raises:
+            NepError: The address is invalid.
+            SettingsError: The choice can't be saved.
         """
         network = self._networks[name]
         checked = network.kind.checked(address)
@@ -214,7 +219,7 @@ class Networks:
         self._save({**self._saved(), name: checked})
 
     def leave(self, name: str) -> None:
-        """Stop showing a network. Raises `SettingsError` when that can't be saved."""
+        """Stop showing a network. Raises `SettingsError` if the choice can't be saved."""
         self._end(self._networks[name])
         self._save({kind: address for kind, address in self._saved().items() if kind != name})
 
@@ -298,7 +303,7 @@ class Networks:
             network.source.watch(topic)
 
     def unwatch(self, key: str) -> None:
-        """End the watch of a topic."""
+        """Stop watching a topic."""
         name, topic = split_key(key)
         network = self._networks.get(name)
         if network is None:
@@ -310,7 +315,7 @@ class Networks:
             network.source.unwatch(topic)
 
     def age(self, now: float, now_ns: int) -> None:
-        """Update the ages."""
+        """Update the ages of nodes and topics."""
         for network in self.chosen:
             network.age(now, now_ns)
 
@@ -327,7 +332,7 @@ class Networks:
 
 
 def lost_words(network: OtherNetwork) -> str:
-    """Return why a network is lost ("ROS 1: no ROS master answers at ..."), or "" while it answers."""
+    """Return why the connection to a network was lost ("ROS 1: no ROS master answers at ..."), or ""."""
     if network.state != "lost":
         return ""
     return _("{network}: {reason}.").format(network=network.kind.words, reason=network.sentence)
@@ -340,13 +345,13 @@ def network_words(name: str) -> str:
 
 
 def topic_words(key: str) -> str:
-    """Return a topic's name for people: "/camera", or "/camera on ROS 2"."""
+    """Return the display name of a topic: "/camera", or "/camera on ROS 2"."""
     name, topic = split_key(key)
     return _("{topic} on {network}").format(topic=topic, network=network_words(name)) if name else topic
 
 
 def by_network(batches: Mapping[str, Batch]) -> tuple[dict[str, Batch], dict[str, Batch]]:
-    """Split batches into those of the native network and those of others."""
+    """Split batches into those of the native network and those of all others."""
     native: dict[str, Batch] = {}
     others: dict[str, Batch] = {}
     for key, batch in batches.items():

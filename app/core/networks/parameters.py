@@ -1,6 +1,6 @@
-"""Parameters of the selected node: current values, recent changes, setting a value.
+"""Parameters of the selected node: current values, recent changes, and setting a value.
 
-Values are received on the node's parameter topic and set by a service call in a thread of its own.
+Values are received on the parameter topic of the node, and set by a service call in a background thread.
 """
 
 from __future__ import annotations
@@ -29,20 +29,25 @@ from nep.text import bounded_str
 ANSWER_TIMEOUT_S = 3.0
 """Timeout of the call that sets a parameter."""
 READ_BYTES = 4 * 2**20
-"""Maximum message size that is decoded in the window."""
+"""Maximum size of a message that is decoded in the window's thread."""
 EDITED_LETTERS = 20_000
 MAX_PARAMETERS = 1000
-"""Number of parameters that a node may declare; more are not shown."""
+"""Maximum number of parameters of a node; further ones are not shown."""
 _MAX_DESCRIPTION_LENGTH = 2_000
-"""Maximum length of a shown description."""
+"""Maximum number of characters shown of a description."""
 
 
 @dataclass(frozen=True, slots=True)
 class ShownParameter:
-    """Parameter as reported by its node. ``kind`` is "bool", "int", "float", "str", "list" or "dict".
+    """Parameter as reported by its node.
 
-    ``minimum`` and ``maximum`` bound numbers; ``choices`` lists the allowed values, if restricted. With
-    ``read_only`` only its own node can set it. ``text`` is the value in editable form.
+    Attributes:
+        kind: "bool", "int", "float", "str", "list" or "dict".
+        minimum: Lower limit of a number, or None.
+        maximum: Upper limit of a number, or None.
+        choices: Allowed values; empty if any value is allowed.
+        read_only: True if only the node itself can set the parameter.
+        text: The value in editable form.
     """
 
     name: str
@@ -65,19 +70,19 @@ class ParameterSetter:
         self._worker: BackgroundWorker[bool] = BackgroundWorker("studio-parameters")
 
     def set(self, node_id: str, name: str, value: object) -> None:
-        """Call the node to set a parameter; `take` returns the result."""
+        """Call the node to set a parameter. `has_been_set` returns the result."""
         owner = f"{node_id} {name}"
         self._submit("", lambda node: self._worker.ask(owner, partial(_set, node, node_id, name, value)))
 
     def has_been_set(self, node_id: str, name: str) -> bool:
-        """Return whether the node has set it since the last call.
+        """Return True once after the parameter has been set; False before.
 
-        Raises `NepError` with the reason if it failed.
+        Raises `NepError` with the reason if setting the parameter failed.
         """
         return self._worker.pop_result(f"{node_id} {name}") is True
 
     def close(self) -> None:
-        """Wait for a call in flight, at most 2 s."""
+        """Wait at most 2 s for a call in flight."""
         self._worker.close()
 
 
@@ -95,8 +100,9 @@ def _set(node: Node, node_id: str, name: str, value: object) -> bool:
 class NodeParameters:
     """Parameters of the shown node. Not thread-safe: use it from the window's thread.
 
-    ``changed`` maps names to the time of the last change while watched (monotonic seconds). ``revision``
-    increases with every change.
+    Attributes:
+        changed: Time of the last change of each parameter, by name (monotonic seconds).
+        revision: Counter that increases with every change.
     """
 
     def __init__(
@@ -114,18 +120,18 @@ class NodeParameters:
         self.all: tuple[ShownParameter, ...] = ()
         self.changed: dict[str, float] = {}
         self.heard = False
-        """True if the node has reported its parameters since it is shown."""
+        """True if the node has reported its parameters since it was selected."""
         self.problem = ""
-        """Why its report can't be read, or ""."""
+        """Why the message with the parameters can't be read, or ""."""
         self.setting = ""
         """Name of the parameter that is being set, or ""."""
         self.refusal = ""
-        """Sentence why the last set call was rejected, or ""."""
+        """Why the last request to set a parameter was rejected, or ""."""
         self.revision = 0
         self._applied_message: Message | None = None
 
     def show(self, node: NodeEntry | None) -> None:
-        """Show the parameters of this node, which may have none; None shows no node."""
+        """Show the parameters of a node; None shows no node."""
         wanted = node if node is not None and node.has_parameters else None
         if wanted is self.node:
             return
@@ -135,7 +141,7 @@ class NodeParameters:
             self.watching = self._watch(key_of(wanted.network, place_of(wanted.id)))
 
     def close(self) -> None:
-        """Show no node."""
+        """Stop showing a node."""
         if self.watching is not None:
             self.watching.close()
         self.watching = self.node = self._applied_message = None
@@ -148,7 +154,7 @@ class NodeParameters:
         return next((each for each in self.all if each.name == name), None)
 
     def refresh(self, now: float) -> None:
-        """Apply received values; ``now`` is monotonic seconds."""
+        """Apply the received values; ``now`` is monotonic seconds."""
         node = self.node
         if node is None:
             return
@@ -192,9 +198,9 @@ class NodeParameters:
                 self.revision += 1
 
     def set(self, name: str, text: str) -> None:
-        """Call the node to set the value that the text means.
+        """Parse a text and call the node to set the parameter to this value.
 
-        `refusal` is then the reason if it can't be set.
+        If the value can't be set, `refusal` is the reason.
         """
         node, parameter = self.node, self.find(name)
         self.revision += 1
@@ -216,7 +222,7 @@ class NodeParameters:
 
 
 def refusal_of(node: NodeEntry, parameter: ShownParameter) -> str:
-    """Return why a parameter can't be set from here, or ""."""
+    """Return why a parameter can't be set from here; "" if it can."""
     if node.gone_s is not None:
         return _("its node has disappeared")
     if len(parameter.text) > EDITED_LETTERS:
@@ -227,7 +233,10 @@ def refusal_of(node: NodeEntry, parameter: ShownParameter) -> str:
 
 
 def parameters_in(state: object) -> tuple[ShownParameter, ...]:
-    """Parse a node's parameter message. Raises `NepError` if it is malformed: any node can publish there."""
+    """Parse the parameter message of a node. Raises `NepError` if the message is malformed.
+
+    Any node can publish on that topic.
+    """
     listed = state.get("parameters") if isinstance(state, Mapping) else None
     if not isinstance(listed, list):
         raise NepError(_("this is not a list of parameters"))
@@ -260,7 +269,7 @@ def _same(one: object, other: object) -> bool:
 
 
 def text_of(value: object) -> str:
-    """Return a value in editable form: strings unchanged, anything else as JSON."""
+    """Format a value for editing: strings unchanged, anything else as JSON."""
     if isinstance(value, str):
         return value
     try:
@@ -270,7 +279,7 @@ def text_of(value: object) -> str:
 
 
 def value_of(text: str, kind: str) -> object:
-    """Parse the text of a parameter of this kind. Raises `ValueError` with a sentence."""
+    """Parse the text of a parameter of this kind. Raises `ValueError` with a message for the user."""
     if kind == "str":
         return text
     stripped = text.strip()

@@ -1,4 +1,4 @@
-"""Source of a network other than the native one, joined by a node of its back end in a thread of its own."""
+"""Source of a network other than the native one, joined through its back end in a background thread."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ POLL_S = 2.0
 
 
 class OtherSource(LiveSource):
-    """`LiveSource` of another network; its sinks get topics by their keys among all networks (`key_of`)."""
+    """Source of another network. Its sinks receive topics by their keys (`key_of`)."""
 
     poll_s = REQUEST_TIMEOUT_S
 
@@ -41,15 +41,16 @@ class OtherSource(LiveSource):
         self._revision = 0
 
     def join(self) -> Node:
-        """Join the network. Raises `NepError` while it doesn't answer."""
+        """Join the network. Raises `NepError` while the network does not respond."""
         with _converted_errors():
             return nep.node(NODE_NAME, self._kind.name, master=self.address, wait_s=POLL_S)
 
     def query_graph(self, node: Node) -> GraphView:
-        """Return the graph with the codecs by which topics are read.
+        """Return the graph, with the codec with which each topic is read.
 
-        The revision increases with every change of nodes or topics: back ends that collect a new graph each
-        time give different graphs the same number.
+        The revision increases with every change of nodes or topics. Back ends that build a new graph for each
+        query don't
+        count revisions themselves.
         """
         with _converted_errors():
             view = node.graph(timeout_s=POLL_S)
@@ -64,7 +65,7 @@ class OtherSource(LiveSource):
         return replace(view, topics=topics, revision=self._revision)
 
     def subscribe(self, node: Node, topic: str, msg_type: str, sink: NodeSink) -> Subscriber:
-        """Subscribe to a topic with the type by which it is read."""
+        """Subscribe to a topic with the message type that can be read (`NetworkKind.reads`)."""
         info = self._view.topics.get(topic) if self._view is not None else None
         wanted = self._kind.reads(info) if info is not None else msg_type
         with _converted_errors():

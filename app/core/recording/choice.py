@@ -1,4 +1,4 @@
-"""Selection of what to record, by names or patterns, and its form in the settings."""
+"""Selection of topics to record, by names or patterns, and its form in the settings."""
 
 from __future__ import annotations
 
@@ -21,10 +21,10 @@ MODES = ("all", "chosen", "pattern")
 MIN_S, MAX_S, USUAL_S = 5, 3_600, 60
 MIN_GB, MAX_GB, USUAL_GB = 0.1, 1_000.0, 2.0
 MIN_MINUTES, MAX_MINUTES = 0.1, 10_080.0
-"""Limits of the recording's duration in minutes; its size limits are those of the flight recorder."""
+"""Minimum and maximum duration of a recording in minutes."""
 MAX_NAMES = 1_000
 MAX_NAME_LENGTH = 80
-"""Maximum length of a file name, which with its suffix all file systems accept."""
+"""Maximum length of a file name, which all file systems accept with an extension added."""
 NOT = lazy("not")
 _INVALID_CHARACTERS = re.compile(r'[\x00-\x1f\x7f<>:"/\\|?*\ud800-\udfff]+')
 _RESERVED_NAMES = re.compile(r"(con|prn|aux|nul|com[0-9]|lpt[0-9])(\..*)?", re.IGNORECASE)
@@ -32,11 +32,14 @@ _RESERVED_NAMES = re.compile(r"(con|prn|aux|nul|com[0-9]|lpt[0-9])(\..*)?", re.I
 
 @dataclass(frozen=True, slots=True)
 class RecordingChoice:
-    """Topics to record.
+    """Selection of topics to record, and limits of the recording.
 
-    ``mode`` is "all"; "chosen" for those in ``topics``; or "pattern" for topics that match ``patterns`` (all
-    if empty) and none of ``left_out``. The recording ends after ``ends_min`` minutes or at ``ends_gb`` (10^9
-    bytes), whichever comes first; None is no limit.
+    Attributes:
+        mode: "all", "chosen" for the topics in `topics`, or "pattern" for topics that match one of `patterns`
+            (any if
+            empty) and none of `left_out`.
+        ends_min: Maximum duration in minutes; None for no limit.
+        ends_gb: Maximum size in GB (10^9 bytes); None for no limit.
     """
 
     mode: str = "all"
@@ -47,7 +50,10 @@ class RecordingChoice:
     ends_gb: float | None = None
 
     def end(self, elapsed_s: float, size_bytes: float, speed: float | None) -> tuple[float, float] | None:
-        """Return the expected (seconds, bytes) at the end for a rate in bytes per second; None if unknown."""
+        """Return the expected duration (s) and size (bytes) at the end; None if unknown.
+
+        ``speed`` is the current data rate in bytes per second.
+        """
         ends = [] if self.ends_min is None else [60.0 * self.ends_min]
         if self.ends_gb is not None and speed:
             ends.append(elapsed_s + (1e9 * self.ends_gb - size_bytes) / speed)
@@ -58,7 +64,7 @@ class RecordingChoice:
 
     @property
     def selection(self) -> recorder.TopicSelection:
-        """Selection for the recorder. Raises `BadTopicError` for an invalid topic."""
+        """Selection in the form of the recorder. Raises `BadTopicError` for an invalid topic."""
         if self.mode == "chosen":
             return recorder.TopicSelection(self.topics)
         if self.mode == "pattern":
@@ -67,7 +73,7 @@ class RecordingChoice:
 
     @property
     def problem(self) -> str:
-        """Sentence why the selection can't be recorded, or ""."""
+        """Reason why the selection can't be recorded, or ""."""
         if self.mode == "chosen" and not self.topics:
             return _("No topic is selected.")
         try:
@@ -78,7 +84,7 @@ class RecordingChoice:
 
 
 def read_choice(told: object) -> RecordingChoice:
-    """Parse the selection in the settings; invalid parts become defaults."""
+    """Parse a selection from the settings; invalid parts become defaults."""
     if not isinstance(told, Mapping):
         return RecordingChoice()
     mode = told.get("mode")
@@ -93,7 +99,7 @@ def read_choice(told: object) -> RecordingChoice:
 
 
 def plain_choice(choice: RecordingChoice) -> dict[str, object]:
-    """Return the selection in the form of the settings."""
+    """Return the selection as JSON data for the settings."""
     return {
         "mode": choice.mode,
         "topics": list(choice.topics),
@@ -110,9 +116,14 @@ def _names(told: object) -> tuple[str, ...]:
 
 @dataclass(frozen=True, slots=True)
 class RingWish:
-    """Settings of the flight recorder: on or off, seconds, and maximum size in GB (10^9 bytes).
+    """Settings of the flight recorder.
 
-    It stores topics that match ``patterns`` (all if empty) and none of ``left_out``.
+    Attributes:
+        is_on: True if the flight recorder is on.
+        seconds: Duration that is stored.
+        size_gb: Maximum size in GB (10^9 bytes).
+        patterns: Patterns of the recorded topics; all topics if empty.
+        left_out: Patterns of topics that are not recorded.
     """
 
     is_on: bool = False
@@ -123,12 +134,12 @@ class RingWish:
 
     @property
     def problem(self) -> str:
-        """Sentence why these topics can't be recorded, or ""."""
+        """Reason why these topics can't be recorded, or ""."""
         return RecordingChoice("pattern", (), self.patterns, self.left_out).problem
 
 
 def read_wish(told: object) -> RingWish:
-    """Parse the flight recorder's settings; invalid parts become defaults."""
+    """Parse settings of the flight recorder; invalid parts become defaults."""
     if not isinstance(told, Mapping):
         return RingWish()
     seconds, size_gb = told.get("seconds"), told.get("size_gb")
@@ -142,7 +153,7 @@ def read_wish(told: object) -> RingWish:
 
 
 def plain_wish(wish: RingWish) -> dict[str, object]:
-    """Return the flight recorder's settings in their stored form."""
+    """Return settings of the flight recorder as JSON data."""
     return {
         "is_on": wish.is_on,
         "seconds": wish.seconds,
@@ -162,9 +173,9 @@ def _within(value: object, least: float, most: float) -> bool:
 
 
 def read_patterns(text: str) -> tuple[tuple[str, ...], tuple[str, ...]]:
-    """Parse "/arm/* *action* not /arm/raw" into (wanted, unwanted) patterns.
+    """Parse "/arm/* *action* not /arm/raw" into wanted and unwanted patterns.
 
-    "not" starts the unwanted ones.
+    The patterns after "not" are unwanted.
     """
     wanted: list[str] = []
     unwanted: list[str] = []
@@ -181,16 +192,16 @@ def read_patterns(text: str) -> tuple[tuple[str, ...], tuple[str, ...]]:
 
 
 def file_stem(name: str) -> str:
-    """Return a name that is valid as a file name on every system; "" when nothing of it is left."""
+    """Convert a name to a file name that is valid on every system; "" if no valid character is left."""
     plain = _INVALID_CHARACTERS.sub(" ", name)
     plain = " ".join(plain.split())[:MAX_NAME_LENGTH].strip(" .")
     return f"_{plain}" if _RESERVED_NAMES.fullmatch(plain) else plain
 
 
 def free_path(wanted: Path, *, is_folder: bool = False) -> Path:
-    """Return this path, numbered if it exists.
+    """Return a path that does not exist: this one, or with a number appended.
 
-    A folder has no suffix: dots in its name belong to times.
+    For a folder, dots in the name are not the start of a suffix.
     """
     stem, suffix = (wanted.name, "") if is_folder else (wanted.stem, wanted.suffix)
     path, number = wanted, 2

@@ -1,7 +1,8 @@
-"""Client of the recorder's process: start, stop, save the flight recorder, report problems.
+"""Client of the recorder process: start, stop, save the flight recorder, report problems.
 
-The process is `nep.recordings.child`: it works while the window is busy, and it finishes a recording even
-after Studio has ended. Threads write commands and read replies; the window never blocks.
+The process runs `nep.recordings.child`. It is not slowed down by a busy window, and finishes a recording even
+after
+Studio has exited. Background threads write commands and read replies, so that the window never blocks.
 """
 
 from __future__ import annotations
@@ -26,9 +27,9 @@ from nep.masters.process import NO_CONSOLE
 from nep.recordings.formats.figures import TopicFigures, read_figures
 
 LOW_DISK_BYTES = 1_000_000_000
-"""Free disk space below which the user is warned; at 200 MB the recorder stops by itself."""
+"""Free disk space below which the user is warned. At 200 MB the recorder stops."""
 AGAIN_S, AGAIN_AT_MOST_S = 2.0, 30.0
-"""Pause before a flight recorder whose process ended is restarted, and its maximum; doubled each time."""
+"""Initial and maximum pause before a flight recorder whose process ended is restarted; doubled each time."""
 END_TIMEOUT_S = 2.0
 MAX_QUEUED_COMMANDS = 1000
 MAX_PENDING_SAVES = 100
@@ -37,7 +38,7 @@ _TAIL_BYTES = 2000
 
 @dataclass(frozen=True, slots=True)
 class RecorderSaid:
-    """Event of the process with this number, as described in `nep.recordings.child`."""
+    """Event sent by a recorder process, as described in `nep.recordings.child`."""
 
     process: int
     content: Mapping[str, object]
@@ -45,7 +46,7 @@ class RecorderSaid:
 
 @dataclass(frozen=True, slots=True)
 class RecorderGone:
-    """The process with this number has ended or could not be started; ``detail`` is its last output."""
+    """Event: a recorder process has ended or could not be started; ``detail`` is its last output."""
 
     process: int
     detail: str
@@ -66,11 +67,16 @@ class RingChoice:
 class RecorderState:
     """State of the recorder.
 
-    ``phase`` is "" (idle), "starting", "recording" or "ending". ``lost`` counts missing messages by their
-    sequence numbers; ``unkept`` messages that could not be written. ``free_bytes`` is the free space of its
-    disk, None while unknown. ``ring_s`` and ``ring_bytes`` are the content of the flight recorder, None while
-    it is off. ``keeping`` are files being saved from it. ``last`` is the file that was finished last,
-    ``limit`` the limit at which it ended: "time", "size", or "".
+    Attributes:
+        phase: "" (idle), "starting", "recording" or "ending".
+        lost: Number of lost messages, determined by their sequence numbers.
+        unkept: Number of messages that could not be written.
+        free_bytes: Free space on the disk; None while unknown.
+        ring_s: Duration stored by the flight recorder; None while it is off.
+        ring_bytes: Size stored by the flight recorder.
+        keeping: Files that are being saved from the flight recorder.
+        last: File that was finished last.
+        limit: Limit at which that file ended: "time", "size", or "".
     """
 
     phase: str = ""
@@ -96,18 +102,21 @@ class OrderLine(Protocol):
         """Send a command; return False when the queue is full. Never blocks."""
 
     def close(self, wait_s: float) -> None:
-        """Close the input and wait for the end at most ``wait_s`` seconds.
+        """Close the input and wait at most ``wait_s`` seconds for the process to exit.
 
-        It finishes its work in any case.
+        The process finishes its work even if that takes longer.
         """
 
 
 StartRecorder = Callable[[int, str, Callable[[object], object]], OrderLine]
-"""Starts the process of a number for a master's address; its events go to the callback, from any thread."""
+"""Starts a recorder process from its number, the address of the master, and an event callback.
+
+The callback is called from any thread.
+"""
 
 
 class RecorderProcess:
-    """Process `nep.recordings.child` with its pipes (see `StartRecorder`)."""
+    """Recorder process and its pipes (see `StartRecorder`)."""
 
     def __init__(self, number: int, address: str, post_event: Callable[[object], object]) -> None:
         # Starts in a thread; posts `RecorderSaid` events, and finally a `RecorderGone`.
@@ -125,7 +134,7 @@ class RecorderProcess:
         return True
 
     def close(self, wait_s: float) -> None:
-        """Close the input and wait for the end of the process."""
+        """Close the input and wait at most ``wait_s`` seconds for the process to exit."""
         with suppress(queue.Full):  # then it does not read, and its work ends with this process
             self._orders.put_nowait(None)
         self._has_ended.wait(wait_s)
@@ -187,7 +196,10 @@ def _tail(log: IO[bytes]) -> str:
 
 
 class RecorderClient:
-    """Sends commands to the recorder and tracks its state. Not thread-safe: window's thread only."""
+    """Sends commands to the recorder and tracks its state.
+
+    Not thread-safe: use it from the window's thread.
+    """
 
     def __init__(
         self,
@@ -230,9 +242,9 @@ class RecorderClient:
         seconds: float | None = None,
         most_bytes: int | None = None,
     ) -> bool:
-        """Start recording these topics (all if empty); return False when a recording is in progress.
+        """Start recording these topics (all if empty); return False if a recording is in progress.
 
-        It ends after ``seconds`` or at ``most_bytes``, whichever comes first.
+        The recording stops after ``seconds`` or at ``most_bytes``, whichever comes first.
         """
         if self.state.phase:
             return False
@@ -256,7 +268,7 @@ class RecorderClient:
         return True
 
     def stop(self) -> None:
-        """Stop recording; the file is complete when ``phase`` is "" again."""
+        """Stop recording. The file is complete when ``phase`` is "" again."""
         if self.state.phase in {"starting", "recording"}:
             self._set(replace(self.state, phase="ending"))
             self._send(op="stop")
@@ -267,16 +279,19 @@ class RecorderClient:
             self._send(op="note", text=text)
 
     def write_entry(self, role: str, value: Mapping[str, object], to: str = "") -> None:
-        """Add an event to the recording and the flight recorder, if they are on.
+        """Add an event to the recording and to the flight recorder, as far as they are on.
 
-        ``to`` restricts it to "recording" or "ring".
+        ``to`` restricts this to "recording" or "ring".
         """
         is_heard = (self.state.phase and to != "ring") or (self._ring is not None and to != "recording")
         if self._process is not None and is_heard:
             self._process.order({"op": "say", "role": role, "value": dict(value), "to": to})
 
     def follow_ring(self, choice: RingChoice | None) -> None:
-        """Switch the flight recorder on with this selection, or off. It restarts after a failure."""
+        """Switch the flight recorder on with this selection, or off with None.
+
+        It is restarted after a failure.
+        """
         if choice == self._ring:
             return
         was_on, self._ring = self._ring is not None, choice
@@ -288,7 +303,10 @@ class RecorderClient:
             self._begin_ring(choice)
 
     def save_last(self, path: Path, seconds: float, note: str = "") -> bool:
-        """Save the last seconds to a file; return False without a flight recorder, or with too many saves."""
+        """Save the last seconds to a file.
+
+        Return False if the flight recorder is off or saves too many files.
+        """
         if self._ring is None or self._process is None or len(self.state.keeping) >= MAX_PENDING_SAVES:
             return False
         self._set(replace(self.state, keeping=(*self.state.keeping, path)))
@@ -296,12 +314,12 @@ class RecorderClient:
         return True
 
     def check(self) -> None:
-        """Restart a flight recorder that ended unexpectedly. Called once a second."""
+        """Restart a flight recorder whose process ended unexpectedly. Called once a second."""
         if self._ring is not None and self._process is None and self._clock() >= self._retry_at:
             self._begin_ring(self._ring)
 
     def close(self, wait_s: float = END_TIMEOUT_S) -> None:
-        """Close the process, which finishes its work even beyond the time waited here."""
+        """Close the input of the process, and wait at most ``wait_s`` seconds while it finishes its work."""
         line, self._process = self._process, None
         if line is not None:
             line.close(wait_s)
@@ -309,7 +327,7 @@ class RecorderClient:
     # ---- events of the process
 
     def on_event(self, event: RecorderSaid | RecorderGone) -> None:
-        """Apply a posted event; those of earlier processes are ignored."""
+        """Apply an event of the process; events of earlier processes are ignored."""
         if event.process != self._number or self._process is None:
             return
         if isinstance(event, RecorderGone):

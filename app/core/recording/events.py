@@ -1,4 +1,4 @@
-"""Events for recordings: runs of behaviours and alarms."""
+"""Events written to recordings: runs of behaviours, and alarms."""
 
 from __future__ import annotations
 
@@ -14,23 +14,24 @@ from nep.programs.alarms import AlarmEvent
 from nep.programs.alarms.sentences import what_words
 
 MAX_PRESENT = 200
-"""Maximum number of present alarms that are repeated; further ones are sent once."""
+"""Maximum number of active alarms that are sent repeatedly; further ones are sent once."""
 MAX_TEXT_LENGTH = 200
 _ACTIVE_STATES = frozenset({"running", "paused"})
 
 
 class Say(Protocol):
-    """Sends an event to the recorder."""
+    """Function that sends an event to the recorder."""
 
     def __call__(self, role: str, value: Mapping[str, object], to: str = "") -> object:
-        """Send to a channel ("runs", "alarms"); ``to`` restricts it to "recording" or "ring"."""
+        """Send an event on a channel ("runs" or "alarms"); ``to`` restricts it to "recording" or "ring"."""
 
 
 class RecordedEvents:
-    """Sends events to the recorder. Not thread-safe: use it from the window's thread.
+    """Publisher of run and alarm events for the recorder. Not thread-safe: use it from the window's thread.
 
-    Present runs and alarms are repeated (`repeat`): to a recording that starts later, and once a second to
-    the flight recorder, so that every saved part contains them. A long recording has only the changes.
+    Active runs and alarms are sent again by `repeat`: once to a recording that starts later, and every second
+    to the
+    flight recorder, so that each saved part contains them. Otherwise only changes are sent.
     """
 
     def __init__(self, say: Say, *, clock_ns: Callable[[], int] = time.time_ns) -> None:
@@ -42,7 +43,7 @@ class RecordedEvents:
         self._run_told: dict[str, object] = {}
 
     def repeat(self, to: str) -> None:
-        """Send the present runs and alarms to the "recording" or the "ring" again."""
+        """Send the active runs and alarms again, to "recording" or "ring"."""
         for role, told in self._present.values():
             self._say(role, told, to)
 
@@ -85,7 +86,7 @@ class RecordedEvents:
     # ---- alarms
 
     def take_alarm(self, event: AlarmEvent) -> None:
-        """Apply an alarm event: on, off, or still on."""
+        """Apply an alarm event: raised, cleared, or still on."""
         key = f"alarm-{event.rule.id}"
         known = self._present.get(key)
         if event.kind == "off":

@@ -17,7 +17,7 @@ class _CancelledError(Exception):
 
 
 class RecordingExport:
-    """Export in a thread of its own. Thread-safe."""
+    """Export that runs in a background thread. Thread-safe."""
 
     def __init__(
         self,
@@ -31,12 +31,12 @@ class RecordingExport:
         # end.
         self._opener: RecordingOpener = LocalOpener() if opener is None else opener
         self.damage = ""
-        """Description of the unreadable parts of the recording, or ""."""
+        """Description of parts of the recording that can't be read, or ""."""
         self._part = part
         self.folder = folder
         self.files: tuple[Exported, ...] = ()
         self.problem = ""
-        """Reason of a failure, or ""."""
+        """Reason why the export failed, or ""."""
         self._recording, self._kind = recording, kind
         self._progress = (0, 0)
         self._is_cancelled = threading.Event()
@@ -46,32 +46,32 @@ class RecordingExport:
 
     @property
     def is_over(self) -> bool:
-        """True if it has finished, failed, or was cancelled."""
+        """True if the export has finished, failed, or was cancelled."""
         return self._is_over.is_set()
 
     @property
     def was_cancelled(self) -> bool:
-        """True if the user cancelled it."""
+        """True if the user cancelled the export."""
         return self._is_cancelled.is_set()
 
     @property
     def share(self) -> float | None:
-        """Progress from 0 to 1; None while unknown."""
+        """Progress from 0 to 1; None if unknown."""
         done, total = self._progress
         return done / total if total else None
 
     def cancel(self) -> None:
-        """Cancel the export: an incomplete file is removed, complete ones stay."""
+        """Cancel the export. The incomplete file is deleted, complete ones remain."""
         self._is_cancelled.set()
 
     def close(self, wait_s: float = 2.0) -> None:
-        """Cancel the export and wait for its end at most ``wait_s`` seconds."""
+        """Cancel the export and wait at most ``wait_s`` seconds until the thread has stopped."""
         self.cancel()
         self._thread.join(wait_s)
         self._opener.close()
 
     def words(self) -> str:
-        """Return the result as a sentence without a full stop, or "" while it runs."""
+        """Return the result as a sentence without a full stop; "" while the export is running."""
         if not self.is_over:
             return ""
         if self.was_cancelled and not self.files:

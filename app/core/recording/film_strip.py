@@ -1,4 +1,4 @@
-"""Preview of a recording: images along its time, and message counts. Read in a thread."""
+"""Preview of a recording: images over time and message counts, read in a background thread."""
 
 from __future__ import annotations
 
@@ -15,22 +15,25 @@ from nep.recordings.reader import RecordedTopic, Recording
 from nep.recordings.recorder import TopicSelection
 
 _BUDGET = (1_000_000_000, 20.0)
-"""Limit of bytes and seconds for one recording."""
+"""Maximum bytes and seconds for reading one recording."""
 _MAX_TOPICS = 10_000
 SAMPLES = 4
-"""Number of messages of a topic that are read to estimate its size."""
+"""Number of messages of a topic that are read to estimate the total size."""
 MAX_SAMPLED = 200
-"""Maximum number of topics whose size is estimated; that of others is unknown."""
+"""Maximum number of topics whose size is estimated."""
 
 
 @dataclass(frozen=True)
 class FilmStripLook:
     """Preview of a recording from ``start_ns`` to ``end_ns``.
 
-    ``pictures`` are images at the centres of equal parts of the time, of the topic with most images; None
-    where one can't be read, empty without such a topic. ``counts`` are the messages of all topics in equal
-    parts, ``by_topic`` those of each topic. ``message_bytes`` is the average message size by topic, where
-    known.
+    Attributes:
+        pictures: Images at the centres of equal time intervals, of the topic with most images. None where no
+            image can
+            be read; empty if the recording has no images.
+        counts: Number of messages of all topics in equal time intervals.
+        by_topic: The same for each topic.
+        message_bytes: Average message size by topic, as far as known.
     """
 
     path: Path
@@ -48,9 +51,9 @@ class FilmStripLook:
         return None if each is None else each * topic.message_count
 
     def about(self, begin_ns: int, end_ns: int, topics: Collection[str]) -> tuple[float, float | None]:
-        """Estimate the number and bytes of messages of these topics in a time range.
+        """Estimate the number and total bytes of messages of these topics in a time range.
 
-        The precision is that of ``counts``. The bytes are None if they are unknown for one of the topics.
+        The resolution is that of `counts`. The size is None if it is unknown for one of the topics.
         """
         count = size = 0.0
         is_known = True
@@ -79,7 +82,7 @@ class FilmStripLook:
 def film_strip(
     path: Path, pictures: int, bars: int, fit: Size, opener: RecordingOpener
 ) -> FilmStripLook | None:
-    """Read the preview of a recording with this number and size of images; None if it can't be read."""
+    """Read the preview of a recording, with this number and size of images; None if it can't be read."""
     try:
         with opener.open(path, cache_bytes=CACHE_BYTES, budget=_BUDGET) as recording:
             if not recording.message_count or len(recording.topics) > _MAX_TOPICS:
@@ -130,9 +133,11 @@ def _message_bytes(recording: Recording) -> dict[str, float]:
 def part_of(
     look: FilmStripLook, begin_ns: int, end_ns: int, wanted: Sequence[str], unwanted: Sequence[str]
 ) -> Part:
-    """Return the part in a time range (inclusive) with topics that match the patterns; all without patterns.
+    """Return the part of a recording in a time range (inclusive), limited to topics that match the patterns.
 
-    Its topics are empty if none matches. Raises `BadTopicError` for an invalid pattern.
+    Without patterns, all topics are included. ``topics`` of the result is empty if none matches. Raises
+    `BadTopicError`
+    for an invalid pattern.
     """
     topics = None
     if wanted or unwanted:

@@ -1,4 +1,4 @@
-"""Recordings of a folder and their contents, read in a thread."""
+"""Recordings in a folder and their contents, read in a background thread."""
 
 from __future__ import annotations
 
@@ -21,25 +21,29 @@ from nep.recordings.reader import Recording
 SUFFIX = ".mcap"
 MAX_FILES = 2_000
 AT_ONCE = 50
-"""Number of files that are read before a partial result is shown ..."""
+"""Number of files after which a partial result is reported."""
 MAX_SCAN_S = 2.0
-"""... and time limit: a file may take some seconds."""
+"""Time after which a partial result is reported; reading one file may take some seconds."""
 MAX_TOPICS = 200
 CACHE_BYTES = 8_000_000
-"""Cache size for a recording that is open only briefly."""
+"""Cache size for a recording that is opened only briefly."""
 SCAN_BUDGET = (256_000_000, 3.0)
-"""Limit of bytes and seconds for scanning one file."""
+"""Maximum bytes and seconds for scanning one file."""
 _OWNER = "recordings"
 
 
 @dataclass(frozen=True, slots=True)
 class RecordingFacts:
-    """File of the folder.
+    """Recording file in the folder.
 
-    ``problem`` is why it can't be read, or "". ``not_scanned`` is why it was not scanned; it may still be
-    openable. ``is_complete``: it was closed properly; otherwise its intact part is read. ``is_kept``: saved
-    by a flight recorder. ``is_read``: more than name, size and time are known. ``topics`` are the first 200
-    names. ``lost`` counts messages that were lost or could not be written, None if not counted.
+    Attributes:
+        is_read: True if the content was read; otherwise only name, size and time are known.
+        topics: First 200 topic names.
+        is_complete: True if the file was closed properly; otherwise only the intact part is read.
+        is_kept: True if the file was saved by a flight recorder.
+        problem: Why the file can't be read, or "".
+        not_scanned: Why the file was not scanned, or ""; it may still be possible to open it.
+        lost: Number of messages that were lost or could not be written; None if unknown.
     """
 
     path: Path
@@ -63,8 +67,10 @@ class RecordingFacts:
 class FolderScan:
     """Contents of the folder, newest first.
 
-    ``problem`` is why it can't be read. ``left_out`` counts older files beyond the limit. ``is_whole``: all
-    files have been read; otherwise call `RecordingFolder.start_scan` again.
+    Attributes:
+        problem: Why the folder can't be read, or "".
+        left_out: Number of older files beyond the limit.
+        is_whole: True if all files have been read; otherwise call `RecordingFolder.start_scan` again.
     """
 
     files: Sequence[RecordingFacts] = ()
@@ -89,21 +95,24 @@ def new_path(folder: Path, now: datetime, word: str = "recording") -> Path:
 
 
 class RecordingFolder:
-    """Scans a folder repeatedly, and opens only new files. Not thread-safe: window's thread only."""
+    """Scans a folder repeatedly, opening only new files. Not thread-safe: use it from the window's thread."""
 
     def __init__(self, folder: Path, opener: RecordingOpener | None = None) -> None:
         self.folder = folder
         self._opener: RecordingOpener = LocalOpener() if opener is None else opener
         self._worker: BackgroundWorker[FolderScan] = BackgroundWorker("recordings-folder")
         self._known: dict[Path, tuple[tuple[int, int], RecordingFacts]] = {}
-        """Used by the worker thread only."""
+        """Facts already read, with the size and time of each file. Used by the worker thread only."""
 
     def start_scan(self, being_written: Path | None = None) -> None:
-        """Start a scan in another thread; `take` returns the result. ``being_written`` is not opened."""
+        """Start a scan in the background; `pop_result` returns the result.
+
+        ``being_written`` is not opened.
+        """
         self._worker.ask(_OWNER, lambda: self._scan(being_written))
 
     def pop_result(self) -> FolderScan | None:
-        """Return a new scan result once; None while there is none."""
+        """Return and clear a new scan result; None if there is none."""
         return self._worker.pop_result(_OWNER)
 
     def close(self) -> None:
@@ -142,7 +151,7 @@ class RecordingFolder:
 
 
 def read_facts(plain: RecordingFacts, opener: RecordingOpener) -> RecordingFacts:
-    """Return the facts with those read from the file, or why it can't be read or was not scanned."""
+    """Return the facts completed from the file, or with the reason why it wasn't read."""
     try:
         with opener.open(plain.path, cache_bytes=CACHE_BYTES, budget=SCAN_BUDGET) as recording:
             words = recording.words

@@ -1,6 +1,6 @@
-"""Reading recordings in a separate process, so that no file can crash Studio.
+"""Opening of recordings in a separate process, so that a damaged file can't crash Studio.
 
-Tests, and programs without a window, may read them in their own process.
+Tests and programs without a window may read recordings in their own process.
 """
 
 from __future__ import annotations
@@ -32,16 +32,16 @@ class RecordingOpener(Protocol):
         """Open a recording. Raises `RecordingError`."""
 
     def close(self) -> None:
-        """Stop at once, also while a recording is read. Idempotent."""
+        """Stop immediately, even while a recording is being read. Idempotent."""
 
 
 def process_opener() -> RecordingOpener:
-    """Return an opener that reads recordings in a separate process, started with the first one."""
+    """Return an opener that reads recordings in a separate process, which the first recording starts."""
     return ReaderProcess(module_command("nep.recordings.apart.reader_process"))
 
 
 class LocalOpener:
-    """Reads recordings in this process."""
+    """Opener that reads recordings in this process."""
 
     def open(
         self,
@@ -58,4 +58,4 @@ class LocalOpener:
         )
 
     def close(self) -> None:
-        """Do nothing: it has no process."""
+        """Do nothing, because there is no process to stop."""

@@ -1,4 +1,4 @@
-"""Recordings of a session: started by the user, the flight recorder, and their folder."""
+"""Recordings of a session: those started by the user, the flight recorder, and the folder of files."""
 
 from __future__ import annotations
 
@@ -48,7 +48,7 @@ else:  # they import the reading of recordings, which no start should wait for
 FOLDER_KEY, CHOICE_KEY, RING_KEY = "recordings_folder", "recording", "flight_recorder"
 NO_FOLDER = "recorder:folder"
 CHOOSE_FOLDER = "recording.folder"
-"""Window command for choosing another folder."""
+"""Window command that opens the choice of another folder."""
 _GB = 1_000_000_000
 _KEPT_FILE = re.compile(r"[\w.-]+\.mcap\b")
 
@@ -57,9 +57,9 @@ def _ignore_made(_path: Path, _kind: str) -> None: ...
 
 
 class SessionRecordings:
-    """Recordings of a session. Not thread-safe: use it from the window's thread, also `on_event`.
+    """Recordings of a session. Not thread-safe, including `on_event`: use it from the window's thread.
 
-    ``on_made`` is called with each finished file, and "recorded" or "kept".
+    ``on_made`` is called with each finished file and "recorded" or "kept".
     """
 
     def __init__(
@@ -148,9 +148,9 @@ class SessionRecordings:
         self._save_setting(CHOICE_KEY, plain_choice(choice))
 
     def record(self, name: str = "", note: str = "", choice: RecordingChoice | None = None) -> str:
-        """Start a recording; return a sentence why it can't start, or "".
+        """Start a recording; return the reason why it can't start, or "".
 
-        ``choice`` applies to this recording only. Without a ``name`` the file is named by the time.
+        ``choice`` applies to this recording only. Without a ``name``, the file is named by the time.
         """
         choice = choice if choice is not None else self.choice
         if self.is_recording:
@@ -188,9 +188,9 @@ class SessionRecordings:
         return self.client.state.ring_s is not None
 
     def set_wish(self, wish: RingWish) -> None:
-        """Set and save the flight recorder's settings.
+        """Set and save the settings of the flight recorder.
 
-        Another selection of topics restarts it: its content is discarded.
+        Changing the selection of topics restarts the flight recorder and discards its content.
         """
         self.wish = wish
         self._save_setting(RING_KEY, plain_wish(wish))
@@ -208,7 +208,7 @@ class SessionRecordings:
         )
 
     def save_last(self, note: str = "", seconds: float | None = None, done: Done | None = None) -> str:
-        """Save the last seconds to a file; return a sentence why that can't start, or "".
+        """Save the last seconds to a file; return the reason why that can't start, or "".
 
         ``done`` is called with the result when the file is finished.
         """
@@ -230,7 +230,7 @@ class SessionRecordings:
         return ""
 
     def carry(self, event: AlarmEvent, action: AlarmAction, done: Done) -> None:
-        """Save the last seconds as the action of an alarm."""
+        """Save the last seconds as the action of an alarm; ``done`` is called with the result."""
         said = what_words(event.rule.condition, event.seen)
         why_not = self.save_last(said, action.seconds, done)
         if why_not:
@@ -244,7 +244,7 @@ class SessionRecordings:
         self._follow_wish()
 
     def check(self) -> None:
-        """Check the recorder. Called once a second."""
+        """Monitor the recorder process. Called once a second."""
         self.client.check()
         self.events.repeat("ring")
 
@@ -270,7 +270,7 @@ class SessionRecordings:
                 done(is_there, words.format(file=path.name))
 
     def close(self) -> None:
-        """Close; the process finishes a recording in progress, even after Studio has ended."""
+        """Close the recorder; its process finishes a recording in progress, even after Studio has exited."""
         self.client.close()
 
     def _save_setting(self, key: str, value: object) -> None:
@@ -279,6 +279,6 @@ class SessionRecordings:
 
 
 def kept_file(words: str) -> str:
-    """Return the file name in "kept alarm-2026-11-27-10-00-00.mcap", or ""."""
+    """Return the file name contained in a text such as "kept alarm-2026-11-27-10-00-00.mcap", or ""."""
     found = _KEPT_FILE.search(words)
     return found[0] if found is not None else ""

@@ -1,1 +1,4 @@
-"""Replay: a recording as a source of topics and messages, beside the live network. Sends nothing."""
+"""Replay of a recording as a source of topics and messages, next to the live network.
+
+A replay publishes nothing, unless the user arms `app.core.recording.replay.sending`.
+"""

@@ -1,4 +1,4 @@
-"""Message density, losses, runs and alarms of a recording, read in a thread for the timeline."""
+"""Message counts, losses, runs and alarms of a recording for the timeline, read in a background thread."""
 
 from __future__ import annotations
 
@@ -13,12 +13,12 @@ from nep.recordings.formats.figures import TopicFigures
 from nep.recordings.reader import Recording
 
 MAX_MARKS = 2_000
-"""Maximum number of marks of one topic; later losses are added to the last one."""
+"""Maximum number of loss marks of one topic; later losses are added to the last mark."""
 
 
 @dataclass(frozen=True, slots=True)
 class Density:
-    """Messages of each topic in each of ``buckets`` equal parts of [``start_ns``, ``end_ns``)."""
+    """Number of messages of each topic in each of ``buckets`` equal intervals of [``start_ns``, ``end_ns``)."""
 
     start_ns: int
     end_ns: int
@@ -26,14 +26,14 @@ class Density:
     counts: Mapping[str, Sequence[int]]
 
     def peak(self, topic: str) -> int:
-        """Return the highest number of messages of a topic in one part."""
+        """Return the highest number of messages of a topic in one interval."""
         counts = self.counts.get(topic)
         return max(counts, default=0) if counts is not None else 0
 
 
 @dataclass(frozen=True, slots=True)
 class LossMark:
-    """Messages that were lost or not stored in the second that ends at ``at_ns``."""
+    """Number of messages that were lost or not stored in the second that ends at ``at_ns``."""
 
     at_ns: int
     count: int
@@ -47,7 +47,10 @@ class _Made:
 
 
 class Densities:
-    """Densities of one recording. Not thread-safe: window's thread only. Results arrive some ticks later."""
+    """Message counts of one recording for the timeline, with losses and spans.
+
+    Results arrive some ticks after the request. Not thread-safe: use it from the window's thread.
+    """
 
     def __init__(self, recording: Recording) -> None:
         self._recording = recording
@@ -61,7 +64,7 @@ class Densities:
         self._worker.ask("spans", lambda: _Made(spans=spans_of(recording)))
 
     def want(self, start_ns: int, end_ns: int, buckets: int) -> None:
-        """Request the density of the shown part; repeated requests are read once."""
+        """Request the message counts of the visible range. Repeating a request has no effect."""
         wanted = (start_ns, end_ns, buckets)
         if wanted == self._wanted or buckets < 1 or end_ns <= start_ns:
             return
@@ -69,7 +72,7 @@ class Densities:
         self._worker.ask("density", lambda: _Made(density=density_of(self._recording, *wanted)))
 
     def collect_results(self) -> bool:
-        """Take finished results; return whether there are any. `problem` is the reason of a failure."""
+        """Store finished results; return True if there were any. `problem` is the reason of a failure."""
         density, losses, spans = (self._pop(owner) for owner in ("density", "losses", "spans"))
         if density is not None:
             self.newest = density.density
@@ -92,16 +95,17 @@ class Densities:
 
 
 def density_of(recording: Recording, start_ns: int, end_ns: int, buckets: int) -> Density:
-    """Count the messages of each part, using only the index."""
+    """Count the messages in each interval, using only the index of the recording."""
     found = recording.densities(start_ns, end_ns, buckets)
     return Density(start_ns, end_ns, buckets, {topic: array("L", counts) for topic, counts in found.items()})
 
 
 def losses_of(recording: Recording) -> dict[str, tuple[LossMark, ...]]:
-    """Return where the recorder's loss counts of each topic increased.
+    """Return the times at which the recorder's loss count of each topic increased.
 
-    Messages that arrived late counted as lost until then: they are subtracted from the newest earlier marks,
-    so that the sum of all marks is the number of messages lost in the end.
+    Messages that arrived late were counted as lost before. They are subtracted from the newest earlier marks,
+    so that
+    the sum of all marks is the final number of lost messages.
     """
     found: dict[str, list[LossMark]] = {}
     before: dict[str, int] = {}

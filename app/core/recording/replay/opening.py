@@ -1,4 +1,4 @@
-"""Opening a recording for replay: reads only its index, and writes nothing."""
+"""Opening of a recording for replay, which reads only the index and writes nothing."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from nep.recordings.reader import Recording
 
 MAX_TOPICS = 10_000
 Progress = Callable[[float], object]
-"""Called with the progress of scanning the file (0 to 1); an exception cancels the opening."""
+"""Called with the progress of scanning the file (0 to 1). Raising an exception cancels the opening."""
 
 
 @dataclass(frozen=True)
@@ -28,7 +28,7 @@ class OpenedRecording:
 
 
 def open_recording(path: Path, progress: Progress, opener: RecordingOpener | None = None) -> OpenedRecording:
-    """Open a recording for replay. Raises `RecordingError` when it has no readable message."""
+    """Open a recording for replay. Raises `RecordingError` if no message can be read."""
 
     def told(done: int, whole: int) -> None:
         progress(done / max(1, whole))

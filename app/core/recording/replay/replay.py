@@ -1,4 +1,4 @@
-"""Replay of a recording for the panels: topics, images, series, log, and its controls."""
+"""Replay of a recording for the panels: topics, images, series, log, and playback controls."""
 
 from __future__ import annotations
 
@@ -33,19 +33,21 @@ from nep.recordings.player import SPEED_MAX, SPEED_MIN, Playback, PlayerStatus
 from nep.recordings.reader import RecordedTopic
 
 FAILED, NOT_CLOSED, DAMAGED = "recording:failed", "recording:not-closed", "recording:damaged"
-"""Ids of its alerts."""
+"""Ids of the alerts of a replay."""
 SHOW_FILE = "recording.folder"
-"""Window command that shows the file's folder; followed by the path."""
+"""Window command that shows the folder of a file; the path follows the name of the command."""
 LOGS = (LOG_TOPIC, LAST_ERRORS_TOPIC)
 STEP_NS = 1_000_000_000
 
 
 class Replay:
-    """Open recording. Not thread-safe: use it from the window's thread. `close` ends its threads.
+    """Open recording. Not thread-safe: use it from the window's thread. `close` stops the background threads.
 
-    ``topics``, ``nodes``, ``networks``, ``images``, ``series``, ``console`` and ``graph`` are the same as
-    those of the live network in a session. A recording has no nodes, and no other networks. ``chosen`` is the
-    topic whose messages are stepped through.
+    Attributes:
+        topics: As ``nodes``, ``networks``, ``images``, ``series``, ``console`` and ``graph``, the counterpart
+            of the
+            live network's attribute in a session. A recording has no nodes and no other networks.
+        chosen: Topic whose messages `step` steps through.
     """
 
     def __init__(
@@ -82,28 +84,28 @@ class Replay:
             alerts.resolve(id)
 
     def start(self) -> None:
-        """Open the file in a thread."""
+        """Open the file in a background thread."""
         self.source.start()
 
     def watch(self, topic: str) -> Watch:
-        """Watch a topic until the watch is closed: its messages arrive in ``topics``."""
+        """Watch a topic until the watch is closed. Messages arrive in ``topics``."""
         return self._watches.open([topic])
 
     def end(self) -> None:
-        """Stop sending and signal the threads to end without waiting; `close` waits."""
+        """Stop publishing and signal the threads to stop, without waiting for them; `close` waits."""
         if self.sending is not None:
             self.sending.end()
         self.source.end()
 
     @property
     def has_ended(self) -> bool:
-        """True if its thread has ended; then the rest is closed too."""
+        """True if the thread has stopped; then all other resources are closed too."""
         if self.source.has_ended:
             self.close()
         return self.source.has_ended
 
     def close(self) -> None:
-        """Stop and wait for the threads. Idempotent."""
+        """Stop the threads and wait for them. Idempotent."""
         self.source.close()
         if self.densities is not None:
             self.densities.close()
@@ -114,12 +116,12 @@ class Replay:
 
     @property
     def status(self) -> ReplayStatus:
-        """Stage of opening, and playback status."""
+        """Stage of opening the file, and playback status."""
         return self.source.status
 
     @property
     def player(self) -> PlayerStatus | None:
-        """Playback status; None before it is open, and after a failure."""
+        """Playback status; None before the file is open and after a failure."""
         return self.source.status.player
 
     @property
@@ -149,7 +151,7 @@ class Replay:
 
     @property
     def lost(self) -> int:
-        """Number of messages missing in the recording, of topics with known statistics."""
+        """Number of messages missing in the recording, counted for topics with known statistics."""
         return sum((each.lost or 0) + each.unkept for each in self.figures.values())
 
     @property
@@ -188,7 +190,7 @@ class Replay:
         self.source.order("seek", lambda playback: playback.seek(at_ns))
 
     def move(self, by_ns: int) -> None:
-        """Seek relative to the playhead."""
+        """Seek by an offset relative to the playhead."""
         self.source.order("move", lambda playback: playback.seek(playback.status().position_ns + by_ns))
 
     def step(self, *, forward: bool) -> None:
@@ -198,12 +200,12 @@ class Replay:
             self.source.order("step", lambda playback: playback.step(topic, forward=forward))
 
     def choose(self, topic: str) -> None:
-        """Choose the topic whose messages are stepped through."""
+        """Choose the topic whose messages `step` steps through."""
         if topic in self.recorded:
             self.chosen = topic
 
     def set_speed(self, speed: float) -> None:
-        """Set the speed, limited to the supported range."""
+        """Set the playback speed, limited to the supported range."""
         wanted = max(SPEED_MIN, min(SPEED_MAX, speed)) if speed == speed else 1.0  # noqa: PLR0124  excludes NaN
 
         def change(playback: Playback) -> None:
@@ -212,7 +214,7 @@ class Replay:
         self.source.order("speed", change)
 
     def loop(self, start_ns: int | None = None, end_ns: int | None = None) -> None:
-        """Loop a range, or the whole recording; an empty range changes nothing."""
+        """Loop a range; without arguments, the whole recording. An empty range is ignored."""
         if start_ns is not None and end_ns is not None:
             start_ns, end_ns = max(start_ns, self.start_ns), min(end_ns, self.end_ns)
             if start_ns >= end_ns:
@@ -220,11 +222,11 @@ class Replay:
         self.source.order("loop", lambda playback: playback.loop(start_ns, end_ns))
 
     def end_loop(self) -> None:
-        """End the loop and continue beyond it."""
+        """Stop looping; playback continues beyond the end of the range."""
         self.source.order("loop", lambda playback: playback.end_loop())
 
     def toggle_loop(self) -> None:
-        """Loop the whole recording or the chosen range; or end the loop."""
+        """Start looping the chosen range or the whole recording, or stop looping."""
         player = self.player
         if player is not None and player.is_looping:
             self.end_loop()
@@ -244,7 +246,7 @@ class Replay:
             self.loop(start_ns if start_ns < at_ns else self.start_ns, at_ns)
 
     def skip(self, *, forward: bool) -> None:
-        """Seek to the next or previous mark: bookmark, start of an alarm or run, else an end."""
+        """Seek to the next or previous mark (a bookmark, or the start of an alarm or run), or to an end."""
         if self.opened is None:
             return
         at_ns, marks = self._position_ns(), [mark.at_ns for mark in self.bookmarks]
@@ -255,16 +257,19 @@ class Replay:
             self.seek(max((mark for mark in marks if mark < at_ns), default=self.start_ns))
 
     def bookmark_here(self) -> Bookmark | None:
-        """Return the bookmark at the playhead, or None."""
+        """Return the bookmark at the playhead; None if there is none."""
         at_ns = self._position_ns()
         return next((mark for mark in self.bookmarks if mark.at_ns == at_ns), None)
 
     def bookmark(self, name: str = "") -> Bookmark | None:
-        """Add a bookmark at the playhead. Raises `RecordingError` when it can't be saved."""
+        """Add a bookmark at the playhead. Raises `RecordingError` if the bookmark can't be saved."""
         return self.opened.bookmarks.add(self._position_ns(), name) if self.opened is not None else None
 
     def rename_bookmark(self, bookmark: Bookmark, name: str) -> None:
-        """Rename a bookmark. Raises `RecordingError`, and `ValueError` for a note of the recording."""
+        """Rename a bookmark.
+
+        Raises `RecordingError`, or `ValueError` for a bookmark that is part of the recording.
+        """
         if self.opened is not None:
             self.opened.bookmarks.rename(bookmark, name)
 
@@ -274,7 +279,7 @@ class Replay:
             self.opened.bookmarks.add(bookmark.at_ns, bookmark.name)
 
     def remove_bookmark(self, bookmark: Bookmark) -> None:
-        """Remove a bookmark. Raises as `rename_bookmark` does."""
+        """Remove a bookmark. Raises the same exceptions as `rename_bookmark`."""
         if self.opened is not None:
             self.opened.bookmarks.remove(bookmark)
 
@@ -282,7 +287,7 @@ class Replay:
     # ---------------------------------------------------------------------------------------------------
 
     def tick(self, now: float) -> None:
-        """Apply the messages of the thread since the last tick; ``now`` is monotonic seconds."""
+        """Apply the messages read since the last tick; ``now`` is monotonic seconds."""
         if self.opened is None and self.source.opened is not None and self.player is not None:
             self._opened(self.source.opened, now)
         self._alert_problems()
@@ -386,7 +391,7 @@ class Replay:
 
 
 def graph_of(topics: Mapping[str, RecordedTopic], figures: Mapping[str, TopicFigures]) -> GraphView:
-    """Return a recording's graph: topics, the number of publishers of each, and losses."""
+    """Return the graph of a recording: topics, number of publishers of each, and losses."""
     found = {}
     for name, topic in topics.items():
         known = figures.get(name)

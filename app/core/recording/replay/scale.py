@@ -1,4 +1,4 @@
-"""Visible time range of a timeline, and the format of its times. Pure."""
+"""Visible time range of a timeline, and formatting of times. Without side effects."""
 
 from __future__ import annotations
 
@@ -16,7 +16,10 @@ STEPS_S = (
 
 @dataclass(frozen=True, slots=True)
 class TimeScale:
-    """Timeline that shows [``begin_ns``, ``end_ns``] of a recording from ``first_ns`` to ``last_ns``."""
+    """Scale of a timeline.
+
+    Shows [``begin_ns``, ``end_ns``] of a recording from ``first_ns`` to ``last_ns``.
+    """
 
     first_ns: int
     last_ns: int
@@ -25,7 +28,7 @@ class TimeScale:
 
     @classmethod
     def whole(cls, first_ns: int, last_ns: int) -> TimeScale:
-        """Return the scale of a whole recording, at least one millisecond."""
+        """Return the scale that shows a whole recording; at least one millisecond."""
         last_ns = max(last_ns, first_ns + MIN_SPAN_NS)
         return cls(first_ns, last_ns, first_ns, last_ns)
 
@@ -36,11 +39,11 @@ class TimeScale:
 
     @property
     def is_whole(self) -> bool:
-        """True if the whole recording is visible."""
+        """True if the scale shows the whole recording."""
         return (self.begin_ns, self.end_ns) == (self.first_ns, self.last_ns)
 
     def share(self, at_ns: int) -> float:
-        """Return the position of a time: 0 at the left edge, 1 at the right one."""
+        """Return the position of a time: 0 at the left edge, 1 at the right edge."""
         return (at_ns - self.begin_ns) / self.span_ns
 
     def time(self, share: float) -> int:
@@ -49,17 +52,17 @@ class TimeScale:
         return max(self.first_ns, min(self.last_ns, at_ns))
 
     def zoomed(self, factor: float, at_ns: int) -> TimeScale:
-        """Return a scale zoomed out (factor above 1) or in, with ``at_ns`` at the same position."""
+        """Return a zoomed scale (out for a factor above 1), with ``at_ns`` at the same position."""
         whole = self.last_ns - self.first_ns
         span = max(MIN_SPAN_NS, min(whole, round(self.span_ns * factor)))
         return self._placed(at_ns - round(self.share(at_ns) * span), span)
 
     def moved(self, by_ns: int) -> TimeScale:
-        """Return a range of the same length, later or earlier."""
+        """Return the scale shifted by a duration."""
         return self._placed(self.begin_ns + by_ns, self.span_ns)
 
     def with_time(self, at_ns: int) -> TimeScale:
-        """Return a range of the same length that contains a time."""
+        """Return the scale shifted, if necessary, so that a time is visible."""
         if self.begin_ns <= at_ns <= self.end_ns:
             return self
         return self._placed(at_ns - self.span_ns // 8, self.span_ns)
@@ -69,12 +72,12 @@ class TimeScale:
         return replace(self, begin_ns=begin_ns, end_ns=begin_ns + span)
 
     def step_s(self, most: int) -> float:
-        """Return the interval of ruler marks for at most this number of marks."""
+        """Return the interval between ruler marks in seconds, for at most ``most`` marks."""
         least = self.span_ns / 1e9 / max(1, most)
         return next((step for step in STEPS_S if step >= least), 86_400.0 * ceil(least / 86_400.0))
 
     def marks(self, most: int, *, by_clock: bool = False) -> Iterator[int]:
-        """Yield the times of ruler marks, relative to the recording's start or to the time of day."""
+        """Yield the times of ruler marks, aligned to the recording's start or to the time of day."""
         step_ns = round(self.step_s(most) * 1e9)
         origin_ns = offset_ns(self.first_ns) if by_clock else self.first_ns
         number = -((origin_ns - self.begin_ns) // step_ns)
@@ -84,7 +87,7 @@ class TimeScale:
 
 
 def offset_ns(at_ns: int) -> int:
-    """Return the origin for marks at full hours of local time, near ``at_ns``."""
+    """Return an offset (ns) near ``at_ns`` that aligns ruler marks to full hours of local time."""
     return -(time.localtime(at_ns // 1_000_000_000).tm_gmtoff or 0) * 1_000_000_000
 
 

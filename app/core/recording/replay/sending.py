@@ -1,7 +1,8 @@
-"""Publishing topics of a recording on the live network, if the user has chosen and armed them.
+"""Publishing of recorded topics on the live network, if the user has chosen and armed them.
 
-Bytes and types are as recorded; the topic may have another name. Late messages are dropped and counted, never
-sent in a burst; a seek sends nothing of what lies between.
+Bytes and types are as recorded; the name of the topic may differ. Late messages are dropped and counted,
+never sent
+in a burst; messages skipped by a seek are not sent.
 """
 
 from __future__ import annotations
@@ -31,27 +32,32 @@ from nep.recordings.reader import Recording
 MAX_DELAY_S = 0.1
 """Delay beyond which a message is dropped."""
 MAX_TYPES = 10
-"""Maximum number of types of a topic in one recording; messages of further ones are dropped."""
+"""Maximum number of message types of a topic in one recording; messages of further types are dropped."""
 Submit = Callable[[str, Job], None]
 
 
 class ReplayRoute(NamedTuple):
-    """Topic of the recording, and the name under which it is published."""
+    """Topic of a recording, and the name under which it is published."""
 
     recorded: str
     name: str
 
     @property
     def target(self) -> Target:
-        """Topic to publish on."""
+        """Target on which the messages are published."""
         return Target("topic", self.name)
 
 
 @dataclass(slots=True, eq=False)
 class SentTopic:
-    """Published topic. ``count`` messages were sent, ``skipped`` were dropped.
+    """Topic of a recording that is being published.
 
-    ``publishers`` are ready ones by type; ``problem`` is a sentence when it can't be sent.
+    Attributes:
+        publishers: Publishers that are ready, by message type.
+        is_ready: True if messages can be sent.
+        count: Number of sent messages.
+        skipped: Number of dropped messages.
+        problem: Why the topic can't be published, or "".
     """
 
     route: ReplayRoute
@@ -73,7 +79,10 @@ class SentTopic:
 
 
 class ReplayOutbox:
-    """Publishes offered messages while the switch is on. `offer` is for the replay's thread, the rest any."""
+    """Publishes messages of a replay while arming is on.
+
+    `offer` is called in the replay's thread; the other methods may be called from any thread.
+    """
 
     def __init__(self, arming: Arming, submit: Submit, gate: MotionGate | None = None) -> None:
         # `submit` runs a job with Studio's live node. Without `gate` messages that move robots are not
@@ -84,12 +93,12 @@ class ReplayOutbox:
 
     @property
     def going(self) -> tuple[SentTopic, ...]:
-        """Topics that are published now."""
+        """Topics that are currently published."""
         with self._lock:
             return tuple(self._active.values())
 
     def begin(self, route: ReplayRoute, turn: int, msg_type: str, *, is_latched: bool) -> None:
-        """Publish this topic as soon as its publisher is ready, during the switch's ``turn``."""
+        """Publish a topic as soon as its publisher is ready, while the arming with number ``turn`` lasts."""
         sent = SentTopic(route, turn, is_latched)
         with self._lock:
             old = self._active.get(route.recorded)
@@ -99,7 +108,7 @@ class ReplayOutbox:
         self._create_publisher(sent, msg_type)
 
     def end(self, recorded: str) -> SentTopic | None:
-        """Stop publishing a topic; return its state."""
+        """Stop publishing a topic; return its final state."""
         with self._lock:
             ended = self._active.pop(recorded, None)
         if ended is not None:
@@ -107,7 +116,7 @@ class ReplayOutbox:
         return ended
 
     def offer(self, messages: Sequence[Message], late_s: Sequence[float]) -> None:
-        """Publish messages that were played just now, each with its delay in seconds."""
+        """Publish messages that were just played; ``late_s`` are their delays in seconds."""
         with self._lock:
             going = dict(self._active)
         for message, late in zip(messages, late_s, strict=True):
@@ -182,35 +191,38 @@ class ReplayOutbox:
 
 
 class ReplaySending:
-    """Topics of one recording that the user chose to publish. Not thread-safe: window's thread only."""
+    """Topics of one recording that the user chose to publish.
+
+    Not thread-safe: use it from the window's thread.
+    """
 
     def __init__(self, acting: SessionActing) -> None:
         self._acting = acting
         self.outbox = ReplayOutbox(acting.arming, acting.submit, acting.gate)
         self.routes: dict[str, str] = {}
-        """Name to publish under, by topic of the recording, for chosen topics."""
+        """Name under which each chosen topic is published, by its name in the recording."""
         self.revision = 0
         self._opened: OpenedRecording | None = None
         self._moving: MovingTopics | None = None
         self._latched: frozenset[str] = frozenset()
         self._pending_routes: list[ReplayRoute] = []
         self._is_asking = False
-        """True if the question about the first of them is open."""
+        """True while the question about the first pending route is open."""
         self._worker: BackgroundWorker[tuple[MovingTopics, frozenset[str]]] | None = None
         self.on_change: Callable[[], object] = _ignore
-        """Called when the published topics change."""
+        """Called when the set of published topics changes."""
 
     def open(self, opened: OpenedRecording) -> None:
-        """Set the opened recording."""
+        """Set the recording when it has been opened."""
         self._opened = opened
 
     @property
     def is_known(self) -> bool:
-        """True if it is known which topics move robots (see `learn`)."""
+        """True if `learn` has determined which topics move robots."""
         return self._moving is not None
 
     def learn(self) -> None:
-        """Find out in a thread which topics move robots."""
+        """Determine in the background which topics move robots."""
         if self._opened is None or self._worker is not None:
             return
         recording = self._opened.recording
@@ -218,14 +230,18 @@ class ReplaySending:
         self._worker.ask("topics", lambda: _moving_and_latched_topics(recording))
 
     def moves(self, recorded: str, name: str) -> bool:
-        """Return whether messages of a topic move a robot, under its own or another name."""
+        """Return True if messages of a topic move a robot, under the recorded or the given name."""
         known = self._moving
         if known is not None and (known.moved_by(recorded) or known.moved_by(name)):
             return True
         return bool(self._acting.gate.moved_by(name))
 
     def choose(self, recorded: str, name: str | None) -> str:
-        """Publish a topic under a name ("" for its own) once armed, or not (None); return why it can't be."""
+        """Choose a topic for publishing under a name ("" for the recorded one); None deselects the topic.
+
+        Chosen topics are published once they are armed. Returns the reason why the topic can't be chosen, or
+        "".
+        """
         if self._opened is None or recorded not in self._opened.recording.topics:
             return ""
         self.revision += 1
@@ -245,9 +261,9 @@ class ReplaySending:
     # ---- switch
 
     def arm(self) -> str:
-        """Arm the chosen topics and publish them as they are played; return why it can't be, or "".
+        """Arm the chosen topics and publish them as they are played; return why that isn't possible, or "".
 
-        Topics that move robots are asked for one after the other: `SessionActing.question`.
+        The user is asked about each topic that moves robots, one after the other: `SessionActing.question`.
         """
         opened = self._opened
         if opened is None or not self.routes:
@@ -296,7 +312,7 @@ class ReplaySending:
         self._changed()
 
     def end(self) -> None:
-        """Stop publishing: the recording closes."""
+        """Stop publishing, because the recording is closed."""
         if self.outbox.going or self._pending_routes:
             self._acting.disarm()
         self._end_all()
@@ -324,7 +340,10 @@ class ReplaySending:
         self._acting.log("warn" if is_bad else "info", route.target, words, sent)
 
     def tick(self) -> None:
-        """Apply changes: end topics that are no longer allowed, or that move a new robot."""
+        """Stop publishing topics that are no longer allowed, or that now move another robot.
+
+        Called at each tick.
+        """
         self._apply_facts()
         arming = self._acting.arming
         if not arming.is_on:
@@ -358,7 +377,7 @@ def _moving_and_latched_topics(recording: Recording) -> tuple[MovingTopics, froz
 
 
 def sent_words(sent: SentTopic) -> str:
-    """Format the numbers of messages: "412 sent, 3 left out, being late"."""
+    """Format the message counts of a topic: "412 sent, 3 left out, being late"."""
     words = ngettext("{count} sent", "{count} sent", sent.count).format(count=sent.count)
     return f"{words}, {late_words(sent.skipped)}" if sent.skipped else words
 

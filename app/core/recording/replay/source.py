@@ -1,7 +1,8 @@
-"""Replay thread: reads a recording and passes on due messages of watched topics.
+"""Replay thread, which reads a recording and delivers the messages of watched topics at their times.
 
-The window queues commands and takes results; neither blocks on the disk. Nothing here uses a node: messages
-only go to the panels.
+The window queues commands and collects results; neither blocks on the disk. This module uses no node:
+messages
+are delivered to the panels only.
 """
 
 from __future__ import annotations
@@ -29,36 +30,40 @@ RATE_S = 2.0
 STATISTICS_INTERVAL_S = 0.5
 TOPICS_AT_ONCE = 100
 FIGURES_SHARE = 10.0
-"""Minimum interval of reading statistics, as a multiple of its duration."""
+"""Minimum pause between two readings of statistics, as a multiple of their duration."""
 HISTORY_S = (5.0, 20.0, 60.0, 180.0)
-"""Ranges before the playhead that are read for topics with history, nearest first ..."""
+"""Ranges before the playhead (s) that are read for topics with history, in this order."""
 HISTORY_TIMEOUT_S = 0.25
-"""... and the time limit."""
+"""Time limit for reading history."""
 MAX_HISTORY_MESSAGES = 8192
 OWN_BYTES = 65_536
-"""Maximum size of copied messages: a small one would keep the whole megabyte that it was read with."""
+"""Maximum size up to which messages are copied, so that a small message doesn't hold a whole block in memory.
+"""
 
 ReplayStage = Literal["reading", "there", "failed"]
 Order = Callable[[Playback], object]
 Forward = Callable[[Sequence[Message], Sequence[float]], object]
-"""Called with messages that are played now and their delays in seconds, in the replay's thread."""
+"""Called in the replay's thread with played messages and their delays in seconds."""
 
 
 class PictureSink(Protocol):
-    """Receiver of images, called in the replay's thread; decodes in its own."""
+    """Receiver of images. Called in the replay's thread; decodes in another thread."""
 
     def offer(self, messages: Sequence[Message]) -> None:
         """Add images, oldest first."""
 
     def rewind(self, topics: Sequence[str]) -> None:
-        """Discard the images of all other topics after a seek."""
+        """Discard the images of all topics except ``topics``, after a seek."""
 
 
 @dataclass(frozen=True, slots=True)
 class ReplayStatus:
-    """State of the replay. ``progress`` is 0 to 1 while opening, ``sentence`` the reason of a failure.
+    """State of the replay.
 
-    ``player`` is the playback status once open.
+    Attributes:
+        progress: Progress of opening the file, 0 to 1.
+        sentence: Reason of a failure.
+        player: Playback status; None before the file is open.
     """
 
     stage: ReplayStage
@@ -70,9 +75,11 @@ class ReplayStatus:
 
 @dataclass(frozen=True, slots=True)
 class ReplayFigures:
-    """Statistics of a topic at the playhead: messages per second before it, time of the newest (ns).
+    """Statistics of a topic at the playhead; None if unknown.
 
-    None if unknown, or without a message.
+    Attributes:
+        rate_hz: Rate in the time before the playhead.
+        newest_ns: Time of the newest message; None without a message.
     """
 
     rate_hz: float | None
@@ -81,10 +88,12 @@ class ReplayFigures:
 
 @dataclass(slots=True)
 class Handed:
-    """Messages since the last `take`, in this order.
+    """Messages returned by one call of `ReplaySource.pop_results`, to be applied in the order of the fields.
 
-    ``jump`` are the newest messages after a seek (None: no seek). ``history`` has earlier messages by topic,
-    for topics with history. ``drained`` are the messages played since.
+    Attributes:
+        jump: Newest messages after a seek; None if there was no seek.
+        history: Earlier messages of topics with history.
+        drained: Messages played since.
     """
 
     jump: Sequence[Message] | None = None
@@ -94,7 +103,10 @@ class Handed:
 
 
 class ReplaySource:
-    """Source of one recording. `start` and `close` start and stop its thread; other calls don't block."""
+    """Source of one recording. `start` and `close` start and stop its thread.
+
+    All other methods don't block.
+    """
 
     def __init__(
         self,
@@ -131,18 +143,19 @@ class ReplaySource:
 
     @property
     def status(self) -> ReplayStatus:
-        """State after the last cycle."""
+        """State after the last cycle of the thread."""
         return self._status
 
     def start(self) -> None:
-        """Start the thread: open the file and play."""
+        """Start the thread, which opens the file and plays it."""
         self._thread.start()
 
     def order(self, kind: str, change: Order) -> None:
         """Queue a change of the playback.
 
-        It replaces a pending change of the same kind at the end of the queue, so that dragging the playhead
-        seeks only to its newest position.
+        A pending change of the same kind at the end of the queue is replaced, so that dragging the playhead
+        seeks only to
+        the newest position.
         """
         with self._changed:
             if self._changes and self._changes[-1][0] == kind:
@@ -158,7 +171,7 @@ class ReplaySource:
         self.order("choose", self._choose)
 
     def unwatch(self, topic: str) -> None:
-        """End the watch of a topic."""
+        """Stop watching a topic."""
         with self._changed:
             self._watched.discard(topic)
         self.order("choose", self._choose)
