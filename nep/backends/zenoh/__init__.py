@@ -1,8 +1,8 @@
 """Back end `zenoh`: messages over Eclipse Zenoh, without a master.
 
-`places` parses where nodes connect, `rendezvous` lets those of one computer find each other, `keys` defines
-the key expressions, `session` is the session of one node, `roster` lists the known nodes, and `library` loads
-zenoh.
+`places` parses the places where nodes connect, `rendezvous` connects the nodes of one computer, `keys`
+defines the key expressions, `session` is the session of one node, `roster` lists the known nodes, and
+`library` loads zenoh.
 """
 
 from nep.backends.base import Backend

@@ -1,6 +1,6 @@
-"""EarlyMessages: messages that arrive before a publisher's reply to the hello. No network, no lock.
+"""EarlyMessages: messages that arrive before the publisher's reply to the hello. No network, no lock.
 
-A publisher's history and its new messages arrive over different paths. New messages that arrive too early are
+A publisher's history and its new messages arrive on different paths. New messages that arrive first are
 queued until the history is complete.
 """
 
@@ -19,11 +19,17 @@ __all__ = ["EarlyMessages"]
 
 T = TypeVar("T")
 _MAX_QUEUED_S = 15.0
-"""Maximum time in seconds that a message is queued; greetings take ten seconds at most."""
+"""Maximum time in seconds that a message is queued. A greeting takes ten seconds at most."""
 
 
 class EarlyMessages(Generic[T]):
-    """Early messages of one subscriber, guarded by its lock. `sources` are its publishers."""
+    """Queue of one subscriber's early messages, guarded by the subscriber's lock.
+
+    Args:
+        sources: Publishers of the subscriber.
+        max_messages: Maximum number of queued messages per publisher.
+        clock: Monotonic clock in seconds.
+    """
 
     def __init__(
         self, sources: PublisherTracker, max_messages: int, clock: Callable[[], float] = time.monotonic
@@ -36,7 +42,7 @@ class EarlyMessages(Generic[T]):
         self._bytes = 0
 
     def keep(self, header: Header, message: T, size_bytes: int) -> bool:
-        """Queue a message that arrived too early; return False if it can be delivered now."""
+        """Queue a message that arrived too early; return False if the message can be delivered now."""
         source = self._sources.find(header.publisher)
         if source is None or source.remote is None or source.has_echoed:
             return False
@@ -52,7 +58,7 @@ class EarlyMessages(Generic[T]):
         return count < self._max_messages and self._bytes < HISTORY_BYTES
 
     def pop(self, publisher: int) -> list[T]:
-        """Remove and return a publisher's queued messages that weren't received since, in order."""
+        """Remove and return a publisher's queued messages in order, without those received since then."""
         self._until.pop(publisher, None)
         queued = self._queued.pop(publisher, [])
         self._bytes -= sum(size_bytes for _seq, _message, size_bytes in queued)

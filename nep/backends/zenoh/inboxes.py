@@ -1,4 +1,4 @@
-"""Inboxes: the condition variable and the sink thread shared by one node's subscribers."""
+"""Inboxes: condition variable and sink thread, shared by the subscribers of one node."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ _WAIT_S = 0.1
 
 
 class SinkSubscriber(Protocol):
-    """Subscriber as the sink thread uses it."""
+    """Subscriber, as the sink thread uses it."""
 
     is_closed: bool
 
@@ -26,14 +26,14 @@ class SinkSubscriber(Protocol):
 
     @property
     def sink(self) -> Sink | None:
-        """Callback for its messages."""
+        """Callback that receives the messages; None if they are read with `poll` or `receive`."""
 
     def take_batch(self) -> list[Message]:
-        """Return the messages for one call of the sink."""
+        """Remove and return the messages for one call of the sink."""
 
 
 class Inboxes:
-    """Inboxes of one node. `changed` guards the inboxes of all its subscribers."""
+    """Inboxes of one node. The condition `changed` guards the inboxes of all its subscribers."""
 
     def __init__(self, name: str) -> None:
         self.changed = threading.Condition()
@@ -45,14 +45,16 @@ class Inboxes:
 
     @property
     def wakes(self) -> int:
-        """Number of `wake` calls."""
+        """Number of `wake` calls so far."""
         return self._wakes
 
     def wait(self, subscribers: Sequence[SinkSubscriber], timeout_s: float, wakes: int | None = None) -> None:
         """Wait for a message in `subscribers`, for one of them to close, or for `wake`.
 
-        `wakes` is the number of `wake` calls known to the caller; if there were more since, the call returns
-        at once.
+        Args:
+            subscribers: Subscribers to wait for.
+            timeout_s: Time limit in seconds.
+            wakes: Value of `wakes` that the caller has seen; returns immediately if `wake` was called since.
         """
         with self.changed:
             before = self._wakes if wakes is None else wakes
@@ -68,7 +70,7 @@ class Inboxes:
             self.changed.notify_all()
 
     def add_sink(self, subscriber: SinkSubscriber) -> None:
-        """Deliver the subscriber's messages to its sink until `remove_sink`."""
+        """Start delivering the subscriber's messages to its sink."""
         with self.changed:
             self._sinks = (*self._sinks, subscriber)
             if self._thread is None and not self._closing.is_set():
@@ -77,12 +79,12 @@ class Inboxes:
             self.changed.notify_all()
 
     def remove_sink(self, subscriber: SinkSubscriber) -> None:
-        """Stop delivering to the subscriber's sink."""
+        """Stop delivering messages to the subscriber's sink."""
         with self.changed:
             self._sinks = tuple(each for each in self._sinks if each is not subscriber)
 
     def close(self, timeout_s: float) -> None:
-        """Stop the sink thread."""
+        """Stop and join the sink thread."""
         self._closing.set()
         self.wake()
         thread = self._thread
@@ -97,6 +99,6 @@ class Inboxes:
                 if messages and subscriber.sink is not None:
                     try:
                         subscriber.sink(messages)
-                    except BaseException:  # also SystemExit: the sinks' thread continues with the next batch
+                    except BaseException:  # also SystemExit: the sink thread continues with the next batch
                         _logger.exception("the sink of '%s' failed", messages[0].topic)
             self._closing.wait(_BATCH_S)

@@ -33,7 +33,7 @@ _NODE_CHUNKS, _PUBLISHER_CHUNKS, _SUBSCRIBER_CHUNKS = 7, 6, 4
 
 
 class LiveToken(NamedTuple):
-    """Content of a liveliness token: `record` belongs to the node `node_id`."""
+    """Parsed liveliness token: a record and the id of the node that it belongs to."""
 
     node_id: str
     record: NodeRecord | PublisherRecord | SubscriberRecord
@@ -53,7 +53,7 @@ def data_key(topic: str) -> str:
 
 
 def data_keys(pattern: str) -> str:
-    """Return the key expression for messages of topics that match a pattern; it may match others, too."""
+    """Return the key expression for messages of matching topics. It may also match other topics."""
     return f"{_ROOT}/data/{_pattern_chunk(pattern)}"
 
 
@@ -68,7 +68,7 @@ def hellos_key(topic: str) -> str:
 
 
 def hellos_keys(pattern: str) -> str:
-    """Return the key expression for hellos to all publishers of the topics of `data_keys`."""
+    """Return the key expression for hellos to all publishers of the topics that `data_keys` matches."""
     return f"{_ROOT}/hello/{_pattern_chunk(pattern)}/*"
 
 
@@ -83,30 +83,30 @@ def _pattern_chunk(pattern: str) -> str:
 
 
 def topic_of(key: str) -> str:
-    """Return the topic in the key of a message or of a reply to a hello."""
+    """Return the topic from the key of a message or of a reply to a hello."""
     return _decode_chunk(key.split("/")[_TOPIC_AT]) if key.count("/") >= _TOPIC_AT else ""
 
 
 def call_key(node_id: str) -> str:
-    """Return the key at which a node replies to requests."""
+    """Return the key at which a node receives requests."""
     return f"{_ROOT}/call/{_encode_chunk(node_id)}"
 
 
 def node_key(node: NodeRecord) -> str:
-    """Return the token of a node."""
+    """Return the liveliness token of a node."""
     words = (node.name, node.host, str(node.pid or 0), node.language, node.generation, str(node.since_ns))
     return "/".join((f"{_LIVE}{_encode_chunk(node.id)}/node", *map(_encode_chunk, words)))
 
 
 def publisher_key(node_id: str, record: PublisherRecord) -> str:
-    """Return the token of a publisher."""
+    """Return the liveliness token of a publisher."""
     latched = "latched" if record.latched else "plain"
     words = (f"{record.id:016x}", record.topic, record.msg_type, record.codec, latched)
     return "/".join((f"{_LIVE}{_encode_chunk(node_id)}/pub", *map(_encode_chunk, words)))
 
 
 def subscriber_key(node_id: str, record: SubscriberRecord) -> str:
-    """Return the token of a subscriber."""
+    """Return the liveliness token of a subscriber."""
     words = (f"{record.id:016x}", record.topic, record.msg_type)
     return "/".join((f"{_LIVE}{_encode_chunk(node_id)}/sub", *map(_encode_chunk, words)))
 
@@ -114,13 +114,13 @@ def subscriber_key(node_id: str, record: SubscriberRecord) -> str:
 def serve_key(service: str, since_ns: int, server: int) -> str:
     """Return the key of a server.
 
-    All clients call the first server in the order of these keys, the oldest.
+    The keys sort by age, and all clients call the first server in this order: the oldest.
     """
     return f"{_ROOT}/serve/{_encode_chunk(service)}/{since_ns:016x}/{server:016x}"
 
 
 def server_key(node_id: str, record: PublisherRecord) -> str:
-    """Return the token of a server."""
+    """Return the liveliness token of a server."""
     since = record.endpoints[0].split("/")[_SINCE_AT]
     return "/".join(
         (
@@ -133,7 +133,7 @@ def server_key(node_id: str, record: PublisherRecord) -> str:
 
 
 def client_key(node_id: str, record: SubscriberRecord) -> str:
-    """Return the token of a client."""
+    """Return the liveliness token of a client."""
     return "/".join(
         (
             f"{_LIVE}{_encode_chunk(node_id)}/cli",

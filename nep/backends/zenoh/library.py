@@ -1,4 +1,4 @@
-"""Access to the zenoh library: loaded with the first node, unusable after a fork."""
+"""Access to the zenoh library, which is loaded with the first node and can't be used after a fork."""
 
 from __future__ import annotations
 
@@ -17,13 +17,15 @@ from nep.system.forks import in_child
 _logger = logging.getLogger("nep")
 _sessions: list[Any] = []
 _inherited: set[str] = set()
-"""Names of libraries in use before a fork: zenoh would wait for its threads, which don't exist in the child.
+"""Names of libraries that were in use before a fork.
+
+In the child process zenoh would wait for threads that don't exist there.
 """
 
 
 # zenoh is only partly typed
 def library(load: Callable[[str], ModuleType] = importlib.import_module) -> Any:  # noqa: ANN401
-    """Return the module zenoh.
+    """Load and return the module zenoh.
 
     Raises:
         BackendUnavailableError: zenoh is not installed or can't be loaded.
@@ -45,7 +47,7 @@ def library(load: Callable[[str], ModuleType] = importlib.import_module) -> Any:
 
 
 def callback(take: Callable[[Any], None], drop: Callable[[], None] | None = None) -> Any:  # noqa: ANN401 - zenoh is not typed
-    """Return a handler that runs in zenoh's network thread, which preserves the order of messages."""
+    """Return a handler that runs in zenoh's network thread, so that messages stay in order."""
     return importlib.import_module("zenoh.handlers").Callback(take, drop, indirect=False)
 
 
@@ -71,7 +73,7 @@ def close_session(session: Any) -> None:  # noqa: ANN401 - zenoh is not typed
 
 
 def keep_forever(owned: Any) -> None:  # noqa: ANN401 - zenoh is not typed
-    """Prevent the finalizer of an object in a forked child, which would notify the network."""
+    """Prevent an object from being finalized in a forked child process, which would notify the network."""
     ctypes.pythonapi.Py_IncRef(ctypes.py_object(owned))
 
 

@@ -18,9 +18,9 @@ Sessions = Callable[[Configuration, float | None], ZenohSession]
 
 
 class ZenohServices:
-    """Services of one node.
+    """Servers, clients and surveyors of one node.
 
-    `session` returns the node's session for a configuration; raises `ClosedError` when the node is closed.
+    `session` returns the node's session for a configuration; it raises `ClosedError` if the node is closed.
     """
 
     def __init__(self, session: Sessions, node_name: str) -> None:
@@ -43,7 +43,7 @@ class ZenohServices:
                 self._servers = (*self._servers, server)
             session.add_server(server)
             session.sync_all(HANDSHAKE_S)
-        except BaseException:  # also Ctrl+C: the caller would have nothing to close
+        except BaseException:  # also Ctrl+C: the caller has no object to close yet
             server.close(0.0)
             raise
         return server
@@ -75,7 +75,7 @@ class ZenohServices:
             self._clients = tuple(each for each in self._clients if each is not closed)
 
     def begin_close(self) -> None:
-        """Stop accepting calls; queued calls are rejected."""
+        """Reject queued and new calls."""
         with self._lock:
             self._is_closed = True
             servers = self._servers
@@ -93,7 +93,7 @@ class ZenohServices:
         self._deadlines.close(max(0.0, deadline - time.monotonic()))
 
     def forked(self) -> None:
-        """Become closed in a forked child, see `nep.system.forks`."""
+        """Mark all services as closed in a forked child process. See `nep.system.forks`."""
         self._is_closed = True
         self._lock = threading.Lock()
         for server in self._servers:

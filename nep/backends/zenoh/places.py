@@ -1,8 +1,10 @@
-"""Places: the values of a node's `master` for this back end, and opening a session for them.
+"""Places: values of a node's `master` for this back end, and sessions opened at them.
 
-local, local/NAME          nodes of this user on this computer, over loopback tcp/HOST:7447,tls/...      a
-zenoh router or peer: the node connects to it and doesn't listen FILE.json5                 a zenoh
-configuration file: TLS, access control, other modes
+    local, local/NAME         nodes of this user on this computer, over loopback
+    tcp/HOST:7447,tls/...     a zenoh router or peer: the node connects to it and doesn't listen
+    FILE.json5                a zenoh configuration file: TLS, access control, other modes
+
+`place_name` validates a place, `open_place` opens a session at it.
 """
 
 from __future__ import annotations
@@ -24,7 +26,7 @@ from nep.i18n import _
 from nep.system.descriptors import check_room
 
 CONFIG_VARIABLE = "NEP_ZENOH_CONFIG"
-"""Environment variable with the default place: a file, or any other value of `master`."""
+"""Environment variable with the default place: any value that `master` accepts."""
 _LOCAL = re.compile(r"local(?:/([\w.-]{1,100}))?", re.ASCII)
 _ENDPOINT = re.compile(r"(?:tcp|tls|quic|udp|ws|unixsock-stream|serial|vsock)/[^\s,]{1,400}", re.ASCII)
 _SECURED = re.compile(r"\b(?:tls|quic)/")
@@ -33,13 +35,14 @@ _DEFAULT_LISTENS = {"router": ["tcp/[::]:7447"], "peer": ["tcp/[::]:0"]}
 _MESSAGE_WAIT_S = 0.05
 """Time in seconds that a message, or the first fragment of a large one, waits for room in a connection.
 
-Zenoh's default of one millisecond passes before its thread has run once on a busy computer. A suspended
-subscriber costs the publisher this time once: zenoh then drops at once until there is room again.
+On a busy computer zenoh's default of one millisecond passes before its thread has run once. A suspended
+subscriber delays the publisher by this time once; then zenoh drops messages immediately until there is room
+again.
 """
 _FRAGMENTS_WAIT_S = 1.0
-"""Total time in seconds that all fragments of a large message wait for room before the message is dropped.
+"""Total time in seconds that the fragments of a large message wait for room before the message is dropped.
 
-Zenoh's default of 50 ms passes before 8 MB are sent over a link of 100 MB/s, or on a busy computer.
+zenoh's default of 50 ms passes before 8 MB are sent over a link of 100 MB/s, or on a busy computer.
 """
 _MAX_TIMEOUT_S = 10**6
 _SESSION_FILES = 16
@@ -51,10 +54,14 @@ _TAIL = re.compile(r" at /\S+\.rs:\d+\.?")
 
 @dataclass(frozen=True)
 class OpenedSession:
-    """Open session with its rendezvous entry.
+    """Open session and its rendezvous entry.
 
-    `endpoints` must be closed in a forked child (`forks.give_up`). Without a connection to one of `routers`
-    no other node is reachable; empty for peers.
+    Attributes:
+        session: Session of zenoh.
+        meeting: Rendezvous of a local place, or None.
+        entry: Entry of this session in `meeting`, or None.
+        endpoints: Endpoints to close in a forked child process (`forks.give_up`).
+        routers: Routers, one of which must be connected to reach other nodes; empty for peers.
     """
 
     session: Any
@@ -65,18 +72,18 @@ class OpenedSession:
 
     @property
     def is_router_lost(self) -> bool:
-        """True if the connection to the router is lost. Zenoh reconnects by itself."""
+        """True if the connection to the router is lost. zenoh reconnects automatically."""
         info = self.session.info
         return bool(self.routers) and not (info.routers_zid() or info.peers_zid())
 
     def leave(self) -> None:
-        """Withdraw the session's address, so that no other session connects to it."""
+        """Remove the session from the rendezvous, so that no other session connects to its address."""
         if self.meeting is not None and self.entry is not None:
             self.meeting.remove(self.entry)
 
 
 def place_name(master: str | None = None) -> str:
-    """Validate a place; the default is $NEP_ZENOH_CONFIG, then "local". Raises `NepError`."""
+    """Validate a place and return it; None selects $NEP_ZENOH_CONFIG, else "local". Raises `NepError`."""
     if master is not None and not isinstance(master, str):
         raise WrongTypeError(
             _("a zenoh address must be a 'str', not a '{kind}'").format(kind=type(master).__name__)
@@ -99,7 +106,7 @@ def _endpoints_in(place: str) -> tuple[str, ...]:
 
 
 def open_place(place: str, wait_s: float | None) -> OpenedSession:
-    """Open a session at a place; wait up to `wait_s` seconds for a router. Raises `NepError`."""
+    """Open a session at a place; wait up to `wait_s` seconds for a router. Raises `NepError` on failure."""
     local = _LOCAL.fullmatch(place)
     if local is not None:
         return _open_local(local.group(1) or "nodes")

@@ -19,7 +19,7 @@ from nep.protocol.wire import EXTENSION, LATCHED, SIZE_MAX, Header, extension_pa
 
 
 class ZenohPublisher:
-    """Publisher of a session. Zenoh drops messages for subscribers without room, which count the losses.
+    """Publisher of a session. zenoh drops messages for subscribers without room; they count the losses.
 
     `count_subscribers` returns the number of subscribers of a topic; `on_close` unregisters and flushes.
     """
@@ -89,20 +89,20 @@ class ZenohPublisher:
         return hello_key(self.spec.topic, self.spec.id)
 
     def counts(self) -> PublisherCount:
-        """Return the statistics for the graph."""
+        """Return the statistics shown in the graph."""
         with self._lock:
             return PublisherCount(
                 self.spec.id, self.count, self._bytes, self.count, self._last_stamp_ns, self._problem
             )
 
     def report(self, problem: str) -> None:
-        """Set the problem of a payload, which the graph shows."""
+        """Set the reason why payloads can't be encoded, shown in the graph."""
         self._problem = problem
 
     # ---- sending
 
     def lend(self, _size_bytes: int) -> memoryview | None:
-        """Return None: zenoh has no shared memory here."""
+        """Return None, because this back end has no shared memory."""
         return None
 
     def skip(self) -> None:
@@ -133,17 +133,17 @@ class ZenohPublisher:
     # ---- closing
 
     def close(self, timeout_s: float) -> None:
-        """Flush within `timeout_s` seconds and unregister. Called by the publisher."""
+        """Flush for up to `timeout_s` seconds and unregister. Called once, by the publisher."""
         self._on_close(self, timeout_s)
 
     def end(self) -> bool:
-        """Stop accepting messages; return False if it was closed already."""
+        """Stop accepting messages; return False if the publisher is already closed."""
         with self._lock:
             was_closed, self._is_closed = self._is_closed, True
             return not was_closed
 
     def release(self) -> None:
-        """Undeclare everything at the session."""
+        """Undeclare the publisher's key expressions and token at the session."""
         for each in (self._hellos, self._listener, self._out):
             with suppress(library().ZError):  # closing the session has undeclared it
                 each.undeclare()

@@ -1,8 +1,8 @@
-"""Rendezvous: how the sessions of one user on one computer find each other without a fixed port.
+"""Rendezvous: connects the sessions of one user on one computer without a fixed port.
 
-Each session listens at a free loopback port and creates a file with the port's number in a folder of the
-user. Under a lock, a new session connects to all sessions with a file and then creates its own, so any two
-sessions are connected, independent of the order in which they start and end.
+Each session listens on a free loopback port and creates a file with the port's number in a folder of the
+user. Under a lock, a new session connects to all sessions that have a file and then creates its own. Any two
+sessions are therefore connected, whatever the order in which they start and end.
 """
 
 from __future__ import annotations
@@ -35,7 +35,7 @@ _SUSPENDED = frozenset({psutil.STATUS_STOPPED, psutil.STATUS_TRACING_STOP})
 
 
 class SessionPort(NamedTuple):
-    """File name of a session: its port and process. `began` distinguishes reused process ids."""
+    """Port and process of a session, encoded in a file name. `began` distinguishes reused process ids."""
 
     port: int
     pid: int
@@ -48,7 +48,7 @@ class SessionPort(NamedTuple):
 
 
 def free_port() -> int:
-    """Return a free loopback port, except those of the original NEP. Raises `AddressInUseError`."""
+    """Return a free loopback port that the original NEP doesn't use. Raises `AddressInUseError`."""
     for _try in range(_PORT_ATTEMPTS):
         with socket.socket() as probe:
             probe.bind((LOOPBACK, 0))
@@ -59,14 +59,14 @@ def free_port() -> int:
 
 
 class Rendezvous:
-    """Folder of the sessions with one name. Raises `NepError` if it doesn't belong to the user."""
+    """Folder of the sessions with one name. Raises `NepError` if the folder doesn't belong to the user."""
 
     def __init__(self, name: str) -> None:
         self._folder = _own_folder(_own_folder(_root_folder()) / name)
 
     @contextmanager
     def exclusive(self) -> Iterator[None]:
-        """Hold the lock for opening a session. A process that hangs with it delays others by 5 s only."""
+        """Hold the lock for opening a session. A process that hangs with the lock delays others by 5 s."""
         with (self._folder / "lock").open("ab") as file:
             is_held = _lock(file.fileno())
             if not is_held:
@@ -81,7 +81,7 @@ class Rendezvous:
                     _unlock(file.fileno())
 
     def entries(self) -> list[SessionPort]:
-        """Return the sessions of running programs; delete the files of others."""
+        """Return the sessions of running processes; delete the files of others."""
         found = []
         for path in self._folder.iterdir():
             entry = _parse_entry(path.name)
@@ -99,7 +99,7 @@ class Rendezvous:
         return found
 
     def add(self, port: int) -> SessionPort:
-        """Create the file of a session that listens at `port`."""
+        """Create the file of a session that listens on `port`."""
         entry = SessionPort(port, os.getpid(), _start_time(os.getpid()))
         (self._folder / entry.name).touch(mode=0o600)
         return entry

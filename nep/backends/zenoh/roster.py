@@ -1,4 +1,4 @@
-"""Roster: known nodes, publishers and subscribers, from their liveliness tokens. No network; thread-safe."""
+"""Roster: known nodes, publishers and subscribers, from their liveliness tokens. No network. Thread-safe."""
 
 from __future__ import annotations
 
@@ -12,11 +12,11 @@ from nep.protocol.topic_pattern import is_pattern, matches
 
 _Record = TypeVar("_Record", PublisherRecord, SubscriberRecord)
 _MAX_TOKENS = 100_000
-"""Maximum number of tokens: any program in the network can create them."""
+"""Maximum number of tokens; limited because any program in the network can create them."""
 
 
 class Roster:
-    """Known nodes, publishers and subscribers. Only `note` changes it. Thread-safe."""
+    """Known nodes, publishers and subscribers. Changed only by `note`. Thread-safe."""
 
     def __init__(self) -> None:
         self._lock = threading.Lock()
@@ -27,7 +27,7 @@ class Roster:
         self._count = 0
 
     def note(self, alive: LiveToken, *, is_there: bool) -> None:
-        """Add or remove a token (idempotent)."""
+        """Add or remove a token. Idempotent."""
         with self._lock:
             if is_there and self._count >= _MAX_TOKENS:
                 return
@@ -56,23 +56,23 @@ class Roster:
             return found + sum(len(self._subscribers[each]) for each in self._matching_locked(topic))
 
     def _matching_locked(self, topic: str) -> list[str]:
-        # Other topics than `topic`.
+        # Returns the patterns that match `topic`, except `topic` itself.
         return [each for each in self._patterns if each != topic and matches(each, topic)]
 
     @property
     def published(self) -> tuple[str, ...]:
-        """Topics with publishers."""
+        """Names of topics that have publishers."""
         with self._lock:
             return tuple(each for each in self._publishers if service_of(each) is None)
 
     @property
     def served(self) -> tuple[str, ...]:
-        """Services with servers."""
+        """Names of services that have servers."""
         with self._lock:
             return tuple(name for each in self._publishers if (name := service_of(each)) is not None)
 
     def servers_of(self, service: str) -> tuple[str, ...]:
-        """Return the keys of a service's servers, oldest first."""
+        """Return the keys of a service's servers, the oldest first."""
         with self._lock:
             entries = self._publishers.get(topic_of(service), {}).values()
             return tuple(sorted(record.endpoints[0] for _node_id, record in entries if record.endpoints))

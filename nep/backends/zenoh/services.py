@@ -1,7 +1,7 @@
-"""Servers and clients over zenoh: a server is a queryable, a call a query, its reply the query's reply.
+"""Servers and clients over zenoh: a server is a queryable, a call is a query to it.
 
-Payloads are sent as is, with the header of `nep.protocol.service_wire` as attachment. Zenoh finishes a query
-without a reply when its server ends, so the client knows that the call is lost.
+Payloads are sent as is, with the header of `nep.protocol.service_wire` as attachment. When a server ends,
+zenoh finishes its queries without a reply, so the client knows that its calls are lost.
 """
 
 from __future__ import annotations
@@ -47,16 +47,16 @@ from nep.protocol.service_wire import NATIVE, PAYLOAD_MAX_BYTES, SERVICE_TYPE, R
 
 _logger = logging.getLogger("nep")
 _LATE_REPLY_S = 30.0
-"""Time in seconds after the timeout in which a reply is still counted as late."""
+"""Time in seconds after a timeout during which a reply is still counted as late."""
 _UNLIMITED_S = 1e9
 _TOKEN_DELAY_S = 0.5
-"""Maximum time in seconds between the end of a server's calls and the removal of its token."""
+"""Maximum time in seconds between the end of a server's queries and the removal of its token."""
 
 Then = Callable[[Outcome], None]
 
 
 class ZenohServer:
-    """Server with its queryable, call queue and unanswered queries."""
+    """Server with its queryable, its call queue and the queries that have no reply yet."""
 
     def __init__(
         self, session: ZenohSession, spec: ServerSpec, on_close: Callable[[ZenohServer], object]
@@ -123,7 +123,7 @@ class ZenohServer:
         return True
 
     def counts(self) -> PublisherCount:
-        """Return the statistics for the graph."""
+        """Return the statistics shown in the graph."""
         tally = self.tally
         return PublisherCount(self.spec.id, tally.calls, tally.bytes, tally.calls, errors=tally.errors)
 
@@ -134,7 +134,7 @@ class ZenohServer:
             call.answer(refusal(self.spec.service, is_closed=True))
 
     def close(self, timeout_s: float) -> None:  # noqa: ARG002 - replies are flushed by the session
-        """Close the server; calls without a reply end."""
+        """Close the server; calls without a reply fail."""
         self.begin_close()
         with self._lock:
             if self.is_closed:
@@ -148,7 +148,7 @@ class ZenohServer:
         self._on_close(self)
 
     def forked(self) -> None:
-        """Become closed in a forked child."""
+        """Mark the server as closed in a forked child process."""
         self.is_closed = True
         for query in self._queries:
             keep_forever(query)
@@ -158,7 +158,7 @@ class ZenohServer:
 
 @dataclass(eq=False)
 class _Call:
-    # Call in flight at the server `key`; "" while there is none. `finished_at` is the deadline for the
+    # Call in flight at the server `key`; "" while there is no server. `finished_at` is the deadline for the
     # removal of the server's token after zenoh has finished the query.
     number: int
     data: bytes | memoryview
@@ -174,7 +174,7 @@ class _Call:
 
 
 class ZenohClient(ClientCalls[_Call]):
-    """Client or surveyor with its calls in flight."""
+    """Client or surveyor and its calls in flight."""
 
     def __init__(
         self,
@@ -247,7 +247,7 @@ class ZenohClient(ClientCalls[_Call]):
             call.key = key
         limit_s = None if call.deadline == math.inf else max(0.0, call.deadline - time.monotonic())
         parts = NATIVE.call(call.number, self.spec.codec.number, limit_s, call.data)
-        call.data = b""  # the query outlives its timeout: free the payload
+        call.data = b""  # the query outlives its timeout: release the payload
         query_s = _UNLIMITED_S if limit_s is None else min(_UNLIMITED_S, limit_s + _LATE_REPLY_S)
         try:
             self._session.call(
@@ -281,7 +281,7 @@ class ZenohClient(ClientCalls[_Call]):
                 self.late += 1
 
     def _handle_finished(self, call: _Call) -> None:
-        # The query is finished: without a reply the server has ended, or never received the call.
+        # The query is finished: without a reply, the server has ended or never received the call.
         if call.key not in self._servers:
             self._finish(call, ServerGoneError(self.spec.service))
             return
@@ -289,7 +289,7 @@ class ZenohClient(ClientCalls[_Call]):
         self._deadlines.add(call.finished_at)
 
     def _fail_unanswered(self, call: _Call, now: float) -> None:
-        # For calls whose query is finished without a reply.
+        # Handles calls whose query is finished without a reply.
         if call.key not in self._servers:
             self._finish(call, ServerGoneError(self.spec.service))
         elif call.finished_at <= now:
@@ -310,18 +310,18 @@ class ZenohClient(ClientCalls[_Call]):
         return True
 
     def forget_all(self, calls: Sequence[OpenCall]) -> None:
-        """Cancel these calls."""
+        """Cancel several calls; their callbacks aren't called."""
         for call in calls:
             self.forget(call)
 
     # ---- events
 
     def servers_changed(self) -> None:
-        """Process a change of the servers: the timeout thread sends waiting calls."""
+        """Handle a change of the servers: the timeout thread sends the waiting calls."""
         self._deadlines.add(0.0)
 
     def expire(self, now: float) -> float:
-        """Send waiting calls and fail expired ones; return the next deadline."""
+        """Send waiting calls, fail expired ones, and return the next deadline."""
         key = next(iter(self._servers), "")
         with self._lock:
             waiting = [each for each in self._calls.values() if not each.key and each.deadline > now]
@@ -345,13 +345,13 @@ class ZenohClient(ClientCalls[_Call]):
         return tuple(sorted(self._session.roster.served))
 
     def counts(self) -> SubscriberCount:
-        """Return the statistics for the graph."""
+        """Return the statistics shown in the graph."""
         return SubscriberCount(self.spec.id, as_count(self._answered), as_count(self._failed))
 
     # ---- closing
 
     def close(self) -> None:
-        """Unregister; calls in flight fail with `ClosedError`."""
+        """Unregister the client; calls in flight fail with `ClosedError`."""
         with self._lock:
             if self.is_closed:
                 return

@@ -1,4 +1,4 @@
-"""ZenohSession: one node's session at one place: discovery, registrations and requests."""
+"""ZenohSession: session of one node at one place, with discovery, registrations and requests."""
 
 from __future__ import annotations
 
@@ -53,34 +53,34 @@ from nep.system.cpu import CpuLoad
 
 _logger = logging.getLogger("nep")
 _GRACE_S = 1.0
-"""Extra time in seconds before a query times out here; normally zenoh reports the timeout."""
+"""Extra time in seconds before a query times out here; zenoh normally reports the timeout earlier."""
 _GREETING_S = 10.0
 _MAX_REPLIES, _MAX_LIST_ITEMS = 100, 20_000
 
 
 class ListedServer(Protocol):
-    """Server as the session lists it."""
+    """Server, as the session uses it."""
 
     record: PublisherRecord
 
     def counts(self) -> PublisherCount:
-        """Return the statistics for the graph."""
+        """Return the statistics shown in the graph."""
 
 
 class ListedClient(Protocol):
-    """Client as the session lists it."""
+    """Client, as the session uses it."""
 
     record: SubscriberRecord
 
     def counts(self) -> SubscriberCount:
-        """Return the statistics for the graph."""
+        """Return the statistics shown in the graph."""
 
     def servers_changed(self) -> None:
-        """Process a change of the service's servers. Runs in a zenoh thread; must not block."""
+        """Handle a change of the service's servers. Called in a zenoh thread; must not block."""
 
 
 class PendingQuery:
-    """Pending query: replies so far, and whether all have replied."""
+    """Query in progress, with the replies received so far by key."""
 
     def __init__(self, timeout_s: float, on_finished: Callable[[], None] | None = None) -> None:
         self._on_finished = on_finished
@@ -90,14 +90,14 @@ class PendingQuery:
         self._changed = threading.Condition()
 
     def add_reply(self, reply: Any) -> None:  # noqa: ANN401 - zenoh is not typed
-        """Add a reply. Runs in a zenoh thread."""
+        """Store a reply. Called in a zenoh thread."""
         if reply.ok is not None:
             with self._changed:
                 self.replies[str(reply.ok.key_expr)] = reply.ok.payload.to_bytes()
                 self._changed.notify_all()
 
     def finish(self) -> None:
-        """Finish the query: all have replied, or the timeout has passed."""
+        """Finish the query, because all nodes have replied or the timeout has passed."""
         with self._changed:
             self._is_finished = True
             self._changed.notify_all()
@@ -105,7 +105,15 @@ class PendingQuery:
             self._on_finished()
 
     def wait(self, wanted: frozenset[str] | None = None, deadline: float | None = None) -> frozenset[str]:
-        """Wait for the replies of `wanted`, or of all; return the keys without a reply."""
+        """Wait for replies, until `deadline` at the latest.
+
+        Args:
+            wanted: Keys whose replies to wait for; None waits until the query is finished.
+            deadline: Time (`time.monotonic`) at which to stop waiting; None for the query's timeout.
+
+        Returns:
+            Those of `wanted` without a reply.
+        """
         ends_at = self._ends_at if deadline is None else min(deadline, self._ends_at)
         with self._changed:
             wait_until(
@@ -157,7 +165,7 @@ class ZenohSession:
         over: Callable[[], None] | None = None,
         is_last: bool = False,
     ) -> PendingQuery:
-        """Query all nodes that reply at `key`; doesn't wait.
+        """Send a query to all nodes that reply at `key`. Doesn't wait.
 
         Args:
             key: Key expression.
@@ -165,7 +173,10 @@ class ZenohSession:
             timeout_s: Seconds until the query is finished.
             take: Called with each reply, in a zenoh thread.
             over: Called when the query is finished.
-            is_last: True to send it behind all messages published before.
+            is_last: True to send the query after all messages published before.
+
+        Returns:
+            The query, whose replies can be waited for.
         """
         zenoh = library()
         query = PendingQuery(timeout_s, over)
@@ -188,9 +199,9 @@ class ZenohSession:
         return query
 
     def sync_all(self, timeout_s: float) -> Mapping[str, bytes]:
-        """Query every node and wait; return the replies.
+        """Send a query to every node, wait for the replies and return them by key.
 
-        Afterwards all earlier declarations are known on both sides.
+        Afterwards both sides know all declarations that the other made before.
         """
         if self._opened.meeting is None:
             self._sync_routers(timeout_s)
@@ -219,7 +230,7 @@ class ZenohSession:
             query.reply(call_key(self.node.id), answer)
 
     def _own_requests(self) -> tuple[Request, ...]:
-        # This node's registration and statistics; empty while it has nothing.
+        # Returns this node's registration and statistics; empty if it has nothing registered.
         with self._lock:
             publishers, subscribers = self._publishers, self._subscribers
             servers, clients = self._servers, self._clients
@@ -287,7 +298,7 @@ class ZenohSession:
                     subscriber.mark_silent(record.id)
 
     def _greet(self, record: PublisherRecord, subscriber: ZenohSubscriber) -> None:
-        # Greets a publisher that came after its subscriber.
+        # Greets a publisher that was created after its subscriber.
         self.ask(
             hello_key(record.topic, record.id),
             None,
@@ -297,7 +308,7 @@ class ZenohSession:
         )
 
     def query_graph(self, timeout_s: float) -> GraphView:
-        """Return the graph; nodes that don't reply in time are listed without statistics.
+        """Return the graph. Nodes that don't reply in time are listed without statistics.
 
         Raises `NepError` while the router is disconnected.
         """
@@ -332,7 +343,7 @@ class ZenohSession:
             raise RequestRefusedError(error.reason) from error
 
     def join(self) -> None:
-        """Announce this node."""
+        """Announce this node by its token."""
         with self._lock:
             if self.node.id not in self._tokens:
                 self._tokens[self.node.id] = self._declare(node_key(self.node))
@@ -341,13 +352,13 @@ class ZenohSession:
         return self._zenoh.liveliness().declare_token(key)
 
     def add_publisher(self, publisher: ZenohPublisher) -> None:
-        """Announce a publisher."""
+        """Announce a publisher by its token."""
         with self._lock:
             self._publishers = (*self._publishers, publisher)
             self._tokens[publisher] = self._declare(publisher_key(self.node.id, publisher.record))
 
     def add_subscriber(self, subscriber: ZenohSubscriber) -> None:
-        """Subscribe and announce a subscriber."""
+        """Subscribe at zenoh and announce a subscriber by its token."""
         spec = subscriber.spec
         record = SubscriberRecord(spec.id, spec.topic, spec.msg_type)
         for remote in self._publishers_for(subscriber):  # messages that arrive before the greeting are queued
@@ -359,7 +370,10 @@ class ZenohSession:
             self._tokens[subscriber] = self._declare(subscriber_key(self.node.id, record))
 
     def greet_all(self, subscriber: ZenohSubscriber, timeout_s: float) -> None:
-        """Greet all publishers of a subscriber's topic, which reply with their history and last number."""
+        """Send a hello to all publishers of a subscriber's topic.
+
+        They reply with their history and the sequence number of their last message.
+        """
         there = self._publishers_for(subscriber)
         for remote in there:
             subscriber.add_publisher(remote)
@@ -378,11 +392,11 @@ class ZenohSession:
         )
 
     def publisher(self, make: Callable[[Any], ZenohPublisher]) -> ZenohPublisher:
-        """Create a publisher with zenoh's session."""
+        """Create a publisher. `make` receives zenoh's session."""
         return make(self._zenoh)
 
     def forget(self, closed: ZenohPublisher | ZenohSubscriber) -> None:
-        """Withdraw a closed publisher or subscriber."""
+        """Remove a closed publisher or subscriber and its token."""
         with self._lock:
             self._publishers = tuple(each for each in self._publishers if each is not closed)
             self._subscribers = tuple(each for each in self._subscribers if each is not closed)
@@ -397,19 +411,19 @@ class ZenohSession:
     # ---- servers and clients
 
     def add_server(self, server: ListedServer) -> None:
-        """Announce a server."""
+        """Announce a server by its token."""
         with self._lock:
             self._servers = (*self._servers, server)
             self._tokens[server] = self._declare(server_key(self.node.id, server.record))
 
     def add_client(self, client: ListedClient) -> None:
-        """Announce a client."""
+        """Announce a client by its token."""
         with self._lock:
             self._clients = (*self._clients, client)
             self._tokens[client] = self._declare(client_key(self.node.id, client.record))
 
     def forget_service(self, closed: ListedServer | ListedClient) -> None:
-        """Withdraw a server or client (idempotent)."""
+        """Remove a closed server or client and its token. Idempotent."""
         with self._lock:
             self._servers = tuple(each for each in self._servers if each is not closed)
             self._clients = tuple(each for each in self._clients if each is not closed)
@@ -419,7 +433,7 @@ class ZenohSession:
                 token.undeclare()
 
     def declare_queryable(self, key: str, take: Callable[[Any], None]) -> Any:  # noqa: ANN401 - zenoh is not typed
-        """Declare a queryable."""
+        """Declare a queryable at `key`; `take` is called with each query."""
         return self._zenoh.declare_queryable(key, callback(take))
 
     def call(
@@ -447,7 +461,7 @@ class ZenohSession:
     # ---- closing
 
     def close(self, timeout_s: float) -> None:
-        """Withdraw all tokens, wait until other nodes know, and close the session."""
+        """Remove all tokens, wait until the other nodes know that, and close the session."""
         self._opened.leave()
         with self._lock:
             tokens = list(self._tokens.values())

@@ -1,4 +1,4 @@
-"""ZenohSubscriber: receives messages from zenoh and queues them for a reader."""
+"""ZenohSubscriber: queues messages received from zenoh for a reader."""
 
 from __future__ import annotations
 
@@ -27,8 +27,7 @@ from nep.protocol.wire import HEADER_BYTES, hello_part, read_header, topic_part
 _logger = logging.getLogger("nep")
 _MAX_TOPIC_PARSERS = 10_000
 _BATCH_BYTES = 64 * 2**20
-"""Maximum size of a sink's batch; the inbox is smaller by this, so that both together stay within the bound.
-"""
+"""Maximum size of a sink's batch. The inbox is smaller by this size, so that both stay within the bound."""
 
 
 class _TopicParser(NamedTuple):
@@ -59,7 +58,7 @@ class ZenohSubscriber(WakingSubscriber):
         self._problem = ""
         self._own_parser = self._new_topic_parser(spec.topic)
         self._topic_parsers: OrderedDict[str, _TopicParser] = OrderedDict()
-        """Parsers of recently received topics (with wildcards), most recent last."""
+        """Parsers of recently received topics of a pattern, the most recent last."""
 
     def _new_topic_parser(self, topic: str) -> _TopicParser:
         spec = self.spec if topic == self.spec.topic else replace(self.spec, topic=topic)
@@ -104,11 +103,11 @@ class ZenohSubscriber(WakingSubscriber):
 
     @property
     def sink(self) -> Sink | None:
-        """Callback for its messages."""
+        """Callback that receives the messages; None if they are read with `poll` or `receive`."""
         return self.spec.sink
 
     def take_batch(self) -> list[Message]:
-        """Return the messages for one call of the sink."""
+        """Remove and return the messages for one call of the sink."""
         with self._inboxes.changed:
             return self._inbox.take_all(_BATCH_BYTES)
 
@@ -119,33 +118,33 @@ class ZenohSubscriber(WakingSubscriber):
 
     @property
     def lost(self) -> int:
-        """Number of messages lost or dropped here for lack of room."""
+        """Number of messages lost in transit or dropped from the full queue."""
         return self._sources.lost
 
     @property
     def refused(self) -> int:
-        """Number of inputs rejected because they aren't valid messages."""
+        """Number of received frames rejected because they are not valid messages."""
         return self._refusals.count
 
     def report(self, problem: str) -> None:
-        """Set the reader's problem, which the graph shows."""
+        """Set the reason why messages can't be decoded, shown in the graph."""
         self._problem = problem
 
     def counts(self) -> SubscriberCount:
-        """Return the statistics for the graph."""
+        """Return the statistics shown in the graph."""
         problem = self._problem or self._refusals.recent_message()
         return SubscriberCount(self.spec.id, as_count(self.received), as_count(self.lost), problem)
 
     # ---- callbacks in zenoh's threads
 
     def receive_message(self, sample: Any) -> None:  # noqa: ANN401 - zenoh is not typed
-        """Process a message of the topic."""
+        """Handle a message of the topic."""
         topic_parser = self._topic_parser_for(sample)
         if topic_parser is not None:
             self._process(sample, topic_parser, topic_parser.topic)
 
     def receive_reply(self, sample: Any) -> None:  # noqa: ANN401 - zenoh is not typed
-        """Process a publisher's reply to a hello: a message of the history, or the number of the last one."""
+        """Handle a publisher's reply to a hello: a message of its history, or its last sequence number."""
         topic_parser = self._topic_parser_for(sample)
         if topic_parser is not None:
             self._process(sample, topic_parser, topic_parser.own)
@@ -184,7 +183,7 @@ class ZenohSubscriber(WakingSubscriber):
     def _is_early(self, topic_parser: _TopicParser, rest: list[bytes]) -> bool:
         header = read_header(rest[0])
         is_early = self._early.keep(header, (topic_parser, rest), sum(map(len, rest)))
-        if not is_early:  # messages queued before it need not wait either
+        if not is_early:  # messages queued before this one need not wait any longer, either
             self._release_early(header.publisher)
         return is_early
 
@@ -211,7 +210,7 @@ class ZenohSubscriber(WakingSubscriber):
             self._sources.add_listed(remote).is_silent = False
 
     def mark_silent(self, publisher: int) -> None:
-        """Mark a publisher as silent; it is kept, because it may only be unreachable."""
+        """Mark a publisher as not responding. It is not removed, because it may only be unreachable."""
         with self._inboxes.changed:
             source = self._sources.find(publisher)
             if source is not None:
@@ -220,7 +219,7 @@ class ZenohSubscriber(WakingSubscriber):
                 self._sources.pop(each)
 
     def bye(self, publisher: int, last_seq: int) -> None:
-        """Process a publisher's bye; its last message was `last_seq`."""
+        """Handle a publisher's bye, which states `last_seq` as its last message."""
         with self._inboxes.changed:
             source = self._sources.find(publisher)
             if source is not None:
@@ -245,7 +244,7 @@ class ZenohSubscriber(WakingSubscriber):
         self._on_close(self)
 
     def forked(self) -> None:
-        """Become closed in a forked child."""
+        """Mark the subscriber as closed in a forked child process."""
         self.is_closed = True
 
 

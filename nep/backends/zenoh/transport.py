@@ -1,4 +1,4 @@
-"""Transport of the back end `zenoh`: one session per node and place, no master."""
+"""Transport of the back end `zenoh`: one session per node and place, without a master."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ _MAX_FLUSH_S = 60.0
 
 @dataclass
 class _PendingFlush:
-    # Closing publisher with its flush request to the subscribers' nodes.
+    # Closing publisher, and its flush request to the nodes of its subscribers.
     session: ZenohSession
     query: PendingQuery
     expected: tuple[Expected, ...]
@@ -84,7 +84,7 @@ class ZenohTransport:
             missing = [each for each in expected if call_key(each.node_id) not in answered]
             publisher.missing = tuple(dict.fromkeys(each.node_name for each in missing))
             publisher.missing_ids = tuple(each.id for each in missing)
-        except BaseException:  # also Ctrl+C: the caller would have nothing to close
+        except BaseException:  # also Ctrl+C: the caller has no object to close yet
             publisher.close(0.0)
             raise
         return publisher
@@ -249,7 +249,7 @@ class ZenohTransport:
             return self._session(configuration, timeout_s).query_graph(min(timeout_s, HANDSHAKE_S))
 
     def begin_close(self) -> None:
-        """Announce the end to all peers; doesn't wait. See `Transport.begin_close`."""
+        """Notify all peers that the node is closing; doesn't wait. See `Transport.begin_close`."""
         with self._lock:
             if self._is_closed:
                 return
@@ -260,7 +260,7 @@ class ZenohTransport:
             self._say_bye(publisher)
 
     def close(self, timeout_s: float) -> None:
-        """Close everything. See `Transport.close`."""
+        """Close all sockets, sessions and threads. See `Transport.close`."""
         deadline = time.monotonic() + timeout_s
         self.begin_close()
         with self._lock:
@@ -280,7 +280,7 @@ class ZenohTransport:
             session.close(min(_CLOSE_TIMEOUT_S, timeout_s))
 
     def forked(self) -> None:
-        """Close the descriptors of the parent's sockets, see `nep.system.forks`."""
+        """Close the descriptors of the parent's sockets in a forked child process. See `nep.system.forks`."""
         for session in self._sessions.values():
             give_up(*session.endpoints)
         self._services.forked()
