@@ -258,7 +258,7 @@ class MemoryClient:
         return SubscriberCount(self.spec.id, self.answered, self.failed)
 
     def close(self) -> None:
-        """Unregister; calls in flight fail with `ClosedError`."""
+        """Unregister the client; calls in flight fail with `ClosedError`."""
         with self.hub.lock:
             if self.is_closed:
                 return

@@ -1,4 +1,4 @@
-"""Back end `zeromq`: the native wire, and direct connections on the original wire."""
+"""Back end `zeromq`: the native wire, and direct connections on the original NEP's wire."""
 
 from nep.backends.base import Backend
 from nep.backends.zeromq.transport import ZeromqTransport

@@ -1,12 +1,12 @@
-"""Endpoints that a publisher's socket binds, and the choice of the endpoint to connect to.
+"""Endpoints that a publisher's socket binds, and selection of the endpoint that a subscriber connects to.
 
-`Bindings` binds one endpoint per address, and on Linux an abstract Unix socket beside the loopback endpoint.
-Small messages between programs of one computer are faster through it than through TCP
+`Bindings` binds one endpoint per address and, on Linux, an abstract Unix socket in addition to the loopback
+endpoint. For small messages between programs of one computer it is faster than TCP
 (docs/adr/0011-local-sockets.md), but messages of hundreds of kilobytes stall on its small buffer. Only Linux
 has abstract names, which need no clean-up after a crash. The name contains the publisher's loopback port,
 which makes it unique.
 
-Set `NEP_LOCAL=0` to disable it, for example to capture the traffic with a network tool.
+Set `NEP_LOCAL=0` to disable Unix sockets, for example to capture the traffic with a network tool.
 """
 
 from __future__ import annotations
@@ -33,13 +33,13 @@ _TCP = f"tcp://{LOOPBACK}:"
 _LOCAL = "ipc://@nep-"
 _FILES_TO_BIND_LOCAL = 384
 _FILES_TO_STAY_LOCAL = 192
-"""Free descriptors to keep: enough for the connections that can arrive between two checks."""
+"""Number of descriptors to keep free: enough for the connections that can arrive between two checks."""
 _probed: set[bool] = set()
-"""Contains True after the first successful probe; later probes are skipped."""
+"""Contains True after a successful probe, so that later probes are skipped."""
 
 
 def has_local_names() -> bool:
-    """Return True if this system has abstract Unix sockets."""
+    """Return True if abstract Unix sockets can be used on this system."""
     return sys.platform == "linux" and zmq.has("ipc")
 
 
@@ -85,9 +85,13 @@ def _is_reachable(name: str) -> bool:
 
 
 def select_endpoint(remote: RemotePublisher, master: str) -> RemotePublisher:
-    """Reduce a publisher's endpoints to the one to connect to from a node that knows its master as `master`.
+    """Return a publisher with only the endpoint that this node should connect to.
 
     On the master's computer this is the publisher's Unix socket, if it has one.
+
+    Args:
+        remote: Publisher with all its endpoints.
+        master: Address at which this node reaches its master.
     """
     publisher = remote.publisher
     if not publisher.endpoints:
@@ -100,12 +104,12 @@ def select_endpoint(remote: RemotePublisher, master: str) -> RemotePublisher:
 
 
 class Bindings:
-    """Bound endpoints of `socket`; guarded by the lock of the socket's owner.
+    """Endpoints to which `socket` is bound. Guarded by the lock of the socket's owner.
 
     Args:
         socket: Socket to bind.
-        may_be_local: True to bind Unix socket names as well.
-        is_watched: True if the owner closes silent connections itself, see `keep_alive`.
+        may_be_local: True to bind Unix sockets as well.
+        is_watched: True if the owner itself closes connections that don't respond; see `keep_alive`.
     """
 
     def __init__(self, socket: Socket, *, may_be_local: bool, is_watched: bool = False) -> None:
@@ -114,11 +118,11 @@ class Bindings:
         self._is_watched = is_watched
         self._bound: dict[str, str] = {}
         self._local: dict[str, str] = {}
-        """Bound Unix socket names, by host."""
+        """Names of the bound Unix sockets, by host."""
 
     @property
     def is_local(self) -> bool:
-        """True if a Unix socket name is bound beside the loopback endpoint."""
+        """True if a Unix socket is bound in addition to the loopback endpoint."""
         return bool(self._local)
 
     @property
@@ -127,7 +131,7 @@ class Bindings:
         return (*self._bound.values(), *self._local.values())
 
     def move(self, hosts: Sequence[str]) -> tuple[str, ...]:
-        """Bind exactly these hosts, each at a port of its own; return the endpoints in the same order.
+        """Bind these hosts and no others, each at its own port; return the endpoints in the same order.
 
         Hosts that can't be bound are skipped. Raises `AddressInUseError` or `TooManyFilesError` if none is
         left.
@@ -150,7 +154,7 @@ class Bindings:
         return tuple(self._bound[host] for host in hosts if host in self._bound)
 
     def unbind_local(self) -> None:
-        """Unbind the Unix socket names; existing connections stay open."""
+        """Unbind the Unix sockets; existing connections stay open."""
         for name in self._local.values():
             self._unbind(name)
         self._local.clear()

@@ -1,7 +1,7 @@
-"""Flow control in bytes, because libzmq bounds its queues only by a number of messages. No sockets.
+"""Flow control in bytes, because libzmq limits its queues only by number of messages. No sockets.
 
-`SendWindow` is for subscribers that acknowledge what they have read; it covers the queues of both sockets and
-of the kernel. `Backlog` is for all others and covers only what libzmq still queues in this process.
+`SendWindow` is for subscribers that acknowledge messages; it covers the queues of both sockets and of the
+kernel. `Backlog` is for all others; it covers only the messages that libzmq still queues in this process.
 """
 
 from __future__ import annotations
@@ -10,20 +10,20 @@ from collections import deque
 from typing import Protocol
 
 WINDOW_BYTES = 192 * 2**20
-"""Maximum number of unacknowledged bytes per subscriber. With the batch in its sink this makes 256 MB."""
+"""Maximum number of unacknowledged bytes per subscriber. Together with a batch in its sink this is 256 MB."""
 MIN_WINDOW_BYTES = 24 * 2**20
-"""Smallest window that a subscriber may request: two steps, so that messages don't wait for each
-acknowledgement.
+"""Smallest window that a subscriber may request.
+
+It is two steps long, so that sending continues while an acknowledgement is under way.
 """
 ACK_STEP_BYTES = 12 * 2**20
-"""Bytes after which a subscriber is asked for an acknowledgement."""
+"""Number of bytes after which an acknowledgement is requested from a subscriber."""
 BACKLOG_STEP_BYTES = 2**20
-"""Bytes after which a message is tracked for subscribers without acknowledgements."""
+"""Number of bytes after which a message is tracked for subscribers without acknowledgements."""
 _ENTRY_BYTES = 2**20
-"""Small messages share an entry up to this size; it is acknowledged with its newest message."""
+"""Maximum size of an entry that several small messages share; acknowledged with its newest message."""
 _ACK_RETRY_S = 0.5
-"""Interval to repeat a request while a subscriber has no room: libzmq drops requests when its queue is full.
-"""
+"""Interval in seconds for repeating a request. libzmq drops requests while the subscriber's queue is full."""
 
 
 class SendWindow:
@@ -31,7 +31,7 @@ class SendWindow:
 
     def __init__(self) -> None:
         self.unacked_bytes = 0
-        """Unacknowledged bytes."""
+        """Total size of the unacknowledged messages."""
         self._bound = WINDOW_BYTES
         self._sent: deque[tuple[int, int]] = deque()
         self._bytes_since_request = 0
@@ -41,12 +41,12 @@ class SendWindow:
     def has_room(self, size_bytes: int) -> bool:
         """Return True if a message of this size can be sent.
 
-        One larger than the window waits for an almost empty one.
+        A message larger than the window is sent when the window is almost empty.
         """
         return self.unacked_bytes <= ACK_STEP_BYTES or self.unacked_bytes + size_bytes <= self._bound
 
     def sent(self, seq: int, size_bytes: int) -> None:
-        """Count `size_bytes` that were sent up to and including message `seq`."""
+        """Add `size_bytes` that were sent up to and including message `seq`."""
         if self._sent and self._sent[-1][1] + size_bytes <= _ENTRY_BYTES:
             self._sent.append((seq, self._sent.pop()[1] + size_bytes))
         else:
@@ -55,24 +55,24 @@ class SendWindow:
         self._bytes_since_request += size_bytes
 
     def note_drop(self) -> None:
-        """Note that a message was dropped for lack of room."""
+        """Record that a message was dropped because the window is full."""
         self._has_drops = True
 
     def should_notify(self) -> bool:
-        """Return True, once, if the subscriber has room again after a drop and should be notified."""
+        """Return True once when the subscriber has room again after a drop and should be notified."""
         if not self._has_drops or self.unacked_bytes > ACK_STEP_BYTES:
             return False
         self._has_drops = False
         return True
 
     def acknowledge(self, seq: int, bound_bytes: int) -> None:
-        """Process an acknowledgement of everything up to `seq`, and adopt `bound_bytes` as the window."""
+        """Handle an acknowledgement of all messages up to `seq`, and adopt `bound_bytes` as the window."""
         self._bound = max(MIN_WINDOW_BYTES, min(bound_bytes, WINDOW_BYTES))
         while self._sent and self._sent[0][0] <= seq:
             self.unacked_bytes -= self._sent.popleft()[1]
 
     def should_request_ack(self, now: float, *, has_room: bool) -> bool:
-        """Return True, and reset the interval, if the subscriber should be asked for an acknowledgement."""
+        """Return True, and restart the interval, if an acknowledgement should be requested."""
         if self._bytes_since_request < ACK_STEP_BYTES and (
             has_room or now < self._requested_at + _ACK_RETRY_S
         ):
@@ -91,10 +91,10 @@ class Tracker(Protocol):
 
 
 class Backlog:
-    """Upper bound of what libzmq queues for the slowest subscriber without acknowledgements.
+    """Estimated backlog of the slowest subscriber without acknowledgements: an upper bound of libzmq's queue.
 
-    Only some messages are tracked. Messages are released in order, so while a tracked one is queued, all sent
-    since are counted as queued, too.
+    Only some messages are tracked. libzmq releases messages in order, so while a tracked message is queued,
+    all messages after it are counted as queued, too.
     """
 
     def __init__(self) -> None:
@@ -108,6 +108,6 @@ class Backlog:
         return self._bytes <= BACKLOG_STEP_BYTES or self._bytes + size_bytes <= WINDOW_BYTES
 
     def sent(self, tracker: Tracker, size_bytes: int) -> None:
-        """Count `size_bytes` sent since the last call; `tracker` belongs to the newest message."""
+        """Add `size_bytes` that were sent since the last call; `tracker` belongs to the newest message."""
         self._held.append((tracker, size_bytes))
         self._bytes += size_bytes

@@ -1,7 +1,7 @@
-"""SubSocket that verifies which connection each message came over.
+"""SubSocket that verifies over which connection each message arrived.
 
 The header of a message contains the id of its publisher, which any sender could forge. libzmq reports the
-descriptor of a message's connection (ZMQ_SRCFD), and the system reports its peer address, which must be the
+descriptor of a message's connection (ZMQ_SRCFD) and the system reports its peer address, which must be the
 endpoint that the master lists for this publisher. docs/trust.md describes the remaining risks.
 """
 
@@ -19,7 +19,7 @@ from nep.i18n import _
 from nep.protocol.wire import HEADER_BYTES, unpack_at, unpack_quickly
 
 CHECKED_TYPES = frozenset({"robot/answer"})
-"""Message types that are accepted only from their own publisher: the confirmation of a robot's stop."""
+"""Message types that are accepted only from their listed publisher: the confirmation of a robot's stop."""
 
 _DONTWAIT = int(zmq.DONTWAIT)
 _SRCFD = int(zmq.SRCFD)
@@ -65,7 +65,7 @@ class CheckedSubSocket(SubSocket):
 def _is_connection_to(frame: zmq.Frame, endpoint: str) -> bool:
     try:
         connection = sockets.socket(fileno=frame.get(_SRCFD))
-    except (OSError, ValueError, zmq.ZMQError):  # closed since: the peer is unknown
+    except (OSError, ValueError, zmq.ZMQError):  # closed in the meantime: the peer is unknown
         return False
     try:
         peer = connection.getpeername()

@@ -1,16 +1,16 @@
-"""IoThread: event loop for sockets.
+"""IoThread: event loop for the sockets of all nodes in a process, or for the sinks of one node.
 
-One thread serves all nodes of a process; each node has one for its sinks.
+One thread serves all nodes; each node with sinks has another one for them.
 
-A ZeroMQ socket may be used by any thread that holds its owner's lock, so this thread never polls sockets,
-only their file descriptors. When one is readable, its owner takes the lock and works until the socket is
-empty. ZMQ_FD is edge-triggered and any use of the socket may consume the edge; a thread that uses a socket
-therefore must either empty it or call `serve_soon`.
+A ZeroMQ socket may be used by any thread that holds its owner's lock, so this thread polls only file
+descriptors, never sockets. When a descriptor is readable, the owner takes the lock and processes input until
+the socket is empty. ZMQ_FD is edge-triggered, and any use of the socket may consume the edge; a thread that
+uses a socket must therefore either empty it or call `serve_soon`.
 
 Only `close` ends the thread: an owner that raises is served again after a second, and when polling itself
-fails (a descriptor was closed under it), the poller is rebuilt without the broken descriptors.
+fails (a descriptor was closed while it was polled), the poller is rebuilt without the broken descriptors.
 
-`SharedContext` is the ZeroMQ context of the process and its I/O thread, created with the first node and
+`SharedContext` holds the process's ZeroMQ context and its I/O thread, created with the first node and
 terminated with the last. A context per node would cost three threads and a dozen descriptors each.
 """
 
@@ -45,23 +45,23 @@ _MAX_SOCKETS = 65_535
 """libzmq's upper limit; the limit on open files is reached first."""
 _CONTEXT_FILES = 12
 _SOCKET_FILES = 4
-"""Descriptors per socket: the socket, its port, its Unix socket name and a connection."""
+"""Number of descriptors per socket: the socket, its port, its Unix socket and a connection."""
 _IDLE_WAKERS = 8
 _ROOM_CHECKS, _ROOM_CHECK_S = 10, 0.01
 _ReadyKey = tuple[selectors.SelectorKey, int]
 _EPOLL_TICK_S = 0.001
 _EPOLL = getattr(selectors, "EpollSelector", ())
 _SELECT_MAX_FD = 1024
-"""`select` supports descriptors below this number."""
+"""Limit of `select`, which supports only descriptors below this number."""
 
 
 class PollState(NamedTuple):
-    """Next wake-up condition of a socket's owner.
+    """Condition for serving a socket's owner again.
 
     Attributes:
         pause_reading: True to pause reading until `due`.
-        due: Time (`time.monotonic`) at which to serve it again; None to wait for input only.
-        sends: True to serve it also when its descriptor is writable. Not for ZeroMQ sockets.
+        due: Time (`time.monotonic`) at which to serve the owner; None to wait for input only.
+        sends: True to serve the owner also when its descriptor is writable. Not for ZeroMQ sockets.
     """
 
     pause_reading: bool = False
@@ -77,13 +77,15 @@ class Pollable(Protocol):
         """File descriptor of the socket."""
 
     def serve(self, now: float) -> PollState:
-        """Process input until the socket is empty. Takes the owner's lock; doesn't block."""
+        """Process input until the socket is empty. Acquires the owner's lock; doesn't block."""
 
 
 class IoThread:
-    """Event loop thread; see the module.
+    """Event loop thread. See the module docstring.
 
-    `add` may be called before `start`. `new_selector` creates the poller.
+    Args:
+        name: Name of the thread.
+        new_selector: Creates the poller.
     """
 
     def __init__(
@@ -98,7 +100,7 @@ class IoThread:
         self._polled: dict[Pollable, tuple[int, int]] = {}
         """Registered descriptor and event mask of each owner."""
         self._suspects: set[Pollable] = set()
-        """Owners that may have broken the poller: each is polled alone before it is registered again."""
+        """Owners that may have broken the poller; each is polled alone before being registered again."""
         self._wake_times: dict[Pollable, float] = {}
         self._timers: list[tuple[float, int, Pollable]] = []
         self._numbers = itertools.count()
@@ -116,18 +118,18 @@ class IoThread:
         self._thread.start()
 
     def add(self, served: Pollable) -> None:
-        """Start serving `served`; its first call follows at once."""
+        """Start serving `served`, immediately and then on input. May be called before `start`."""
         self._queue_command("add", served, None)
 
     def serve_soon(self, served: Pollable) -> None:
-        """Serve `served` again, whether its descriptor is ready or not."""
+        """Serve `served` again as soon as possible, even if its descriptor is not ready."""
         self._queue_command("soon", served, None)
 
     def remove(self, served: Pollable, timeout_s: float = 2.0) -> None:
         """Stop serving `served`; afterwards its socket may be closed.
 
-        While the thread is blocked (by a sink that doesn't return), only the first call waits for
-        `timeout_s`.
+        While the thread is blocked by a sink that doesn't return, only the first call waits for `timeout_s`
+        seconds.
         """
         if threading.current_thread() is self._thread or not self._thread.is_alive():
             self._unregister(served)
@@ -138,7 +140,7 @@ class IoThread:
             self._stuck_in = self._turns
 
     def close(self, timeout_s: float = 5.0) -> None:
-        """Stop the thread and join it for up to `timeout_s` seconds."""
+        """Stop the thread and wait up to `timeout_s` seconds for it to end."""
         self._is_closing = True
         self._pause.set()
         self._waker.wake()
@@ -148,7 +150,7 @@ class IoThread:
             self._thread.join(timeout_s)
 
     def forked(self) -> None:
-        """Become closed in a forked child, which has no such thread and shares the parent's poller."""
+        """Mark the thread as closed in a forked child process, where only the parent's poller exists."""
         self._is_closing = True
         self._pause = threading.Event()
         self._served.clear()
@@ -257,7 +259,7 @@ class IoThread:
         return max(0.0, self._timers[0][0] - time.monotonic()) if self._timers else None
 
     def _probe(self, served: Pollable, mask: int) -> None:
-        # Windows' select reports a broken descriptor only while polling, and then for the whole set.
+        # Windows' select reports a broken descriptor only while polling, and then for all descriptors.
         with self._new_selector() as trial:
             trial.register(served.fd, mask)
             trial.select(0)
@@ -310,7 +312,7 @@ def _ready(selector: selectors.BaseSelector, timeout_s: float | None) -> Sequenc
 
 
 class SharedContext:
-    """ZeroMQ context of the process; see the module. Each `shared_context` call needs one `leave` call."""
+    """ZeroMQ context of the process. Each call of `shared_context` must be followed by one of `leave`."""
 
     def __init__(self) -> None:
         check_room(_CONTEXT_FILES, "a node")
@@ -331,7 +333,7 @@ class SharedContext:
             raise
 
     def socket(self, kind: int, what: str) -> Socket:
-        """Create a socket with a linger of 0. Raises `TooManyFilesError`, which names `what`."""
+        """Create a socket with a linger of 0. Raises `TooManyFilesError`, whose message contains `what`."""
         self._wait_for_room(what)
         try:
             created = self._context.socket(kind)
@@ -353,12 +355,12 @@ class SharedContext:
         check_room(_SOCKET_FILES, what)
 
     def take_waker(self) -> Waker:
-        """Return a waker for a waiting thread. Raises `TooManyFilesError`."""
+        """Return a waker for a waiting thread, from the pool if possible. Raises `TooManyFilesError`."""
         with self._lock:
             return self._idle_wakers.pop() if self._idle_wakers else Waker()
 
     def give_waker(self, waker: Waker) -> None:
-        """Return a waker to the pool."""
+        """Return a waker to the pool for reuse."""
         waker.clear()
         with self._lock:
             if not self._is_terminated and len(self._idle_wakers) < _IDLE_WAKERS:
@@ -372,9 +374,9 @@ class SharedContext:
             self.users += 1
 
     def leave(self) -> None:
-        """Remove a user that has closed all its sockets.
+        """Remove a user, which must have closed all its sockets.
 
-        The last one stops the thread and terminates the context.
+        The last user stops the thread and terminates the context.
         """
         with _lock:
             self.users -= 1
@@ -399,7 +401,7 @@ _shared: SharedContext | None = None
 _inherited: list[SharedContext] = []
 
 
-"""Contexts inherited by a forked child. They are kept because destroying them would affect the parent."""
+"""Contexts inherited by a forked child process. They are kept: destroying them would affect the parent."""
 
 
 def shared_context() -> SharedContext:

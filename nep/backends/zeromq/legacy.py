@@ -1,8 +1,8 @@
-"""Direct connections on the original wire: one fixed address without a master.
+"""Direct connections on the original NEP's wire: a fixed address without a master.
 
-A frame is one part with one payload. Up to 0.5.4.5 (generation A) the topic precedes it (`topic {"a":1}`);
-from 0.5.4.8 on (B) only for `dictionary`. `image` always has the prefix; `images`, `bytes` and `msgpack`
-never. Images are base64.
+A frame has one part with one payload. In generation A (up to 0.5.4.5) the topic precedes the payload (`topic
+{"a":1}`); in generation B (from 0.5.4.8 on) only for the type `dictionary`. `image` always has the prefix;
+`images`, `bytes` and `msgpack` never have it. Images are base64.
 """
 
 from __future__ import annotations
@@ -45,12 +45,12 @@ _HIGH_WATER_MARKS = {"image": 64, "bytes": 1000}
 _DEFAULT_HIGH_WATER_MARK = 10_000
 """High-water mark in messages per connection.
 
-For small messages this stays below the byte limit of all connections together, so that one subscriber that
-doesn't read can't use up the others' room.
+For small messages this stays below the byte limit shared by all connections, so that one subscriber that
+doesn't read can't use up the room of the others.
 """
 _logger = logging.getLogger("nep")
 _CLOSE_EVENT_MS = 100
-"""Time that libzmq may need after the linger period to report a socket as closed."""
+"""Time in milliseconds after the linger period in which libzmq reports a socket as closed."""
 
 
 def has_prefix(generation: str, msg_type: str) -> bool:
@@ -87,7 +87,7 @@ def from_frame(topic: str, msg_type: str, codec: str, frame: bytes) -> bytes | N
 
 
 def attach(socket: Socket, direct: Direct, *, is_publisher: bool) -> str:
-    """Bind or connect according to the mode; return the endpoint. Raises `AddressInUseError`."""
+    """Bind or connect, depending on the mode, and return the endpoint. Raises `AddressInUseError`."""
     if direct.mode == "many2many":
         # both sides connect, to the two ports of the original NEP's proxy
         return connect(socket, f"{direct.ip}:{direct.port + (0 if is_publisher else 1)}")
@@ -97,9 +97,9 @@ def attach(socket: Socket, direct: Direct, *, is_publisher: bool) -> str:
 
 
 class OriginalPublisher:
-    """Publisher on the original wire.
+    """Publisher on the original NEP's wire.
 
-    Owns `socket`, an XPUB that looks like a PUB to the original programs.
+    Owns `socket`, an XPUB that programs of the original NEP treat as a PUB.
     """
 
     def __init__(
@@ -134,24 +134,24 @@ class OriginalPublisher:
 
     @property
     def is_heard(self) -> bool:
-        """True if there are any filters."""
+        """True if any filter is set."""
         return self._filters > 0
 
     @property
     def subscribers(self) -> int:
-        """Number of filters; a proxy in between counts as one."""
+        """Number of filters, which is the number of subscribers; a proxy in between counts as one."""
         return self._filters
 
     def wait_for_any(self, timeout_s: float) -> None:
-        """Wait until a subscriber connects, for up to `timeout_s` seconds."""
+        """Wait up to `timeout_s` seconds for a subscriber to connect."""
         with self._changed:
             wait_until(self._changed, lambda: self._filters > 0, timeout_s)
 
     def report(self, problem: str) -> None:
-        """Ignore the problem: there is no graph to show it."""
+        """Ignore the problem, because a direct connection has no graph to report it in."""
 
     def lend(self, _size_bytes: int) -> memoryview | None:
-        """Return None: the original wire has no shared memory."""
+        """Return None, because the original wire has no shared memory."""
         return None
 
     def skip(self) -> None:
@@ -198,16 +198,16 @@ class OriginalPublisher:
             self._is_closed = True
 
     def finish(self, deadline: float) -> None:
-        """Set the deadline for flushing.
+        """Set the deadline for flushing; `release` waits for it.
 
-        The original wire has no acknowledgement; `release` lingers instead.
+        The original wire has no acknowledgements.
         """
         self._deadline = deadline
 
     def flush(self, deadline: float) -> None:
-        """Close the socket; libzmq keeps sending until `deadline`.
+        """Close the socket. libzmq continues sending until `deadline`.
 
-        The I/O thread must not serve it any more.
+        The I/O thread must have stopped serving it.
         """
         with self._changed:
             self._is_closed = True
@@ -215,7 +215,7 @@ class OriginalPublisher:
             self._socket.close(self._remaining_ms())
 
     def release(self) -> None:
-        """Close the socket and wait until libzmq has sent everything; log a warning at the deadline."""
+        """Wait until libzmq has sent everything and closed the socket; log a warning at the deadline."""
         if not self._socket.closed:
             self.flush(self._deadline)
         with self._changed:
@@ -243,7 +243,7 @@ class OriginalPublisher:
 
 
 class OriginalSubSocket(UnbatchedReader):
-    """SUB socket for frames of both generations. They have no sequence numbers, so `lost` is unknown."""
+    """SUB socket for frames of both generations. They have no sequence numbers, so losses are unknown."""
 
     def __init__(self, socket: Socket, spec: SubscriberSpec) -> None:
         self.fd = int(socket.getsockopt(zmq.FD))
@@ -264,7 +264,7 @@ class OriginalSubSocket(UnbatchedReader):
         return bool(int(self._socket.getsockopt(zmq.EVENTS)) & zmq.POLLIN)
 
     def read(self, rest: MessageBuffer, *, may_wait: bool = False) -> Message | None:  # noqa: ARG002 - never batched
-        """Return the next message of this topic, or None."""
+        """Return the next message of the topic, or None."""
         while True:
             try:
                 parts = self._socket.recv_multipart(0 if may_wait else zmq.DONTWAIT)
@@ -287,7 +287,7 @@ class OriginalSubSocket(UnbatchedReader):
                 return Message(self._spec.topic, data, self._codec.name, self._spec.msg_type)
 
     def dropped(self, count: int) -> None:
-        """Count messages dropped here for lack of room: the only losses that can be known."""
+        """Count messages dropped from the full queue, the only detectable losses."""
         self.received -= count
         self.lost = (self.lost or 0) + count
 

@@ -1,4 +1,4 @@
-"""Sequence numbers of a subscriber's publishers, and the count of lost messages. No sockets."""
+"""Sequence numbers of a subscriber's publishers, and the number of lost messages. No sockets."""
 
 from __future__ import annotations
 
@@ -15,13 +15,13 @@ from nep.system.addresses import is_loopback
 from nep.system.computer import computer_id
 
 BYE_TIMEOUT_S = 3.0
-"""Time in seconds after a publisher has unregistered in which its last messages may still arrive."""
+"""Time in seconds during which the last messages of an unregistered publisher may still arrive."""
 EARLY_MESSAGES_S = 5.0
 GAP_MAX = 2**32
-"""Largest accepted gap in sequence numbers: an hour at a million messages per second."""
+"""Maximum accepted gap in sequence numbers: an hour at a million messages per second."""
 MIN_RECONNECT_S, MAX_RECONNECT_S = 2.0, 30.0
 UNLISTED_MAX = 1000
-"""Maximum number of remembered publishers that aren't listed by the master: any sender can invent ids."""
+"""Maximum number of tracked publishers that the master doesn't list; any sender can invent ids."""
 _UNKNOWN = kind_of("", "", "")
 
 
@@ -29,10 +29,10 @@ _UNKNOWN = kind_of("", "", "")
 class TrackedPublisher:
     """State of one publisher.
 
-    `last` is the sequence number of its newest message received or counted as lost; None while unknown, 0 if
-    all of its messages are expected.
-
-    `form` is the header form of its last message, to which `kind` belongs; 0 if there is none.
+    Attributes:
+        form: Header form of its last message, to which `kind` belongs; 0 if there is none.
+        last: Sequence number of its newest message that was received or counted as lost. None while unknown;
+            0 if all its messages are expected.
     """
 
     form: int = 0
@@ -40,36 +40,38 @@ class TrackedPublisher:
     """Header form of its last message in shared memory."""
     kind: MessageKind = _UNKNOWN
     clock: PublisherClock = field(default_factory=PublisherClock)
-    """Clock of the publisher's computer, used by its messages."""
+    """Clock of the publisher's computer; its messages refer to it."""
     remote: RemotePublisher | None = None
     endpoint: str = ""
     refused: str = ""
-    """Endpoint that couldn't be connected; `problem` has the reason."""
+    """Endpoint to which connecting failed; `problem` has the reason."""
     problem: str = ""
     early_until: float | None = None
-    """Time until which messages before the echo are skipped, see `PublisherTracker.is_early`."""
+    """Time until which messages before the echo are skipped. See `PublisherTracker.is_early`."""
     last: int | None = None
     is_heard: bool = False
-    """True once a message, echo or bye was received."""
+    """True if a message, echo or bye was received."""
     is_connected: bool = False
-    """True once one was received since the socket was connected to `endpoint`."""
+    """True if a message, echo or bye was received since the socket was connected to `endpoint`."""
     reconnect_s: float = MIN_RECONNECT_S
     reconnect_at: float = math.inf
     has_echoed: bool = False
     is_silent: bool = False
     ends_at: float | None = None
     promised: int = 0
-    """Newest sequence number reported by the master or by the publisher's unregistration."""
+    """Newest sequence number reported by the master, or stated when the publisher was unregistered."""
     late_from: int = 0
     late_to: int = 0
-    """First of the promised messages counted as lost that may still arrive. They can only do so while
-    `late_to` equals `last`: a later message would have been sent after them.
+    """Last message of the range from `late_from` that was counted as lost and may still arrive.
+
+    These messages can arrive only while `late_to` equals `last`, because a later message would have been sent
+    after them.
     """
     jump_seq: int = 0
-    """Sequence number of a message that was rejected because the gap before it is too large; otherwise 0."""
+    """Sequence number of a message rejected because of a too large gap before it; 0 if there is none."""
 
     def connecting(self, endpoint: str) -> None:
-        """Forget the previous connection; the next one is about to be made, over the same socket."""
+        """Reset the state of the connection before the same socket connects to `endpoint`."""
         is_retry = endpoint == self.endpoint
         self.reconnect_s = min(MAX_RECONNECT_S, 2 * self.reconnect_s) if is_retry else MIN_RECONNECT_S
         self.reconnect_at = time.monotonic() + self.reconnect_s
@@ -79,19 +81,19 @@ class TrackedPublisher:
 
 
 class PublisherTracker:
-    """Counts `received` and `lost` by gaps in the sequence numbers."""
+    """Counter of received and lost messages, from gaps in the sequence numbers."""
 
     def __init__(self) -> None:
         self.received = 0
         self.lost = 0
         self.by_id: dict[int, TrackedPublisher] = {}
-        """All publishers by id. Read-only for others."""
+        """State of each publisher by id. Read-only for other modules."""
         self._clocks: Mapping[str, ClockDifference] = {}
         self._unlisted: dict[int, None] = {}
         """Ids of publishers that the master doesn't list, oldest first."""
 
     def get(self, publisher: int) -> TrackedPublisher:
-        """Return a publisher's state; create it if needed, which may evict the oldest unlisted one."""
+        """Return a publisher's state; create it if needed, which may evict the oldest unlisted publisher."""
         source = self.by_id.get(publisher)
         if source is None:
             source = self.by_id[publisher] = TrackedPublisher()
@@ -101,7 +103,7 @@ class PublisherTracker:
         return source
 
     def expect_all_of(self, publisher: int) -> None:
-        """Count losses from the first message of a new publisher. No effect once a message was received."""
+        """Count losses from the first message of a new publisher. No effect after its first message."""
         source = self.get(publisher)
         if source.last is None:
             source.last = 0
@@ -115,7 +117,7 @@ class PublisherTracker:
         return source
 
     def set_clock_differences(self, clocks: Mapping[str, ClockDifference]) -> None:
-        """Set the clock differences of other computers, by node id."""
+        """Set the clock differences of other computers by node id."""
         self._clocks = clocks
         for source in self.by_id.values():
             if source.remote is not None:
@@ -139,15 +141,15 @@ class PublisherTracker:
 
     @property
     def echoing(self) -> int:
-        """Number of publishers that have confirmed this subscriber with an echo."""
+        """Number of publishers that have sent an echo to this subscriber."""
         return sum(source.has_echoed for source in self.by_id.values())
 
     def count_message(self, publisher: int, seq: int, *, is_alone: bool) -> bool:
-        """Count a message; return False for a duplicate.
+        """Count a message; return False if it is a duplicate.
 
-        Duplicates are possible with messages sent to this subscriber alone (latched). Raises `WireError` if
-        the gap before it exceeds `GAP_MAX`. If the publisher continues from there, counting restarts with an
-        unknown number of losses.
+        Only messages that were sent to this subscriber alone (`is_alone`), such as latched ones, can be
+        duplicates. Raises `WireError` if the gap before the message exceeds `GAP_MAX`. If the publisher
+        continues from there, counting restarts with an unknown number of losses.
         """
         source = self.get(publisher)
         source.is_heard = source.is_connected = True
@@ -163,7 +165,7 @@ class PublisherTracker:
             if last is not None:
                 self.lost += seq - last - 1
             source.last = seq
-        elif 0 < source.late_to == last and source.late_from <= seq:  # it was only late
+        elif 0 < source.late_to == last and source.late_from <= seq:  # the message was only late
             source.late_from = seq + 1
             self.lost -= 1
         elif is_alone:
@@ -175,8 +177,8 @@ class PublisherTracker:
         """Return True if a message to all subscribers will be sent again before the echo.
 
         A publisher with a history may read this subscriber's filter before its hello. Messages sent in
-        between are newer than those of the history, which follows with all of them. Publishers that send no
-        echo are accepted after `EARLY_MESSAGES_S`.
+        between are newer than the messages of the history, which follows and contains all of them. Messages
+        of publishers that send no echo are accepted after `EARLY_MESSAGES_S`.
         """
         source = self.by_id.get(publisher)
         if source is None or source.has_echoed or source.is_heard or source.remote is None:
@@ -189,7 +191,7 @@ class PublisherTracker:
         return now < source.early_until
 
     def advance_to(self, publisher: int, seq: int) -> bool:
-        """Process an echo or bye: all messages up to `seq` were sent before it on the same connection.
+        """Handle an echo or bye: all messages up to `seq` were sent before it on the same connection.
 
         Returns False, and counts nothing, if the gap exceeds `GAP_MAX`.
         """
@@ -204,11 +206,11 @@ class PublisherTracker:
         return True
 
     def expect_up_to(self, publisher: int, seq: int) -> None:
-        """Process the master's report that `seq` was sent. Call only when the socket is empty.
+        """Handle the master's report that `seq` was sent. Call only when the socket is empty.
 
-        Messages reported one renewal ago and not received since are counted as lost; if they arrive after
-        all, they are subtracted again. Also applies to unlisted publishers, which may have ended while this
-        computer was disconnected.
+        Messages that were already reported at the previous renewal and not received since are counted as
+        lost; if they arrive after all, the number is corrected. Also for unlisted publishers, which may have
+        ended while this computer was disconnected.
         """
         source = self.by_id.get(publisher)
         if source is None or source.last is None or seq - source.last > GAP_MAX:
@@ -221,34 +223,35 @@ class PublisherTracker:
         source.promised = seq
 
     def count_dropped(self, count: int) -> None:
-        """Count received messages that were dropped for lack of room."""
+        """Count received messages that were dropped from a full queue."""
         self.received -= count
         self.lost += count
 
     def mark_closing(self, publisher: int, final: int, now: float) -> None:
-        """Note that a publisher unregistered or was replaced; `final` is its last message, 0 if unknown."""
+        """Record that a publisher was unregistered or replaced. `final` is its last message, 0 if unknown."""
         source = self.by_id.get(publisher)
         if source is not None and source.ends_at is None:
             source.ends_at = now + BYE_TIMEOUT_S
             source.promised = max(source.promised, final)
 
     def mark_silent(self, publisher: int, final: int) -> None:
-        """Note that a publisher is no longer listed; `final` is the newest message known to the master."""
+        """Record that a publisher is no longer listed. `final` is the newest message known to the master."""
         source = self.by_id.get(publisher)
         if source is not None:
             source.is_silent = True
             source.promised = max(source.promised, final)
 
     def count_missing(self, publisher: int) -> None:
-        """Count the missing messages of a publisher that is about to be removed as lost."""
+        """Count the missing messages of a publisher as lost, before the publisher is removed."""
         source = self.by_id.get(publisher)
         if source is not None and source.last is not None:
             self.advance_to(publisher, source.promised)
 
     def expired(self, now: float) -> list[int]:
-        """Return publishers to remove.
+        """Return the ids of publishers to remove.
 
-        These are unregistered ones whose bye is overdue, and the oldest silent ones beyond `UNLISTED_MAX`.
+        These are unregistered publishers whose bye is overdue, and the oldest silent ones beyond
+        `UNLISTED_MAX`.
         """
         all_ = self.by_id.items()
         silent = [each for each, source in all_ if source.is_silent and source.ends_at is None]
@@ -256,7 +259,7 @@ class PublisherTracker:
         return silent[: max(0, len(silent) - UNLISTED_MAX)] + over
 
     def silent(self, now: float) -> list[int]:
-        """Publishers of which nothing was received in time after the socket was connected to them."""
+        """Return publishers from which nothing was received in time after connecting to them."""
         return [
             each
             for each, source in self.by_id.items()
@@ -264,7 +267,7 @@ class PublisherTracker:
         ]
 
     def replaced_by(self, remote: RemotePublisher) -> list[int]:
-        """Return silent publishers that `remote` replaces: its program was restarted."""
+        """Return the silent publishers that `remote` replaces, because its program was restarted."""
         return [
             each
             for each, source in self.by_id.items()
@@ -276,7 +279,7 @@ class PublisherTracker:
 
 
 def _is_here(remote: RemotePublisher) -> bool:
-    # Older versions don't send a computer id; the endpoint decides then.
+    # Older versions don't send the id of the computer; then the endpoints are compared.
     own = computer_id()
     if own and remote.computer:
         return own == remote.computer

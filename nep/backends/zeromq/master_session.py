@@ -1,6 +1,6 @@
 """MasterSession: a node's registrations at one master, renewed periodically.
 
-Keeps everything that is registered, so that a restarted master receives it again at once. `RenewalTimer`
+Stores everything that is registered, so that a restarted master receives it again immediately. `RenewalTimer`
 schedules the renewals.
 """
 
@@ -62,62 +62,69 @@ from nep.system.addresses import MasterName, is_endpoint, is_loopback, look_up
 from nep.system.cpu import CpuLoad
 
 _MAX_RENEW_S = 30.0
-"""Upper bound for the renewal interval that a master may request."""
+"""Maximum renewal interval in seconds that a master may request."""
 
 _logger = logging.getLogger("nep")
 
 _ADDRESS_CHECK_S = 1.0
-"""Interval at which a node checks whether its publishers have to move to other addresses."""
+"""Interval in seconds for checking whether the publishers have to move to other addresses."""
 _JOIN_RETRY_S = 0.5
 _RECONNECT_S, _RECONNECT_FAR_S = 2.0, 2 * CONNECT_MS / 1000
-"""Reconnection interval. libzmq gives up after a failed handshake, as with a PUB socket at the master's
-address.
+"""Reconnection intervals for a master on this and on another computer.
+
+libzmq gives up after a failed handshake, for example with a PUB socket at the master's address.
 """
 
 
 class SessionPublisher(Protocol):
-    """Publisher as its session uses it."""
+    """Publisher, as its session uses it."""
 
     @property
     def is_local(self) -> bool:
-        """True if programs of this computer can connect without TCP, see `bindings`."""
+        """True if programs of this computer can connect without TCP. See `bindings`."""
 
     def counts(self) -> PublisherCount:
-        """Return the statistics for a renewal."""
+        """Return the statistics that a renewal reports."""
 
     def move(self, hosts: Sequence[str]) -> tuple[str, ...]:
-        """Bind at these addresses of this computer; return the endpoints."""
+        """Bind to these addresses of this computer and no others; return the endpoints."""
 
     def unbind_local(self) -> None:
-        """Accept TCP connections only from now on."""
+        """Accept only TCP connections from now on."""
 
 
 class SessionSubscriber(Protocol):
-    """Subscriber as its session uses it."""
+    """Subscriber, as its session uses it."""
 
     def counts(self) -> SubscriberCount:
-        """Return the statistics for a renewal."""
+        """Return the statistics that a renewal reports."""
 
     def connect(self, remotes: Iterable[RemotePublisher]) -> None:
         """Connect to further publishers."""
 
     def publisher_removed(self, publisher: int, final: int, *, is_closed: bool) -> None:
-        """Process the removal of a publisher."""
+        """Handle the removal of a publisher.
+
+        Args:
+            publisher: Id of the publisher.
+            final: Sequence number of its last message, 0 if unknown.
+            is_closed: True if the publisher unregistered, False if its node doesn't respond.
+        """
 
     def reconcile(self, remotes: Iterable[RemotePublisher]) -> None:
         """Replace the list of publishers."""
 
     def tick(self, now: float, last_seqs: Iterable[tuple[int, int]]) -> None:
-        """Process the newest sequence numbers known to the master."""
+        """Handle a renewal: the newest sequence numbers known to the master, as (publisher id, number)."""
 
     def reconnect_remote(self) -> None:
-        """Reconnect to other computers, after the address of this one has changed."""
+        """Reconnect to publishers on other computers, because the address of this computer has changed."""
 
 
 class RenewalTimer:
-    """Renewal schedule: every second, unless the master requests another interval.
+    """Schedule of renewals: every second, unless the master requests another interval.
 
-    `due_at` is a time of the node's own clock (`time.monotonic`).
+    `due_at` is the time of the next renewal (`time.monotonic`).
     """
 
     def __init__(self) -> None:
@@ -125,7 +132,7 @@ class RenewalTimer:
         self._renew_s = RENEW_S
 
     def start(self, now: float) -> None:
-        """Note a renewal at `now`; schedules the next one in case the master doesn't reply."""
+        """Record a renewal sent at `now`; schedule the next one in case the master doesn't reply."""
         self.due_at = now + self._renew_s
 
     def set_interval(self, renew_s: float, now: float) -> None:
@@ -135,9 +142,14 @@ class RenewalTimer:
 
 
 class MasterSession:
-    """Registrations of `node` at the master at `address`, over `socket` (a DEALER) served by `io`.
+    """Registrations of a node at one master.
 
-    `look_up` resolves host names.
+    Args:
+        socket: DEALER socket for the connection.
+        io: Thread that serves the socket.
+        node: Record of the node.
+        address: Address of the master.
+        look_up: Resolves a host name.
     """
 
     def __init__(
@@ -183,15 +195,15 @@ class MasterSession:
 
     @property
     def endpoint(self) -> str:
-        """Endpoint of the connection; "" before the master's address is resolved."""
+        """Endpoint of the connection; "" until the master's address is resolved."""
         return self._calls.endpoint
 
     @property
     def hosts(self) -> tuple[str, ...]:
-        """Addresses of this computer at which publishers bind.
+        """Addresses of this computer to which publishers bind.
 
         On the master's computer these are the loopback address and those at which the master serves other
-        computers; elsewhere it is the address of the interface towards the master.
+        computers; on other computers it is the address of the interface that reaches the master.
         """
         return (LOOPBACK, *self._served_hosts) if self._is_near else (self._own_host,)
 
@@ -216,7 +228,7 @@ class MasterSession:
     def add_publisher(
         self, record: PublisherRecord, publisher: SessionPublisher, wait_s: float | None
     ) -> Added:
-        """Register a publisher; return the subscribers to expect. Raises as `RpcClient.ask` does."""
+        """Register a publisher; return the subscribers to wait for. Raises as `RpcClient.ask` does."""
         with self._lock:
             self._publishers[record.id] = (record, publisher)
         try:
@@ -257,7 +269,7 @@ class MasterSession:
         return replace(reply, publishers=self._select_endpoints(reply.publishers))
 
     def remove_publisher(self, publisher: int, last_seq: int) -> None:
-        """Unregister a publisher; doesn't wait."""
+        """Unregister a publisher, whose last message is `last_seq`. Doesn't wait."""
         with self._lock:
             known = self._publishers.pop(publisher, None)
             self._confirmed.discard(publisher)
@@ -265,7 +277,7 @@ class MasterSession:
             self._calls.notify(RemovePublisher(self._node.id, publisher, last_seq))
 
     def remove_subscriber(self, subscriber: int) -> None:
-        """Unregister a subscriber; doesn't wait."""
+        """Unregister a subscriber. Doesn't wait."""
         with self._lock:
             known = self._subscribers.pop(subscriber, None)
             self._confirmed.discard(subscriber)
@@ -273,11 +285,11 @@ class MasterSession:
             self._calls.notify(RemoveSubscriber(self._node.id, subscriber))
 
     def report_missing(self, publisher: int, subscribers: Iterable[int]) -> None:
-        """Report subscribers that didn't complete the handshake."""
+        """Report subscribers that did not complete the handshake with a publisher."""
         self._calls.notify(ReportMissing(self._node.id, publisher, tuple(subscribers)))
 
     def query_graph(self, timeout_s: float) -> GraphView:
-        """Return the graph. Raises as `RpcClient.ask` does."""
+        """Request the graph. Raises as `RpcClient.ask` does."""
         self.wait_for_name(timeout_s)
         reply = self._calls.ask(Look(), timeout_s)
         if not isinstance(reply, Seen):
@@ -287,11 +299,11 @@ class MasterSession:
         return reply.view
 
     def begin_leave(self) -> None:
-        """Unregister the node, if the master is connected. Doesn't wait."""
+        """Unregister the node if the master is connected. Doesn't wait."""
         with self._lock:
             if self._is_closed:
                 return
-            self._is_closed = True  # no more joins from now on
+            self._is_closed = True  # prevents joining again
         if self._calls.is_connected:
             self._renew()  # subscribers that miss the bye learn the last sequence numbers from the master
         with self._lock:
@@ -303,7 +315,7 @@ class MasterSession:
             self._left_at = time.monotonic()
 
     def leave(self, timeout_s: float) -> None:
-        """Wait for the reply to `begin_leave`, for up to `timeout_s` seconds since it was sent."""
+        """Wait for the reply to `begin_leave` until `timeout_s` seconds after it was sent."""
         if self._leaving is None:
             return
         left = timeout_s + self._left_at - time.monotonic()
@@ -321,7 +333,7 @@ class MasterSession:
     # ---- in the I/O thread
 
     def serve(self, now: float) -> PollState:
-        """Process replies; renew when due, and at once after a reconnection."""
+        """Process replies. Renew when due, and immediately after a reconnection."""
         answers = self._calls.read()
         self._read_at = self._clock.now() if answers else self._read_at
         for answer in answers:
@@ -355,7 +367,7 @@ class MasterSession:
             self._calls.reconnect()
 
     def _update_addresses(self) -> None:
-        # Publishers move when an address of this computer or the master changes, or descriptors run out.
+        # Publishers move when this computer's address or the master changes, or when descriptors run out.
         if not self._is_near and self._name.known:
             self._own_host = local_address_towards(self._name.known) or self._own_host
             self._reconnect_from(self._own_host)
@@ -426,7 +438,7 @@ class MasterSession:
             return
         offset = self._clock.offset()
         if offset is None:
-            self._update_clocks({})  # also after this computer's clock was set
+            self._update_clocks({})  # also after the clock of this computer was set
         with self._lock:
             publishers = [
                 publisher for each, (_, publisher) in self._publishers.items() if each in self._confirmed

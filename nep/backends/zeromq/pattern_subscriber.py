@@ -1,8 +1,8 @@
-"""PatternSubscriber: one subscriber for all topics that match its pattern.
+"""PatternSubscriber: one subscriber for all topics that match a pattern.
 
 It creates a member for each published topic: a subscriber with its own socket that says hello with the same
-id. The master knows one subscriber and reports every matching publisher to its node, so publishers wait for
-it as for any other and its first message isn't lost.
+id. The master lists one subscriber and reports every matching publisher to its node, so publishers wait for
+it as for any other subscriber, and its first message isn't lost.
 """
 
 from __future__ import annotations
@@ -28,11 +28,11 @@ from nep.system.wakeup import Waker
 
 _logger = logging.getLogger("nep")
 _MAX_MEMBERS = 2_000
-"""Maximum number of topics per subscriber: any program at the master could publish any number."""
+"""Maximum number of topics per subscriber; limited because any program can publish any number of topics."""
 
 
 class PatternSubscriber(WakingSubscriber):
-    """Subscriber with wildcards; see the module.
+    """Subscriber to a pattern. See the module docstring.
 
     Args:
         new_readable: Creates the socket of a member.
@@ -57,7 +57,7 @@ class PatternSubscriber(WakingSubscriber):
         self._on_close = on_close
         self._members: dict[str, NativeSubscriber] = {}
         self._closed_early: set[int] | None = set()
-        """Ids of publishers that closed before `begin`; None afterwards."""
+        """Ids of publishers that closed before `begin`; None after `begin`."""
         self._inbox = Inbox(spec.keep, spec.max_messages, spec.max_bytes)
         self._removed_totals = _Totals()
         self._dropped = 0
@@ -84,7 +84,7 @@ class PatternSubscriber(WakingSubscriber):
         return self.is_closed or len(self._inbox) > 0
 
     def _receive(self, messages: Sequence[Message]) -> None:
-        # Runs in the thread that serves the members.
+        # Called in the thread that serves the members.
         if self.spec.sink is not None:
             self.spec.sink(messages)
             return
@@ -107,7 +107,7 @@ class PatternSubscriber(WakingSubscriber):
 
     @property
     def lost(self) -> int:
-        """Number of messages lost or dropped here for lack of room."""
+        """Number of messages lost in transit or dropped from the full queue."""
         with self._members_lock:
             return (
                 self._removed_totals.lost
@@ -117,7 +117,7 @@ class PatternSubscriber(WakingSubscriber):
 
     @property
     def refused(self) -> int:
-        """Number of inputs rejected because they aren't valid messages."""
+        """Number of received frames rejected because they are not valid messages."""
         with self._members_lock:
             return self._removed_totals.refused + sum(each.refused for each in self._members.values())
 
@@ -127,11 +127,11 @@ class PatternSubscriber(WakingSubscriber):
         return tuple(endpoint for each in list(self._members.values()) for endpoint in each.endpoints)
 
     def report(self, problem: str) -> None:
-        """Set the reader's problem, which is sent with the next renewal."""
+        """Set the reason why messages can't be decoded; the next renewal reports it."""
         self._problem = problem
 
     def counts(self) -> SubscriberCount:
-        """Return the statistics for a renewal."""
+        """Return the statistics that a renewal reports."""
         with self._members_lock:
             problems = (each.counts().problem for each in self._members.values())
             problem = self._problem or self._member_error or next(filter(None, problems), "")
@@ -142,7 +142,7 @@ class PatternSubscriber(WakingSubscriber):
     def member(self, topic: str, *, may_create: bool = True) -> NativeSubscriber | None:
         """Return the member for a topic, or None.
 
-        With `may_create` a missing member is created, unless there is no room.
+        With `may_create`, a missing member is created unless there are already `_MAX_MEMBERS`.
         """
         with self._members_lock:
             member = self._members.get(topic)
@@ -177,7 +177,7 @@ class PatternSubscriber(WakingSubscriber):
         return NativeSubscriber(self._new_readable(spec), self._io, spec, lambda _id: None)
 
     def begin(self, remotes: Iterable[RemotePublisher]) -> None:
-        """Connect to the publishers known at registration, except those closed since."""
+        """Connect to the publishers listed at registration, except those that have closed since."""
         with self._members_lock:
             closed, self._closed_early = self._closed_early or set(), None
             members = list(self._members.values())
@@ -190,13 +190,13 @@ class PatternSubscriber(WakingSubscriber):
                     found.connect((remote,))
 
     def note_early_close(self, publisher: int) -> None:
-        """Note that a publisher closed, in case the reply to the registration still lists it."""
+        """Record that a publisher closed, because the reply to the registration may still list it."""
         with self._members_lock:
             if self._closed_early is not None:
                 self._closed_early.add(publisher)
 
     def wait_for(self, publishers: Iterable[int], timeout_s: float, waker: Waker) -> bool:
-        """Wait until these publishers have sent their echo; see `NativeSubscriber.wait_for`."""
+        """Wait until these publishers have sent their echo. See `NativeSubscriber.wait_for`."""
         ids = tuple(publishers)
         deadline = time.monotonic() + timeout_s
         members = list(self._members.values())
@@ -213,7 +213,7 @@ class PatternSubscriber(WakingSubscriber):
             member.correct(clocks)
 
     def tick(self, now: float, last_seqs: Iterable[tuple[int, int]]) -> None:
-        """Process a renewal, see `NativeSubscriber.tick`; remove members without publishers."""
+        """Handle a renewal as `NativeSubscriber.tick` does, and remove members without publishers."""
         seqs = tuple(last_seqs)
         for topic, member in list(self._members.items()):
             member.tick(now, seqs)
@@ -244,7 +244,7 @@ class PatternSubscriber(WakingSubscriber):
             member.close()
 
     def forked(self) -> None:
-        """Become closed in a forked child."""
+        """Mark the subscriber as closed in a forked child process."""
         self.is_closed = True
         for member in list(self._members.values()):
             member.forked()

@@ -1,7 +1,8 @@
-"""PendingBatch: messages published in quick succession, to be sent in one part. No sockets.
+"""PendingBatch: messages published in quick succession, which are sent in one part. No sockets.
 
-A message is sent at once unless the previous one was published less than `BATCH_WINDOW_NS` ago. Otherwise it
-waits for more, until there are `MAX_PENDING` or `MAX_DELAY_NS` have passed. See docs/adr/0009-one-part.md.
+A message is sent immediately unless the previous one was published less than `BATCH_WINDOW_NS` ago. Otherwise
+it waits for others until there are `MAX_PENDING`, or until `MAX_DELAY_NS` have passed. See
+docs/adr/0009-one-part.md.
 """
 
 from __future__ import annotations
@@ -20,49 +21,51 @@ BATCH_WINDOW_NS = 20_000
 MAX_DELAY_NS = 100_000
 MAX_PENDING = 64
 FULL_BATCH_BYTES = 65_536
-"""Size at which a batch is sent: copying more at once takes longer than a separate send."""
+"""Size in bytes at which a batch is sent, because copying more takes longer than sending separately."""
 MAX_BATCHED_BYTES = 16_384
-"""Upper size limit of messages in a batch: copying larger ones costs more than it saves."""
+"""Maximum size in bytes of a message in a batch, because copying larger ones costs more than it saves."""
 _BURST_CHECK_S = 500e-6
-"""Interval at which the I/O thread checks while the publisher itself sends full batches."""
+"""Interval in seconds of the I/O thread's checks while the publisher itself sends full batches."""
 
 
 _time_ns = time.time_ns
 
 
 class SendPath(Protocol):
-    """Sending end of a publisher."""
+    """Sending end of a publisher, as the batch uses it."""
 
     is_heard: bool
     """True if any subscriber is connected."""
     problem: str
-    """Problem of the newest payload; empty if none."""
+    """Reason why the newest payload was rejected; "" if it was encoded."""
 
     def send_now(self, data: bytes) -> None:
-        """Send pending messages, then `data`."""
+        """Send pending messages, then the message with payload `data`."""
 
     def flush_locked(self) -> None:
         """Send pending messages. Call with the lock held."""
 
     def flush_soon_locked(self) -> None:
-        """Have the I/O thread send pending messages soon. Call with the lock held."""
+        """Let the I/O thread send pending messages soon. Call with the lock held."""
 
 
 class PendingBatch:
-    """Pending messages of one publisher; guarded by its lock, except `pending`.
+    """Pending messages of one publisher. Guarded by the publisher's lock, except `pending`.
 
     `may_wait` is False to disable batches.
     """
 
     def __init__(self, *, may_wait: bool) -> None:
         self.pending: list[tuple[bytes, int]] = []
-        """Pending payloads and their time stamps. Any thread may append without the lock, which would cost as
-        much as the rest of publishing; it then checks `is_flush_scheduled`.
+        """Pending payloads with their time stamps.
+
+        Any thread may append without the lock, because acquiring it would take as long as the rest of
+        publishing; the thread then checks `is_flush_scheduled`.
         """
         self.until_ns = 0
-        """Time before which a new message is batched."""
+        """Time (ns since 1970) until which a new message is batched."""
         self.ends_ns = 0
-        """Time by which the pending messages must be sent."""
+        """Time (ns since 1970) by which the pending messages must be sent."""
         self.is_allowed = False
         """True if all current subscribers accept batches."""
         self.is_flush_scheduled = False
@@ -70,7 +73,7 @@ class PendingBatch:
         self.is_flushing = False
         """True while pending messages are being sent."""
         self.has_sent_full = False
-        """True if the publisher has sent a full batch since the I/O thread's last check."""
+        """True if the publisher has sent a full batch since the I/O thread last checked."""
         self._may_wait = may_wait
 
     def allow(self, *, reads_batches: bool) -> None:
@@ -137,7 +140,7 @@ class PendingBatch:
     def pop_batch(self) -> list[tuple[bytes, int]]:
         """Remove and return up to `BATCH_MAX` pending messages, oldest first.
 
-        Must not be called without any.
+        There must be at least one.
         """
         taken = self.pending[:BATCH_MAX]
         del self.pending[: len(taken)]  # more may have been appended meanwhile
@@ -145,12 +148,12 @@ class PendingBatch:
         return taken
 
     def next_check_s(self, now_ns: int) -> float:
-        """Return seconds until the I/O thread must check again; 0 to send pending messages now.
+        """Return the seconds until the I/O thread must check again; 0 if pending messages must be sent now.
 
-        For the I/O thread.
+        Only for the I/O thread.
         """
         had_full, self.has_sent_full = self.has_sent_full, False
-        # Before reading: a thread that appends afterwards requests a check itself.
+        # Must precede reading: a thread that appends afterwards requests a check itself.
         self.is_flush_scheduled = had_full
         pending = self.pending[:1]
         left_ns = pending[0][1] + MAX_DELAY_NS - now_ns if pending else 0
@@ -161,5 +164,5 @@ class PendingBatch:
 
     @property
     def burst_check_s(self) -> float:
-        """Seconds until the next check with no pending messages; 0 after the end of a burst."""
+        """Return the seconds until the next check while nothing is pending; 0 after the end of a burst."""
         return _BURST_CHECK_S if self.is_flush_scheduled else 0.0

@@ -1,8 +1,8 @@
 """NativePublisher: a publisher's XPUB socket and its subscribers.
 
-Messages are sent in the publishing thread. Subscriptions are read by whichever thread uses the socket next,
-the publisher's or the I/O thread. A subscriber counts as connected once its hello was read, see
-`docs/wire.md`.
+Messages are sent in the publishing thread. Subscriptions are read in whichever thread uses the socket next,
+the publishing thread or the I/O thread. A subscriber counts as connected when its hello was read. See
+docs/wire.md.
 """
 
 from __future__ import annotations
@@ -59,10 +59,11 @@ _POLLIN = int(zmq.POLLIN)
 _time_ns = time.time_ns
 _NO_COPY_BYTES = 65_536
 _MAX_ONE_PART_BYTES = MAX_BATCHED_BYTES
-"""Size limit for messages sent in one part, if all subscribers accept it: see docs/adr/0009-one-part.md."""
+"""Maximum size of messages sent in one part if all subscribers accept it. See docs/adr/0009-one-part.md."""
 _READ_INTERVAL_NS = 500_000
-"""Interval at which a busy publishing thread reads subscriptions. The I/O thread checks afterwards, because
-sending may have consumed the edge of ZMQ_FD.
+"""Interval in nanoseconds at which a busy publishing thread reads subscriptions.
+
+The I/O thread checks afterwards, because sending may have consumed the edge of ZMQ_FD.
 """
 _IO_CHECK_S = 0.02
 _BYE_RETRY_S = 0.05
@@ -73,10 +74,15 @@ def _only_bytes(payload: object) -> NoReturn:
 
 
 class GreetedPublisher:
-    """Publisher that waits for the hello of listed subscribers; `changed` guards its state."""
+    """Publisher that waits for the hellos of listed subscribers. `changed` guards its state."""
 
     def __init__(self, changed: threading.Condition, seen: dict[int, int]) -> None:
-        """Initialize; `seen` has the message count at the hello of each connected subscriber."""
+        """Initialize the publisher.
+
+        Args:
+            changed: Condition that guards the publisher's state.
+            seen: Number of messages at the hello of each connected subscriber, by id.
+        """
         self._changed, self._seen = changed, seen
         self._names: dict[int, str] = {}
         self._expected: set[int] = set()
@@ -94,14 +100,14 @@ class GreetedPublisher:
             return tuple(sorted({self._names[each] for each in self._expected - set(self._seen)}))
 
     def expect(self, expected: Iterable[Expected]) -> None:
-        """Note registered subscribers that will connect."""
+        """Add registered subscribers that will connect."""
         with self._changed:
             for each in expected:
                 self._expected.add(each.id)
                 self._names[each.id] = each.node_name
 
     def wait_for(self, expected: Iterable[Expected], timeout_s: float) -> tuple[int, ...]:
-        """Wait for the hello of these subscribers; return the ids of those still missing."""
+        """Wait for the hellos of these subscribers; return the ids of those that are still missing."""
         wanted = {each.id for each in expected}
         with self._changed:
             wait_until(self._changed, lambda: wanted <= self._seen.keys(), timeout_s)
@@ -126,7 +132,7 @@ class NativePublisher(GreetedPublisher):
         self._count = 0
         """Number of messages sent or skipped."""
         self.subscribers = 0
-        """Number of subscribers that have said hello and not left."""
+        """Number of subscribers that have sent a hello and are still connected."""
         self._on_close = on_close
         self._serve_soon = serve_soon
         self._socket = socket
@@ -137,13 +143,13 @@ class NativePublisher(GreetedPublisher):
         # bypasses pyzmq's handling of routing ids and groups, which takes half of the time
         self._send: Callable[..., object] = super(zmq.Socket, socket).send
         self._bytes = self._windowed_bytes = 0
-        """Value of `_bytes` up to which the send windows are accounted."""
+        """Value of `_bytes` up to which the send windows have been updated."""
         self._full_path_at = 0
-        """Value of `_bytes` from which a message needs the full path with flow control."""
+        """Value of `_bytes` from which messages need flow control and so take the full path."""
         self._backlog = Backlog()
         self._last_stamp_ns: int | None = None
         self.problem = ""
-        """Problem of the newest payload; empty if none."""
+        """Reason why the newest payload was rejected; "" if it was encoded."""
         self._subscriptions = Subscriptions(spec.topic, spec.id)
         if can_share() and not spec.history:
             self._subscriptions.shared = SharedPayloads(spec.id, self._send_offer_locked)
@@ -172,14 +178,14 @@ class NativePublisher(GreetedPublisher):
     # ---- subscribers
 
     def wait_for_any(self, timeout_s: float) -> None:
-        """Wait for the hello of any subscriber, for up to `timeout_s` seconds."""
+        """Wait up to `timeout_s` seconds for the hello of any subscriber."""
         with self._changed:
             wait_until(self._changed, lambda: bool(self._seen), timeout_s)
 
     def counts(self) -> PublisherCount:
-        """Return the statistics for a renewal.
+        """Return the statistics that a renewal reports.
 
-        Called once a second, so silent connections are ended here, too.
+        Called once per second; therefore also closes connections that don't respond.
         """
         with self._changed:
             self._subscriptions.end_silent()
@@ -188,14 +194,14 @@ class NativePublisher(GreetedPublisher):
             )
 
     def move(self, hosts: Sequence[str]) -> tuple[str, ...]:
-        """Bind at these addresses of this computer; return the endpoints. See `Bindings.move`."""
+        """Bind to these addresses of this computer only; return the endpoints. See `Bindings.move`."""
         with self._lock:
             endpoints = () if self._socket.closed else self._bindings.move(hosts)
             self._read_subscriptions_locked()  # binding may have consumed the edge of ZMQ_FD
             return endpoints
 
     def unbind_local(self) -> None:
-        """Accept TCP connections only from now on."""
+        """Accept only TCP connections from now on."""
         with self._lock:
             if not self._socket.closed and self._bindings.is_local:
                 self._bindings.unbind_local()
@@ -213,13 +219,13 @@ class NativePublisher(GreetedPublisher):
 
     @property
     def is_local(self) -> bool:
-        """True if programs of this computer can connect without TCP, see `bindings`."""
+        """True if programs of this computer can connect without TCP. See `bindings`."""
         return self._bindings.is_local
 
     # ---- sending
 
     def report(self, problem: str) -> None:
-        """Set the problem of a payload, which is sent with the next renewal."""
+        """Set the reason why payloads can't be encoded; the next renewal reports it."""
         self.problem = problem
 
     def skip(self) -> None:
@@ -241,11 +247,11 @@ class NativePublisher(GreetedPublisher):
             self._send_now(data, extension_fields)
 
     def quick_publish(self, asked: QuickPublish) -> Callable[..., None]:
-        """Return the fast publish function, see `nep.backends.base.PublishesQuickly`."""
+        """Return the fast publish function. See `nep.backends.base.PublishesQuickly`."""
         return self._batch.publish_function(asked, self, self._lock)
 
     def send_now(self, data: bytes) -> None:
-        """Send pending messages, then `data`."""
+        """Send pending messages, then the message with payload `data`."""
         self._send_now(data, None)
 
     def _send_now(self, payload: bytes | memoryview, extension_fields: Mapping[str, object] | None) -> None:
@@ -323,7 +329,7 @@ class NativePublisher(GreetedPublisher):
             self._poll_subscriptions_locked(stamp_ns)
 
     def lend(self, size_bytes: int) -> memoryview | None:
-        """Return writable shared memory for a payload, or None."""
+        """Return writable shared memory for a payload, or None if no subscriber shares memory."""
         shared = self._subscriptions.shared
         with self._lock:
             return None if shared is None or self.is_closed else shared.lend(size_bytes)
@@ -349,7 +355,7 @@ class NativePublisher(GreetedPublisher):
         send(data, 0, size < _NO_COPY_BYTES)
 
     def flush_soon_locked(self) -> None:
-        """Have the I/O thread send pending messages soon. Call with the lock held."""
+        """Let the I/O thread send pending messages soon. Call with the lock held."""
         if not self._batch.is_flush_scheduled:
             self._batch.is_flush_scheduled = self._is_io_scheduled = True
             self._serve_soon(self)
@@ -542,7 +548,7 @@ class NativePublisher(GreetedPublisher):
         self._on_close(self, timeout_s)
 
     def say_bye(self) -> None:
-        """Send the bye, after which every subscriber reads the remaining messages and disconnects."""
+        """Send the bye: subscribers read the remaining messages and disconnect."""
         with self._changed:
             self.is_closed = True
             self.flush_locked()
@@ -553,7 +559,7 @@ class NativePublisher(GreetedPublisher):
         with self._changed:
             while self._seen and (left := deadline - time.monotonic()) > 0.0:
                 if not wait_until(self._changed, lambda: not self._seen, min(left, _BYE_RETRY_S)):
-                    self._send_bye_locked()  # a full queue drops the bye like any message
+                    self._send_bye_locked()  # a full queue drops the bye like any other message
             if self._seen:
                 undelivered = [max(self._count - seen, len(self._history)) for seen in self._seen.values()]
                 if any(undelivered):  # otherwise only the bye is missing
@@ -568,7 +574,7 @@ class NativePublisher(GreetedPublisher):
                 self.subscribers = 0
 
     def release(self) -> None:
-        """Close the socket. The I/O thread must not serve it any more."""
+        """Close the socket. The I/O thread must have stopped serving it."""
         with self._changed:
             self.is_closed = True
             if self._subscriptions.shared is not None:

@@ -24,7 +24,7 @@ _logger = logging.getLogger("nep")
 _READ_MAX = 50
 """Maximum number of replies read at once, before other sockets are served."""
 _RESEND_S = 0.5
-"""Interval to resend a request without a reply: it may have gone to a master that was just ending."""
+"""Interval in seconds for sending an unanswered request again; the master may have been shutting down."""
 _MAX_CALLS = 256
 
 Then = Callable[[Reply], None]
@@ -40,11 +40,11 @@ class PendingCall:
     reply: Reply | None = None
     is_sent: bool = False
     view: bytes | None = None
-    """Body of a reply with a graph; the waiting thread decodes it."""
+    """Undecoded graph reply; the waiting thread decodes it."""
 
 
 class ReceivedAnswer(NamedTuple):
-    """Message from the master, and the callback of the request that it answers."""
+    """Message from the master, with the callback of the request that it replies to, or None."""
 
     what: Reply | Push
     then: Then | None
@@ -53,7 +53,7 @@ class ReceivedAnswer(NamedTuple):
 class RpcClient:
     """Client for requests to the master at `address`.
 
-    `after_use` is called when the socket may have input for which its descriptor no longer signals.
+    `after_use` is called when the socket may have input that its descriptor no longer signals.
     """
 
     def __init__(self, socket: Socket, address: str, after_use: Callable[[], None]) -> None:
@@ -65,7 +65,7 @@ class RpcClient:
         self._is_closed = False
         self.refusals = RejectionLog()
         self.has_more = False
-        """True if `read` left messages unread."""
+        """True if `read` has left messages unread."""
         self.is_connected = False
         """True if a master was connected at the last `read`."""
         self._changed = threading.Condition(threading.Lock())
@@ -88,7 +88,7 @@ class RpcClient:
             return any(call.is_waited for call in self._calls.values())
 
     def connect(self, address: str) -> None:
-        """Connect to `address` instead of the previous one. Callable from any thread."""
+        """Disconnect from the previous address and connect to `address`. Thread-safe."""
         with self._changed:
             if self._is_closed or self.endpoint == endpoint_of(address):
                 return
@@ -99,7 +99,7 @@ class RpcClient:
         self._after_use()
 
     def reconnect(self) -> None:
-        """Reconnect, because the local address has changed or the handshake failed."""
+        """Reconnect, because the local address has changed or the handshake has failed."""
         with self._changed:
             if self._is_closed or not self.endpoint:
                 return
@@ -122,11 +122,11 @@ class RpcClient:
         return self.wait(self.begin(request), timeout_s)
 
     def begin(self, request: Request) -> PendingCall:
-        """Send a request; pass the result to `wait`."""
+        """Send a request and return it for `wait`."""
         return self._send(request, is_waited=True, then=None)
 
     def wait(self, call: PendingCall, timeout_s: float | None) -> Reply:
-        """Wait for the reply. Raises as `ask` does."""
+        """Wait for the reply to a request. Raises as `ask` does."""
         started = time.monotonic()
         with self._changed:
             while not wait_until(
@@ -162,14 +162,14 @@ class RpcClient:
         return reply
 
     def notify(self, request: Request, then: Then | None = None) -> None:
-        """Send a request without waiting; dropped if no master is connected.
+        """Send a request without waiting. The request is dropped if no master is connected.
 
         `then` is called with the reply in the I/O thread.
         """
         self._send(request, is_waited=False, then=then)
 
     def read(self) -> list[ReceivedAnswer]:
-        """Return up to `_READ_MAX` received messages, and send pending requests. For the I/O thread."""
+        """Return up to `_READ_MAX` received messages, and send pending requests. Only for the I/O thread."""
         answers: list[ReceivedAnswer] = []
         events = 0
         with self._changed:
@@ -186,13 +186,13 @@ class RpcClient:
         return answers
 
     def stop(self) -> None:
-        """Fail waiting threads with `ClosedError`; send nothing from now on."""
+        """Fail all waiting threads with `ClosedError`, and send nothing from now on."""
         with self._changed:
             self._is_closed = True
             self._changed.notify_all()
 
     def release(self) -> None:
-        """Close the socket. The I/O thread must not serve it any more."""
+        """Close the socket. The I/O thread must have stopped serving it."""
         with self._changed:
             self._is_closed = True
             self._socket.close(0)
@@ -216,7 +216,7 @@ class RpcClient:
         return call
 
     def _drop_oldest_locked(self) -> None:
-        # A master that hangs would let requests without a waiting thread pile up.
+        # Requests without a waiting thread would pile up while the master hangs.
         oldest = next((number for number, call in self._calls.items() if not call.is_waited), None)
         if oldest is not None:
             del self._calls[oldest]

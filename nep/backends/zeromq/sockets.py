@@ -1,4 +1,4 @@
-"""Helpers of native sockets: high-water marks, ports, keep-alive, waits, rejected input."""
+"""Helpers for sockets of the native wire: high-water marks, ports, keep-alive, waits, rejected input."""
 
 from __future__ import annotations
 
@@ -29,34 +29,31 @@ Socket = zmq.Socket[bytes]
 Part = bytes | memoryview | zmq.Frame
 LOOPBACK = "127.0.0.1"
 SHORT_WAIT_S = 0.005
-"""Maximum time in seconds that a reader waits in a socket while holding its lock. Shorter waits are no
-faster: a timer that ends before the kernel's next tick costs more than the wait.
+"""Maximum time in seconds that a reader waits in a socket while holding its lock.
+
+Shorter waits are no faster: a timer that ends before the kernel's next tick costs more than the wait.
 """
 _SLICE_S = 0.1
 _IN_USE_ERRORS = frozenset({errno.EADDRINUSE, zmq.EADDRINUSE, errno.EACCES, errno.EMFILE, errno.ENFILE})
-"""Errors of bind that mean that the address exists but is in use."""
+"""Errors of bind which mean that the address exists but can't be used now."""
 _SEND_HIGH_WATER_MARK = 50_000
 _IMAGE_HIGH_WATER_MARK = 32
 _PORT_FILES = 2
 SILENT_MS = 15_000
-"""Milliseconds without an acknowledgement of sent data after which a connection to another computer is
-closed.
-"""
+"""Time in milliseconds without an acknowledgement after which a connection to another computer is closed."""
 CONNECT_MS = 3000
-"""Timeout of connection attempts to other computers. Without it the system retries at growing intervals."""
+"""Timeout in milliseconds for connecting to other computers. The system's own retries get ever slower."""
 ORIGINAL_PORTS = frozenset({7000, 7777, 7780, 12345, 50000, *range(9000, 10000)})
 """Ports on which programs of the original NEP expect something else."""
 
 _TcpInfo = struct.Struct("=2xBB52xI")
-"""Fields of Linux's `tcp_info`: retransmissions, window probes, and milliseconds since the last
-acknowledgement.
-"""
+"""Fields of Linux's `tcp_info`: retransmissions, window probes, and ms since the last acknowledgement."""
 _MIN_RETRIES = 3
 _SRCFD = int(zmq.SRCFD)
 
 
 class RejectionLog:
-    """Count of rejected inputs, with the newest reason. Not thread-safe: guarded by the owner."""
+    """Count of rejected inputs, with the newest reason. Not thread-safe: guarded by its owner's lock."""
 
     def __init__(self) -> None:
         self.count = 0
@@ -78,25 +75,25 @@ class RejectionLog:
 
 
 def set_send_high_water_mark(owner: Socket) -> None:
-    """Set the high-water mark for sending. Call before bind: libzmq ignores changes for open connections.
+    """Set the high-water mark for sending. Call before bind, because open connections keep theirs.
 
-    The bytes are bounded by `byte_window`.
+    `byte_window` limits the bytes.
     """
     owner.setsockopt(zmq.SNDHWM, _SEND_HIGH_WATER_MARK)
 
 
 def receive_high_water_mark(codec: str) -> int:
-    """Return the high-water mark for receiving. A small one suffices: the I/O thread empties the socket."""
+    """Return the high-water mark for receiving. It can be small: the I/O thread empties the socket."""
     return _IMAGE_HIGH_WATER_MARK if codec == "image" else 1000
 
 
 def set_receive_timeout(owner: Socket) -> None:
-    """Let a blocking receive time out after `SHORT_WAIT_S` seconds."""
+    """Set the timeout of a blocking receive to `SHORT_WAIT_S` seconds."""
     owner.setsockopt(zmq.RCVTIMEO, round(SHORT_WAIT_S * 1000))
 
 
 def bind_free_port(owner: Socket, host: str) -> str:
-    """Bind to a free port of `host`, except those of the original NEP; return the endpoint.
+    """Bind to a free port of `host` that the original NEP doesn't use; return the endpoint.
 
     Raises `AddressInUseError`.
     """
@@ -119,7 +116,7 @@ def bind(owner: Socket, address: str) -> str:
 
 
 def connect(owner: Socket, address: str) -> str:
-    """Connect to an address, whether it is bound yet or not; return the endpoint. Raises `NepError`."""
+    """Connect to an address and return the endpoint; the peer may bind it later. Raises `NepError`."""
     endpoint = endpoint_of(address)
     if not is_endpoint(endpoint):
         raise NepError(
@@ -133,7 +130,7 @@ def connect(owner: Socket, address: str) -> str:
 
 
 def local_address_towards(address: str) -> str | None:
-    """Return the local address used to reach a master at `address`, or None without a route."""
+    """Return this computer's address for reaching a master at `address`, or None without a route."""
     if is_loopback(address):
         return LOOPBACK
     try:
@@ -145,18 +142,19 @@ def local_address_towards(address: str) -> str | None:
 
 
 def is_far(endpoint: str) -> bool:
-    """Return True if the endpoint is on another computer, or may be reached from one."""
+    """Return True if the endpoint is on another computer, or can be reached from one."""
     return endpoint.startswith("tcp://") and not is_loopback(endpoint.removeprefix("tcp://"))
 
 
 def keep_alive(owner: Socket, endpoint: str, *, is_watched: bool = False) -> None:
-    """Detect within a dozen seconds that the computer behind the next endpoint's connections has vanished.
+    """Set socket options that detect within a dozen seconds that a peer's computer has vanished.
 
-    Call before connecting or binding; a port of "*" is any. TCP keep-alive probes idle connections. The
-    kernel answers them for a program stopped in a debugger, which a ZeroMQ heartbeat would disconnect.
-    Unacknowledged data is resent for a quarter of an hour, hence the limit (TCP_MAXRT). A stopped program
-    could exceed that as well, so publishers check it themselves where supported (`is_watched`, see
-    `FarConnection`). Needed only for other computers: on the same one the kernel reports every end.
+    Call before connecting or binding to `endpoint`; its port may be "*". TCP keep-alive probes idle
+    connections. The kernel also answers the probes for a program stopped in a debugger, which a ZeroMQ
+    heartbeat would disconnect. Unacknowledged data would be resent for a quarter of an hour, so that time is
+    limited, too (TCP_MAXRT). A stopped program could exceed the limit as well; publishers therefore check it
+    themselves where the system supports that (`is_watched`, see `FarConnection`). Only needed for other
+    computers, because on the same computer the kernel reports the end of every connection.
     """
     far = is_far(endpoint)
     owner.setsockopt(zmq.TCP_KEEPALIVE, 1 if far else -1)
@@ -169,7 +167,10 @@ def keep_alive(owner: Socket, endpoint: str, *, is_watched: bool = False) -> Non
 
 
 def wait_until(changed: threading.Condition, is_met: Callable[[], bool], timeout_s: float) -> bool:
-    """Wait until `is_met()`, holding `changed`; return False on timeout. In slices, for Ctrl+C on Windows."""
+    """Wait until `is_met()` returns True, with `changed` held; return False on timeout.
+
+    Waits in slices, because on Windows Ctrl+C doesn't interrupt a wait.
+    """
     deadline = time.monotonic() + timeout_s
     while not is_met():
         left = deadline - time.monotonic()
@@ -180,7 +181,7 @@ def wait_until(changed: threading.Condition, is_met: Callable[[], bool], timeout
 
 
 def sendable(data: bytes | memoryview) -> Part:
-    """Return an object that can be sent without a copy: received messages as is, mutable data as a copy."""
+    """Return `data`, or a copy if it is mutable, so that it can be sent without a further copy."""
     if isinstance(data, bytes):
         return data
     if not (data.readonly and data.c_contiguous):
@@ -193,23 +194,22 @@ def sendable(data: bytes | memoryview) -> Part:
 
 @dataclass(frozen=True)
 class FarConnection:
-    """Connection over which a subscriber on another computer said hello.
+    """Connection over which a subscriber on another computer has sent its hello.
 
-    Identified by its descriptor, which may be reused, and its peer address.
-
-    When a computer changes its address or network, it reconnects, but its old connection isn't closed.
-    Messages would be queued for both until the system gives up.
+    Identified by its descriptor, which may be reused, and its peer address. When a computer changes its
+    address or network, it reconnects, but its old connection isn't closed. Messages would be queued for both
+    connections until the system gives up.
     """
 
     fd: int
     peer: tuple[str, int]
 
     can_tell: ClassVar[bool] = sys.platform == "linux"
-    """True if this system supports `is_silent`."""
+    """True if `is_silent` is supported on this system."""
 
     @classmethod
     def of(cls, received: zmq.Frame) -> FarConnection | None:
-        """Return the connection over which `received` came, or None for this computer or if unknown."""
+        """Return the connection that delivered `received`; None if it is local or unknown."""
         try:
             host = str(received.get("Peer-Address"))
             if os.name != "posix" or not host or host.startswith("127."):
@@ -221,9 +221,10 @@ class FarConnection:
         return None if peer is None else cls(fd, peer)
 
     def is_silent(self) -> bool:
-        """Return True if the peer hasn't acknowledged anything for long, in spite of several retries.
+        """Return True if the peer hasn't acknowledged anything for long in spite of several retries.
 
-        The kernel acknowledges probes for a program stopped in a debugger, as its receive window is full.
+        The kernel acknowledges probes for a program stopped in a debugger, because its receive window is
+        full.
         """
         if not self.can_tell:
             return False
@@ -238,7 +239,7 @@ class FarConnection:
         return bool(max(resent, asked) >= _MIN_RETRIES and last_answer_ms >= SILENT_MS)
 
     def end(self) -> None:
-        """Close the connection, if it still exists; libzmq then releases its queue."""
+        """Close the connection if it still exists; libzmq then releases its queue."""
         try:
             with _duplicated(self.fd) as connection:
                 if connection.getpeername() == self.peer:

@@ -1,7 +1,7 @@
-"""SubSocket: a SUB socket and its publishers. Parses messages and notices and counts losses.
+"""SubSocket: a SUB socket and its publishers. Parses messages and notices, and counts losses.
 
-Guarded by its subscriber's lock. Nearly every message directly follows the previous one of its publisher:
-those take a fast path, and everything else goes through `CarefulParser`.
+Guarded by its subscriber's lock. Nearly every message directly follows the previous message of its publisher
+and takes a fast path; `CarefulParser` handles all others.
 """
 
 from __future__ import annotations
@@ -57,16 +57,14 @@ from nep.protocol.wire import (
 from nep.system.addresses import is_endpoint
 
 MessageBuffer = list[Message] | deque[Message]
-"""Containers to which messages are appended."""
+"""Container to which messages are appended."""
 
 _NO_COPY_BYTES = 8_192
-"""Size from which libzmq receives into separate memory: keeping a view of it keeps nothing else alive."""
+"""Size in bytes from which libzmq receives into separate memory, of which a view can be kept."""
 SHARED_FORM = SHARED << 16
 _Part = bytes | memoryview
 _Run = tuple[MessageKind, int, int, tuple[int, ...], Sequence[bytes]]
-"""Messages whose payloads were decoded: kind, publisher id, first sequence number, time stamps and encoded
-payloads.
-"""
+"""Messages whose payloads were decoded: kind, publisher id, first seq, time stamps and encoded payloads."""
 
 _logger = logging.getLogger("nep")
 _DONTWAIT = int(zmq.DONTWAIT)  # plain ints: looking up pyzmq's enum members costs as much as the call
@@ -77,14 +75,14 @@ _TOO_SHORT = lazy("a message must have 3 or 4 parts, but this one is incomplete"
 
 
 class CarefulParser:
-    """Parser for everything that doesn't take the fast path. No sockets.
+    """Parser for messages and notices that don't take the fast path. No sockets.
 
     Args:
         spec: Settings of the subscriber.
-        hello: Its hello filter.
+        hello: Hello filter of the subscriber.
         sources: Publishers; updated by the parser.
         leave: Ends the connection to a publisher.
-        tell: Acknowledges messages up to a sequence number to a publisher.
+        tell: Sends a publisher an acknowledgement of all messages up to a sequence number.
         shared: Readers of shared memory, or None.
     """
 
@@ -230,7 +228,7 @@ class SubSocket:
         )
         self._topic_length = len(self._topic)
         self.payloads: deque[Any] = deque()
-        """See `nep.backends.base.GivesPayloads`."""
+        """Decoded payloads. See `nep.backends.base.GivesPayloads`."""
         self.wants_payloads = False
         self._run: _Run | None = None
         self._body = self._topic_length + HEADER_BYTES
@@ -255,11 +253,11 @@ class SubSocket:
 
     @property
     def has_input(self) -> bool:
-        """True if a message can be read. Also processes connects and disconnects."""
+        """True if a message can be read. Also handles connections and disconnections."""
         return bool(int(self._socket.getsockopt(_EVENTS)) & _POLLIN)
 
     def connect(self, remote: RemotePublisher) -> None:
-        """Connect to a publisher (idempotent). Silent publishers that it replaces are removed later."""
+        """Connect to a publisher. Silent publishers that it replaces are removed later. Idempotent."""
         endpoint = remote.publisher.endpoints[0] if remote.publisher.endpoints else ""
         self._disconnect_replaced(remote, endpoint)
         source = self.sources.add_listed(remote)
@@ -303,7 +301,7 @@ class SubSocket:
             source.endpoint = endpoint
 
     def reconnect_remote(self) -> None:
-        """Reconnect to publishers on other computers. Unread messages of theirs are dropped."""
+        """Reconnect to publishers on other computers. Their unread messages are discarded."""
         for source in self.sources.by_id.values():
             if is_far(source.endpoint):
                 self._connect(source, source.endpoint)
@@ -326,7 +324,7 @@ class SubSocket:
 
     @property
     def problem(self) -> str:
-        """Problem of a listed publisher; empty if none."""
+        """Reason why a listed publisher can't be received; "" if there is none."""
         listed = (each for each in self.sources.by_id.values() if each.problem and not each.is_silent)
         return next((each.problem for each in listed), "")
 
@@ -371,11 +369,11 @@ class SubSocket:
     ) -> int:
         """Read messages until the socket is empty or a limit is reached; return their number.
 
-        Batches are read whole; notices are processed on the way. The fast path for messages of one part is
+        Batches are read completely; notices are handled in between. The fast path for messages of one part is
         inlined here.
 
         Args:
-            into: Container to append to.
+            into: Container to which messages are appended.
             max_messages: Maximum number of messages.
             max_bytes: Maximum number of bytes.
             may_wait: True to wait for the first message.
@@ -490,7 +488,7 @@ class SubSocket:
         return True
 
     def restore(self, into: deque[Message]) -> None:
-        """Convert the remaining payloads back to messages and put them first into `into`."""
+        """Convert the remaining payloads back to messages and insert them at the front of `into`."""
         if self._run is None:
             return
         kind, publisher, first, stamps_ns, raws = self._run
@@ -536,10 +534,10 @@ class SubSocket:
         return len(messages), 0
 
     def read(self, rest: MessageBuffer, *, may_wait: bool = False) -> Message | None:
-        """Return the next message, or None if the socket is empty; wait with `may_wait`.
+        """Return the next message, or None if the socket is empty; with `may_wait`, wait for one.
 
-        Other messages of its batch are appended to `rest`. Repeats the fast path of `read_into`, because the
-        call would take a third longer in programs that read single messages.
+        Other messages of the same batch are appended to `rest`. The fast path of `read_into` is repeated
+        here, because calling it would take a third longer in programs that read single messages.
         """
         if not may_wait and not int(self._socket.getsockopt(_EVENTS)) & _POLLIN:
             return None  # the common case: raising `zmq.Again` is ten times slower
@@ -620,7 +618,7 @@ class SubSocket:
             return None, None
 
     def dropped(self, count: int) -> None:
-        """Count received messages that were dropped for lack of room."""
+        """Count received messages that were dropped from a full queue."""
         self.sources.count_dropped(count)
 
     def close(self) -> None:

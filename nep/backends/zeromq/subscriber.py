@@ -1,15 +1,16 @@
 """A subscriber's socket with its lock, inbox and readers.
 
 `SocketSubscriber` reads from any `Readable`, a socket that returns messages. `NativeSubscriber` is for the
-native wire and connects to publishers as they register.
+native wire and connects to publishers when they register.
 
-A reader leases the socket for a moment, and the I/O thread doesn't read meanwhile: a `listen` loop gets its
+A reader leases the socket for a moment, in which the I/O thread doesn't read: a `listen` loop gets its
 messages directly from the socket in its own thread. Without a reader the I/O thread moves messages into the
-inbox, which is bounded in bytes.
+inbox, whose size in bytes is limited.
 
 A reader that receives in quick succession waits in the socket itself, which shortens the round trip of small
 messages by a fifth to a third compared to polling the descriptor. It holds the lock for up to `SHORT_WAIT_S`,
-and doesn't start while another thread wants the socket. After that it polls the descriptor without the lock.
+and doesn't wait there while another thread wants the socket. After that time it polls the descriptor without
+the lock.
 """
 
 from __future__ import annotations
@@ -43,11 +44,11 @@ _POLLIN = int(zmq.POLLIN)
 _INFINITE = math.inf
 LEASE_S = 0.02
 _WAITER_CHECK_S = 0.1
-"""Interval at which the I/O thread checks whether a reader still waits."""
+"""Interval in seconds at which the I/O thread checks whether a reader still waits."""
 _MAX_IO_DELAY_S = _WAITER_CHECK_S + LEASE_S
-"""A read wakes the I/O thread only if that would come later than this: not for every message."""
+"""Maximum time in seconds until the I/O thread's next check; a read wakes it only if that is later."""
 _BATCH_S = 0.005
-"""Sinks and inboxes are filled at most 200 times a second."""
+"""Minimum interval in seconds between two calls of a sink or two transfers to the inbox."""
 _BATCH_MESSAGES = 10_000
 _BATCH_BYTES = 64 * 2**20
 _HANDSHAKE_BATCH = 50
@@ -70,11 +71,11 @@ class Readable(Protocol):
 
     @property
     def problem(self) -> str:
-        """Persistent problem; empty if none."""
+        """Reason why messages can't be received; "" if there is none."""
 
     @property
     def has_input(self) -> bool:
-        """True if a message can be read. Also processes connects and disconnects."""
+        """True if a message can be read. Also handles connections and disconnections."""
 
     def read_into(
         self, into: MessageBuffer, max_messages: int, max_bytes: int, *, may_wait: bool = False
@@ -82,36 +83,36 @@ class Readable(Protocol):
         """Read messages until the socket is empty or a limit is reached; return their number.
 
         Args:
-            into: Container to append to.
+            into: Container to which messages are appended.
             max_messages: Maximum number of messages.
             max_bytes: Maximum number of bytes.
             may_wait: True to wait up to `SHORT_WAIT_S` for the first message.
         """
 
     def read(self, rest: MessageBuffer, *, may_wait: bool = False) -> Message | None:
-        """Return the next message, or None; with `may_wait` wait up to `SHORT_WAIT_S`.
+        """Return the next message, or None; with `may_wait`, wait up to `SHORT_WAIT_S`.
 
-        Other messages of its batch are appended to `rest`.
+        Other messages of the same batch are appended to `rest`.
         """
 
     def dropped(self, count: int) -> None:
-        """Count received messages that were dropped for lack of room."""
+        """Count received messages that were dropped from a full queue."""
 
     def close(self) -> None:
         """Close the socket."""
 
 
 class UnbatchedReader:
-    """Implements `Readable.read_into` for libraries without batches."""
+    """Implementation of `Readable.read_into` for sockets without batches."""
 
     def read(self, rest: MessageBuffer, *, may_wait: bool = False) -> Message | None:
-        """Return the next message, see `Readable.read`."""
+        """Return the next message. See `Readable.read`."""
         raise NotImplementedError
 
     def read_into(
         self, into: MessageBuffer, max_messages: int, max_bytes: int, *, may_wait: bool = False
     ) -> int:
-        """Read messages one by one, see `Readable.read_into`."""
+        """Read messages one by one. See `Readable.read_into`."""
         count = 0
         while count < max_messages and max_bytes > 0:
             message = self.read(into, may_wait=may_wait and not count)
@@ -130,13 +131,13 @@ class NativeReadable(Readable, Protocol):
     """Publishers of the topic."""
 
     def connect(self, remote: RemotePublisher) -> None:
-        """Connect to a publisher (idempotent)."""
+        """Connect to a publisher. Idempotent."""
 
     def leave(self, publisher: int) -> None:
         """Disconnect from a publisher and remove it."""
 
     def reconnect_remote(self) -> None:
-        """Reconnect to publishers on other computers. Unread messages of theirs are dropped."""
+        """Reconnect to publishers on other computers. Their unread messages are discarded."""
 
     def reconnect(self, publisher: int) -> None:
         """Disconnect from a connected publisher and connect again."""
@@ -161,14 +162,14 @@ class SocketSubscriber(Generic[R]):
         self._read_into = readable.read_into
         self._queues_all = spec.keep == "all"
         self.ready: deque[Message] = deque()
-        """Messages read ahead, before those of the inbox. Pop from the left, without the lock."""
+        """Messages read ahead, which precede those of the inbox. Pop from the left, without the lock."""
         self._source: SubSocket | None = readable if isinstance(readable, SubSocket) else None
         self.payloads: deque[Any] = deque() if self._source is None else self._source.payloads
-        """See `nep.backends.base.GivesPayloads`."""
+        """Decoded payloads. See `nep.backends.base.GivesPayloads`."""
         self.wants_payloads = False
         self._ahead = ReadAhead(spec.max_messages)
         self._may_exceed_bound = spec.max_messages >= 10 * AHEAD_MOST
-        """True if the queue is large enough to exceed its bound by a few messages."""
+        """True if the queue is long enough to exceed its limit by a few messages."""
         self._read_at = 0.0
         self._inbox = Inbox(spec.keep, spec.max_messages, spec.max_bytes)
         self._leased_until = 0.0
@@ -240,20 +241,20 @@ class SocketSubscriber(Generic[R]):
 
     @property
     def lost(self) -> int | None:
-        """Number of messages lost or dropped here for lack of room."""
+        """Number of messages lost in transit or dropped from the full queue."""
         return self._readable.lost
 
     @property
     def refused(self) -> int:
-        """Number of inputs rejected because they aren't valid messages."""
+        """Number of received frames rejected because they are not valid messages."""
         return self._readable.refusals.count
 
     def report(self, problem: str) -> None:
-        """Set the reader's problem, which is sent with the next renewal."""
+        """Set the reason why messages can't be decoded; the next renewal reports it."""
         self._problem = problem
 
     def counts(self) -> SubscriberCount:
-        """Return the statistics for a renewal."""
+        """Return the statistics that a renewal reports."""
         problem = self._problem or self._readable.refusals.recent_message() or self._readable.problem
         lost = None if self.lost is None else as_count(self.lost)
         return SubscriberCount(self.spec.id, as_count(self.received), lost, problem)
@@ -261,7 +262,7 @@ class SocketSubscriber(Generic[R]):
     # ---- waiting
 
     def enter_wait(self, waker: Wakes) -> bool:
-        """Prepare to poll the descriptor; return False if a message is available."""
+        """Prepare to poll the descriptor; return False if a message is available or it is closed."""
         self._lock_requests.append(None)  # as `_requested_lock` does, but faster
         try:
             with self._lock:
@@ -279,7 +280,7 @@ class SocketSubscriber(Generic[R]):
             self._lock_requests.pop()
 
     def leave_wait(self, waker: Wakes) -> None:
-        """End a wait that `enter_wait` began."""
+        """End the wait that `enter_wait` prepared."""
         with self._lock:
             self._waiters.remove(waker)
             if waker in self._woken:
@@ -311,7 +312,7 @@ class SocketSubscriber(Generic[R]):
     # ---- in the I/O thread
 
     def serve(self, now: float) -> PollState:
-        """Move available messages into the inbox or the sink, unless a reader holds the lease."""
+        """Move available messages to the inbox or the sink, unless a reader leases the socket."""
         sink = self.spec.sink
         if now < self._leased_until and not self.is_closed:
             # without the lock, which a waiting reader holds; a stale value is harmless
@@ -337,7 +338,7 @@ class SocketSubscriber(Generic[R]):
         if sink is not None and batch:
             try:
                 sink(batch)
-            except BaseException:  # also SystemExit: the sinks' thread continues with the next batch
+            except BaseException:  # also SystemExit: the sink thread continues with the next batch
                 _logger.exception("the sink of '%s' failed", self.spec.topic)
         return PollState(pause_reading=True, due=now + _BATCH_S) if count or batch else PollState()
 
@@ -363,7 +364,7 @@ class SocketSubscriber(Generic[R]):
                 self._waker = None
 
     def forked(self) -> None:
-        """Become closed and empty in a forked child."""
+        """Mark the subscriber as closed and empty in a forked child process."""
         self.is_closed = True
         self.payloads.clear()
         self.ready.clear()
@@ -379,7 +380,7 @@ class SocketSubscriber(Generic[R]):
             self._lock_requests.pop()
 
     def restore(self) -> None:
-        """Convert the remaining payloads back to messages, see `GivesPayloads`."""
+        """Convert the remaining payloads back to messages. See `GivesPayloads.restore`."""
         if self._source is not None:
             with self._requested_lock():
                 self._source.restore(self.ready)
@@ -464,25 +465,25 @@ class SocketSubscriber(Generic[R]):
 
 
 class NativeSubscriber(SocketSubscriber[NativeReadable]):
-    """Subscriber on the native wire. The master session calls the methods for publishers."""
+    """Subscriber on the native wire. The master session calls the methods that concern publishers."""
 
     def __init__(
         self, readable: NativeReadable, io: IoThread, spec: SubscriberSpec, on_close: Callable[[int], None]
     ) -> None:
         super().__init__(readable, io, spec, on_close)
         self._closed_early: set[int] | None = set()
-        """Ids of publishers that closed before `begin`; None afterwards."""
+        """Ids of publishers that closed before `begin`; None after `begin`."""
 
     @property
     def has_publishers(self) -> bool:
-        """True if it has any publishers, including silent ones."""
+        """True if there are any publishers, including silent ones."""
         with self._requested_lock():
             return bool(self._readable.sources.by_id)
 
     def wait_for(self, publishers: Iterable[int], timeout_s: float, waker: Waker) -> bool:
         """Wait for the echo of these publishers; return False on timeout.
 
-        Publishers that say bye meanwhile, or can't be connected, are skipped.
+        Publishers that send a bye in the meantime, or to which connecting fails, are skipped.
         """
         wanted = frozenset(publishers)
         sources = self._readable.sources
@@ -507,9 +508,9 @@ class NativeSubscriber(SocketSubscriber[NativeReadable]):
         return tuple(source.endpoint for _each, source in self._readable.sources.items() if source.endpoint)
 
     def begin(self, remotes: Iterable[RemotePublisher]) -> None:
-        """Connect to the publishers known at registration, except those closed since.
+        """Connect to the publishers listed at registration, except those that have closed since.
 
-        The notification of a close is read in another thread than the reply and may be processed first.
+        The notification of a close is read in another thread than the reply and may be handled first.
         """
         with self._requested_lock():
             closed, self._closed_early = self._closed_early or set(), None
@@ -523,7 +524,7 @@ class NativeSubscriber(SocketSubscriber[NativeReadable]):
                 self._readable.sources.expect_all_of(publisher)
 
     def connect(self, remotes: Iterable[RemotePublisher]) -> None:
-        """Connect to publishers (idempotent)."""
+        """Connect to publishers. Idempotent."""
         with self._requested_lock():
             self._connect_locked(remotes)
 
@@ -534,7 +535,7 @@ class NativeSubscriber(SocketSubscriber[NativeReadable]):
             self._after_use_locked()
 
     def reconnect_remote(self) -> None:
-        """Reconnect to publishers on other computers, after the address of this one has changed."""
+        """Reconnect to publishers on other computers, because the address of this computer has changed."""
         with self._requested_lock():
             if not self.is_closed:
                 self._fill_locked()
@@ -543,7 +544,7 @@ class NativeSubscriber(SocketSubscriber[NativeReadable]):
                 self._after_use_locked()
 
     def reconcile(self, remotes: Iterable[RemotePublisher]) -> None:
-        """Replace the list of publishers: connect to new ones; missing ones are marked as silent."""
+        """Replace the list of publishers: connect to new ones, and mark missing ones as silent."""
         known = tuple(remotes)
         self.connect(known)
         listed = {remote.publisher.id for remote in known}
@@ -553,7 +554,7 @@ class NativeSubscriber(SocketSubscriber[NativeReadable]):
                     source.is_silent = True
 
     def publisher_removed(self, publisher: int, final: int, *, is_closed: bool) -> None:
-        """Process the removal of a publisher. Its connection stays until the bye, or until it is replaced."""
+        """Handle the removal of a publisher. Its connection stays until its bye, or until it is replaced."""
         with self._requested_lock():
             if is_closed and self._closed_early is not None:
                 self._closed_early.add(publisher)
@@ -568,9 +569,9 @@ class NativeSubscriber(SocketSubscriber[NativeReadable]):
             self._readable.sources.set_clock_differences(clocks)
 
     def tick(self, now: float, last_seqs: Iterable[tuple[int, int]]) -> None:
-        """Process a renewal: remove publishers that closed without a bye, and update the losses.
+        """Handle a renewal: remove publishers that closed without a bye, and update the losses.
 
-        `last_seqs` has the newest sequence numbers known to the master.
+        `last_seqs` contains the newest sequence numbers known to the master, as (publisher id, number).
         """
         with self._requested_lock():
             if self.is_closed:

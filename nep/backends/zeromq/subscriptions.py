@@ -12,28 +12,28 @@ from nep.protocol.wire import Hello, parse_hello, parse_read, parse_shares, topi
 
 _logger = logging.getLogger("nep")
 MAX_SUBSCRIBERS = 10_000
-"""Maximum number of greeted subscribers. Further ones receive messages like subscribers without a hello."""
+"""Maximum number of subscribers with a hello. Further ones are treated as subscribers without one."""
 
 
 class Subscriptions:
-    """Subscribers of a publisher, by the subscriptions that its socket receives. No sockets.
+    """Subscribers of a publisher, from the subscriptions that its socket receives. No sockets.
 
-    Tracks subscribers that said hello to this publisher of `topic`, and the plain filters of others. Guarded
-    by the publisher's lock.
+    Tracks subscribers that have sent a hello to this publisher of `topic`, and the plain filters of others.
+    Guarded by the publisher's lock.
     """
 
     def __init__(self, topic: str, publisher: int) -> None:
         self.seen: dict[int, int] = {}
-        """Message counts at the hello, by the id of connected subscribers."""
+        """Number of messages at the hello of each connected subscriber, by id."""
         self.hellos: dict[int, bytes] = {}
-        """First part that addresses one subscriber alone, by its id."""
+        """First part of messages addressed to one subscriber alone, by its id."""
         self.legacy_filters: dict[bytes, int] = {}
-        """Number of subscribers by plain filter, for those that don't accept messages of one part."""
+        """Number of subscribers by plain filter, of those that don't accept messages of one part."""
         self._without_batches: set[int] = set()
         self.windows: dict[int, SendWindow] = {}
-        """Send windows of subscribers that acknowledge messages."""
+        """Send windows of subscribers that acknowledge messages, by id."""
         self._far: dict[int, FarConnection] = {}
-        """Connections of subscribers on other computers."""
+        """Connections of subscribers on other computers, by id."""
         self.shared: SharedPayloads | None = None
         self.refusals = RejectionLog()
         self._id = publisher
@@ -56,7 +56,7 @@ class Subscriptions:
         return not self.legacy_filters and len(self.windows) == len(self.seen)
 
     def forget(self) -> None:
-        """Remove all subscribers that said hello."""
+        """Remove all subscribers that have sent a hello."""
         self.seen.clear()
         self.hellos.clear()
         self.windows.clear()
@@ -66,15 +66,15 @@ class Subscriptions:
     def note(
         self, event: bytes, count: int, connection_of: Callable[[], FarConnection | None] = lambda: None
     ) -> bytes | None:
-        """Process a subscription event after `count` messages.
+        """Handle a subscription event.
 
         Args:
             event: Event from the XPUB socket.
             count: Number of messages published so far.
-            connection_of: Returns the connection of the event if it comes from another computer.
+            connection_of: Returns the connection of the event, or None if it is on this computer.
 
         Returns:
-            First part that addresses a subscriber to greet, or None.
+            First part of messages to a subscriber that must be greeted, or None.
         """
         is_wanted, subscription = event[:1] == b"\1", event[1:]
         hello = parse_hello(subscription)
@@ -83,7 +83,7 @@ class Subscriptions:
                 self._update_filters(subscription, is_wanted=is_wanted)
             return None
         if hello.topic != self._name:
-            return None  # a subscriber of this port's previous owner
+            return None  # a subscriber of another publisher that had this port before
         if is_wanted:
             own = self._add_subscriber(hello, subscription, count)
             if own is not None:
@@ -93,7 +93,7 @@ class Subscriptions:
         return None
 
     def _handle_answer(self, subscription: bytes, *, is_wanted: bool) -> bool:
-        # Returns True for acknowledgements and replies to offers, which it processes.
+        # Handles acknowledgements and replies to offers. Returns True for these.
         read, shares = parse_read(subscription), parse_shares(subscription)
         if read is not None:
             if is_wanted and read.publisher == self._id and read.subscriber in self.windows:
@@ -125,7 +125,7 @@ class Subscriptions:
         return subscription
 
     def _update_connection(self, subscriber: int, connection: FarConnection | None) -> None:
-        # After a hello over a new connection the previous one is abandoned.
+        # A hello over a new connection means that the previous connection is abandoned.
         before = self._far.pop(subscriber, None)
         if connection is not None:
             self._far[subscriber] = connection
@@ -133,7 +133,7 @@ class Subscriptions:
                 before.end()
 
     def end_silent(self) -> None:
-        """End connections to computers that have vanished; their subscribers are removed soon after."""
+        """Close connections to computers that have vanished; their subscribers are then removed."""
         for connection in self._far.values():
             if connection.is_silent():
                 connection.end()

@@ -1,4 +1,4 @@
-"""Transport of the back end `zeromq`: the native wire, and direct connections on the original wire."""
+"""Transport of the back end `zeromq`: the native wire, and direct connections on the original NEP's wire."""
 
 from __future__ import annotations
 
@@ -48,16 +48,16 @@ from nep.system.forks import give_up, watch
 from nep.system.wakeup import Waker
 
 DIRECT_WAIT_S = 0.3
-"""Seconds to wait for a peer of a direct connection; without a master it is unknown whether there is one."""
+"""Time in seconds to wait for a peer of a direct connection, which may not exist."""
 _LEAVE_S = 0.3
 _THREAD_FILES = 4
 _MAX_IDLE_SESSIONS = 8
-"""Maximum number of sessions kept without registrations."""
+"""Maximum number of sessions that are kept without registrations."""
 _Subscriber = SocketSubscriber[Readable] | NativeSubscriber | OriginalSubscriber | PatternSubscriber
 
 
 class OwnedPublisher(PublisherTransport, Pollable, Protocol):
-    """Publisher as its transport uses it."""
+    """Publisher, as its transport uses it."""
 
     spec: PublisherSpec
 
@@ -65,29 +65,29 @@ class OwnedPublisher(PublisherTransport, Pollable, Protocol):
         """Send the bye and stop accepting messages."""
 
     def finish(self, deadline: float) -> None:
-        """Wait until all messages are delivered, until `deadline` at the latest."""
+        """Wait until all messages are delivered, at most until `deadline`."""
 
     def release(self) -> None:
-        """Release the socket. The I/O thread must not serve it any more."""
+        """Release the socket. The I/O thread must have stopped serving it."""
 
 
 class MasteredPublisher(OwnedPublisher, SessionPublisher, Protocol):
     """Publisher registered at a master."""
 
     def expect(self, expected: Iterable[Expected]) -> None:
-        """Note registered subscribers that will connect."""
+        """Add registered subscribers that will connect."""
 
     def wait_for(self, expected: Iterable[Expected], timeout_s: float) -> tuple[int, ...]:
-        """Wait for the hello of these subscribers; return the ids of those still missing."""
+        """Wait for the hellos of these subscribers; return the ids of those that are still missing."""
 
 
 class ThreadWait:
-    """Waker and poller of one thread. An early wake is kept."""
+    """Waker and poller of one thread. A wake before the wait ends the wait immediately."""
 
     def __init__(self) -> None:
         self.waker = Waker()
         self.is_busy = False
-        """True while its thread waits or is about to."""
+        """True while its thread waits or is about to wait."""
         self._fds: list[int] | None = None
         self._poll: Callable[[int], Sequence[tuple[int, int]]]
 
@@ -113,10 +113,10 @@ def _poll_of(fds: tuple[int, ...]) -> Callable[[int], Sequence[tuple[int, int]]]
 
 
 class ZeromqTransport:
-    """Sockets and master sessions of one node, in the process-wide context and I/O thread.
+    """Sockets and master sessions of one node, in the context and I/O thread of the process.
 
-    Sinks run in a separate thread per node, so that they can't block other nodes and may send requests to the
-    master and create publishers and subscribers.
+    Sinks run in a separate thread per node, so that they can't block other nodes, and may send requests to
+    the master and create publishers and subscribers.
     """
 
     def __init__(self, node: NodeRecord) -> None:
@@ -151,7 +151,7 @@ class ZeromqTransport:
         session = self._session(configuration.master)
         session.wait_for_name(spec.wait_s)
         closer = self._publisher_closer(lambda: session.remove_publisher(spec.id, publisher.count))
-        # before bind: socket options apply to connections of later binds only
+        # before bind, because socket options apply only to connections of later binds
         publisher = self._mastered_publisher(spec, closer)
         with closed_on_error(publisher.release):
             endpoints = publisher.move(session.hosts)
@@ -173,7 +173,7 @@ class ZeromqTransport:
             absent = publisher.wait_for(reply.expected, HANDSHAKE_S)
             if absent:
                 session.report_missing(spec.id, absent)
-        except BaseException:  # also Ctrl+C: the caller would have nothing to close
+        except BaseException:  # also Ctrl+C: the caller has no object to close yet
             publisher.close(0.0)
             raise
         return publisher
@@ -212,7 +212,7 @@ class ZeromqTransport:
         with self._lock:
             self._check_open_locked()
             self._publishers[publisher.spec.id] = publisher
-            self._io.add(publisher)  # before `close` can remove it, which takes this lock first
+            self._io.add(publisher)  # before `close` can remove the publisher, which acquires this lock first
 
     def _publisher_closer(self, unregister: Callable[[], None]) -> Callable[[OwnedPublisher, float], None]:
         def close(publisher: OwnedPublisher, timeout_s: float) -> None:
@@ -321,7 +321,7 @@ class ZeromqTransport:
         with self._lock:
             if subscriber.spec.id not in self._subscribers:
                 raise ClosedError(f"node '{self._node.name}'")
-            io.add(subscriber)  # before `close` can remove it, which takes this lock first
+            io.add(subscriber)  # before `close` can remove the subscriber, which acquires this lock first
 
     @contextmanager
     def _opening(self) -> Iterator[None]:
@@ -451,7 +451,7 @@ class ZeromqTransport:
             return self._session(configuration.master).query_graph(timeout_s)
 
     def begin_close(self) -> None:
-        """Announce the end to all peers; doesn't wait. See `Transport.begin_close`."""
+        """Notify all peers that the node is closing; doesn't wait. See `Transport.begin_close`."""
         with self._lock:
             if self._is_closed:
                 return
@@ -465,7 +465,7 @@ class ZeromqTransport:
             publisher.say_bye()
 
     def close(self, timeout_s: float) -> None:
-        """Close everything. See `Transport.close`."""
+        """Close all sockets, sessions and threads. See `Transport.close`."""
         deadline = time.monotonic() + timeout_s
         self.begin_close()
         with self._lock:
@@ -508,7 +508,7 @@ class ZeromqTransport:
                 session.close()
 
     def forked(self) -> None:
-        """Close the descriptors of the parent's ports and connections, see `nep.system.forks`."""
+        """Close the descriptors of the parent's sockets in a forked child process. See `nep.system.forks`."""
         give_up(*self._attached.values())
         self._services.forked()
         for session in self._sessions.values():

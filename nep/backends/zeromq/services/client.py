@@ -1,7 +1,7 @@
 """SocketClient: sends calls, receives replies, and detects when its server disappears.
 
-It is connected to one server at a time. When a connection has ended and its last reply was read, all
-remaining calls that were sent over it have failed.
+A client is connected to one server at a time. When a connection has ended and its last reply was read, all
+remaining calls that were sent over it fail.
 """
 
 from __future__ import annotations
@@ -37,10 +37,9 @@ _logger = logging.getLogger("nep")
 _READ_MAX = 100
 _MIN_RETRY_S, _MAX_RETRY_S = 0.1, 2.0
 _PENDING_RETRY_S = 0.8
-"""Maximum retry interval while calls are pending."""
+"""Maximum interval in seconds between connection attempts while calls are pending."""
 _HAND_OVER_S = 2.0
-"""Seconds for which new calls wait for the last replies of a closing server before they go to the next one.
-"""
+"""Time in seconds that new calls wait for the last replies of a closing server."""
 
 Then = Callable[[Outcome], None]
 _Outcomes = list[tuple[Then, Outcome]]
@@ -66,15 +65,15 @@ class Connection(Protocol):
     endpoint: str
     is_open: bool
     again_s: float
-    """Delay in seconds before reconnecting after it ended."""
+    """Time in seconds to wait before reconnecting after the connection has ended."""
 
     @property
     def is_over(self) -> bool:
-        """True if the connection was open and has ended; earlier input can still be read."""
+        """True if the connection was open and has ended. Replies received before can still be read."""
 
     @property
     def has_input(self) -> bool:
-        """True if a reply is available that the descriptor no longer signals."""
+        """True if a reply is available that the descriptor doesn't signal any more."""
 
     def update(self) -> None:
         """Update `is_open` and `is_over`."""
@@ -89,20 +88,20 @@ class Connection(Protocol):
         """Close the connection and discard unread replies."""
 
     def forked(self) -> None:
-        """Release the connection in a forked child."""
+        """Release the connection in a forked child process."""
 
 
 class SocketClient:
-    """Client over sockets.
+    """Client for services over sockets.
 
     Args:
         connect_to: Creates a connection to an endpoint.
-        spec: Settings.
+        spec: Settings of the client.
         framing: Wire format.
-        serve_soon: Asks the I/O thread to serve this client.
-        closer: Closes this client.
+        serve_soon: Asks the I/O thread to serve the client.
+        closer: Closes the client.
         known_services: Queries the master for the names of services; None without a master.
-        endpoint: Endpoint of the server, without a master.
+        endpoint: Endpoint of the server without a master, or "".
     """
 
     def __init__(
@@ -129,17 +128,20 @@ class SocketClient:
         self._numbers = itertools.count(1)
         self._calls: dict[int, _Call] = {}
         self._unanswered: dict[int, int] = {}
-        """Sizes of the calls sent over this connection by number, oldest first, including cancelled ones:
-        replies without a number come in this order, and it limits what is sent to a server that hangs.
+        """Sizes of the calls sent over this connection by number, oldest first, including cancelled ones.
+
+        Needed because replies without a number arrive in this order, and to limit the bytes sent to a server
+        that hangs.
         """
         self._bytes = self._unanswered_bytes = 0
         self.fixed_endpoint = endpoint
-        """Endpoint of the server, without a master."""
+        """Endpoint of the server without a master, or ""."""
         self._servers: dict[int, str] = {0: endpoint} if endpoint else {}
         self._current: int | None = None
         self._unlisted: int | None = None
-        """Id of a connected server that is no longer listed but kept, because it may only be suspended and
-        there is no other.
+        """Id of the connected server if the master doesn't list it any more, else None.
+
+        It is kept while there is no other server, because it may only be suspended.
         """
         self._connected_endpoint = ""
         """Endpoint of the current connection; cleared to force a reconnection."""
@@ -161,7 +163,7 @@ class SocketClient:
 
     @property
     def fd(self) -> int:
-        """-1: the connections are polled, and the client is served when something is due."""
+        """-1, because the connections are polled; the client itself is served when a call is due."""
         return -1
 
     @property
@@ -181,7 +183,7 @@ class SocketClient:
 
     @property
     def endpoint(self) -> str:
-        """Endpoint of the connection or connection attempt; "" without a known server."""
+        """Endpoint of the current connection or connection attempt; "" if no server is known."""
         connection = self._connection
         return "" if connection is None else connection.endpoint
 
@@ -258,7 +260,7 @@ class SocketClient:
         return bool(remote.publisher.endpoints)
 
     def publisher_removed(self, server: int, final: int, *, is_closed: bool) -> None:  # noqa: ARG002 - a message count
-        """Process the removal of a server. Without `is_closed` it may only be suspended."""
+        """Handle the removal of a server. Unless `is_closed`, the server may only be suspended."""
         with self._lock:
             if is_closed or server != self._current or not self.is_connected or len(self._servers) > 1:
                 self._servers.pop(server, None)
@@ -268,7 +270,7 @@ class SocketClient:
         self._serve_soon(self)
 
     def reconnect_remote(self) -> None:
-        """Reconnect to a server on another computer, after the address of this one has changed."""
+        """Reconnect to a server on another computer, because the address of this computer has changed."""
         with self._lock:
             if is_far(self._connected_endpoint):
                 self._connected_endpoint = ""
@@ -291,17 +293,17 @@ class SocketClient:
         self._serve_soon(self)
 
     def tick(self, now: float, last_seqs: Iterable[tuple[int, int]]) -> None:
-        """Do nothing: replies have no sequence numbers."""
+        """Do nothing, because replies have no sequence numbers."""
 
     def counts(self) -> SubscriberCount:
-        """Return the statistics for a renewal."""
+        """Return the statistics that a renewal reports."""
         problem = self._refusals.recent_message()
         return SubscriberCount(self.spec.id, as_count(self._answered), as_count(self._failed), problem)
 
     # ---- in the I/O thread: the socket
 
     def serve(self, now: float) -> PollState:
-        """Process the connection and expired calls, see `Pollable.serve`."""
+        """Process replies, the state of the connection, and expired calls. See `Pollable.serve`."""
         return PollState(pause_reading=True, due=self._serve(now))
 
     def _serve_connection(self, now: float) -> PollState:
@@ -465,7 +467,7 @@ class SocketClient:
     # ---- closing
 
     def close(self) -> None:
-        """Unregister; calls in flight fail with `ClosedError`. Idempotent."""
+        """Unregister the client; calls in flight fail with `ClosedError`. Idempotent."""
         self._closer(self)
 
     def release(self) -> None:
@@ -474,13 +476,13 @@ class SocketClient:
             self._is_closed = True
             left, self._calls = list(self._calls.values()), {}
             connection, self._connection = self._connection, None
-        if connection is not None:  # without the lock: the thread that polls it may wait for that
+        if connection is not None:  # without the lock: the thread that polls it may wait for the lock
             connection.close()
         what = _("client of '{service}'").format(service=self._name)
         self._run_callbacks([(each.then, ClosedError(what)) for each in left])
 
     def forked(self) -> None:
-        """Become closed in a forked child, see `nep.system.forks`."""
+        """Mark the client as closed in a forked child process. See `nep.system.forks`."""
         self._is_closed = True
         self._lock = threading.Lock()
         self._calls = {}

@@ -1,8 +1,8 @@
 """ServerConnection: connection to one server that reports when it opens and ends.
 
-Replies received before the end can still be read. With `IMMEDIATE` or `RECONNECT_IVL` -1 libzmq would discard
-them, and a reconnected socket couldn't report which connection ended. Therefore each connection has its own
-socket, which never reconnects, and a monitor.
+Replies received before the end can still be read. With `IMMEDIATE` or a `RECONNECT_IVL` of -1, libzmq would
+discard them, and a reconnected socket couldn't report which connection has ended. Therefore each connection
+has its own socket, which never reconnects, and a monitor.
 """
 
 from __future__ import annotations
@@ -18,19 +18,19 @@ from nep.backends.zeromq.sockets import Part, Socket, keep_alive
 from nep.protocol.service_wire import PAYLOAD_MAX_BYTES
 
 CONNECTION_FILES = 4
-"""File descriptors per connection, including those of libzmq."""
+"""Number of file descriptors per connection, including those of libzmq."""
 
 _LARGE_BYTES = 65_536
-"""Size from which calls are sent without a copy."""
+"""Size in bytes from which calls are sent without a copy."""
 _NEVER_MS = 24 * 3600 * 1000
 _EVENT = struct.Struct("=hi")
 _names = itertools.count(1)
 
 
 class ServerConnection:
-    """Connection that starts to connect at once. Not thread-safe: guarded by the client's lock.
+    """Connection to a server, which starts connecting immediately. Guarded by the client's lock.
 
-    `serve` is called in the I/O thread when there are events.
+    `serve` is called in the I/O thread on events.
     """
 
     def __init__(
@@ -91,7 +91,7 @@ class ServerConnection:
             return None
 
     def forked(self) -> None:
-        """Do nothing in a forked child: libzmq must not be touched, see `nep.system.forks`."""
+        """Do nothing in a forked child process, where libzmq must not be touched. See `nep.system.forks`."""
 
     def close(self) -> None:
         """Close the sockets and discard unread replies."""

@@ -34,9 +34,9 @@ if TYPE_CHECKING:
 
 
 class ZeromqServices:
-    """Services of one node.
+    """Servers, clients and surveyors of one node.
 
-    `session` returns the node's session with a master; raises `ClosedError` when the node is closed.
+    `session` returns the node's session with a master; it raises `ClosedError` if the node is closed.
     """
 
     def __init__(
@@ -68,7 +68,7 @@ class ZeromqServices:
         )
         try:
             session.add_publisher(record, server, spec.wait_s)
-        except BaseException:  # also Ctrl+C: the caller would have nothing to close
+        except BaseException:  # also Ctrl+C: the caller has no object to close yet
             server.close(0.0)
             raise
         return server
@@ -103,7 +103,7 @@ class ZeromqServices:
             server.begin_close()
             self._shared.io.remove(server)
             while server.serve(now := time.monotonic()).due is not None and now < deadline:
-                pass  # calls received meanwhile are rejected, too
+                pass  # calls received in the meantime are rejected, too
             server.release(deadline)
 
         socket = self._shared.socket(zmq.ROUTER, f"a server of '{spec.service}'")
@@ -116,7 +116,7 @@ class ZeromqServices:
                 self._clients.add(owner)
             else:
                 self._servers.add(owner)
-            self._shared.io.add(owner)  # before `close` can remove it, which takes this lock first
+            self._shared.io.add(owner)  # before `close` can remove the owner, which acquires this lock first
 
     def _check_open_locked(self) -> None:
         if self._is_closed:
@@ -222,7 +222,7 @@ class ZeromqServices:
     # ---- closing
 
     def begin_close(self) -> None:
-        """Stop accepting calls; waiting clients are notified."""
+        """Reject queued and new calls, so that waiting clients are notified."""
         with self._lock:
             self._is_closed = True
             servers = tuple(self._servers)
@@ -242,7 +242,7 @@ class ZeromqServices:
             server.close(max(0.0, deadline - time.monotonic()))
 
     def forked(self) -> None:
-        """Become closed in a forked child, see `nep.system.forks`."""
+        """Mark all services as closed in a forked child process. See `nep.system.forks`."""
         for server in self._servers:
             give_up(*server.endpoints)
             server.forked()

@@ -1,7 +1,7 @@
-"""RouterServer: a server's socket. The I/O thread reads calls; any thread replies.
+"""RouterServer: a server's socket. The I/O thread reads calls; any thread can reply.
 
-Clients of the original NEP connect to a ROUTER as well: their REQ doesn't notice, and it allows replies to
-several clients at once.
+Clients of the original NEP connect to the ROUTER socket as well: their REQ sockets don't notice the
+difference, and a ROUTER can reply to several clients at the same time.
 """
 
 from __future__ import annotations
@@ -28,14 +28,14 @@ _logger = logging.getLogger("nep")
 _READ_MAX = 100
 """Maximum number of calls read at once, before other sockets are served."""
 _LARGE_BYTES = 65_536
-"""Size from which replies are sent without a copy, and tracked until libzmq has sent them."""
+"""Size in bytes from which replies are sent without a copy, and tracked until libzmq has sent them."""
 _UNREAD_MAX_BYTES = 256 * 2**20
 _REPLY_HIGH_WATER_MARK = 1000
 """High-water mark: number of replies queued for a client that doesn't read them."""
 
 
 class CallReader:
-    """Parser of calls. Malformed ones are counted, and logged at increasing intervals.
+    """Parser of calls. Malformed calls are counted, and logged at increasing intervals.
 
     Not thread-safe: guarded by the server's lock.
     """
@@ -76,14 +76,20 @@ class CallReader:
             )
 
     def recent_message(self) -> str:
-        """Return the newest problem, see `RejectionLog.recent_message`."""
+        """Return the newest problem. See `RejectionLog.recent_message`."""
         return self._refusals.recent_message()
 
 
 class RouterServer:
     """Server over a ROUTER socket.
 
-    `serve_soon` asks the I/O thread to serve it, `closer` closes it, and `unregister` may be called twice.
+    Args:
+        socket: ROUTER socket.
+        spec: Settings of the server.
+        framing: Wire format.
+        serve_soon: Asks the I/O thread to serve the server.
+        unregister: Unregisters the server; may be called twice.
+        closer: Closes the server within a time limit in seconds.
     """
 
     is_local = False
@@ -101,7 +107,7 @@ class RouterServer:
         self.calls = CallQueue()
         self.tally = Tally()
         self.fixed: tuple[str, ...] = ()
-        """Endpoint of a direct server."""
+        """Endpoint of a server without a master."""
         self.socket = socket
         self._framing = framing
         self._serve_soon = serve_soon
@@ -132,15 +138,15 @@ class RouterServer:
         return self._is_closed
 
     def move(self, hosts: Sequence[str]) -> tuple[str, ...]:
-        """Bind at these addresses of this computer; return the endpoints."""
+        """Bind to these addresses of this computer and no others; return the endpoints."""
         with self._lock:
             return () if self._is_closed else self._bindings.move(hosts)
 
     def unbind_local(self) -> None:
-        """Do nothing: servers have no Unix socket names."""
+        """Do nothing, because servers have no Unix sockets."""
 
     def counts(self) -> PublisherCount:
-        """Return the statistics for a renewal."""
+        """Return the statistics that a renewal reports."""
         tally = self.tally
         calls, problem = as_count(tally.calls), self._reader.recent_message()
         return PublisherCount(self.spec.id, calls, as_count(tally.bytes), calls, None, problem, tally.errors)
@@ -148,7 +154,7 @@ class RouterServer:
     # ---- in the I/O thread
 
     def serve(self, now: float) -> PollState:
-        """Queue calls; reject those for which there is no room."""
+        """Queue calls, and reject them while the queue is full."""
         calls: list[IncomingCall] = []
         with self._lock:
             if self._is_closed:
@@ -225,14 +231,14 @@ class RouterServer:
         call.answer(refusal(self.spec.service, is_closed=self.calls.is_closed))
 
     def release(self, deadline: float) -> None:
-        """Close the socket; it lingers until `deadline`. The I/O thread must not serve it any more."""
+        """Close the socket, which lingers until `deadline`. The I/O thread must have stopped serving it."""
         with self._lock:
             if not self._is_closed:
                 self._is_closed = True
                 self.socket.close(max(0, round((deadline - time.monotonic()) * 1000)))
 
     def forked(self) -> None:
-        """Become closed in a forked child, see `nep.system.forks`."""
+        """Mark the server as closed in a forked child process. See `nep.system.forks`."""
         self._is_closed = True
         self._lock = threading.Lock()
         self.calls.forked()

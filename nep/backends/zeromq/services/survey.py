@@ -28,7 +28,10 @@ class _SentCall(NamedTuple):
 
 
 class SurveyClient:
-    """Surveyor. `new_client` connects to the respondent at an endpoint; `closer` closes the surveyor."""
+    """Surveyor with one client per respondent.
+
+    `new_client` creates the client for a respondent's endpoint; `closer` closes the surveyor.
+    """
 
     def __init__(
         self,
@@ -43,7 +46,7 @@ class SurveyClient:
         self._lock = threading.Lock()
         self._clients: dict[int, SocketClient] = {}
         self._leaving: list[SocketClient] = []
-        """Clients of unlisted respondents, whose last replies are still accepted."""
+        """Clients of respondents that are no longer listed; their last replies are still accepted."""
         self._answered = self._failed = self._late = 0
         """Statistics of closed clients."""
 
@@ -72,7 +75,7 @@ class SurveyClient:
             for client in clients:
                 try:
                     sent.append(_SentCall(client, client.begin(data, timeout_s, then)))
-                except ClosedError:  # left meanwhile
+                except ClosedError:  # left in the meantime
                     continue
         except BaseException:
             self.forget_all(sent)
@@ -80,7 +83,7 @@ class SurveyClient:
         return sent
 
     def forget_all(self, calls: Sequence[OpenCall]) -> None:
-        """Cancel these calls."""
+        """Cancel several calls; their callbacks aren't called."""
         for sent in calls:
             if isinstance(sent, _SentCall):
                 sent.client.forget(sent.call)
@@ -139,7 +142,7 @@ class SurveyClient:
                 client.reconnect_remote()
 
     def publisher_removed(self, publisher: int, final: int, *, is_closed: bool) -> None:  # noqa: ARG002 - unused here
-        """Process the removal of a respondent."""
+        """Handle the removal of a respondent."""
         with self._lock:
             self._remove_respondent(publisher)
 
@@ -155,10 +158,10 @@ class SurveyClient:
                 self._add_respondent(respondent, endpoints)
 
     def tick(self, now: float, last_seqs: Iterable[tuple[int, int]]) -> None:
-        """Do nothing: replies have no sequence numbers."""
+        """Do nothing, because replies have no sequence numbers."""
 
     def counts(self) -> SubscriberCount:
-        """Return the statistics for a renewal."""
+        """Return the statistics that a renewal reports."""
         with self._lock:
             counts = [each.counts() for each in self._all()]
             answered = self._answered + sum(each.received or 0 for each in counts)
@@ -169,11 +172,11 @@ class SurveyClient:
     # ---- closing
 
     def close(self) -> None:
-        """Unregister; calls in flight fail with `ClosedError`. Idempotent."""
+        """Unregister the surveyor; calls in flight fail with `ClosedError`. Idempotent."""
         self._closer(self)
 
     def release(self) -> None:
-        """Close all connections."""
+        """Close the connections to all respondents."""
         with self._lock:
             self.is_closed = True
             clients = self._all()
@@ -182,7 +185,7 @@ class SurveyClient:
         self._end(clients)
 
     def forked(self) -> None:
-        """Become closed in a forked child, see `nep.system.forks`."""
+        """Mark the surveyor as closed in a forked child process. See `nep.system.forks`."""
         self.is_closed = True
         self._lock = threading.Lock()
 

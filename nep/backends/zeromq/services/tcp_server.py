@@ -1,4 +1,4 @@
-"""TcpServer: a server over plain TCP for programs without ZeroMQ."""
+"""TcpServer: a server over plain TCP, for programs without ZeroMQ."""
 
 from __future__ import annotations
 
@@ -26,20 +26,20 @@ from nep.system.log_rarely import is_logged
 _logger = logging.getLogger("nep")
 
 _BACKLOG = 128
-"""Backlog of connections to be accepted."""
+"""Maximum number of connections that wait to be accepted."""
 _PEERS_MAX = 1000
 _READ_MAX = 100
 _UNREAD_MAX_BYTES = 256 * 2**20
 """Maximum number of bytes queued per client; further replies are dropped."""
 _LISTENER_FILES = 2
 _ACCEPT_PAUSE_S = 0.5
-"""Pause in seconds before accepting again when descriptors have run out."""
+"""Pause in seconds before accepting again after descriptors have run out."""
 
 
 class TcpServer:
     """Server that listens at `address`. Raises `AddressInUseError`, `TooManyFilesError`.
 
-    `io` serves the sockets, and `closer` closes the server.
+    `io` serves the sockets; `closer` closes the server.
     """
 
     def __init__(
@@ -63,7 +63,7 @@ class TcpServer:
     # ---- in the I/O thread
 
     def serve(self, now: float) -> PollState:
-        """Accept connections, see `Pollable.serve`."""
+        """Accept connections. See `Pollable.serve`."""
         for _turn in range(_READ_MAX):
             if self.is_closed:
                 return PollState()
@@ -101,7 +101,7 @@ class TcpServer:
         self._io.add(peer)
 
     def serve_peer(self, peer: _Peer, now: float) -> PollState:
-        """Queue calls of a client, and send its pending replies."""
+        """Queue the calls of a client and send its pending replies."""
         calls: list[IncomingCall] = []
         with self._changed:
             if peer not in self._peers:
@@ -128,7 +128,7 @@ class TcpServer:
                 parts = peer.stream.next()
                 if (
                     parts is None and not turn
-                ):  # read once per turn; the level-triggered descriptor signals the rest
+                ):  # read once per turn: the level-triggered descriptor signals further input
                     peer.stream.read()
                     parts = peer.stream.next()
                 if parts is None:
@@ -185,7 +185,7 @@ class TcpServer:
             self._reject(call)
 
     def release(self, deadline: float) -> None:
-        """Stop listening; clients can read their replies until `deadline`."""
+        """Stop listening. Clients can read their replies until `deadline`."""
         self._io.remove(self)
         with self._changed:
             if self.is_closed:
@@ -206,7 +206,7 @@ class TcpServer:
             peer.stream.close()
 
     def forked(self) -> None:
-        """Become closed in a forked child, see `nep.system.forks`."""
+        """Mark the server as closed in a forked child process. See `nep.system.forks`."""
         self.is_closed = True
         self._changed = threading.Condition(threading.Lock())
         self._listener.detach()

@@ -1,6 +1,6 @@
 """Calls and replies over plain TCP: length-prefixed pairs of header and payload.
 
-For programs with sockets but without ZeroMQ; docs/services.md has the specification.
+For programs without ZeroMQ. docs/services.md specifies the format.
 """
 
 from __future__ import annotations
@@ -20,12 +20,12 @@ from nep.system.addresses import host_of, is_loopback
 _SIZE = struct.Struct("<I")
 _CHUNK_BYTES, _TURN_BYTES = 262_144, 1_048_576
 _SMALL_BYTES = 65_536
-"""Size below which a copy is cheaper than another system call."""
+"""Size in bytes below which a copy is cheaper than another system call."""
 _KEEPALIVE_IDLE_S, _KEEPALIVE_INTERVAL_S, _KEEPALIVE_PROBES = 4, 2, 4
 
 
 class TcpStream:
-    """Sends and receives pairs of parts over a non-blocking socket.
+    """Stream of pairs of parts over a non-blocking socket.
 
     Not thread-safe: guarded by its owner's lock.
     """
@@ -34,14 +34,14 @@ class TcpStream:
         self._socket = connected
         self.fd = connected.fileno()
         self.is_over = False
-        """True if nothing more will be received."""
+        """True if no more data will be received."""
         self.is_broken = False
-        """True if nothing can be sent any more."""
+        """True if no more data can be sent."""
         self._input = bytearray()
         self._start = 0
         self._output: deque[memoryview] = deque()
         self.backlog = 0
-        """Bytes that are not sent yet."""
+        """Number of bytes that are not sent yet."""
         with suppress(OSError):  # it may have ended already
             connected.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
 
@@ -66,7 +66,7 @@ class TcpStream:
     def next(self) -> list[bytes] | None:
         """Return the oldest complete pair, or None.
 
-        Raises `WireError` for an invalid size and for an incomplete pair at the end; the stream is over then.
+        Raises `WireError` for an invalid size or an incomplete pair at the end; the stream is then over.
         """
         available = len(self._input) - self._start
         if available < _SIZE.size:
@@ -108,7 +108,7 @@ class TcpStream:
     # ---- sending
 
     def send(self, parts: Sequence[bytes | memoryview]) -> None:
-        """Send a pair as far as the socket accepts it now; `flush` sends the rest."""
+        """Queue a pair and send as much as the socket accepts now; `flush` sends the rest."""
         if self.is_broken:
             return
         header, payload = parts
@@ -119,7 +119,7 @@ class TcpStream:
         self.flush()
 
     def flush(self) -> None:
-        """Send pending data as far as the socket accepts it now."""
+        """Send as much of the pending data as the socket accepts now."""
         while self._output:
             try:
                 sent = self._socket.send(self._output[0])
@@ -147,22 +147,22 @@ class TcpStream:
             self._socket.shutdown(socket.SHUT_WR)
 
     def close(self) -> None:
-        """Close the socket. The I/O thread must not serve it any more."""
+        """Close the socket. The I/O thread must have stopped serving it."""
         self.is_over = True
         self._abort()
         self._socket.close()
 
     def forked(self) -> None:
-        """Release the socket in a forked child.
+        """Release the socket in a forked child process.
 
-        Its descriptor is closed by address, see `nep.system.forks`.
+        `nep.system.forks` closes its descriptor by address.
         """
         self.is_over = self.is_broken = True
         self._socket.detach()
 
 
 class TcpConnection:
-    """TCP connection of a client to `address`; the counterpart of `ServerConnection`. Connects at once.
+    """Client's TCP connection to `address`; starts connecting immediately. Counterpart of `ServerConnection`.
 
     Not thread-safe: guarded by the client's lock.
     """
@@ -195,7 +195,7 @@ class TcpConnection:
 
     @property
     def has_input(self) -> bool:
-        """False: the descriptor is level-triggered."""
+        """False, because the descriptor is level-triggered and signals all input."""
         return False
 
     def update(self) -> None:
@@ -212,13 +212,13 @@ class TcpConnection:
             self.is_open = not self._is_dead
 
     def serve(self, now: float) -> PollState:
-        """Process the connection, see `Pollable.serve`."""
+        """Send and receive. See `Pollable.serve`."""
         rest = self._serve(now)
         pause_reading = self._is_dead or self._stream.is_over
         return PollState(pause_reading, rest.due, sends=not self.is_open or self._stream.backlog > 0)
 
     def send(self, parts: Sequence[bytes | memoryview]) -> None:
-        """Send a call; the I/O thread sends what the socket doesn't accept now."""
+        """Send a call. The I/O thread sends what the socket doesn't accept immediately."""
         self._stream.send(parts)
         if self._stream.backlog:
             self._io.serve_soon(self)
@@ -240,12 +240,12 @@ class TcpConnection:
         self._stream.close()
 
     def forked(self) -> None:
-        """Release the connection in a forked child."""
+        """Release the connection in a forked child process."""
         self._stream.forked()
 
 
 def keep_alive(connected: socket.socket, address: str) -> None:
-    """Detect within a dozen seconds that the peer's computer has vanished, see `sockets.keep_alive`."""
+    """Detect within a dozen seconds that the peer's computer has vanished. See `sockets.keep_alive`."""
     connected.setsockopt(socket.SOL_SOCKET, socket.SO_KEEPALIVE, 1)
     if is_loopback(address):
         return

@@ -1,1 +1,1 @@
-"""Large payloads through shared memory on one computer, see docs/adr/0023-shared-memory.md."""
+"""Large payloads through shared memory on one computer. See docs/adr/0023-shared-memory.md."""

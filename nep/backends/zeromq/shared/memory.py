@@ -1,11 +1,11 @@
-"""Shared memory for payloads between programs of one computer and user, by iceoryx2.
+"""Shared memory for payloads between programs of one computer and user, over iceoryx2.
 
-The socket still carries a message per payload, so order, losses and waiting are those of the wire: see
-docs/wire.md. A publisher has one `SharedWriter` with slots of one size; a subscriber has one `SharedReader`
-per publisher. Programs that can't share memory (another computer or user, iceoryx2 missing, memory full) use
-the socket alone. Measurements: docs/adr/0023-shared-memory.md.
+The socket still carries a message per payload, so order, losses and waiting are the same as without shared
+memory; see docs/wire.md. A publisher has one `SharedWriter` with slots of one size; a subscriber has one
+`SharedReader` per publisher. Programs that can't share memory (another computer or user, iceoryx2 missing,
+memory full) use only the socket. Measurements: docs/adr/0023-shared-memory.md.
 
-iceoryx2 removes the resources of killed programs when the next program of the user starts to share memory.
+iceoryx2 releases the resources of a killed program when another program of the user starts to share memory.
 """
 
 from __future__ import annotations
@@ -30,32 +30,32 @@ from weakref import WeakValueDictionary
 from nep.system.forks import in_child
 
 SHARED_BYTES = 32 * 2**10
-"""Size from which shared memory is faster than the socket."""
+"""Size in bytes from which shared memory is faster than the socket."""
 _MAX_PAYLOAD_BYTES = 64 * 2**20
 _SLOTS_BYTES = 320 * 2**20
-"""Total size of a publisher's slots; at least `_MIN_SLOTS` slots."""
+"""Total size of a publisher's slots in bytes; there are at least `_MIN_SLOTS`."""
 _MIN_SLOTS, _MAX_SLOTS = 4, 256
 _MIN_SLOT_BYTES = 64 * 2**10
 _HELD_MOST = 12
-"""Payloads of a publisher that a reader keeps in their slots; further ones are copied to free the slots."""
+"""Maximum number of a publisher's payloads that a reader leaves in their slots; further ones are copied."""
 _HEADER_BYTES = 64
-"""Bytes before a payload: number, size, and padding for its alignment."""
+"""Size in bytes of the header before a payload: number, size, and padding for alignment."""
 _HEADER = struct.Struct("=QQ")
 _COPIED_BYTES = 2**18
-"""Size up to which payloads requested as bytes are copied on arrival, which frees their slots at once."""
+"""Size in bytes up to which payloads requested as bytes are copied on arrival, which frees their slots."""
 _LOANS = 4
 _READERS = 64
 _SPARE_BYTES = 64 * 2**20
-"""Space to keep free in the shared-memory file system: writing a page without space kills the program."""
+"""Bytes to keep free in the shared-memory file system; a write without free space kills the program."""
 _QUERY_INTERVAL_S = 0.05
 _QUERY_BYTES = _MAX_PAYLOAD_BYTES
-"""Validity of a free-space query, in time and in bytes written by one publisher."""
+"""Bytes that a publisher may write, within `_QUERY_INTERVAL_S`, before free space is queried again."""
 _MEMORY = "/dev/shm"  # noqa: S108 - only queried for free space; no file is created by name
 _MODULE = "iceoryx2"
 _logger = logging.getLogger("nep")
 _lock = threading.Lock()
 _forks = 0
-"""Number of forks between this process and the one that loaded this module."""
+"""Number of forks since the process that loaded this module."""
 
 
 class _Opened:
@@ -86,14 +86,15 @@ _process = _Process()
 
 
 def can_share() -> bool:
-    """Return True if this program may share memory, as far as known without loading iceoryx2."""
+    """Return True if this program may share memory, as far as is known without loading iceoryx2."""
     return not _process.is_refused and os.environ.get("NEP_SHARED_MEMORY", "") != "0"
 
 
 def begin_sharing() -> object:
-    """Load iceoryx2 if needed, which is slow the first time; return None if it is unavailable.
+    """Load iceoryx2 if needed, which is slow the first time.
 
-    Keep the returned object while memory is shared.
+    Returns:
+        An object to keep while memory is shared, or None if iceoryx2 is unavailable.
     """
     return _open()
 
@@ -117,7 +118,7 @@ def _new_node(library: ModuleType, folder: Path) -> Any:  # noqa: ANN401 - not t
     configuration.global_cfg.root_path = library.Path.new(str(folder))
     configuration.global_cfg.prefix = library.FileName.new("nep_")
     builder = library.NodeBuilder.new().config(configuration)
-    # Ctrl+C belongs to the program
+    # the program handles Ctrl+C itself
     builder = builder.signal_handling_mode(library.SignalHandlingMode.Disabled)
     return builder.create(library.ServiceType.Ipc)
 
@@ -135,13 +136,13 @@ def _own_folder() -> Path:
 
 
 def _keep_forever(*inherited: object) -> None:
-    # Prevents finalizers in a forked child, which would release the parent's resources.
+    # Prevents finalizers from releasing the parent's resources in a forked child process.
     for each in inherited:
         ctypes.pythonapi.Py_IncRef(ctypes.py_object(each))
 
 
 def _forked() -> None:
-    # Runs in the forked child, which starts over.
+    # Called in the forked child process, which starts from scratch.
     global _lock, _forks
     _lock, _forks = threading.Lock(), _forks + 1
     opened = None if _process.opened is None else _process.opened()
@@ -171,7 +172,7 @@ class _FreeSpace:
 
 
 def room_bytes() -> int:
-    """Return the free bytes of the shared-memory file system; 0 if unknown."""
+    """Return the number of free bytes in the shared-memory file system; 0 if unknown."""
     if sys.platform == "win32":  # Python on Windows has no statvfs
         return 0
     try:
@@ -196,7 +197,7 @@ class _Slots:
 
 
 class Loan:
-    """Slot that a payload is written into before it is published. Released with its last reference."""
+    """Slot into which a payload is written before it is published. Released with its last reference."""
 
     def __init__(self, port: Any, sample: Any, size: int) -> None:  # noqa: ANN401 - iceoryx2 is not typed
         self.size = size
@@ -207,13 +208,13 @@ class Loan:
 
     @property
     def buffer(self) -> memoryview:
-        """Writable buffer of the payload's size. It keeps the loan alive."""
+        """Writable buffer with the size of the payload. Keeps the loan alive."""
         array = (ctypes.c_uint8 * self.size).from_address(self.address)
         array.loan = self  # type: ignore[attr-defined]
         return memoryview(array).cast("B")
 
     def send(self, number: int) -> None:
-        """Hand the payload to all readers. It must not be changed afterwards."""
+        """Publish the payload to all readers. It must not be changed afterwards."""
         head = (ctypes.c_uint8 * _HEADER.size).from_address(self.address - _HEADER_BYTES)
         _HEADER.pack_into(head, 0, number, self.size)
         sample, self._sample = self._sample, None
@@ -229,7 +230,7 @@ class SharedWriter:
 
     def __init__(self, publisher: int) -> None:
         self.generation = 0
-        """Number of the memory segment that readers must open, from 1. Larger payloads need a new segment."""
+        """Number of the memory segment that readers must open, from 1; larger payloads need a new segment."""
         self.number = 0
         """Number of payloads sent."""
         self._publisher = publisher
@@ -242,7 +243,7 @@ class SharedWriter:
         self._slots = _Slots()
 
     def prepare(self, size: int) -> bool:
-        """Provide slots for payloads of `size` bytes; return False if impossible.
+        """Provide slots for payloads of `size` bytes; return False if that is impossible.
 
         May start a new `generation`.
         """
@@ -276,7 +277,7 @@ class SharedWriter:
         return True
 
     def loan(self, size: int) -> Loan | None:
-        """Return a free slot, or None if the readers hold all of them."""
+        """Return a free slot, or None if readers hold all of them."""
         sample = self._sample(size)
         if sample is None:
             return None
@@ -293,9 +294,9 @@ class SharedWriter:
             return None
 
     def copy(self, data: bytes | memoryview, size: int) -> int | None:
-        """Copy a payload into a slot and hand it to the readers.
+        """Copy a payload into a slot and publish it to the readers.
 
-        Returns the payload's number, or None without a free slot.
+        Returns the payload's number, or None if no slot is free.
         """
         sample = self._sample(size)
         if sample is None:
@@ -308,7 +309,7 @@ class SharedWriter:
         return number
 
     def lent(self, data: memoryview) -> Loan | None:
-        """Return the loan whose memory `data` is, or None."""
+        """Return the loan that owns the memory of `data`, or None."""
         if not self._loans or data.readonly or not data.c_contiguous:
             return None
         address = ctypes.addressof(ctypes.c_uint8.from_buffer(data))
@@ -316,20 +317,20 @@ class SharedWriter:
         return found if found is not None and found.size == data.nbytes else None
 
     def send(self, loan: Loan) -> int:
-        """Hand a loan to the readers; return its number."""
+        """Publish a loan to the readers; return its number."""
         self.number += 1
         self._loans.pop(loan.address, None)
         loan.send(self.number)
         return self.number
 
     def tidy(self) -> None:
-        """Reclaim the slots of killed readers."""
+        """Reclaim slots that are held by killed readers."""
         if self._opened is not None and self._port is not None:
             self._opened.node.try_cleanup_dead_nodes()
             self._port.update_connections()
 
     def close(self) -> None:
-        """Release the memory. Payloads held by readers stay valid."""
+        """Release the memory. Payloads that readers hold remain valid."""
         self._port = self._service = self._opened = None
         self._slot_bytes = 0
         self._slots = _Slots()
@@ -352,7 +353,7 @@ class SharedReader:
     """Shared memory of one publisher, as a subscriber reads it. Guarded by the subscriber's lock."""
 
     def __init__(self, publisher: int, generation: int) -> None:
-        """Open the memory. Raises `LookupError` if this program can't."""
+        """Open the memory of a publisher. Raises `LookupError` if this program can't open it."""
         self._opened = _open()
         if self._opened is None:
             raise LookupError
@@ -369,9 +370,9 @@ class SharedReader:
         _readers[id(self)] = self
 
     def read(self, number: int, *, may_copy: bool = False) -> bytes | memoryview | None:
-        """Return the payload with this number, read-only, or None if it was overwritten.
+        """Return the payload with this number as a read-only buffer, or None if it was overwritten.
 
-        With `may_copy` small payloads are copied out of their slot.
+        With `may_copy`, small payloads are copied out of their slots.
         """
         while True:
             found, self._ahead = self._ahead or self._next(), None

@@ -15,13 +15,13 @@ from nep.protocol.wire import Shares
 
 _NUMBER = struct.Struct("<Q")
 _MAX_OFFERS = 4
-"""Maximum number of offers to a subscriber; without a reply it can't share memory."""
+"""Maximum number of offers to a subscriber. One that doesn't reply can't share memory."""
 _OFFER_RETRY_S = 0.5
 _TIDY_S = 1.0
 
 
 class SharedPayloads:
-    """Shared-memory readers of one publisher. `offer(subscriber, generation)` sends an offer."""
+    """Shared-memory readers of one publisher. `offer` sends an offer of a generation to a subscriber."""
 
     def __init__(self, publisher: int, offer: Callable[[int, int], None]) -> None:
         self.readers: set[int] = set()
@@ -32,19 +32,19 @@ class SharedPayloads:
         self._tidied_at = float("-inf")
 
     def note(self, shares: Shares) -> None:
-        """Process a subscriber's confirmation that it has opened the memory."""
+        """Handle a subscriber's confirmation that it has opened the memory."""
         if shares.generation == self._writer.generation:
             self.readers.add(shares.subscriber)
 
     def forget(self, subscriber: int) -> None:
-        """Remove a subscriber that has left or says hello again."""
+        """Remove a subscriber that has left or has sent another hello."""
         self.readers.discard(subscriber)
         self._offered.pop(subscriber, None)
 
     def write(self, data: bytes | memoryview, subscribers: Mapping[int, int], now: float) -> bytes | None:
         """Write a payload to shared memory; return the part of the message that refers to it.
 
-        Returns None if it must go through the socket: no readers, or no free slot.
+        Returns None if the payload must go through the socket, because there is no reader or no free slot.
         """
         size = data.nbytes if isinstance(data, memoryview) else len(data)
         if not subscribers or not self._is_ready(size, subscribers, now):
@@ -85,13 +85,13 @@ class SharedPayloads:
         return None if loan is None else loan.buffer
 
     def close(self) -> None:
-        """Stop sharing."""
+        """Stop sharing memory."""
         self.readers.clear()
         self._writer.close()
 
 
 class SharedSources:
-    """Shared-memory readers of one subscriber; `answer` confirms an offer to the publisher."""
+    """Memory that one subscriber shares with publishers. `answer` sends the confirmation of an offer."""
 
     def __init__(self, subscriber: int, answer: Callable[[Shares], None]) -> None:
         self._subscriber = subscriber
@@ -99,7 +99,7 @@ class SharedSources:
         self._readers: dict[int, SharedReader] = {}
 
     def open(self, publisher: int, generation: int) -> None:
-        """Open the memory that a publisher offers, and confirm it if that succeeded."""
+        """Open the memory that a publisher offers; confirm the offer if opening succeeded."""
         known = self._readers.get(publisher)
         if known is None or known.generation != generation:
             try:
@@ -111,11 +111,9 @@ class SharedSources:
     def read(
         self, publisher: int, part: bytes | memoryview, *, may_copy: bool = False
     ) -> bytes | memoryview | None:
-        """Return the payload that a message's part refers to, or None if it was overwritten.
+        """Return the payload to which a message's part refers, or None if it was overwritten.
 
-        Raises `WireError`.
-
-        With `may_copy` small payloads are copied out of their slot.
+        With `may_copy`, small payloads are copied out of their slots. Raises `WireError`.
         """
         reader = self._readers.get(publisher)
         if len(part) != _NUMBER.size:
@@ -125,7 +123,7 @@ class SharedSources:
         return None if reader is None else reader.read(_NUMBER.unpack(part)[0], may_copy=may_copy)
 
     def leave(self, publisher: int) -> None:
-        """Close a publisher's memory; payloads in use stay valid."""
+        """Close the memory of a publisher. Payloads in use remain valid."""
         self._readers.pop(publisher, None)
 
     def close(self) -> None:
