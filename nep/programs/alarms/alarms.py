@@ -1,4 +1,4 @@
-"""Alarms: rules, the actions that run when one turns on, and the history. Used by `nep watch` and Studio."""
+"""`Alarms`: alarm rules, their actions and history. Used by `nep watch` and Studio."""
 
 from __future__ import annotations
 
@@ -22,9 +22,9 @@ MAX_TRIES = 20
 _MAX_DEEDS = 1_000
 
 Done = Callable[[bool, str], None]
-"""Completion callback of an action: success, and the result in words. Called once, from any thread."""
+"""Completion callback of an action: (success, result as text). Called once, from any thread."""
 Carrier = Callable[[AlarmEvent, AlarmAction, Done], None]
-"""Function that starts one kind of action without blocking."""
+"""Function that starts an action of one kind without blocking, and calls `Done` when it has ended."""
 
 
 @dataclass(slots=True)
@@ -55,7 +55,8 @@ class Alarms:
         Args:
             rules: Rules to evaluate.
             history: Earlier records (default: none).
-            carriers: Functions that run actions, by kind of action; other kinds are recorded as failed.
+            carriers: Functions that start actions, by kind of action. Actions of other kinds are recorded as
+                failed.
             clock: Monotonic clock in seconds.
             clock_s: Clock in seconds since 1970.
         """
@@ -68,7 +69,7 @@ class Alarms:
         self._deeds: deque[tuple[AlarmRule, str, float]] = deque(maxlen=_MAX_DEEDS)
         self._running_count = 0
         self.revision = 0
-        """Number of rule changes."""
+        """Number of changes to the rules so far."""
 
     @property
     def rules(self) -> tuple[AlarmRule, ...]:
@@ -96,13 +97,13 @@ class Alarms:
         self.set_rules([each for each in self.rules if each.id != rule_id])
 
     def snooze(self, rule_id: str, until_s: float) -> None:
-        """Run no actions of this alarm until `until_s` (seconds since 1970; 0 ends a snooze)."""
+        """Run no actions of a rule until `until_s` (seconds since 1970; 0 ends the snooze)."""
         rule = self.rule(rule_id)
         if rule is not None:
             self.put(replace(rule, snoozed_until_s=until_s))
 
     def retry_in_s(self, rule_id: str) -> float | None:
-        """Return the seconds until a failed action is retried, or None if none is pending."""
+        """Return the seconds until a failed action of a rule is retried, or None if no retry is pending."""
         dues = [retry.due for (id, _kind), retry in self._retries.items() if id == rule_id]
         return max(0.0, min(dues) - self._clock()) if dues else None
 
@@ -112,13 +113,13 @@ class Alarms:
         return self._running_count > 0
 
     def take_deeds(self) -> list[tuple[AlarmRule, str, float]]:
-        """Return the actions completed since the last call: (rule, result in words, seconds since 1970)."""
+        """Return and clear the completed actions: (rule, result as text, time in seconds since 1970)."""
         deeds = list(self._deeds)
         self._deeds.clear()
         return deeds
 
     def tick(self) -> list[AlarmEvent]:
-        """Evaluate time-based rules, start actions and retries, and return the new events."""
+        """Evaluate time-based rules, start actions and due retries, and return the new events."""
         self._process_results()
         events = self.evaluator.tick()
         for event in events:

@@ -17,7 +17,7 @@ from nep.programs.alarms.rule import AlarmAction
 __all__ = ["CALL_S", "AlarmCommands"]
 
 CALL_S = 5.0
-"""Timeout of a service call."""
+"""Time limit of a service call in seconds."""
 _MAX_CACHED = 50
 
 
@@ -36,7 +36,7 @@ class AlarmCommands:
         self._node: Node | None = None
 
     def carry(self, node: Node, action: AlarmAction, done: Done) -> None:
-        """Start an action. Blocks for a publisher's first handshake, not for replies. Never raises."""
+        """Start an action. Waits for the handshake of a new publisher, but not for replies. Never raises."""
         try:
             with self._lock:
                 self._use_node(node)

@@ -24,10 +24,10 @@ from nep.protocol.topic_pattern import matches
 __all__ = ["AlarmEvaluator", "AlarmEvent", "AlarmPhase", "AlarmState"]
 
 LARGE_BYTES = 256 * 1024
-"""Of larger messages only the newest of each batch is decoded."""
+"""Size above which a message is decoded only if it is the newest of its batch."""
 MAX_EVENTS = 1_000
 MASTER_GRACE_S = 3.0
-"""Time in which nodes register at a restarted master; until then none counts as gone."""
+"""Time after a master's restart in which nodes register again; no node counts as disconnected before."""
 RATE_WINDOW_S, MAX_RATE_WINDOW_S = 2.0, 60.0
 _SAMPLE_PERIOD_S = 0.25
 _MAX_SAMPLES = 256
@@ -37,10 +37,16 @@ AlarmPhase = Literal["off", "faulty", "waits", "well", "pending", "on"]
 
 @dataclass(frozen=True, slots=True)
 class AlarmEvent:
-    """Transition of an alarm: "on", "off", or "still" on when its snooze ended.
+    """Transition of an alarm.
 
-    `seen` is the value that caused it, `at_s` its time (s since 1970), `lasted_s` how long the alarm was on,
-    `count` how often it occurred meanwhile. With `is_snoozed` no action is run.
+    Attributes:
+        kind: "on", "off", or "still" if the alarm is still on when its snooze ends.
+        rule: Rule of the alarm.
+        at_s: Time of the transition (s since 1970).
+        seen: Value that caused it.
+        lasted_s: How long the alarm was on.
+        count: Number of times the condition became true while the alarm was on.
+        is_snoozed: True if no action runs.
     """
 
     kind: Literal["on", "off", "still"]
@@ -57,12 +63,12 @@ class AlarmState:
     """Current state of an alarm.
 
     Attributes:
-        phase: "off" (disabled), "faulty" (invalid rule), "waits" (its subject was never seen), "well"
-            (condition false), "pending" (true, but not yet long enough) or "on".
+        phase: "off" (disabled), "faulty" (invalid rule), "waits" (its topic or node was never seen), "well"
+            (condition false), "pending" (condition true, but not yet long enough) or "on".
         seen: Newest value.
         on_for_s: How long the alarm has been on.
-        count: How often it occurred since it is on.
-        trouble: "missing" if the newest message lacks the field, "no_number" if it isn't a number,
+        count: Number of times the condition became true since the alarm turned on.
+        trouble: "missing" if the newest message lacks the field, "no_number" if the field isn't a number,
             "unreadable" if the message can't be decoded.
     """
 
@@ -75,7 +81,7 @@ class AlarmState:
 
 @dataclass(slots=True, eq=False)
 class _SubscribedTopic:
-    """Subscribed topic: its message count, last arrival, and the rules that read its values."""
+    """Subscribed topic: message count, time of the last message, and the rules that read its values."""
 
     readers: list[AlarmTrack] = field(default_factory=list)
     there_since: float | None = None
@@ -94,7 +100,7 @@ class _SubscribedTopic:
 
 
 class AlarmEvaluator:
-    """Evaluator of alarm rules. `take` is thread-safe; call the rest from one thread."""
+    """Evaluator of alarm rules. `evaluate` is thread-safe; call the other methods from one thread."""
 
     def __init__(
         self,
@@ -121,7 +127,7 @@ class AlarmEvaluator:
         self.skipped = 0
         """Number of large messages that were not decoded."""
         self.came = threading.Event()
-        """Set when a message turned an alarm on, so that a waiting thread wakes up."""
+        """Event that is set when a message turned an alarm on, to wake the thread that calls `tick`."""
         self.set_rules(rules)
 
     @property
@@ -131,11 +137,11 @@ class AlarmEvaluator:
 
     @property
     def topics(self) -> frozenset[str]:
-        """Topics that must be subscribed for the rules."""
+        """Topics that the rules need to be subscribed."""
         return topics_of([track.rule for track in self._tracks.values()])
 
     def set_rules(self, rules: Sequence[AlarmRule]) -> None:
-        """Replace the rules; unchanged rules keep their state."""
+        """Replace the rules. Rules with an unchanged condition keep their state."""
         now = self._clock()
         with self._lock:
             before, self._tracks = self._tracks, {}
@@ -178,7 +184,7 @@ class AlarmEvaluator:
     # ---- inputs
 
     def evaluate(self, topic: str, messages: Sequence[Message]) -> None:
-        """Process messages of a topic, oldest first. Does nothing for topics without a rule."""
+        """Process messages of a topic, oldest first. Topics without a rule are ignored."""
         subscription = self._subscribed.get(topic)
         if subscription is None or not messages:
             return
@@ -201,7 +207,7 @@ class AlarmEvaluator:
             self.came.set()
 
     def see(self, view: GraphView | None) -> None:
-        """Process a new graph; None while no master replies, so that no node counts as gone."""
+        """Process a new graph. Pass None while no master replies, so that no node counts as disconnected."""
         now = self._clock()
         with self._lock:
             before, self._view = self._view, view

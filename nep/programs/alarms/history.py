@@ -1,4 +1,4 @@
-"""Bounded history of alarms: when each was on, for how long, and which actions ran."""
+"""Bounded history of alarms: when an alarm was on, for how long, and which actions ran."""
 
 from __future__ import annotations
 
@@ -15,11 +15,11 @@ MAX_RECORDS = 500
 _MAX_DEEDS = 20
 _MAX_CHARACTERS = 300
 _MAX_TIME_S = 3e10
-"""Later times (after the year 2920) are invalid: some systems have no date for them."""
+"""Maximum time stamp (the year 2920). Later times are invalid: some systems can't convert them to a date."""
 
 
 class AlarmDeed(NamedTuple):
-    """Completed action: its kind, and the result in words."""
+    """Completed action: its kind, and its result as text."""
 
     kind: str
     words: str
@@ -31,12 +31,12 @@ class AlarmRecord:
 
     Attributes:
         rule_id: Id of the rule.
-        words: What was seen, such as "range of /distance is 0.36, below 0.4".
+        words: Cause as text, such as "range of /distance is 0.36, below 0.4".
         at_s: Start (s since 1970).
-        lasted_s: Duration, None while the alarm is on or if its end was not seen.
+        lasted_s: Duration; None while the alarm is on, or if its end was not observed.
         is_on: True while the alarm is on.
-        count: How often the condition became true in this period.
-        was_snoozed: True if no action ran.
+        count: Number of times the condition became true in this period.
+        was_snoozed: True if no action ran because of a snooze.
         deeds: Completed actions.
     """
 
@@ -56,7 +56,7 @@ class AlarmRecord:
 
 
 class AlarmHistory:
-    """The last `MAX_RECORDS` records, oldest first; iteration is newest first. Not thread-safe."""
+    """Newest `MAX_RECORDS` records of alarms. Iteration starts with the newest. Not thread-safe."""
 
     def __init__(self, records: Iterable[AlarmRecord] = ()) -> None:
         self.records: deque[AlarmRecord] = deque(records, maxlen=MAX_RECORDS)
@@ -74,7 +74,7 @@ class AlarmHistory:
         self.revision += 1
 
     def current(self, rule_id: str) -> AlarmRecord | None:
-        """Return the record of an alarm that is on, or None."""
+        """Return the record of the period in which an alarm currently is on, or None."""
         return next((each for each in self if each.rule_id == rule_id and each.is_on), None)
 
     def last(self, rule_id: str) -> AlarmRecord | None:
@@ -82,17 +82,17 @@ class AlarmHistory:
         return next((each for each in self if each.rule_id == rule_id), None)
 
     def since(self, rule_id: str, at_s: float) -> int:
-        """Return how often an alarm turned on since `at_s`."""
+        """Return the number of times an alarm has turned on since `at_s` (seconds since 1970)."""
         return sum(each.rule_id == rule_id and each.at_s >= at_s for each in self.records)
 
     def clear(self) -> None:
-        """Remove all records except of alarms that are on."""
+        """Remove all records except those of alarms that are on."""
         self.records = deque((each for each in self.records if each.is_on), maxlen=MAX_RECORDS)
         self.revision += 1
 
 
 def record_plain(record: AlarmRecord) -> dict[str, object]:
-    """Convert a record to its JSON form."""
+    """Convert a record to a JSON-serializable dict."""
     plain: dict[str, object] = {"alarm": record.rule_id, "words": record.words, "at_s": round(record.at_s, 3)}
     if record.lasted_s is not None:
         plain["lasted_s"] = round(record.lasted_s, 3)
@@ -106,7 +106,10 @@ def record_plain(record: AlarmRecord) -> dict[str, object]:
 
 
 def record_from(plain: object) -> AlarmRecord | None:
-    """Convert JSON to a record; None if it is invalid. Records are never on: their end was not seen."""
+    """Convert a decoded JSON value to a record, or return None if it is invalid.
+
+    The record is never on, because the end of its period was not observed.
+    """
     if not isinstance(plain, Mapping):
         return None
     rule_id, words, at_s = plain.get("alarm"), plain.get("words"), plain.get("at_s")

@@ -1,4 +1,4 @@
-"""Recent losses of a topic's subscribers, computed from the counts in the graph."""
+"""Recent message losses of a topic, computed from the subscribers' counts in the graph."""
 
 from __future__ import annotations
 
@@ -10,11 +10,14 @@ __all__ = ["TopicLosses"]
 
 _SAMPLE_PERIOD_S = 0.9
 _MAX_SAMPLES = 700
-"""Number of samples: ten minutes."""
+"""Maximum number of samples, which cover ten minutes."""
 
 
 class TopicLosses:
-    """Loss counts per subscriber, so that new and restarted subscribers don't count as losses."""
+    """Sliding window over the loss counts of a topic's subscribers.
+
+    Counts are compared per subscriber, so that a new or restarted subscriber doesn't appear as a loss.
+    """
 
     def __init__(self) -> None:
         self._before: dict[int, tuple[int, int]] = {}
@@ -22,7 +25,12 @@ class TopicLosses:
         self._known = False
 
     def add(self, info: TopicInfo | None, now: float) -> None:
-        """Add the counts of a graph snapshot; None if the topic doesn't exist."""
+        """Add the counts of a graph snapshot.
+
+        Args:
+            info: Topic in the graph; None if the topic doesn't exist.
+            now: Time of the snapshot (monotonic, s).
+        """
         counts = {
             each.id: (each.lost, each.received)
             for each in (info.subscribers if info is not None else ())
@@ -43,7 +51,7 @@ class TopicLosses:
             self._samples.append((now, lost, received))
 
     def percent(self, window_s: float, now: float) -> float | None:
-        """Return the percentage of messages lost in the last `window_s`, or None if unknown."""
+        """Return the percentage of messages lost in the last `window_s` seconds, or None if unknown."""
         if not self._known:
             return None
         lost = received = 0

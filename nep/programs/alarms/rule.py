@@ -1,4 +1,4 @@
-"""Alarm rules: condition, actions, and their validation. Pure data."""
+"""Alarm rules: conditions, actions, and validation. Performs no input or output."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ __all__ = [
 ]
 
 Scalar = float | int | str | bool | None
-"""Value that a field is compared with."""
+"""Type of values that a field can be compared with."""
 
 TOPIC_KINDS = ("silent", "rate_below", "rate_above", "loses", "appears")
 VALUE_KINDS = ("below", "above", "equals", "is_not", "changes")
@@ -43,7 +43,7 @@ KINDS = (*TOPIC_KINDS, *VALUE_KINDS, *NODE_KINDS)
 NEEDS_LIMIT = frozenset({"rate_below", "rate_above", "loses", "below", "above", "equals", "is_not"})
 NUMBER_KINDS = NEEDS_LIMIT - {"equals", "is_not"}
 EVENT_KINDS = frozenset({"changes", "appears", "comes"})
-"""Conditions that are momentary, not lasting."""
+"""Kinds of conditions that describe a momentary event instead of a lasting state."""
 ACTION_KINDS = ("banner", "sound", "keep", "run", "call", "send", "stop", "console")
 NAMED_ACTIONS = frozenset({"run", "call", "send"})
 
@@ -63,12 +63,12 @@ class AlarmCondition:
 
     Attributes:
         kind: One of `KINDS`.
-        name: Topic (with "appears" also a pattern) or node; "" while not chosen.
+        name: Topic (with "appears" also a pattern) or node; "" if not chosen yet.
         path: Field path of the compared value, as in `nep topic echo`.
         limit: Value to compare with: a number for `NUMBER_KINDS` (Hz for rates, percent for "loses").
-        for_s: How long the condition must hold without a break; for "silent" the silence, for "loses" the
-            length of the window.
-        margin: Hysteresis: distance beyond the limit that a number must go back before the alarm turns off.
+        for_s: How long the condition must hold without interruption; for "silent" the duration of the
+            silence, for "loses" the length of the window.
+        margin: Hysteresis: how far a number must return beyond the limit before the alarm turns off.
     """
 
     kind: str
@@ -80,12 +80,12 @@ class AlarmCondition:
 
     @property
     def is_about_node(self) -> bool:
-        """True if `name` is a node."""
+        """True if `name` is the name of a node."""
         return self.kind in NODE_KINDS
 
     @property
     def is_about_value(self) -> bool:
-        """True if messages must be decoded."""
+        """True if the condition compares a field, so that messages must be decoded."""
         return self.kind in VALUE_KINDS
 
     @property
@@ -96,7 +96,7 @@ class AlarmCondition:
 
     @property
     def needs_topic(self) -> bool:
-        """True if the topic must be subscribed."""
+        """True if the condition needs a subscription to the topic."""
         return self.is_about_value or self.kind in {"silent", "rate_below", "rate_above"}
 
 
@@ -125,12 +125,13 @@ class AlarmRule:
 
     Attributes:
         id: Unique id.
-        condition: When the alarm turns on.
-        actions: What runs then.
-        is_on: False if a person disabled the alarm.
+        condition: Condition that turns the alarm on.
+        actions: Actions that run when the alarm turns on.
+        is_on: False if a person disabled the rule.
         calm_s: How long the condition must be false before the alarm turns off; repetitions before that are
             counted, not reported.
-        snoozed_until_s: End of the snooze (s since 1970), in which no actions run; the history continues.
+        snoozed_until_s: End of the snooze (s since 1970). Until then no actions run, but the history
+            continues.
     """
 
     id: str
@@ -141,12 +142,12 @@ class AlarmRule:
     snoozed_until_s: float = 0.0
 
     def is_snoozed(self, now_s: float) -> bool:
-        """Return whether the alarm is snoozed at `now_s` (s since 1970)."""
+        """Return True if the rule is snoozed at `now_s` (seconds since 1970)."""
         return now_s < self.snoozed_until_s
 
 
 class RuleProblem(NamedTuple):
-    """Problem of a rule: the key in its file, and a sentence without full stop."""
+    """Problem of a rule: its key in the alarm file, and a sentence without full stop."""
 
     key: str
     sentence: str
@@ -171,7 +172,7 @@ class _Check:
 
 
 def float_of(number: float) -> float:
-    """Convert a number to a float; an integer that is too large becomes infinite."""
+    """Convert a number to a float; an integer that is too large becomes infinity."""
     try:
         return float(number)
     except OverflowError:
@@ -260,7 +261,5 @@ def _is_scalar(value: object) -> bool:
 
 
 def topics_of(rules: Sequence[AlarmRule]) -> frozenset[str]:
-    """Return the topics that must be subscribed for these rules."""
-    return frozenset(
-        rule.condition.name for rule in rules if rule.condition.needs_topic and rule.condition.name
-    )
+    """Return the topics to which the rules need a subscription."""
+    return frozenset(rule.condition.name for rule in rules if rule.condition.needs_topic and rule.condition.name)

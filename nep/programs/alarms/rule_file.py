@@ -1,4 +1,4 @@
-"""Alarm file: JSON ↔ rules and history. Errors name the line.
+"""Alarm file: conversion between JSON and alarm rules with their history. Errors name the line.
 
 ::
 
@@ -80,7 +80,7 @@ EXAMPLE = """\
  ]
 }
 """
-"""Output of `nep watch --example`."""
+"""Example of an alarm file, printed by `nep watch --example`."""
 
 _ROOT_KEYS = ("format", "alarms", "history")
 _RULE_KEYS = ("id", "on", "when", "do", "calm_s", "snoozed_until_s")
@@ -97,7 +97,7 @@ _DEFAULT_FOR: Mapping[str, float] = {"silent": 2.0, "loses": 30.0}
 
 @dataclass(frozen=True, slots=True)
 class AlarmFile:
-    """Content of an alarm file: rules, history, and the problems of rules that were skipped."""
+    """Content of an alarm file: rules, history, and a message for each invalid rule that was skipped."""
 
     rules: tuple[AlarmRule, ...] = ()
     history: AlarmHistory | None = None
@@ -105,7 +105,7 @@ class AlarmFile:
 
 
 def read_alarms(path: Path) -> AlarmFile:
-    """Read the alarms of a file. Raises `NepError` for the first problem."""
+    """Read an alarm file. Raises `NepError` with the first problem."""
     try:
         with path.open("rb") as file:
             data = file.read(_MAX_BYTES + 1)
@@ -123,7 +123,7 @@ def read_text(data: bytes, path: str, *, lenient: bool = False) -> AlarmFile:
 
     Args:
         data: Content of the file.
-        path: Its path, for error messages.
+        path: Path of the file, for error messages.
         lenient: Skip invalid alarms and report them in `AlarmFile.problems`.
 
     Raises:
@@ -195,15 +195,15 @@ def _action_plain(action: AlarmAction) -> object:
 
 
 class NewerAlarmsError(NepError):
-    """Alarm file of a newer version; it may be valid."""
+    """Error for an alarm file written by a newer version, in which the file may be valid."""
 
 
 class _InvalidAlarm(Exception):  # noqa: N818 - never leaves this module
-    """Invalid alarm; the message is complete."""
+    """Error for an invalid alarm. The message needs no further context."""
 
 
 class _Reader:
-    """Parser of alarm files that knows the line of each alarm and key."""
+    """Parser of alarm files that tracks the line of each alarm and key for error messages."""
 
     def __init__(self, path: str, text: str, *, lenient: bool) -> None:
         self._path, self._text, self._lenient = path, text, lenient

@@ -1,4 +1,4 @@
-"""Alarm rules, events and values as text for people."""
+"""Formatting of alarm rules, events and values as translated text."""
 
 from __future__ import annotations
 
@@ -82,7 +82,7 @@ def time_words(seconds: float) -> str:
 
 
 def value_words(value: object) -> str:
-    """Format a field's value; long texts are shortened, lists and maps shown by kind."""
+    """Format the value of a field. Long texts are shortened; lists and maps are shown as their kind."""
     if isinstance(value, bool) or value is None:
         return {True: _("true"), False: _("false"), None: _("null")}[value]
     if isinstance(value, int):
@@ -95,7 +95,7 @@ def value_words(value: object) -> str:
 
 
 def limit_words(condition: AlarmCondition, value: Scalar) -> str:
-    """Format a limit or value with the unit of the condition."""
+    """Format a limit or a value with the unit that the condition implies."""
     if condition.kind in {"rate_below", "rate_above"} and isinstance(value, int | float):
         return _("{count} messages per second").format(count=number(value, ".4g"))
     if condition.kind == "loses" and isinstance(value, int | float):

@@ -1,4 +1,4 @@
-"""State machine of one alarm: pending, on, off. Pure; the time is passed in.
+"""State machine of one alarm: off, pending, on. Has no clock; the time is passed in.
 
 An alarm stays on until its condition was false for `calm_s`; repetitions before that are counted, not
 reported.
@@ -17,13 +17,20 @@ from nep.programs.alarms.rule import EVENT_KINDS, MAX_CHARACTERS, AlarmRule, Sca
 __all__ = ["AlarmTrack", "Turn", "scalar_of"]
 
 EVENT_SHOWN_S = 5.0
-"""Minimum time that an alarm of a momentary event stays on."""
+"""Minimum time that an alarm caused by a momentary event stays on, in seconds."""
 
 Trouble = Literal["", "missing", "no_number"]
 
 
 class Turn(NamedTuple):
-    """Transition of an alarm; `lasted_s` is how long it was on, 0 when it turns on."""
+    """Transition of an alarm.
+
+    Attributes:
+        is_on: True if the alarm turned on, False if it turned off.
+        seen: Value that caused the transition.
+        lasted_s: How long the alarm was on; 0 if it turned on.
+        times: Number of times the condition became true while the alarm was on.
+    """
 
     is_on: bool
     seen: Scalar
@@ -33,14 +40,17 @@ class Turn(NamedTuple):
 
 @dataclass(slots=True)
 class _Value:
-    """Field path and last value read."""
+    """Field path of a rule, and the value last read there."""
 
     path: Path = ()
     last: object = MISSING
 
 
 class AlarmTrack:
-    """State of one alarm. `observe` inputs, `settle` when time passes; both may return a `Turn`."""
+    """State of one alarm.
+
+    Call `observe` with new input and `settle` as time passes; both may return a `Turn`.
+    """
 
     def __init__(self, rule: AlarmRule) -> None:
         self.rule = rule
@@ -56,9 +66,9 @@ class AlarmTrack:
         self.count = 0
         self.seen: Scalar = None
         self.was_seen = False
-        """True if the alarm's subject ever existed."""
+        """True if the alarm's topic or node has ever existed."""
         self.trouble: Trouble = ""
-        """Why the last value can't be compared."""
+        """Reason why the last value can't be compared; "" if it can."""
 
     @property
     def is_on(self) -> bool:
@@ -67,11 +77,11 @@ class AlarmTrack:
 
     @property
     def is_pending(self) -> bool:
-        """True if the condition holds, but not yet for long enough."""
+        """True if the condition holds, but not long enough yet."""
         return self._true_since is not None and not self.is_on
 
     def read(self, payload: object, now: float) -> Turn | None:
-        """Process a payload of the alarm's topic; `now` is monotonic (s)."""
+        """Process a payload of the alarm's topic; `now` is the monotonic time in seconds."""
         value = pick(payload, self._value.path)
         if self._is_false_fast(value):
             self.seen, self.trouble, self.was_seen = value, "", True  # type: ignore[assignment]  # a number
@@ -105,9 +115,13 @@ class AlarmTrack:
         return value >= self._bound if self._is_below else value <= self._bound
 
     def compare(self, number: float, now: float, *, is_below: bool, seen: Scalar = None) -> Turn | None:
-        """Process a number compared with the limit, with hysteresis.
+        """Compare a number with the limit, with hysteresis.
 
-        `seen` is the original value if it was converted to a float.
+        Args:
+            number: Number to compare.
+            now: Monotonic time in seconds.
+            is_below: True if the condition is that the number is below the limit, False for above.
+            seen: Original value, if `number` was converted from it.
         """
         limit, margin = self.rule.condition.number, self.rule.condition.margin
         if self.is_on:
@@ -117,13 +131,13 @@ class AlarmTrack:
         return self.observe(is_so, number if seen is None else seen, now)
 
     def happened(self, now: float) -> Turn | None:
-        """Process a momentary event."""
+        """Process a momentary event: turn the alarm on, and let it turn off after `EVENT_SHOWN_S`."""
         turn = self.observe(True, self.seen, now)
         self.observe(False, self.seen, now)
         return turn
 
     def observe(self, is_so: bool, seen: Scalar, now: float) -> Turn | None:
-        """Process whether the condition holds now, and the value seen."""
+        """Process the current truth of the condition (`is_so`) and the value that was seen."""
         turn = self.advance(now)
         self.was_seen = True
         self.seen = seen
@@ -140,7 +154,7 @@ class AlarmTrack:
         return turn or self.advance(now)
 
     def advance(self, now: float) -> Turn | None:
-        """Update the state for the time that has passed."""
+        """Update the state for the time that has passed since the last call."""
         since, false_since = self._true_since, self._false_since
         if self.on_since is None:
             if since is None or now - since < self._for_s:
@@ -154,7 +168,7 @@ class AlarmTrack:
         return turn
 
     def end(self, now: float) -> Turn | None:
-        """Turn the alarm off because it is no longer evaluated."""
+        """Turn the alarm off because its rule is no longer evaluated."""
         if self.on_since is None:
             return None
         end = now if self._false_since is None else self._false_since
@@ -164,7 +178,7 @@ class AlarmTrack:
 
 
 def scalar_of(value: object) -> Scalar:
-    """Convert a value for display in an event: lists and maps become their size, long texts are cut.
+    """Convert a value for an event: a list or map becomes its size, a long text is cut.
 
     Integers beyond 64 bits become floats, because few JSON readers accept them.
     """

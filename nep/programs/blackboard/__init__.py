@@ -1,1 +1,1 @@
-"""Blackboard: newest values of topics by key, with their ages. `nep.Blackboard`."""
+"""Blackboard: the newest values of topics by key, with their ages. Public as `nep.Blackboard`."""

@@ -1,8 +1,8 @@
-"""Start of a message's age. Pure.
+"""Start time of a message's age. Performs no input or output.
 
-The time stamp is used if the publisher's clock agrees with ours, so that transmission time and time kept as
-latched count; else the arrival. The wall clock is read once, at arrival: later clock changes don't affect
-ages.
+If the clocks of publisher and receiver agree, the age starts at the message's time stamp, which includes
+transmission and the time it was latched; otherwise at its arrival. The wall clock is read once, at arrival,
+so that later clock changes don't affect ages.
 """
 
 from __future__ import annotations
@@ -13,14 +13,14 @@ from nep.programs.blackboard.entries import AgeBy
 __all__ = ["AHEAD_S", "BEHIND_S", "beginning_of"]
 
 AHEAD_S = 0.1
-"""A stamp further in the future comes from a wrong clock."""
+"""Maximum time that a stamp may be in the future, in seconds; beyond, the publisher's clock is wrong."""
 BEHIND_S = 10.0
-"""An older stamp comes from a wrong clock, unless the message is latched."""
+"""Maximum age of a stamp at arrival in seconds, unless the message is latched; beyond, the clock is wrong."""
 _NS = 1e9
 
 
 def beginning_of(message: Message, now: float, wall_ns: int) -> tuple[float, AgeBy]:
-    """Return when the message's age began (on the clock of `now`), and which source was used."""
+    """Return the start of a message's age (on the clock of `now`), and its source: "stamp" or "arrival"."""
     if message.stamp_ns is None:
         return now, "arrival"
     on_the_way_s = (wall_ns - message.stamp_ns) / _NS

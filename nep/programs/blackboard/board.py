@@ -37,7 +37,7 @@ MAX_KEYS = 100_000
 MAX_BYTES = 256 * 2**20
 _MAX_CHANGES = 10_000
 _WAIT_SLICE_S = 0.1
-"""Waits are split into slices, to notice a closed node, and for Ctrl+C on Windows."""
+"""Maximum duration of a single wait, to notice a closed node, and for Ctrl+C on Windows."""
 _IMMEDIATE_S = 1e-6
 _MIN_TIMER_S = 0.001
 _MAX_SUGGESTIONS = 1_000
@@ -52,12 +52,12 @@ class BlackboardEntry:
         key: Key, such as ``human.1.position``.
         value: Copy of the value.
         age_s: Age in seconds.
-        age_by: "stamp" if the age counts from the publisher's time stamp, "arrival" if from the arrival,
-            because there is no stamp or the clocks don't agree.
-        source: Topic of the value, "" if it was set with `Blackboard.put`.
-        robot: Robot that perceived it, if the message names one.
+        age_by: "stamp" if the age starts at the publisher's time stamp; "arrival" if it starts at the
+            arrival, because there is no stamp or the clocks don't agree.
+        source: Topic of the value; "" if the value was set with `Blackboard.put`.
+        robot: Robot that perceived the value, if the message names one.
         stamp_ns: Publisher's time stamp (ns since 1970), if any.
-        left_s: Seconds until the value expires; infinite if it doesn't.
+        left_s: Seconds until the value expires; infinite if it doesn't expire.
     """
 
     key: str
@@ -75,9 +75,9 @@ class BlackboardChange:
     """Change of a key's value.
 
     Attributes:
-        entry: New entry, or the last one if the key is gone.
-        cause: "new" or "changed"; or, if the key is gone, "expired", "removed", "dropped" (memory limit) or
-            "replaced" (by a value above or below the key).
+        entry: New entry, or the last one if the key has no value any more.
+        cause: "new" or "changed"; or, if the key has no value any more, "expired", "removed", "dropped"
+            (memory limit) or "replaced" (by a value of a key above or below).
     """
 
     entry: BlackboardEntry
@@ -90,7 +90,7 @@ class BlackboardChange:
 
     @property
     def value(self) -> object:
-        """New value; None if the key is gone."""
+        """New value; None if the key has no value any more."""
         return None if self.is_gone else self.entry.value
 
     @property
@@ -110,12 +110,13 @@ class _Observer(NamedTuple):
 class Blackboard:
     """Store of the newest value of each key, from watched topics and from `put`. Thread-safe.
 
-    Watched messages are stored by a thread of the node; only `on_change` needs `Node.spin`. Values are copied
-    in and out.
+    Watched messages are stored by a thread of the node; only the callbacks of `on_change` need `Node.spin`.
+    Values are copied when they are stored and when they are read.
 
     Args:
-        node: Node that subscribes; None for a board without topics.
-        max_keys: Maximum number of keys; the values updated longest ago are dropped and counted in `dropped`.
+        node: Node that subscribes to the watched topics; None for a blackboard without topics.
+        max_keys: Maximum number of keys. Beyond, the least recently updated values are dropped and counted in
+            `dropped`.
         max_bytes: Approximate memory limit, enforced in the same way.
         clock: Monotonic clock in seconds.
         wall_clock_ns: Clock in nanoseconds since 1970.
@@ -153,7 +154,7 @@ class Blackboard:
         self._pending_bytes = 0
         self._timer_at = math.inf
         self.changes_dropped = 0
-        """Number of changes not delivered to callbacks because they came faster than the node spins."""
+        """Number of changes that were not passed to callbacks, because the node doesn't spin fast enough."""
         forks.watch(self)
 
     # ---- writing
@@ -169,21 +170,21 @@ class Blackboard:
         each: str = "",
         lives_s: float | None = None,
     ) -> BlackboardWatch:
-        """Store the messages of a topic or pattern; the fields of a map are stored by their own keys.
+        """Store the messages of a topic or pattern. Each field of a map is stored under its own key.
 
         Args:
             topic: Topic or pattern.
             msg_type: Message type.
             configuration: As for `Node.new_sub`.
-            key: Key to store under; a name in braces is replaced by that field of the message, as in
-                ``human.{id}``. None stores RIZE perceptions at the root (``touched.head``) and others under
-                the topic's name.
-            fields: Fields to store, or a mapping to other names (default: all).
-            each: Field with a list of messages to store one by one.
-            lives_s: Seconds after which a value that is not updated expires; None keeps it.
+            key: Key to store messages under. A name in braces is replaced with that field of the message, as
+                in ``human.{id}``. With None, perceptions of RIZE are stored at the root (``touched.head``)
+                and other messages under the topic's name.
+            fields: Fields to store, or a mapping from fields to other names (default: all fields).
+            each: Field that contains a list of items to store one by one.
+            lives_s: Seconds after which a value expires unless it is updated; None for no expiry.
 
         Returns:
-            The watch, which counts messages; close it to stop.
+            The watch, which counts messages. Close it to stop storing.
 
         Raises:
             BadKeyError: The key is invalid. Other errors are those of `Node.new_sub`.
@@ -215,12 +216,12 @@ class Blackboard:
             self._ignored |= {publisher}
 
     def put(self, key: str | tuple[str, ...], value: object, *, lives_s: float | None = None) -> None:
-        """Store a value; the fields of a map are stored by their own keys, keeping other keys.
+        """Store a value. Each field of a map is stored under its own key; other keys below `key` stay.
 
         Args:
             key: Key, or a tuple of its names.
             value: Any value; it is copied.
-            lives_s: Seconds after which the value expires; None keeps it.
+            lives_s: Seconds after which the value expires; None for no expiry.
 
         Raises:
             BadKeyError: The key is invalid.
@@ -236,7 +237,7 @@ class Blackboard:
         self._store(entries)
 
     def remove(self, key: str | tuple[str, ...]) -> int:
-        """Remove a key and all keys below it; return how many."""
+        """Remove a key and all keys below; return the number of removed keys."""
         names = parse_key(key)
         with self._updated:
             self._expire_locked()
@@ -299,12 +300,12 @@ class Blackboard:
     def get(
         self, key: str | tuple[str, ...], default: object = None, *, max_age_s: float | None = None
     ) -> object:
-        """Return the value of a key, or a dict of the values below it.
+        """Return the value of a key, or a dict of the values below the key.
 
         Args:
             key: Key, or a tuple of its names.
-            default: Returned if there is no value, or none young enough.
-            max_age_s: Maximum age in seconds; None accepts any.
+            default: Returned if there is no value, or if all values are older than `max_age_s`.
+            max_age_s: Maximum age in seconds; None for no limit.
         """
         found = self._value_of(parse_key(key), seconds("max_age_s", max_age_s))
         return default if found is _MISSING else found
@@ -332,14 +333,14 @@ class Blackboard:
             return len(self._entries)
 
     def age_s(self, key: str | tuple[str, ...]) -> float:
-        """Return the age of a key's value, or of the youngest below it; infinite if there is none."""
+        """Return the age of a key's value, or of the newest value below; infinite if there is none."""
         names = parse_key(key)
         with self._updated:
             now = self._expire_locked()
             return min((each.age_s(now) for each in self._entries.below(names)), default=math.inf)
 
     def entry(self, key: str | tuple[str, ...]) -> BlackboardEntry | None:
-        """Return the entry of exactly this key, or None."""
+        """Return the entry of the key itself, ignoring keys below, or None."""
         names = parse_key(key)
         with self._updated:
             now = self._expire_locked()
@@ -358,7 +359,7 @@ class Blackboard:
         return sorted(key_text(each.key) for each in found)
 
     def snapshot(self, pattern: str = "**") -> dict[str, BlackboardEntry]:
-        """Return the matching entries by key, all at one moment."""
+        """Return all entries that match a pattern, by key, as of one moment."""
         names = parse_key(pattern)
         with self._updated:
             now = self._expire_locked()
@@ -388,7 +389,7 @@ class Blackboard:
 
     @property
     def outdated(self) -> int:
-        """Number of values rejected because they were older than the stored one or had already expired."""
+        """Number of values rejected because a newer one was stored or because they had already expired."""
         return self._entries.outdated
 
     # ---- waiting and callbacks
@@ -399,17 +400,17 @@ class Blackboard:
         condition: Callable[[object], object] | None = None,
         timeout_s: float | None = None,
     ) -> object:
-        """Wait until a key has a value for which `condition(value)` is true, and return it.
+        """Wait until a key has a value that fulfils `condition`, and return the value.
 
         Args:
             key: Key, or a tuple of its names.
-            condition: Called in this thread after each update; shorter-lived values may be missed. None
-                accepts any value.
-            timeout_s: Maximum wait in seconds; None waits forever.
+            condition: Function of the value, called in this thread after updates; None accepts any value.
+                Values that are replaced quickly may be skipped.
+            timeout_s: Time limit in seconds; None for no limit.
 
         Raises:
-            WaitTimeoutError: The timeout has passed.
-            ClosedError: The board or its node was closed.
+            WaitTimeoutError: The time limit has passed.
+            ClosedError: The blackboard or its node was closed.
         """
         names, limit_s = parse_key(key), seconds("timeout_s", timeout_s)
         if condition is not None:
@@ -429,18 +430,18 @@ class Blackboard:
                     self._updated.wait(left)
 
     def on_change(self, pattern: str, callback: OnChange) -> Callable[[], None]:
-        """Call `callback` with each `BlackboardChange` of a matching key, in the thread that spins the node.
+        """Call `callback` with each `BlackboardChange` of matching keys, in the thread that spins the node.
 
-        It is called when a value becomes different or is gone, not for equal updates. Exceptions propagate
-        out of `Node.spin`; the remaining changes are delivered by the next one. Without a node, call
-        `deliver`.
+        The callback is called when a value changes or disappears, not for updates with an equal value.
+        Exceptions propagate out of `Node.spin`; the remaining changes are delivered by the next call of
+        `spin`. Without a node, call `deliver`.
 
         Args:
             pattern: Keys, with wildcards as for `keys`.
             callback: Function of one `BlackboardChange`.
 
         Returns:
-            A function that ends the subscription.
+            A function that removes the callback.
         """
         observer = _Observer(parse_key(pattern), plain_function("callback", callback))
         with self._updated:
@@ -532,7 +533,7 @@ class Blackboard:
             raise ClosedError(_("the blackboard"), is_forked=self._is_forked)
 
     def close(self) -> None:
-        """Stop watching and wake waiting threads; values can still be read and put. Idempotent."""
+        """Stop watching and wake waiting threads. Values can still be read and stored. Idempotent."""
         with self._updated:
             self._is_closed = True
             watches, self._watches, self._observers = self._watches, (), ()
@@ -544,7 +545,7 @@ class Blackboard:
             watch.close()
 
     def forked(self) -> None:
-        """Reset locks and watches in a forked child; values stay. See `nep.system.forks`."""
+        """Reset locks and close watches in a forked child process; values stay. See `nep.system.forks`."""
         self._is_closed = self._is_forked = True
         if self._lock.locked():  # held by a thread of the parent: the tree may be half-updated
             self._entries = self._entries.rebuilt()

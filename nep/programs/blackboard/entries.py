@@ -1,6 +1,6 @@
-"""Bounded store of blackboard entries by key, with expiry. Pure. Not thread-safe.
+"""Bounded store of blackboard entries by key, with expiry. No input or output. Not thread-safe.
 
-Entries form a tree of names, so that finding keys above and below another takes constant time.
+Entries form a tree of names, so that finding the keys above and below another key takes constant time.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from nep.programs.blackboard.values import is_same, size_of
 __all__ = ["AgeBy", "Cause", "Entries", "EntryChange", "StoredEntry"]
 
 AgeBy = Literal["stamp", "arrival"]
-"""What an age counts from: the publisher's time stamp or the arrival."""
+"""Start of an age: the publisher's time stamp or the arrival."""
 Cause = Literal["new", "changed", "replaced", "removed", "expired", "dropped"]
 _ENTRY_BYTES = 600
 _NAME_BYTES = 100
@@ -29,7 +29,19 @@ _MAX_STALE_ENDS = 1_000
 
 @dataclass(frozen=True)
 class StoredEntry:
-    """Stored value. `since` is when its age began, `expires` when it expires (blackboard clock)."""
+    """Stored value of a key.
+
+    Attributes:
+        key: Key of the value.
+        value: The value.
+        since: Start of the value's age (blackboard's clock).
+        age_by: Whether the age starts at the time stamp or at the arrival.
+        expires: Time at which the value expires (blackboard's clock).
+        stamp_ns: Publisher's time stamp (ns since 1970), if any.
+        publisher: Id of the publisher, if any.
+        source: Topic of the value, or "".
+        robot: Robot that perceived the value, or "".
+    """
 
     key: Key
     value: object
@@ -41,30 +53,33 @@ class StoredEntry:
     source: str = ""
     robot: str = ""
     bytes: int = field(init=False)
-    """Approximate memory use."""
+    """Approximate memory use of the entry."""
 
     def __post_init__(self) -> None:
         names = _NAME_BYTES * len(self.key) + sum(map(len, self.key))
         object.__setattr__(self, "bytes", _ENTRY_BYTES + names + size_of(self.value))
 
     def age_s(self, now: float) -> float:
-        """Return the age at `now`; 0 if the clock was set back."""
+        """Return the age at `now`; 0 if the start is in the future because a clock was set back."""
         return max(0.0, now - self.since)
 
 
 class EntryChange(NamedTuple):
-    """Change of an entry; it is gone unless the cause is "new" or "changed"."""
+    """Change of an entry. The key has no value any more unless `cause` is "new" or "changed"."""
 
     entry: StoredEntry
     cause: Cause
 
 
 class _Tree(dict[str, "StoredEntry | _Tree"]):
-    """Subtree of names below a name."""
+    """Subtree with the entries and subtrees of the names below a name."""
 
 
 class Entries:
-    """Newest entry of each key. Beyond the limits the oldest are dropped and counted."""
+    """Newest entry of each key.
+
+    Beyond the limits, the least recently updated entries are dropped and counted.
+    """
 
     def __init__(self, max_keys: int, max_bytes: int) -> None:
         self._max_keys = max_keys
@@ -82,11 +97,11 @@ class Entries:
 
     @property
     def next_end(self) -> float:
-        """Time of the next `expire`; infinite if nothing expires."""
+        """Time at which `expire` must be called next; infinite if no entry expires."""
         return self._expiry_heap[0][0] if self._expiry_heap else math.inf
 
     def rebuilt(self) -> Entries:
-        """Return a copy built from the entries; for a fork that interrupted a change."""
+        """Return a new store built from the entries, for a fork that interrupted an update of the tree."""
         copy = Entries(self._max_keys, self._max_bytes)
         for entry in list(self._by_age.values()):
             copy.put(entry, -math.inf)
@@ -96,11 +111,11 @@ class Entries:
     # ---- reading
 
     def get(self, key: Key) -> StoredEntry | None:
-        """Return the entry of exactly this key, or None."""
+        """Return the entry of the key itself, or None."""
         return self._by_age.get(key)
 
     def below(self, key: Key) -> Iterator[StoredEntry]:
-        """Yield the entry of this key, or those of all keys below it."""
+        """Yield the entry of a key, or the entries of all keys below."""
         found = self._at(key)
         if isinstance(found, StoredEntry):
             yield found
@@ -108,7 +123,7 @@ class Entries:
             yield from _all_of(found)
 
     def matching(self, pattern: Key) -> Iterator[StoredEntry]:
-        """Yield the entries whose key matches, in tree order."""
+        """Yield the entries whose keys match a pattern, in tree order."""
         beginning = literal_levels(pattern)
         found = self.below(beginning)
         if pattern == (*beginning, "**"):
@@ -126,9 +141,10 @@ class Entries:
     # ---- changing
 
     def put(self, entry: StoredEntry, now: float) -> list[EntryChange]:
-        """Store an entry unless a newer one of another publisher exists; return the changes.
+        """Store an entry unless another publisher's newer entry exists; return the changes.
 
-        Entries above and below its key are replaced. Raises `BadValueError` if it exceeds the memory limit.
+        Entries of keys above and below are replaced. Raises `BadValueError` if the entry exceeds the memory
+        limit.
         """
         if entry.bytes > self._max_bytes:
             template = _("it needs {size} bytes, but at most {most} are allowed")
@@ -154,15 +170,15 @@ class Entries:
         return changes
 
     def has_below(self, key: Key) -> bool:
-        """Return whether longer keys begin with this one."""
+        """Return True if there are entries below a key."""
         return isinstance(self._at(key), _Tree)
 
     def remove(self, key: Key) -> list[EntryChange]:
-        """Remove a key and all below it."""
+        """Remove the entries of a key and of all keys below; return the changes."""
         return [EntryChange(self._pop(each.key), "removed") for each in list(self.below(key))]
 
     def expire(self, now: float) -> list[EntryChange]:
-        """Remove expired entries."""
+        """Remove expired entries; return the changes."""
         changes = []
         while self._expiry_heap and self._expiry_heap[0][0] <= now:
             end, key = heapq.heappop(self._expiry_heap)

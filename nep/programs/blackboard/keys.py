@@ -1,4 +1,4 @@
-r"""Blackboard keys: names separated by dots, as in `human.1.position`. Pure.
+r"""Blackboard keys: names separated by dots, as in `human.1.position`. Performs no input or output.
 
 A dot or backslash within a name is escaped with a backslash: `file.a\.txt` has two names.
 """
@@ -18,7 +18,7 @@ Key = tuple[str, ...]
 MAX_LEVELS = 32
 _MAX_CHARACTERS = 1_000
 _MAX_WRITTEN_LENGTH = 2 * _MAX_CHARACTERS + MAX_LEVELS
-"""Length of the longest written key: each character escaped, plus dots."""
+"""Length of the longest written key: every character escaped, plus dots."""
 _SPECIAL = re.compile(r"([.\\])")
 _NAME = re.compile(r"((?:[^.\\]|\\.|\\$)*)(?:\.|$)", re.DOTALL)
 _ESCAPE = re.compile(r"\\(.)", re.DOTALL)
@@ -26,7 +26,7 @@ _WILD = frozenset({"*", "**"})
 
 
 def parse_key(key: str | Sequence[str]) -> Key:
-    """Split a key into its names; a tuple is returned as is. Raises `BadKeyError`."""
+    """Split a key into its names; a tuple is returned unchanged. Raises `BadKeyError`."""
     if isinstance(key, str):
         if len(key) > _MAX_WRITTEN_LENGTH:  # splitting it would take long
             raise _too_long(key)
@@ -65,7 +65,7 @@ def _names(text: str) -> Key:
 
 
 def key_text(names: Key) -> str:
-    """Join names to a written key; the inverse of `parse_key`."""
+    """Join names into a written key; the inverse of `parse_key`."""
     return ".".join(_SPECIAL.sub(r"\\\1", name) if "." in name or "\\" in name else name for name in names)
 
 
@@ -75,12 +75,12 @@ def key_of_topic(topic: str) -> Key:
 
 
 def key_matches(pattern: Key, key: Key) -> bool:
-    """Return whether a key matches: `*` is one non-empty name, `**` any number of names."""
+    """Return True if a key matches a pattern: `*` is one non-empty name, `**` any number of names."""
     return levels_match(pattern, key)
 
 
 def literal_levels(pattern: Key) -> Key:
-    """Return the names before the first wildcard."""
+    """Return the names of a pattern before its first wildcard."""
     for number, name in enumerate(pattern):
         if name in _WILD:
             return pattern[:number]

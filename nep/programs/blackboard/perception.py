@@ -1,8 +1,8 @@
-"""Perception messages of RIZE programs, mostly on `/blackboard`. Pure.
+"""Perception messages of RIZE programs, mostly on `/blackboard`. Performs no input or output.
 
-`{"primitive": "touched", "input": {"head": 1}, "robot": "Pepper"}`: values are probabilities or booleans.
-Older programs send only `"input": "add"`; some quote names and values, `{"'happy'": "1"}`; through rosbridge
-everything is a JSON text in the field `data`.
+Format: `{"primitive": "touched", "input": {"head": 1}, "robot": "Pepper"}`, where values are probabilities or
+booleans. Older programs send only `"input": "add"`, and some quote names and values: `{"'happy'": "1"}`.
+Through rosbridge, the message is a JSON text in the field `data`.
 """
 
 from __future__ import annotations
@@ -21,7 +21,13 @@ _QUOTES = "'\""
 
 
 class Perception(NamedTuple):
-    """Perceived `primitive` with its `values`, and the `robot` that perceived it ("" if unknown)."""
+    """Perception of a robot.
+
+    Attributes:
+        primitive: Kind of perception, such as "touched".
+        values: Perceived values by name.
+        robot: Robot that perceived them; "" if unknown.
+    """
 
     primitive: str
     values: Mapping[str, object]
@@ -29,7 +35,7 @@ class Perception(NamedTuple):
 
 
 def perception_in(payload: object) -> Perception | None:
-    """Parse a payload as a perception; None for other messages."""
+    """Parse a payload as a perception; return None for other messages."""
     if isinstance(payload, Mapping) and len(payload) == 1 and isinstance(payload.get("data"), str):
         try:
             payload = JSON.decode(payload["data"].encode("utf-8", "surrogatepass"), NOTHING)

@@ -1,10 +1,14 @@
-"""Blackboard server for other programs in any language, used by `nep blackboard`.
+"""Blackboard server for programs in any language, used by `nep blackboard`.
 
-The topic `/NAME/changes` has a map with "blackboard", "key", "value", "cause" and details of the value. The
-service `NAME/get` takes "key" and replies "found", "value" and "age_s"; or takes "pattern" and replies
-"entries" and how many "more" there are; "max_age_s" excludes older values. `NAME/set` takes "key" and
-"value", or a map "values", and "lives_s". `NAME/keys` takes "pattern" and replies "keys" and "more". Invalid
-requests raise `ServiceError` at the caller. NaN is `null`, as in JSON.
+The topic `/NAME/changes` carries maps with "blackboard", "key", "value", "cause" and details of the value.
+Services:
+
+- `NAME/get` takes "key" and replies "found", "value" and "age_s"; or takes "pattern" and replies "entries"
+  and the number of omitted entries, "more". "max_age_s" excludes older values.
+- `NAME/set` takes "key" and "value", or a map "values"; and "lives_s".
+- `NAME/keys` takes "pattern" and replies "keys" and "more".
+
+Invalid requests raise `ServiceError` at the caller. NaN is sent as `null`, because JSON lacks NaN.
 """
 
 from __future__ import annotations
@@ -30,7 +34,7 @@ __all__ = ["DEFAULT_NAME", "MAX_ENTRIES", "BlackboardServer", "service_of"]
 
 DEFAULT_NAME = "blackboard"
 MAX_ENTRIES = 10_000
-"""Maximum number of entries in a reply, which includes the number of omitted ones."""
+"""Maximum number of entries in a reply; the number of omitted entries is part of the reply."""
 _MAX_REPLY_BYTES = 32 * 2**20
 
 
@@ -40,10 +44,10 @@ def service_of(name: str, what: str) -> str:
 
 
 class BlackboardServer:
-    """Server that publishes the changes of `board` and replies to requests.
+    """Server that publishes the changes of a blackboard and replies to requests.
 
-    Runs in the thread that spins `node`. Usable as a context manager. Raises as `Node.new_pub` and
-    `Node.new_server` do.
+    Runs in the thread that spins `node`. Usable as a context manager. The constructor raises the exceptions
+    of `Node.new_pub` and `Node.new_server`.
     """
 
     def __init__(self, node: Node, board: Blackboard, name: str = DEFAULT_NAME) -> None:
@@ -106,7 +110,7 @@ class BlackboardServer:
         return {"keys": found[:MAX_ENTRIES], "more": max(0, len(found) - MAX_ENTRIES)}
 
     def close(self) -> None:
-        """Stop publishing and serving; the board stays open. Idempotent."""
+        """Stop publishing and serving; the blackboard stays open. Idempotent."""
         self._end()
         for server in self._servers:
             server.close()

@@ -1,4 +1,4 @@
-"""Blackboard values: copies, approximate sizes, comparison. Pure."""
+"""Blackboard values: copying, approximate sizes, comparison. Performs no input or output."""
 
 from __future__ import annotations
 
@@ -17,7 +17,10 @@ _ITEM_BYTES = 8
 
 
 def copied(value: object, depth: int = _MAX_DEPTH) -> object:
-    """Copy lists and maps deeply. Raises `ValueError` if the value is too deep or contains itself."""
+    """Return a deep copy of lists and maps.
+
+    Raises `ValueError` if the value is too deep or contains itself.
+    """
     if isinstance(value, list | tuple):
         if _has_only_numbers(value):
             return list(value)
@@ -38,7 +41,7 @@ def _has_only_numbers(value: list[object] | tuple[object, ...]) -> bool:
 
 
 def size_of(value: object) -> int:
-    """Return the approximate memory use in bytes."""
+    """Return the approximate memory use of a value in bytes."""
     size, waiting = 0, [value]
     while waiting:
         each = waiting.pop()
@@ -59,7 +62,7 @@ def size_of(value: object) -> int:
 
 
 def is_same(one: object, other: object) -> bool:
-    """Return whether two values are equal; NaN equals NaN, but 1, 1.0 and True differ."""
+    """Return True if two values are equal and of the same type; NaN equals NaN."""
     if one is other:
         return True
     if type(one) is not type(other):
@@ -73,9 +76,10 @@ def is_same(one: object, other: object) -> bool:
 
 
 def leaves(value: object, key: Key = ()) -> Iterator[tuple[Key, object]]:
-    """Yield the values of a nested map with their keys; any other value, and an empty map, as one value.
+    """Yield the values of a nested map with their keys.
 
-    A map with keys other than text and whole numbers, or nested too deeply for keys, is one value, too.
+    A value that is not a map, an empty map, a map with keys other than text and whole numbers, and a map that
+    is nested too deeply are yielded as one value.
     """
     if not isinstance(value, Mapping) or not value or len(key) >= MAX_LEVELS or not _has_names(value):
         yield key, value

@@ -28,7 +28,7 @@ _MISSING = object()
 
 
 class PerceivedValue(NamedTuple):
-    """Value of a message, its key, and the robot that perceived it, if named."""
+    """Value found in a message, its key, and the robot that perceived it ("" if unknown)."""
 
     key: Key
     value: object
@@ -36,7 +36,7 @@ class PerceivedValue(NamedTuple):
 
 
 class MessageReading:
-    """Mapping of a topic's messages to keys and values. Pure.
+    """Conversion of a topic's messages to keys and values. Performs no input or output.
 
     Args:
         key: As for `Blackboard.watch`.
@@ -59,7 +59,10 @@ class MessageReading:
         self._fields = None if fields is None else [(parse_key(one), parse_key(two)) for one, two in pairs]
 
     def items(self, payload: object) -> Sequence[object]:
-        """Return the items of a payload. Raises `NepError` if the field `each` isn't a list."""
+        """Return the items of a payload to be stored one by one.
+
+        Raises `NepError` if the field `each` isn't a list.
+        """
         if self._each:
             found = _field(payload, self._each)
             if not isinstance(found, list | tuple):
@@ -68,7 +71,7 @@ class MessageReading:
         return payload if self._has_holes and isinstance(payload, list | tuple) else (payload,)
 
     def findings(self, topic: str, item: object) -> Iterator[PerceivedValue]:
-        """Yield the values of an item with their keys. Raises `NepError` if no key can be formed."""
+        """Yield the values of an item with their keys. Raises `NepError` if a key can't be formed."""
         seen = None if self._fields is not None else perception_in(item)
         if seen is not None:
             beginning = () if self._key is None else self._key_for(item)
@@ -113,12 +116,15 @@ def _name_in(item: object, field: str) -> str:
 
 
 def is_change_message(payload: object) -> bool:
-    """Return whether a payload is a blackboard's own change, which a pattern would feed back forever."""
+    """Return True if a payload is a change published by a blackboard.
+
+    Storing such messages under a pattern would publish further changes in an endless loop.
+    """
     return isinstance(payload, Mapping) and "blackboard" in payload and "cause" in payload
 
 
 class BlackboardWatch:
-    """Watched topic, with message counts. Thread-safe; usable as a context manager."""
+    """Watch of a topic, with message counts. Thread-safe; usable as a context manager."""
 
     def __init__(
         self,
@@ -134,7 +140,7 @@ class BlackboardWatch:
         self.refused = 0
         """Number of messages that could not be decoded or stored completely; the reason is logged."""
         self.problem = ""
-        """Reason why the last message was rejected, "" if it was not."""
+        """Reason why the last message was rejected; "" if it was stored."""
         self._reading = reading
         self._store = keep
         self._is_pattern = is_pattern
@@ -143,7 +149,7 @@ class BlackboardWatch:
         self._lock = threading.Lock()
 
     def attach(self, subscriber: Subscriber) -> None:
-        """Set the subscriber whose messages are stored."""
+        """Set the subscriber that receives the messages."""
         with self._lock:
             self._subscriber = subscriber
             is_closed = self._is_closed
@@ -151,7 +157,7 @@ class BlackboardWatch:
             subscriber.close()
 
     def store_messages(self, messages: Sequence[Message]) -> None:
-        """Store messages. Runs in the node's sink thread."""
+        """Store messages on the blackboard. Called in the node's sink thread."""
         for message in messages:
             if self._is_closed:
                 return
@@ -189,7 +195,7 @@ class BlackboardWatch:
             )
 
     def close(self) -> None:
-        """Stop storing messages; stored values stay. Idempotent."""
+        """Stop storing messages; values already stored stay. Idempotent."""
         with self._lock:
             self._is_closed = True
             subscriber = self._subscriber
@@ -197,7 +203,7 @@ class BlackboardWatch:
             subscriber.close()
 
     def forked(self) -> None:
-        """Reset the lock in a forked child. See `nep.system.forks`."""
+        """Mark the watch as closed in a forked child process. See `nep.system.forks`."""
         self._is_closed = True
         self._lock = threading.Lock()
 

@@ -1,8 +1,8 @@
-"""Bridges: forwarding of topics between two back ends, or two networks of one.
+"""Bridges: forwarding of topics between two back ends, or between two networks of one back end.
 
-`configuration` defines a bridge and `toml_file` parses it; `bridge` connects two instances of `side`; a
-`route` forwards one topic in one direction at the rate of `pacer`. `trail` prevents loops, `other_bridges`
-detects bridges between the same networks, and `topic_types` chooses message types.
+`configuration` defines a bridge and `toml_file` parses it. `bridge` connects two instances of `side`. A
+`route` forwards one topic in one direction, at a rate limited by `pacer`. `trail` prevents loops,
+`other_bridges` detects bridges between the same networks, and `topic_types` chooses message types.
 """
 
 from nep.programs.bridges.bridge import Bridge

@@ -1,4 +1,4 @@
-"""Bridge: two nodes, and the routes between them."""
+"""`Bridge`: two nodes and the routes between them."""
 
 from __future__ import annotations
 
@@ -35,9 +35,9 @@ if TYPE_CHECKING:
 __all__ = ["Bridge", "check_installed"]
 
 MAX_ROUTES = 500
-"""Maximum number of routes, in both directions, that patterns create."""
+"""Maximum number of routes that patterns create, in both directions."""
 IDLE_S = 60.0
-"""Time after which a route created by a pattern is removed if its topic has no publisher."""
+"""Time in seconds after which a pattern's route is removed if its topic has no publisher."""
 _OWN_TOPICS = "/nep/"
 _WAIT_SLICE_S = 0.05
 _FLUSH_TIMEOUT_S, _JOIN_TIMEOUT_S = 2.0, 0.2
@@ -45,15 +45,15 @@ _logger = logging.getLogger("nep")
 
 
 class Bridge:
-    """Bridge that forwards the topics of `configuration` until it is closed. Usable as a context manager.
+    """Bridge that forwards the configured topics until it is closed. Usable as a context manager.
 
-    Networks and topics that don't exist yet are waited for. Raises `NepError` for a back end that is not
-    installed or does not know a type.
+    The bridge waits for networks and topics that don't exist yet. The constructor raises `NepError` for a
+    back end that is not installed or does not know a message type.
 
     Args:
         configuration: The two networks and their topics.
-        allow_moving: Names of robots that may be moved; messages that would move others are dropped and
-            counted as failed. None forwards everything, for programs that check by themselves.
+        allow_moving: Names of robots that may be moved. Messages that would move other robots are dropped and
+            counted as failed. None forwards everything, for programs that check messages themselves.
     """
 
     def __init__(
@@ -100,15 +100,16 @@ class Bridge:
 
     @property
     def is_ready(self) -> bool:
-        """True if both graphs are known and all named topics of known type are subscribed."""
+        """True if both graphs are known, and all listed topics whose type is known are subscribed."""
         return all(each.is_ready for each in self._routes) and all(
             side.view is not None for side in self.sides.values()
         )
 
     def wait_until_ready(self, timeout_s: float | None = None) -> bool:
-        """Wait until the bridge is ready or closed; return whether it is ready.
+        """Wait until the bridge is ready or closed; return True if it is ready.
 
-        `timeout_s` of None waits without limit.
+        Args:
+            timeout_s: Time limit in seconds; None for no limit.
         """
         deadline = None if timeout_s is None else time.monotonic() + timeout_s
         while not self.is_ready:
@@ -118,9 +119,9 @@ class Bridge:
         return True
 
     def refusals(self, timeout_s: float) -> tuple[str, ...]:
-        """Return why named topics are blocked: they move robots without permission.
+        """Return the reasons why listed topics are blocked because they would move robots without permission.
 
-        Waits up to `timeout_s` until both graphs and the descriptions of their robots are known.
+        Waits at most `timeout_s` seconds until both graphs and the descriptions of their robots are known.
         """
         deadline = time.monotonic() + timeout_s
         while not all(side.knows_robots for side in self.sides.values()) and time.monotonic() < deadline:
@@ -129,7 +130,7 @@ class Bridge:
         return tuple(dict.fromkeys(filter(None, refusals)))
 
     def status(self) -> dict[str, object]:
-        """Return configuration and message counts, as published on `/nep/bridges`."""
+        """Return the configuration and message counts in the form published on `/nep/bridges`."""
         return {
             "bridge": self.configuration.name,
             "id": self.id,
@@ -230,10 +231,10 @@ class Bridge:
                 route.close()
 
     def publishes_status_on(self, side: BridgeSide, view: GraphView) -> bool:
-        """Return whether the status is published on this side.
+        """Return True if the status is published on this side.
 
-        If both back ends share one graph, it is published on side a only, because two nodes of one topic
-        would conflict.
+        If both back ends share one graph, the status is published on side a only, because two publishers of
+        one topic would conflict.
         """
         return side.name == "a" or (side.poll_count > 1 and self.sides["a"].node.id not in view.nodes)
 
@@ -282,7 +283,7 @@ class Bridge:
     # ---- closing
 
     def close(self, timeout_s: float = _FLUSH_TIMEOUT_S) -> None:
-        """Stop forwarding; received messages are delivered first, within `timeout_s`. Idempotent."""
+        """Stop forwarding; messages already received are delivered first, within `timeout_s`. Idempotent."""
         deadline = time.monotonic() + timeout_s
         self._closed.set()
         for side in self.sides.values():
@@ -305,7 +306,7 @@ class Bridge:
 
 
 def check_installed(configuration: BridgeConfiguration) -> None:
-    """Raise `NepError` for a back end that is not installed or doesn't know a type."""
+    """Raise `NepError` for a back end that is not installed or doesn't know a message type."""
     for name in SIDES:
         side = configuration.side(name)
         with Node(configuration.node_name(name), side.backend.name, master=side.master):

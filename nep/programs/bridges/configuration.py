@@ -1,6 +1,6 @@
-"""Configuration of a bridge, and the short form of the command line.
+"""Configuration of a bridge, and its short form on the command line.
 
-The file format is parsed by `nep.programs.bridges.toml_file`.
+`nep.programs.bridges.toml_file` parses the file format.
 """
 
 from __future__ import annotations
@@ -41,18 +41,21 @@ SideName = Literal["a", "b"]
 SIDES: tuple[SideName, SideName] = ("a", "b")
 DIRECTIONS: dict[str, Direction] = {"a->b": "a->b", "b->a": "b->a", "both": "both"}
 NODE_PREFIX = "bridge-"
-"""Prefix of the names of a bridge's nodes."""
+"""Name prefix of a bridge's nodes."""
 _WILDCARD = re.compile(r"\*\*|\*")
 _REACHABLE_ADDRESS = re.compile(r"(?:^|[/,])(?!127\.|localhost:)[\w.-]+:\d+", re.ASCII)
-"""Address of another computer, or one of this computer that others can reach."""
+"""Pattern of a network address at which other computers can reach a master."""
 _MAX_NAME_LENGTH = 60
 
 
 @dataclass(frozen=True)
 class SideConfiguration:
-    """One of the two networks. `network` identifies it for all bridges: see `nep.programs.bridges.trail`.
+    """Configuration of one side of a bridge.
 
-    Nodes are created with `backend` and `master`.
+    Attributes:
+        backend: Back end of the node on this side.
+        master: Address of the master.
+        network: Identifies the network for all bridges; see `nep.programs.bridges.trail`.
     """
 
     backend: Backend
@@ -64,8 +67,10 @@ class SideConfiguration:
 class TopicEnd:
     """Topic or pattern on one side.
 
-    `msg_type` is the type used for publishing and subscribing there, "" to detect it. `qos` is a profile name
-    of the back end, or "".
+    Attributes:
+        name: Name of the topic, or pattern.
+        msg_type: Message type for publishing and subscribing on this side; "" to detect it.
+        qos: Name of a QoS profile of the back end, or "".
     """
 
     name: str
@@ -79,7 +84,7 @@ class TopicEnd:
         return found.group() if found is not None else ""
 
     def part_in(self, topic: str) -> str:
-        """Return the part of `topic` that the wildcard matches, or "" if the pattern doesn't match."""
+        """Return the part of `topic` that the wildcard stands for, or "" if the pattern doesn't match."""
         before, wildcard, after = self.name.partition(self.wildcard or "*")
         part = topic.removeprefix(before).removesuffix(after)
         is_whole = wildcard and part and topic == before + part + after
@@ -92,9 +97,13 @@ class TopicEnd:
 
 @dataclass(frozen=True)
 class BridgeTopic:
-    """Topic and its names on both sides; `max_rate_hz` of 0 means unlimited.
+    """Topic or pattern of a bridge. Either both ends have the same wildcard, or neither has one.
 
-    Either both ends have the same wildcard, or neither has one.
+    Attributes:
+        a: Topic on side a.
+        b: Topic on side b.
+        direction: Direction in which messages are forwarded.
+        max_rate_hz: Maximum rate; 0 for no limit.
     """
 
     a: TopicEnd
@@ -104,7 +113,7 @@ class BridgeTopic:
 
     @property
     def is_pattern(self) -> bool:
-        """True if it stands for any number of topics."""
+        """True if this is a pattern, which stands for any number of topics."""
         return bool(self.a.wildcard)
 
     @property
@@ -113,7 +122,7 @@ class BridgeTopic:
         return SIDES if self.direction == "both" else ("a",) if self.direction == "a->b" else ("b",)
 
     def end(self, side: SideName) -> TopicEnd:
-        """Return the end on that side."""
+        """Return the topic or pattern on a side."""
         return self.a if side == "a" else self.b
 
 
@@ -121,7 +130,7 @@ class BridgeTopic:
 class BridgeConfiguration:
     """Configuration of a bridge.
 
-    Its nodes are named `bridge-NAME-to-BACKEND`, after the other side's back end.
+    The bridge's nodes are named `bridge-NAME-to-BACKEND`, after the back end of the other side.
     """
 
     name: str
@@ -134,7 +143,7 @@ class BridgeConfiguration:
         return self.a if name == "a" else self.b
 
     def node_name(self, side: SideName) -> str:
-        """Return the name of the node on that side; it shows in the graph where topics come from."""
+        """Return the name of the node on a side; it names the back end from which its topics come."""
         other = self.b if side == "a" else self.a
         return f"{NODE_PREFIX}{self.name}-to-{other.backend.name}"
 
@@ -152,7 +161,13 @@ def checked_name(name: str) -> str:
 
 
 def side_of(backend: str, master: str = "", network: str = "") -> SideConfiguration:
-    """Return the configuration of a side; without `master`, at the back end's default. Raises `NepError`."""
+    """Create the configuration of a side. Raises `NepError` for an unknown back end or an invalid address.
+
+    Args:
+        backend: Name of the back end.
+        master: Address of the master (default: the back end's default).
+        network: Id of the network (default: derived from the address).
+    """
     found = backend_named(backend)
     try:
         place = found.master(master or None)
@@ -173,7 +188,7 @@ def _network(backend: Backend, master: str) -> str:
 
 
 def checked_topic_names(a: str, b: str) -> None:
-    """Raise `NepError` unless these are valid names of one topic on both sides."""
+    """Raise `NepError` unless these are valid names of a topic or pattern on both sides."""
     wildcards = []
     for name in (check_topic(a), check_topic(b)):
         found = _WILDCARD.findall(name)
@@ -193,7 +208,7 @@ def checked_topic_names(a: str, b: str) -> None:
 
 
 def direction_named(name: str) -> Direction:
-    """Return the direction with this name. Raises `NepError`."""
+    """Validate a direction and return it. Raises `NepError`."""
     if name not in DIRECTIONS:
         raise NepError(
             _("'{name}' is not a direction; {did_you_mean}").format(
@@ -206,9 +221,10 @@ def direction_named(name: str) -> Direction:
 def join_line(
     a: str, b: str, *, name: str, direction: str = "both", max_rate_hz: float = 0.0
 ) -> BridgeConfiguration:
-    """Return the configuration of `nep bridge A B`; both are BACKEND:TOPIC or BACKEND@MASTER:TOPIC.
+    """Create the configuration for `nep bridge A B`. Raises `NepError`.
 
-    Without a topic (`ros:`) it has the same name as on the other side. Raises `NepError`.
+    `a` and `b` have the form BACKEND:TOPIC or BACKEND@MASTER:TOPIC. A side without a topic (`ros:`) has the
+    topic of the other side.
     """
     (a_side, a_topic), (b_side, b_topic) = _side_and_topic(a), _side_and_topic(b)
     a_topic, b_topic = a_topic or b_topic, b_topic or a_topic
@@ -221,7 +237,7 @@ def join_line(
 
 
 def check_apart(a: SideConfiguration, b: SideConfiguration) -> None:
-    """Raise `NepError` if both sides are the same network, in which every message would return."""
+    """Raise `NepError` if both sides are the same network, because every message would return."""
     if a.network == b.network:
         raise NepError(
             _("both sides are the network '{network}'; give one of them another back end or master").format(

@@ -1,8 +1,9 @@
 """Detection of other bridges between the same two networks, by their status on `BRIDGES_TOPIC`.
 
-A bridge seen on both sides connects the same networks, whatever their names. If it forwards a topic in the
-same direction, each message arrives twice. If it forwards it back and neither network carries trails,
-messages would loop: then the bridge with the greater id stops forwarding that topic.
+A bridge that is seen on both sides connects the same networks, whatever their names. If both bridges forward
+a topic in the same direction, each message arrives twice. If they forward a topic in opposite directions and
+neither network carries trails, messages would loop; then the bridge with the greater id stops forwarding that
+topic.
 """
 
 from __future__ import annotations
@@ -17,18 +18,18 @@ from nep.programs.bridges.configuration import SIDES, SideName
 __all__ = ["HEARTBEAT_S", "OtherBridge", "OtherBridges", "Way"]
 
 HEARTBEAT_S = 5.0
-"""Maximum interval between two status messages of a bridge."""
+"""Maximum interval between two status messages of a bridge in seconds."""
 _EXPIRY_S = 3 * HEARTBEAT_S
 _MAX_BRIDGES = 64
 _MAX_ID_LENGTH = 100
 _MAX_ROUTES = 1000
 
 Way = tuple[SideName, str, str]
-"""Origin side, topic there, topic on the other side."""
+"""Route of a bridge: (side of the origin, topic there, topic on the other side)."""
 
 
 class OtherBridge(NamedTuple):
-    """Bridge between the same networks, and its routes in terms of our sides."""
+    """Other bridge between the same networks. The sides in its routes are those of our bridge."""
 
     id: str
     name: str
@@ -38,7 +39,11 @@ class OtherBridge(NamedTuple):
 class _Status(NamedTuple):
     """Status of a bridge received on one of our sides.
 
-    `on` is the side of that bridge on which it was published.
+    Attributes:
+        at: Time of arrival.
+        name: Name of the bridge.
+        on: Side, in terms of that bridge, on which the status was published.
+        ways: Routes of the bridge, with sides in its own terms.
     """
 
     at: float
@@ -48,7 +53,11 @@ class _Status(NamedTuple):
 
 
 class OtherBridges:
-    """Tracker of other bridges. Thread-safe. `own` is the id of our bridge."""
+    """Tracker of other bridges. Thread-safe.
+
+    Args:
+        own: Id of our bridge, whose status is ignored.
+    """
 
     def __init__(self, own: str) -> None:
         self._own = own
@@ -56,7 +65,7 @@ class OtherBridges:
         self._statuses: dict[SideName, OrderedDict[str, _Status]] = {side: OrderedDict() for side in SIDES}
 
     def add_status(self, side: SideName, status: object, now: float) -> None:
-        """Process a status received on that side of ours; invalid ones are ignored."""
+        """Process a status received on a side of our bridge; an invalid status is ignored."""
         if not isinstance(status, Mapping):
             return
         id_, name, on = (status.get(key) for key in ("id", "bridge", "side"))
@@ -74,7 +83,7 @@ class OtherBridges:
                 statuses.popitem(last=False)
 
     def between(self, now: float) -> list[OtherBridge]:
-        """Return the bridges seen on both sides recently."""
+        """Return the bridges seen recently on both sides."""
         with self._lock:
             on_a, on_b = ({**self._statuses[side]} for side in SIDES)
         found = []

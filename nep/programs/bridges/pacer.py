@@ -1,4 +1,4 @@
-"""Rate limit of a route, and a thread that calls functions at given times."""
+"""Rate limit of a route, and a timer thread."""
 
 from __future__ import annotations
 
@@ -14,9 +14,10 @@ _MAX_CATCH_UP = 0.1
 
 
 class Limit:
-    """Evenly spaced limit of `rate_hz` messages per second.
+    """Rate limit with evenly spaced slots. Delays up to a tenth of the period are caught up.
 
-    Delays up to a tenth of the period are caught up.
+    Args:
+        rate_hz: Maximum number of messages per second.
     """
 
     def __init__(self, rate_hz: float) -> None:
@@ -25,7 +26,7 @@ class Limit:
         """Time of the next free slot."""
 
     def has_room(self, now: float) -> bool:
-        """Take the next slot if it is due; return whether it was."""
+        """Return True and take the next slot if its time has come."""
         if now < self.next_at:
             return False
         self.next_at = max(self.next_at, now - _MAX_CATCH_UP * self._period_s) + self._period_s
@@ -33,7 +34,10 @@ class Limit:
 
 
 class Pacer:
-    """Timer thread that calls functions at given times (monotonic, s). Started by the first call."""
+    """Timer thread that calls functions at given times (monotonic, s).
+
+    The thread starts with the first call.
+    """
 
     def __init__(self, name: str) -> None:
         self._name = name

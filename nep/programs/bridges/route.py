@@ -1,4 +1,4 @@
-"""Route: forwards the messages of one topic in one direction, and counts their outcomes."""
+"""`Route`: forwards the messages of one topic in one direction and counts the outcomes."""
 
 from __future__ import annotations
 
@@ -26,18 +26,34 @@ from nep.text import escaped, shortened
 __all__ = ["Route", "RouteCounts", "RouteEnd"]
 
 MAX_BACKLOG_MESSAGES = 10_000
-"""Messages buffered for the other side, at most 64 MB; then the oldest are dropped and counted."""
+"""Maximum number of messages buffered for the other side, with at most 64 MB in total.
+
+Beyond, the oldest are dropped and counted.
+"""
 _MAX_BACKLOG_BYTES = 64 * 2**20
 _MAX_LATCHED_PUBLISHERS = 256
-"""Publishers per topic whose latched message is forwarded by a publisher of its own."""
+"""Maximum number of publishers per topic whose latched message is forwarded by a separate publisher."""
 _PUBLISHER_EXPIRY_S = 10.0
-"""Absence from the graph after which a publisher counts as gone; a restarted master relearns it sooner."""
+"""Absence from the graph in seconds after which a publisher counts as closed.
+
+A restarted master knows all publishers again in less time.
+"""
 _MAX_PROBLEM_LENGTH = 300
 
 
 @dataclass(frozen=True)
 class RouteEnd:
-    """Topic on one side, and that side. `msg_type` is "" to detect it."""
+    """End of a route: a topic on one side.
+
+    Attributes:
+        side: Name of the side.
+        network: Id of the side's network.
+        backend: Back end of the side.
+        topic: Name of the topic on the side.
+        msg_type: Message type; "" to detect it.
+        qos: Name of a QoS profile, or "".
+        echoes: Loop guard of the topic for networks that don't identify publishers.
+    """
 
     side: SideName
     network: str
@@ -47,24 +63,24 @@ class RouteEnd:
     qos: str = ""
     echoes: LoopGuard = field(default_factory=LoopGuard)
     guard: MotionGuard | None = field(default=None, compare=False)
-    """Guard of robots on this side; None publishes everything there."""
+    """Guard of the robots on this side; None publishes all messages."""
 
 
 @dataclass(frozen=True)
 class RouteCounts:
-    """Outcomes of messages so far: `received` are `sent`, `thinned`, `failed`, `dropped` or `waiting`.
+    """Outcomes of a route's messages: `received` is the sum of sent, thinned, failed, dropped and waiting.
 
     Attributes:
         received: Messages received from the origin.
         sent: Messages published at the end.
         bytes: Size of the sent messages.
         lost: Messages that did not reach the bridge, not included in `received`; None if unknown.
-        thinned: Messages replaced by a newer one because of `max_rate_hz`.
+        thinned: Messages replaced with a newer one because of `max_rate_hz`.
         failed: Messages that could not be decoded, converted or published; see `problem`.
-        dropped: Messages discarded because the other side was missing and the buffer was full.
-        waiting: Buffered messages.
-        returned: Messages that a bridge had brought from the destination, or might have; not included in
-            `received`.
+        dropped: Messages discarded because the other side was unavailable and the buffer was full.
+        waiting: Messages in the buffer.
+        returned: Messages ignored because a bridge has, or may have, forwarded them from the destination; not
+            included in `received`.
         problem: Reason of the last failure.
     """
 
@@ -81,7 +97,7 @@ class RouteCounts:
 
 
 class _BufferedSink:
-    """Sink of one subscriber that forwards at once, or buffers until it is opened."""
+    """Sink of a subscriber that passes messages on, or buffers them until it is opened."""
 
     def __init__(self, take: Callable[[Sequence[Message]], None], *, is_open: bool) -> None:
         self.is_open = is_open
@@ -110,10 +126,20 @@ class _BufferedSink:
 
 
 class Route:
-    """Route from `origin` to `end`. Messages are received in threads of the origin's node.
+    """Route that forwards messages from `origin` to `end`.
 
-    The threads of the sides call `subscribe` and `open_publishers` with their nodes. `bridge` is the bridge's
-    id, `own` the ids of all its publishers. `wake` requests a call of `open_publishers`.
+    Messages are received in threads of the origin's node. The threads of the sides call `subscribe` and
+    `open_publishers`.
+
+    Args:
+        origin: Topic from which messages come.
+        end: Topic on which messages are published.
+        bridge: Id of the bridge.
+        own: Ids of all publishers of the bridge.
+        wake: Requests a call of `open_publishers`.
+        pacer: Timer of rate-limited messages.
+        max_rate_hz: Maximum rate; 0 for no limit.
+        clock: Monotonic clock in seconds.
     """
 
     def __init__(
@@ -131,13 +157,13 @@ class Route:
         self.origin = origin
         self.end = end
         self.is_found = False
-        """True if a pattern created the route."""
+        """True if the route was created by a pattern."""
         self.idle_since: float | None = None
-        """Time (monotonic, s) since which the topic has no other publisher, None if it has one."""
+        """Time (monotonic, s) since which the topic has no publisher except bridges; None if it has one."""
         self.troubles: dict[SideName, str] = {}
-        """Reasons why it can't subscribe or publish now, by side."""
+        """Current reasons why the route can't subscribe or publish, by side."""
         self.rival = ""
-        """Name of a bridge that forwards these messages instead; then this route is inactive."""
+        """Name of another bridge that forwards these messages; then this route is inactive."""
         self._bridge = bridge
         self._own = own
         self._wake = wake
@@ -184,32 +210,32 @@ class Route:
 
     @property
     def trouble(self) -> str:
-        """Reason why it can't subscribe or publish now, "" if it can."""
+        """Current reason why the route can't subscribe or publish; "" if it can."""
         return next(iter(self.troubles.copy().values()), "")
 
     @property
     def is_subscribed(self) -> bool:
-        """True if its topic is subscribed."""
+        """True if the route has subscribed to its topic."""
         return self._subscriber is not None
 
     @property
     def is_ready(self) -> bool:
-        """True if its topic is subscribed, or will be once it has a publisher with a type."""
+        """True if the route has subscribed, or will as soon as its topic has a publisher with a type."""
         return self._subscriber is not None or self._waits_for_type
 
     @property
     def needs_publisher(self) -> bool:
-        """True if messages wait for a publisher on the other side."""
+        """True if messages are waiting for a publisher on the other side."""
         return len(self._backlog) > 0
 
     @property
     def needs_type(self) -> bool:
-        """True if messages wait and the type to publish with is undecided."""
+        """True if messages are waiting and the type to publish them with is not decided yet."""
         return self._form is None and not self.end.msg_type and self.needs_publisher
 
     @property
     def refusal(self) -> str:
-        """Reason why publishing is denied now: it would move a robot without permission."""
+        """Reason why publishing is currently denied (it would move a robot without permission), or ""."""
         if self.end.guard is None:
             return ""
         msg_type = self.end.msg_type if self._form is None else self._form.msg_type
@@ -218,9 +244,10 @@ class Route:
     # ---- called in the thread of the origin's side
 
     def subscribe(self, node: Node, view: GraphView, own_nodes: Collection[str]) -> None:
-        """Subscribe, or subscribe again if the topic turns out to have another type.
+        """Subscribe to the topic, or subscribe again if the topic turns out to have another type.
 
-        If the back end has its own types, wait until the topic has a publisher. Raises `NepError`.
+        If the back end has its own types, the subscription waits until the topic has a publisher. Raises
+        `NepError`.
         """
         known = type_in(view, self.origin.topic, own_nodes)
         if self._subscriber is None:
@@ -262,7 +289,7 @@ class Route:
         )
 
     def end_taking(self) -> None:
-        """Unsubscribe, and forward a rate-limited message at once."""
+        """Unsubscribe, and forward a message held back by the rate limit at once."""
         with self._lock:
             subscriber, self._limit = self._subscriber, None
         if subscriber is not None:
@@ -270,7 +297,7 @@ class Route:
         self._forward_pending()
 
     def close(self) -> None:
-        """Close the route while its bridge continues."""
+        """Close the route's subscriber and publishers while the bridge keeps running."""
         self.end_taking()
         with self._lock:
             self._is_closed = True
@@ -356,7 +383,10 @@ class Route:
     # ---- called in the thread of the end's side
 
     def open_publishers(self, node: Node, view: GraphView, own_nodes: Collection[str]) -> None:
-        """Create the publishers that messages wait for, and send these messages. Raises `NepError`."""
+        """Create the publishers for which messages are waiting, and send these messages.
+
+        Raises `NepError`.
+        """
         while True:
             with self._lock:
                 message = self._send_backlog()
@@ -383,7 +413,7 @@ class Route:
         return self._form
 
     def close_departed(self, origin: GraphView, now: float) -> None:
-        """Close publishers of latched messages whose original publisher left the graph."""
+        """Close the publishers of latched messages whose original publisher has left the graph."""
         there = origin.topics.get(self.origin.topic)
         ids = {each.id for each in there.publishers} if there is not None else set()
         ended = []

@@ -1,4 +1,4 @@
-"""One network of a bridge: its node, and the thread that maintains its subscribers and publishers."""
+"""One side of a bridge: its node, and the thread that maintains its subscribers and publishers."""
 
 from __future__ import annotations
 
@@ -27,11 +27,11 @@ _STATUS_TYPE = "nep/bridge"
 _logger = logging.getLogger("nep")
 _GRAPH_POLL_S, _EARLY_POLL_S = 1.0, 0.05
 _REQUEST_TIMEOUT_S = 1.0
-"""Timeout of requests to the master."""
+"""Time limit of requests to the master in seconds."""
 
 
 class BridgeOfSide(Protocol):
-    """Bridge as seen by its sides."""
+    """Interface of a bridge to its sides."""
 
     own_nodes: frozenset[str]
 
@@ -46,16 +46,16 @@ class BridgeOfSide(Protocol):
         """Return the status to publish."""
 
     def publishes_status_on(self, side: BridgeSide, view: GraphView) -> bool:
-        """Return whether the status is published, and other bridges are detected, on that side."""
+        """Return True if the status is published, and other bridges are detected, on a side."""
 
     def on_status(self, side: SideName, message: Message) -> None:
-        """Process a status received on that side, possibly our own."""
+        """Process a status received on a side; it may be the bridge's own."""
 
 
 class BridgeSide:
-    """Side of a bridge: creates what routes need as soon as its network is available.
+    """Side of a bridge. Creates subscribers and publishers of routes once its network is available.
 
-    Raises `NepError` for a back end that is not installed.
+    The constructor raises `NepError` for a back end that is not installed.
     """
 
     def __init__(
@@ -69,7 +69,7 @@ class BridgeSide:
         self.configuration = configuration
         self.view: GraphView | None = None
         self.problem = ""
-        """Reason why the network is unavailable, "" if it is available or not queried yet."""
+        """Reason why the network is unavailable; "" if it is available or was not queried yet."""
         self.poll_count = 0
         """Number of successful graph queries."""
         self.node = Node(
@@ -87,7 +87,7 @@ class BridgeSide:
 
     @property
     def knows_robots(self) -> bool:
-        """True if the descriptions of all current robots were read, or there is no guard."""
+        """True if the descriptions of all current robots have been read, or there is no guard."""
         if self.guard is None or self.guard.is_settled:
             return True
         if self.view is not None:
@@ -101,16 +101,16 @@ class BridgeSide:
         self._thread.start()
 
     def wake(self) -> None:
-        """Wake the thread because a route needs something."""
+        """Wake the thread because a route needs a subscriber or publisher."""
         self._wake_event.set()
 
     def begin_close(self) -> None:
-        """Create nothing any more."""
+        """Create no more subscribers and publishers."""
         self._is_closing = True
         self._wake_event.set()
 
     def join(self, timeout_s: float) -> None:
-        """Wait for the thread to end."""
+        """Wait at most `timeout_s` seconds for the thread to end."""
         if self._thread is not None:
             self._thread.join(max(0.0, timeout_s))
 

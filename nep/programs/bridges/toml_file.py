@@ -1,4 +1,4 @@
-"""Bridge file: TOML → `BridgeConfiguration`. Errors name the line and the key."""
+"""Bridge file: parses TOML into a `BridgeConfiguration`. Errors name the line and the key."""
 
 from __future__ import annotations
 
@@ -70,7 +70,7 @@ a = "/robot/*"
 b = "/r2d2/*"
 direction = "b->a"
 """
-"""Output of `nep bridge --example`."""
+"""Example of a bridge file, printed by `nep bridge --example`."""
 
 _KEYS = ("name", *SIDES, "topics")
 _SIDE_KEYS = ("backend", "master", "network")
@@ -85,7 +85,7 @@ _CHECKED = TypeVar("_CHECKED")
 
 
 def read_configuration(path: Path) -> BridgeConfiguration:
-    """Read the configuration in a file. Raises `NepError`."""
+    """Read a bridge file. Raises `NepError`."""
     shown = escaped(str(path))
     try:
         with path.open("rb") as file:
@@ -114,9 +114,12 @@ def read_configuration(path: Path) -> BridgeConfiguration:
 
 
 def read_text(text: str, path: str, stem: str) -> BridgeConfiguration:
-    """Parse the configuration in the text of a file at `path`; the default name of the bridge is `stem`.
+    """Parse the text of a bridge file. Raises `NepError`.
 
-    Raises `NepError`.
+    Args:
+        text: Content of the file.
+        path: Path of the file, for error messages.
+        stem: Default name of the bridge.
     """
     try:
         table = tomllib.loads(text)
@@ -135,9 +138,10 @@ def _toml_sentence(path: str, text: str, said: str) -> str:
 
 
 class _Reader:
-    """Converter of TOML tables that knows the line of each key.
+    """Converter of parsed TOML that finds the line of each key for error messages.
 
-    `where` is the name of a table, "" for the root; `number` is the index of the `[[topics]]` table.
+    In its methods, `where` is the name of a table ("" for the root) and `number` the index of a `[[topics]]`
+    table.
     """
 
     def __init__(self, path: str, text: str) -> None:

@@ -1,4 +1,4 @@
-"""Message types at both ends of a bridge: for subscribing and for publishing."""
+"""Message types for subscribing and publishing at both ends of a bridge."""
 
 from __future__ import annotations
 
@@ -15,12 +15,12 @@ __all__ = ["Form", "default_type", "type_for", "type_in"]
 
 _DEFAULT_TYPE = "json"
 _NO_MAPS = frozenset({"string", "bytes", "image"})
-"""Codecs whose payloads have no fields, and so don't fit a back end's own types."""
+"""Codecs whose payloads have no fields, so that a back end's own types can't represent them."""
 _UNKNOWN = frozenset({"", "*"})
 
 
 class Form:
-    """Encoding of messages on the other side."""
+    """Message type and codec used on the other side."""
 
     def __init__(self, msg_type: str, codec: Codec, topic: str) -> None:
         self.msg_type = msg_type
@@ -30,14 +30,17 @@ class Form:
             self.encode = JsonEncoder(topic).encode
 
     def has(self, message: Message) -> bool:
-        """Return whether a message already has this form; a back end's own codec must also match the type."""
+        """Return True if a message already has this codec.
+
+        For a back end's own codec, the type must match, too.
+        """
         if message.codec != self.codec.name:
             return False
         return message.codec in CODECS or message.msg_type == self.msg_type
 
 
 def type_in(view: GraphView, topic: str, own_nodes: Collection[str]) -> str:
-    """Return the type under which other nodes publish a topic, or "" if none does."""
+    """Return the type with which nodes other than the bridge publish a topic, or "" if none does."""
     known = view.topics.get(topic)
     if known is None or all(each.node_id in own_nodes for each in known.publishers):
         return ""
@@ -45,16 +48,16 @@ def type_in(view: GraphView, topic: str, own_nodes: Collection[str]) -> str:
 
 
 def default_type(backend: Backend) -> str:
-    """Return the type for subscribing to an unpublished topic; "" if the back end needs the real one."""
+    """Return the type for subscribing to an unpublished topic; "" if the back end needs the actual type."""
     return _DEFAULT_TYPE if backend.codec_for is codec_for else ""
 
 
 def type_for(message: Message, backend: Backend, known: TopicInfo | None, own_nodes: Collection[str]) -> str:
     """Return the type for publishing messages like `message` on a topic without configured type.
 
-    It is the type of the topic there if only this back end knows that type and the message may be a map, or
-    if it is published with the same codec, because a topic must not have two types. Else it is the message's
-    own type.
+    The topic's existing type is used if only this back end knows that type and the message may be a map, or
+    if the topic is published with the same codec, because a topic must not have two types. Otherwise the
+    message keeps its own type.
     """
     own = _kept_type(message, backend)
     if known is None or known.msg_type in _UNKNOWN:

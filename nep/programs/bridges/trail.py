@@ -1,8 +1,8 @@
-"""Trails: the networks that a message has passed, so that no bridge sends it back.
+"""Loop prevention for bridges: each message carries the list of networks that it has passed.
 
-A bridge stores the trail in the message's extension under the key "bridge": `{"networks": [...], "bridges":
-[...]}`, the networks passed in order, and the ids of all bridges. For back ends without extensions, `LoopGuard`
-remembers recently sent messages.
+A bridge stores this trail in the message's extension under the key "bridge": `{"networks": [...], "bridges":
+[...]}`, with the networks in order and the ids of all bridges. For back ends without extensions, `LoopGuard`
+recognizes returning messages.
 """
 
 from __future__ import annotations
@@ -17,9 +17,9 @@ __all__ = ["TRAIL_KEY", "LoopGuard", "Trail", "read_trail"]
 
 TRAIL_KEY = "bridge"
 MAX_HOPS = 16
-"""Maximum number of bridges that a message passes; longer chains are loops."""
+"""Maximum number of bridges that forward a message; longer chains are loops."""
 ECHO_S = 5.0
-"""Time after which an echo is no longer expected."""
+"""Time in seconds within which a sent message is recognized when it returns."""
 _MAX_WORD_LENGTH = 400
 _MAX_ECHOES = 4096
 
@@ -31,21 +31,21 @@ class Trail(NamedTuple):
     bridges: tuple[str, ...] = ()
 
     def may_go(self, network: str, bridge: str) -> bool:
-        """Return whether this bridge may forward it into this network."""
+        """Return True if a bridge may forward the message into a network."""
         return network not in self.networks and bridge not in self.bridges and len(self.bridges) < MAX_HOPS
 
     def carried(self, origin: str, network: str, bridge: str) -> Trail:
-        """Return the trail after this bridge forwards the message from `origin` into `network`."""
+        """Return the trail of the message after a bridge has forwarded it from `origin` into `network`."""
         been = self.networks if origin in self.networks else (*self.networks, origin)
         return Trail((*been, network), (*self.bridges, bridge))
 
     def to_plain(self) -> dict[str, object]:
-        """Convert to the form in an extension."""
+        """Return the trail as a JSON-serializable dict for the extension."""
         return {"networks": list(self.networks), "bridges": list(self.bridges)}
 
 
 def read_trail(extension: Mapping[str, object]) -> Trail:
-    """Return the trail in an extension; an empty one if it is missing or invalid."""
+    """Parse the trail in an extension; a missing or invalid trail is empty."""
     found = extension.get(TRAIL_KEY)
     if not isinstance(found, Mapping):
         return Trail()
@@ -61,11 +61,11 @@ def _words(found: object) -> tuple[str, ...]:
 
 
 class LoopGuard:
-    """Recently sent messages of a topic in a network that doesn't identify publishers.
+    """Loop guard of a topic for a network that doesn't identify publishers. Thread-safe.
 
-    A message that comes back has no sign of its origin. It is recognized by its bytes, once per time sent,
-    within `ECHO_S`: an equal message of another publisher is mistaken for an echo only if the echo itself is
-    missing. Thread-safe.
+    A returning message carries no sign of its origin, so it is recognized by its bytes, once for each time it
+    was sent, within `ECHO_S`. An equal message of another publisher is mistaken for an echo only if the echo
+    itself is missing.
     """
 
     def __init__(self) -> None:
@@ -74,14 +74,14 @@ class LoopGuard:
         self._are_needed = True
 
     def not_needed(self) -> None:
-        """Stop remembering: the network identifies publishers."""
+        """Stop recording messages, because the network identifies publishers."""
         if self._are_needed:
             self._are_needed = False
             with self._lock:
                 self._sent.clear()
 
     def sent(self, data: bytes | memoryview, now: float) -> None:
-        """Remember a message that is being sent."""
+        """Record a message that is being sent."""
         if self._are_needed:
             key = _digest(data)
             with self._lock:
@@ -91,7 +91,7 @@ class LoopGuard:
                     self._sent.popitem(last=False)
 
     def is_echo(self, data: bytes | memoryview, now: float) -> bool:
-        """Return whether this message was sent and is coming back; forget it then."""
+        """Return True if a received message is one that was sent, and remove its record."""
         key = _digest(data)
         with self._lock:
             count, at = self._sent.pop(key, (0, 0.0))

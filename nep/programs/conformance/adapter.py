@@ -25,20 +25,20 @@ _MAX_LINE_BYTES = 64 * 2**20
 
 
 class AdapterError(NepError):
-    """The adapter can't be started or violates the protocol of adapters."""
+    """Error for an adapter that can't be started or violates the protocol of adapters."""
 
 
 class AdapterStreams(Protocol):
-    """Output and input stream of an adapter, and its end."""
+    """Output and input stream of an adapter."""
 
     reads: IO[bytes]
     writes: IO[bytes]
 
     def wait(self, timeout_s: float) -> int | None:
-        """Return the exit code, or None if the adapter still runs after ``timeout_s``."""
+        """Return the exit code, or None if the adapter still runs after `timeout_s` seconds."""
 
     def end(self) -> None:
-        """End the adapter, by force if necessary."""
+        """Stop the adapter, by force if necessary."""
 
 
 class AdapterProcess:
@@ -66,14 +66,14 @@ class AdapterProcess:
         self.writes: IO[bytes] = writes
 
     def wait(self, timeout_s: float) -> int | None:
-        """Return the exit code, or None if the adapter still runs after ``timeout_s``."""
+        """Return the exit code, or None if the adapter still runs after `timeout_s` seconds."""
         try:
             return self._process.wait(timeout_s)
         except subprocess.TimeoutExpired:
             return None
 
     def end(self) -> None:
-        """Close its standard input, and kill the process if it does not exit within 3 s."""
+        """Close the adapter's standard input, and kill the process if it does not exit within 3 s."""
         with suppress(OSError):
             self.writes.close()
         if self.wait(3.0) is None:
@@ -83,12 +83,12 @@ class AdapterProcess:
 
 
 class Adapter:
-    """Requests to an adapter, its replies and events. A thread of its own reads the lines."""
+    """Client of an adapter: sends requests and collects replies and events, which a thread reads."""
 
     def __init__(self, lines: AdapterStreams) -> None:
         self.lines = lines
         self.events: list[Mapping[str, Any]] = []
-        """Messages received by its subscribers, in the order of the events."""
+        """Messages received by the adapter's subscribers, in the order of the events."""
         self._replies: dict[int, Mapping[str, Any]] = {}
         self._incoming: deque[bytes | None] = deque()
         self._count = 0
@@ -103,7 +103,7 @@ class Adapter:
         self._incoming.append(None)
 
     def begin(self, do: str, **members: object) -> int:
-        """Send a request and return its number for `reply`."""
+        """Send a request and return its number, to be passed to `reply`."""
         self._count += 1
         line = json.dumps({"id": self._count, "do": do, **members}).encode() + b"\n"
         try:
@@ -114,7 +114,10 @@ class Adapter:
         return self._count
 
     def reply(self, number: int) -> Mapping[str, Any] | None:
-        """Return the reply to a request, or None if pending. Raises `AdapterError` if it reports an error."""
+        """Return the reply to a request, or None if pending.
+
+        Raises `AdapterError` if the reply is an error.
+        """
         self.pump()
         reply = self._replies.get(number)
         if reply is None:
@@ -146,6 +149,6 @@ class Adapter:
                 self.events.append(message)
 
     def end(self) -> None:
-        """End the adapter and the reading thread."""
+        """Stop the adapter and the reading thread."""
         self.lines.end()
         self._reader.join(5.0)

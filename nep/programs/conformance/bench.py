@@ -1,4 +1,4 @@
-"""Test bench: one adapter with a simulated master and peers, polled in one thread."""
+"""Test bench: one adapter with a simulated master and peers. All sockets are polled in one thread."""
 
 from __future__ import annotations
 
@@ -22,13 +22,18 @@ from nep.protocol.requests import AddPublisher, AddSubscriber, Leave, PublisherC
 __all__ = ["Bench", "Start"]
 
 Start = Callable[[str], AdapterStreams]
-"""Starts an adapter with this address of the master."""
+"""Function that starts an adapter with the given address of the master."""
 _POLL_MS = 2
 _ANSWER_S = 15.0
 
 
 class Bench:
-    """Test bench for rules. ``scale`` multiplies the times of the wire; the adapter must use the same."""
+    """Test bench for rules.
+
+    Args:
+        start: Starts the adapter.
+        scale: Factor for the times of the wire; the adapter must use the same.
+    """
 
     def __init__(self, start: Start, scale: float = 1.0) -> None:
         self.scale = scale
@@ -38,7 +43,7 @@ class Bench:
         self.publishers: list[ScriptedPublisher] = []
         self.subscribers: list[ScriptedSubscriber] = []
         self.connect_delay_s: float | None = 0.0
-        """Delay before the tester's subscribers connect to a listed publisher; None: they don't connect."""
+        """Delay before the tester's subscribers connect to a listed publisher; None if they don't connect."""
         self._connecting: list[tuple[float, ScriptedSubscriber, str]] = []
         self._opened: list[tuple[str, Mapping[str, Any]]] = []
         self._numbers = itertools.count(1)
@@ -58,7 +63,7 @@ class Bench:
     # ---- time
 
     def pump(self) -> None:
-        """Process all pending input of master, peers and adapter."""
+        """Process all pending input of the master, the peers and the adapter."""
         self.master.pump()
         for peer in self._peers():
             peer.pump()
@@ -69,7 +74,7 @@ class Bench:
         self.adapter.pump()
 
     def until(self, is_met: Callable[[], bool], timeout_s: float) -> bool:
-        """Pump until the condition is met; return False after ``timeout_s``, which is not scaled."""
+        """Pump until the condition is met; return False after `timeout_s` seconds, which are not scaled."""
         deadline = time.monotonic() + timeout_s
         while True:
             self.pump()
@@ -88,11 +93,14 @@ class Bench:
         poller.poll(_POLL_MS)
 
     def wait(self, seconds: float) -> None:
-        """Pump for ``seconds`` times `scale`."""
+        """Pump for `seconds` times `scale`."""
         self.until(lambda: False, seconds * self.scale)
 
     def need(self, is_met: Callable[[], bool], what: str, timeout_s: float = 5.0) -> None:
-        """Pump until the condition is met; raise `BrokenRuleError` with ``what`` after the scaled timeout."""
+        """Pump until the condition is met.
+
+        Raises `BrokenRuleError` naming `what` after the scaled timeout.
+        """
         if not self.until(is_met, max(timeout_s * self.scale, 2.0 if self.scale < 1 else timeout_s)):
             raise broken(_("no '{what}' within {seconds:g} s").format(what=what, seconds=timeout_s))
 
@@ -103,7 +111,7 @@ class Bench:
         return self.finish(self.adapter.begin(do, **members), do)
 
     def finish(self, number: int, do: str) -> Mapping[str, Any]:
-        """Wait for the reply to the request ``number``. Raises `AdapterError`."""
+        """Wait for the reply to request `number` and return it. Raises `AdapterError`."""
         found: list[Mapping[str, Any]] = []
 
         def has_finished() -> bool:
@@ -121,7 +129,7 @@ class Bench:
         return found[0]
 
     def new_topic(self) -> str:
-        """Return an unused topic."""
+        """Return the name of an unused topic."""
         return f"/check/{next(self._numbers)}"
 
     def new_pub(self, topic: str, msg_type: str = "json", **members: object) -> int:
@@ -165,11 +173,11 @@ class Bench:
     # ---- requests to the master
 
     def requests(self, do: str) -> list[RecordedRequest]:
-        """Return all requests of this name."""
+        """Return all requests with this name that the master received."""
         return [each for each in self.master.received if each.do == do]
 
     def request(self, do: str, field: str, id: object) -> RecordedRequest:
-        """Wait for the request of this name whose ``field`` is ``id``, and return it."""
+        """Wait for the request with this name whose `field` equals `id`, and return it."""
         self.need(lambda: any(each.what.get(field) == id for each in self.requests(do)), do)
         return next(each for each in self.requests(do) if each.what.get(field) == id)
 
@@ -191,7 +199,7 @@ class Bench:
         raise broken(_("no '{what}' was received").format(what="node"))
 
     def renewal(self, after: int, timeout_s: float = 5.0) -> RecordedRequest:
-        """Wait for a renewal after the first ``after`` requests, and return it."""
+        """Wait for a renewal, ignoring the first `after` requests, and return it."""
         self.need(
             lambda: any(each.do == "renew" for each in self.master.received[after:]), "renew", timeout_s
         )
@@ -200,13 +208,13 @@ class Bench:
     # ---- peers
 
     def new_socket(self, kind: int) -> zmq.Socket[bytes]:
-        """Return a socket, to be closed by the rule."""
+        """Create a socket; the rule must close it."""
         socket: zmq.Socket[bytes] = self._context.socket(kind)
         socket.linger = 0
         return socket
 
     def fail_handshake(self, kind: str, endpoint: str) -> None:
-        """Be another program's socket at an endpoint until the adapter has connected to it and left again.
+        """Imitate another program's socket at an endpoint until the adapter has connected and disconnected.
 
         Args:
             kind: Type of socket that the adapter must reject, such as ``PUB``.
@@ -218,7 +226,7 @@ class Bench:
     def publisher(
         self, topic: str, msg_type: str = "json", *, echoes: bool = True, is_listed: bool = True
     ) -> ScriptedPublisher:
-        """Return a publisher of the tester, registered at the master if ``is_listed``."""
+        """Create a publisher of the tester, and register it at the master if `is_listed`."""
         created = ScriptedPublisher(self._context, topic, msg_type, echoes=echoes)
         self.publishers.append(created)
         if is_listed:
@@ -232,7 +240,7 @@ class Bench:
     def subscriber(
         self, topic: str, msg_type: str = "json", *, level: int | None = 3, endpoint: str | None = None
     ) -> ScriptedSubscriber:
-        """Return a subscriber of the tester, connected to ``endpoint`` or else registered at the master."""
+        """Create a subscriber of the tester, connected to `endpoint` or else registered at the master."""
         created = ScriptedSubscriber(self._context, topic, msg_type, level)
         self.subscribers.append(created)
         if endpoint is None:
@@ -242,7 +250,7 @@ class Bench:
         return created
 
     def subscribed_publisher(self, topic: str, msg_type: str = "json") -> tuple[ScriptedPublisher, int]:
-        """Return a publisher of the tester and the number of the adapter's subscriber connected to it."""
+        """Create a publisher of the tester and a subscriber of the adapter; wait until they are connected."""
         publisher = self.publisher(topic, msg_type)
         sub = self.new_sub(topic, msg_type)
         self.need(lambda: bool(publisher.hellos), "hello")
@@ -259,11 +267,11 @@ class Bench:
     # ---- between rules and at the end
 
     def forget(self) -> None:
-        """Leave closing of the opened publishers and subscribers to the rule."""
+        """Leave closing the adapter's publishers and subscribers to the rule."""
         self._opened.clear()
 
     def clear(self) -> None:
-        """Close all publishers and subscribers of a rule; the adapter keeps running."""
+        """Close all publishers and subscribers that a rule opened; the adapter keeps running."""
         self.master.change = lambda _request, reply: reply
         self.connect_delay_s = 0.0
         self._connecting.clear()
@@ -289,7 +297,7 @@ class Bench:
         yield from self.subscribers
 
     def close(self) -> None:
-        """End the adapter and close all sockets."""
+        """Stop the adapter and close all sockets."""
         try:
             self.adapter.end()
         finally:

@@ -1,4 +1,4 @@
-"""Check of rules against one adapter, which is restarted after each broken rule."""
+"""Check of an adapter against rules. The adapter is restarted after each broken rule."""
 
 from __future__ import annotations
 
@@ -26,20 +26,26 @@ _MODULES = (
     "limits",
     "services",
 )
-"""Modules of rules in the order of their checks; later rules depend on earlier ones."""
+"""Modules of rules in the order in which they are checked; later rules depend on earlier ones."""
 Status = Literal["passed", "failed", "skipped"]
 
 
 @dataclass(frozen=True)
 class Outcome:
-    """Result of a rule. ``seen`` describes the failure or the reason for skipping, and is empty otherwise."""
+    """Result of a rule.
+
+    Attributes:
+        rule: Rule that was checked.
+        status: "passed", "failed" or "skipped".
+        seen: Description of the failure or reason for skipping; "" if passed.
+    """
 
     rule: Rule
     status: Status
     seen: str = ""
 
     def to_plain(self) -> dict[str, object]:
-        """Return the JSON object of ``--json``."""
+        """Return the result as a JSON-serializable dict, for ``--json``."""
         return {
             "id": self.rule.id,
             "status": self.status,
@@ -50,7 +56,10 @@ class Outcome:
 
 
 def chosen_rules(ids: Iterable[str]) -> list[Rule]:
-    """Return the rules with these ids, or all rules if empty. Raises `KeyError` with an unknown id."""
+    """Return the rules with these ids, or all rules if there are none.
+
+    Raises `KeyError` for an unknown id.
+    """
     wanted = list(ids)
     for each in wanted:
         if each not in RULES:
@@ -60,11 +69,11 @@ def chosen_rules(ids: Iterable[str]) -> list[Rule]:
 
 
 def check(start: Start, rules: Iterable[Rule], scale: float = 1.0) -> Iterator[Outcome]:
-    """Check an adapter against these rules, and yield each outcome.
+    """Check an adapter against rules, and yield each outcome.
 
     Args:
         start: Starts an adapter with the given address of the master.
-        rules: Rules in the order of their checks.
+        rules: Rules in the order in which they are checked.
         scale: Factor for the times of the wire; the adapter must scale them equally.
 
     Raises:

@@ -1,4 +1,4 @@
-"""Another program's ZeroMQ socket at an address where the client expects a different kind of socket."""
+"""ZeroMQ socket of another program at an address where the client expects a different kind of socket."""
 
 from __future__ import annotations
 
@@ -14,10 +14,10 @@ _GREETING = b"\xff" + bytes(8) + b"\x7f\x03\x00NULL".ljust(23, b"\0") + bytes(32
 
 
 class OtherSocket:
-    """Listener that completes the handshake of ZMTP 3.0 as a socket of the given type, such as ``PUB``.
+    """Listener that completes the ZMTP 3.0 handshake as a socket of the given type, such as ``PUB``.
 
-    A client's library ends the connection itself, because the types don't match. A real socket would race
-    with it: libzmq connects again if the other side ended the connection, and never if it did so itself.
+    The client's library disconnects by itself, because the types don't match. A real socket would cause a
+    race: libzmq connects again if the other side disconnected, but never if it disconnected itself.
     """
 
     def __init__(self, endpoint: str, kind: str) -> None:
@@ -38,7 +38,7 @@ class OtherSocket:
             raise
 
     def has_been_left(self) -> bool:
-        """Accept pending clients; return whether one has ended its connection."""
+        """Accept pending clients; return True if one of them has disconnected."""
         with contextlib.suppress(BlockingIOError):
             while True:
                 client, _address = self._listener.accept()

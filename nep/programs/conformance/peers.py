@@ -1,4 +1,4 @@
-"""Publishers and subscribers of the tester: plain sockets that record and send raw parts."""
+"""Publishers and subscribers of the tester: sockets that record and send raw parts."""
 
 from __future__ import annotations
 
@@ -32,13 +32,13 @@ __all__ = ["Notice", "ScriptedPublisher", "ScriptedSubscriber", "new_node"]
 
 
 def new_node(name: str) -> NodeRecord:
-    """Return the record of a new node of the tester."""
+    """Create the record of a new node of the tester."""
     return NodeRecord(secrets.token_hex(8), name, "tester", None, "tester")
 
 
 @dataclass(frozen=True)
 class Filter:
-    """Subscription or unsubscription received by an XPUB socket."""
+    """Subscription filter that an XPUB socket received, added or removed."""
 
     at: float
     is_added: bool
@@ -47,7 +47,7 @@ class Filter:
 
 @dataclass(frozen=True)
 class Notice:
-    """Echo or bye, or a message sent under a hello (with a payload)."""
+    """Echo, bye, or (with a payload) message that was sent under a hello."""
 
     at: float
     hello: bytes
@@ -56,7 +56,7 @@ class Notice:
 
 
 class ScriptedPublisher:
-    """XPUB socket that records all filters and sends any parts; ``echoes`` makes it answer hellos."""
+    """XPUB socket that records all filters and sends arbitrary parts; answers hellos if `echoes`."""
 
     def __init__(self, context: zmq.Context[Any], topic: str, msg_type: str, *, echoes: bool) -> None:
         self.topic, self.echoes = topic, echoes
@@ -71,7 +71,7 @@ class ScriptedPublisher:
         self.seq = 0
         self.filters: list[Filter] = []
         self.hellos: dict[bytes, Hello] = {}
-        """Current hellos for its topic, by filter."""
+        """Current hellos for the publisher's topic, by filter."""
         self.echoed_at: float | None = None
 
     @property
@@ -120,7 +120,7 @@ class ScriptedPublisher:
                 self.hellos.pop(noted.what, None)
 
     def echo(self, hello: bytes) -> None:
-        """Answer a hello with the seq of the last message."""
+        """Answer a hello with the sequence number of the last message."""
         self.notice(hello)
         self.echoed_at = time.monotonic()
 
@@ -134,7 +134,14 @@ class ScriptedPublisher:
             self.notice(hello, BYE)
 
     def send(self, payload: bytes, form: str = "parts", *, seq: int | None = None, flags: int = 0) -> None:
-        """Send the next message: in ``parts``, as ``one`` part, or ``alone`` under each hello."""
+        """Send the next message.
+
+        Args:
+            payload: Encoded payload.
+            form: "parts" for several parts, "one" for one part, "alone" for a message under each hello.
+            seq: Sequence number; None for the next one.
+            flags: Flags of the header.
+        """
         self.seq = self.seq + 1 if seq is None else seq
         header, topic = self._header(flags, payload), topic_part(self.topic)
         if form == "one":
@@ -159,7 +166,7 @@ class ScriptedPublisher:
 
 
 class ScriptedSubscriber:
-    """SUB socket that keeps all received parts. ``level`` is its hello level, None for no hello."""
+    """SUB socket that records all received parts; `level` is its hello level, None for no hello."""
 
     def __init__(self, context: zmq.Context[Any], topic: str, msg_type: str, level: int | None) -> None:
         self.topic, self.level = topic, level
@@ -178,7 +185,7 @@ class ScriptedSubscriber:
         self.endpoint = ""
 
     def connect(self, endpoint: str) -> None:
-        """Connect to a publisher, unless connected."""
+        """Connect to a publisher, unless already connected."""
         if not self.endpoint:
             self.endpoint = endpoint
             self.socket.connect(endpoint)
@@ -197,7 +204,7 @@ class ScriptedSubscriber:
 
     @property
     def notices(self) -> list[Notice]:
-        """Received echoes, byes and messages under its hello; malformed ones are left out."""
+        """Received echoes, byes and messages under the subscriber's hello, without malformed ones."""
         found = []
         for at, parts in zip(self.times, self.received, strict=True):
             if parts[0] == self.hello and len(parts) >= 2 and len(parts[1]) == HEADER_BYTES:
@@ -225,5 +232,8 @@ class ScriptedSubscriber:
 
     @property
     def messages(self) -> list[Parts]:
-        """All received messages of its topic, batches split. Raises `WireError` for malformed parts."""
+        """Received messages of the subscriber's topic, with batches split.
+
+        Raises `WireError` for malformed parts.
+        """
         return [each for parts in self.raw for each in read_parts(parts)]

@@ -1,4 +1,4 @@
-"""Ports of 127.0.0.1: binding to one that was just released, and reserving a closed one."""
+"""Ports of 127.0.0.1: binding to a port that was just released, and reserving a closed port."""
 
 from __future__ import annotations
 
@@ -18,12 +18,12 @@ _WAIT_S = 5.0
 
 
 def bind_again(socket: zmq.Socket[Any], endpoint: str) -> None:
-    """Bind, and retry while libzmq's thread is still closing the previous socket of the endpoint."""
+    """Bind a socket, retrying while libzmq's thread is still closing the previous socket of the endpoint."""
     retry_bind(lambda: socket.bind(endpoint))
 
 
 def retry_bind(bind: Callable[[], object]) -> None:
-    """Call ``bind``, and retry while libzmq's thread is still closing the previous socket of the endpoint."""
+    """Call `bind`, retrying while libzmq's thread is still closing the previous socket of the endpoint."""
     deadline = time.monotonic() + _WAIT_S
     while True:
         try:
@@ -37,7 +37,7 @@ def retry_bind(bind: Callable[[], object]) -> None:
 
 @contextmanager
 def closed_port() -> Iterator[str]:
-    """Reserve a port that rejects connections; the value is its endpoint."""
+    """Reserve a port at which connections are rejected; yields its endpoint."""
     with sockets.socket() as held:
         held.bind(("127.0.0.1", 0))
         yield f"tcp://127.0.0.1:{held.getsockname()[1]}"

@@ -1,4 +1,4 @@
-"""Registry of the rules of the native wire: `rule` registers a check, `RULES` has all."""
+"""Registry of the rules of the native wire: `rule` registers a check, `RULES` contains all rules."""
 
 from __future__ import annotations
 
@@ -17,11 +17,12 @@ class Rule:
     """Rule of the native wire.
 
     Attributes:
-        requirement: English sentence; translate it with `_` to show it.
+        id: Unique id.
+        requirement: English sentence; translate it with `_` for display.
         section: Anchor of a heading in docs/wire.md, or ``PAGE.md#anchor``.
         judge: Raises `BrokenRuleError` if the adapter on the bench breaks the rule.
         features: Features that an adapter must announce for the rule to apply.
-        is_last: The adapter has exited after the check.
+        is_last: True if the adapter has exited after the check.
     """
 
     id: str
@@ -33,7 +34,7 @@ class Rule:
 
     @property
     def place(self) -> str:
-        """Page and section of the requirement."""
+        """Page and section of the requirement in docs."""
         section = self.section.replace(" ", "-")
         return section if ".md#" in section else f"wire.md#{section}"
 

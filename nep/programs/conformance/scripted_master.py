@@ -1,7 +1,7 @@
 """Simulated master that records all requests and can change any reply.
 
-Its state is that of the real master (`nep.masters.graph.Graph`) without a clock: leases don't expire until a
-rule unlists a node by `ScriptedMaster.drop`.
+Its state is that of the real master (`nep.masters.graph.Graph`) without a clock: a lease doesn't expire until
+a rule calls `ScriptedMaster.drop`.
 """
 
 from __future__ import annotations
@@ -37,7 +37,16 @@ PEER = "peer"
 
 @dataclass(frozen=True)
 class RecordedRequest:
-    """Received request. ``problem`` describes a malformed one, in terms of the wire."""
+    """Received request.
+
+    Attributes:
+        at: Time of arrival.
+        sender: Route of the sender.
+        do: Name of the request.
+        call: Number of the call.
+        what: Content of the request.
+        problem: Description of a malformed request, in terms of the wire; "" if it is valid.
+    """
 
     at: float
     sender: str
@@ -48,11 +57,16 @@ class RecordedRequest:
 
 
 Change = Callable[[RecordedRequest, dict[str, Any]], "dict[str, Any] | None"]
-"""Returns the reply to send in place of the given one, or None to send nothing."""
+"""Function that returns the reply to send instead of the given one, or None to send no reply."""
 
 
 class ScriptedMaster:
-    """Master on a free port of 127.0.0.1. Call `pump` to process requests."""
+    """Master on a free port of 127.0.0.1. Call `pump` to process requests.
+
+    Args:
+        context: ZeroMQ context.
+        on_push: Called with each message that is pushed to a node of the tester.
+    """
 
     def __init__(self, context: zmq.Context[Any], on_push: Callable[[Outgoing], None]) -> None:
         self._context = context
@@ -71,11 +85,11 @@ class ScriptedMaster:
 
     @property
     def sockets(self) -> list[zmq.Socket[bytes]]:
-        """Open sockets, to poll."""
+        """Open sockets to be polled."""
         return [] if self._socket is None else [self._socket]
 
     def start(self) -> None:
-        """Bind with a new epoch and an empty graph, to the same port as before."""
+        """Bind with a new epoch and an empty graph; a restart uses the same port."""
         self.graph = Graph(secrets.randbits(62) | 1, 0.0, learn_s=0.0)
         self._socket = self._context.socket(zmq.ROUTER)
         self._socket.linger = 0
@@ -86,19 +100,19 @@ class ScriptedMaster:
             self.port = self._socket.bind_to_random_port("tcp://127.0.0.1")
 
     def stop(self) -> None:
-        """Close the socket: no master is running."""
+        """Close the socket, as if no master were running."""
         if self._socket is not None:
             self._socket.close(0)
             self._socket = None
 
     def pump(self) -> None:
-        """Answer all pending requests."""
+        """Reply to all pending requests."""
         while self._socket is not None and self._socket.poll(0):
             sender, *parts = self._socket.recv_multipart()
             self._serve(sender.decode("utf-8", "surrogateescape"), parts)
 
     def submit(self, request: Request) -> None:
-        """Apply a request of the tester. Raises `WireError` if it is refused."""
+        """Apply a request of the tester. Raises `WireError` if the graph rejects the request."""
         for each in self.graph.apply(request, 1, 0.0, PEER):
             if isinstance(each.answer, Refused):
                 raise WireError(each.answer.reason)
@@ -106,12 +120,12 @@ class ScriptedMaster:
                 self._push(each)
 
     def drop(self, node_id: str) -> None:
-        """Unlist a node, as after the end of its lease."""
+        """Remove a node from the graph, as if its lease had expired."""
         for each in self.graph.drop([node_id]):
             self._push(each)
 
     def repeat_pushes(self, node_id: str, record: PublisherRecord, node: NodeRecord) -> None:
-        """Push a publisher to the adapter's node twice more."""
+        """Push a publisher to the adapter's node two more times."""
         came = PublisherCame(
             self.graph.epoch, self.graph.revision, RemotePublisher(record, node.id, node.name)
         )

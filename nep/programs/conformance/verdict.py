@@ -1,4 +1,4 @@
-"""Expectations of rules, and the error of a client that breaks one."""
+"""Checks for rules, and the error raised if a client breaks a rule."""
 
 from __future__ import annotations
 
@@ -15,16 +15,16 @@ _MAX_SHOWN = 200
 
 
 class BrokenRuleError(NepError):
-    """The client broke a rule; the message describes the observed behaviour."""
+    """Error for a client that broke a rule; the message describes the observed behaviour."""
 
 
 def broken(sentence: str) -> BrokenRuleError:
-    """Return the error with this message."""
+    """Create the error with this message."""
     return BrokenRuleError(sentence)
 
 
 def expect(what: str, seen: object, wanted: object) -> None:
-    """Raise `BrokenRuleError` unless ``seen`` equals ``wanted`` in type and value. ``what`` names a field."""
+    """Raise `BrokenRuleError` unless `seen` equals `wanted` in type and value; `what` names the field."""
     if seen != wanted or type(seen) is not type(wanted):
         raise BrokenRuleError(
             _("{what} is {seen}, expected {wanted}").format(
@@ -35,7 +35,7 @@ def expect(what: str, seen: object, wanted: object) -> None:
 
 @contextmanager
 def at_most(seconds: float) -> Iterator[None]:
-    """Raise `BrokenRuleError` if the block takes longer."""
+    """Raise `BrokenRuleError` if the block takes longer than `seconds`."""
     began = time.monotonic()
     yield
     took_s = time.monotonic() - began
@@ -44,6 +44,6 @@ def at_most(seconds: float) -> Iterator[None]:
 
 
 def printable(value: object) -> str:
-    """Return a printable form of a value, of limited length."""
+    """Return the `ascii` of a value, shortened for a message."""
     text = ascii(value)
     return text if len(text) <= _MAX_SHOWN else f"{text[:_MAX_SHOWN]}…"

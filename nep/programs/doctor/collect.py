@@ -63,7 +63,7 @@ _GATEWAY_OFF = {"0", "false", "no", "off"}
 def collect_facts(
     address: str | None = None, *, folders: Sequence[tuple[str, Path]] = (), here: Path | None = None
 ) -> Facts:
-    """Collect all facts; takes up to two seconds when no master replies.
+    """Collect all facts; takes up to two seconds if no master replies.
 
     Args:
         address: Address of the master (default: NEP_MASTER or the default address).
@@ -79,8 +79,8 @@ def collect_in_steps(
 ) -> Iterator[tuple[tuple[str, ...], Facts]]:
     """Yield the facts after each step of `collect_facts`, quick steps first.
 
-    Each item starts with the names of the parts of the diagnosis (`nep.programs.doctor.diagnosis.PARTS`)
-    whose facts are complete since this step.
+    Each item starts with the names of the checks in `nep.programs.doctor.diagnosis.PARTS` whose facts are
+    complete after this step.
     """
     chosen, package = master_address(address), Path(nep.errors.__file__).parent
     facts = Facts(time.time(), chosen, sys.platform, _versions(), str(package))
@@ -144,9 +144,9 @@ def _answers_at(address: str) -> str:
 
 
 def start_obstacle(address: str | None = None) -> Finding | None:
-    """Return why no master can be started at the address, or None if nothing prevents it.
+    """Return the finding that prevents starting a master at the address, or None.
 
-    An address that is not loopback is an obstacle, because a master starts at loopback only.
+    An address that is not loopback is an obstacle, because masters are started at loopback addresses only.
     """
     chosen = master_address(address)
     facts = Facts(time.time(), chosen, sys.platform, {}, "", loopback=loopback_problem())
@@ -189,7 +189,7 @@ def _port(
 
 
 def loopback_problem() -> str:
-    """Return why this program can't connect to itself over 127.0.0.1, or "" if it can."""
+    """Return the reason why this program can't connect to itself over 127.0.0.1, or "" if it can."""
     try:
         with socket.socket() as server:
             server.bind(("127.0.0.1", 0))

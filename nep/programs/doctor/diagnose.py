@@ -1,4 +1,4 @@
-"""Complete run of the doctor, optionally for one topic."""
+"""Complete diagnosis, optionally for one topic."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from nep.programs.doctor.topics import topic_findings
 __all__ = ["Tell", "diagnose"]
 
 Tell = Callable[[tuple[Finding, ...], int, int], object]
-"""Progress callback: findings so far (worst first), number of checks done, number of all checks."""
+"""Progress callback: (findings so far, worst first; number of completed checks; number of all checks)."""
 
 
 def diagnose(
@@ -24,12 +24,12 @@ def diagnose(
     folders: Sequence[tuple[str, Path]] = (),
     tell: Tell | None = None,
 ) -> tuple[Finding, ...]:
-    """Run all checks and return the findings, worst first; takes some seconds.
+    """Run all checks and return the findings, worst first. Takes some seconds.
 
     Args:
         address: Address of the master.
-        topic: Topic whose messages don't arrive. Its findings come before others of the same severity and
-            replace general ones with the same id.
+        topic: Topic whose messages don't arrive. Findings about the topic come first among those of the same
+            severity, and replace general findings with the same id.
         folders: As for `collect_facts`.
         tell: Called after each step with the findings so far.
     """

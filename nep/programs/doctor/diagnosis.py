@@ -1,4 +1,4 @@
-"""Diagnosis of the doctor: a pure function from facts to findings, without sockets, files or clock."""
+"""Diagnosis: functions that derive findings from facts, without sockets, files or a clock."""
 
 from __future__ import annotations
 
@@ -18,15 +18,15 @@ __all__ = ["PARTS", "findings", "in_order", "report", "to_plain", "worst"]
 MIN_FILES = 1024
 FILES_WARNING_RATIO = 0.8
 _FILES_PER_TOPIC = 20
-"""File descriptors of the master per topic of the original NEP; a native topic needs fewer."""
+"""File descriptors that a master needs per topic of the original NEP; a native topic needs fewer."""
 _ORDER: dict[Severity, int] = {"error": 0, "warning": 1, "info": 2, "ok": 3}
 _SIGNS = {"error": "x", "warning": "!", "info": "-", "ok": "+"}
 EARLIEST_S = 1_704_067_200.0
-"""Start of 2024; an earlier clock was never set."""
+"""Start of 2024. A clock with an earlier time was never set."""
 
 
 def findings(facts: Facts) -> tuple[Finding, ...]:
-    """Return all findings of the facts, worst first."""
+    """Derive all findings from the facts, worst first."""
     return in_order(finding for part in PARTS.values() for finding in part(facts))
 
 
@@ -36,13 +36,13 @@ def in_order(found: Iterable[Finding]) -> tuple[Finding, ...]:
 
 
 def worst(found: Sequence[Finding]) -> Literal[0, 1, 2]:
-    """Return the exit code: 2 with an error, 1 with a warning, else 0."""
+    """Return the exit code for findings: 2 with an error, 1 with a warning, else 0."""
     severities = {finding.severity for finding in found}
     return 2 if "error" in severities else 1 if "warning" in severities else 0
 
 
 def report(found: Sequence[Finding]) -> str:
-    """Format the findings as plain text, for a bug report."""
+    """Format findings as plain text, for a bug report."""
     lines = []
     for finding in found:
         lines.append(f"{_SIGNS[finding.severity]} {finding.sentence}")
@@ -51,7 +51,7 @@ def report(found: Sequence[Finding]) -> str:
 
 
 def to_plain(found: Sequence[Finding]) -> list[dict[str, object]]:
-    """Return the findings as dicts, for `--json`."""
+    """Convert findings to JSON-serializable dicts, for `--json`."""
     return [asdict(finding) for finding in found]
 
 
@@ -245,4 +245,4 @@ PARTS: Mapping[str, Callable[[Facts], Iterator[Finding]]] = {
     "clock": _clock,
     "versions": _versions,
 }
-"""Checks by name; findings of equal severity appear in this order."""
+"""Checks by name. Findings of equal severity are shown in this order."""

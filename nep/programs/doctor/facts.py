@@ -1,4 +1,4 @@
-"""Facts about this computer that the doctor judges, as frozen dataclasses. None means unknown."""
+"""Facts about this computer that the doctor evaluates, as frozen dataclasses. None means unknown."""
 
 from __future__ import annotations
 
@@ -24,16 +24,23 @@ __all__ = [
 ]
 
 Reach = Literal["", "elsewhere", "refused", "timeout", "unknown"]
-"""Why an address can't be reached; "" if it can, or was not tried.
+"""Reason why an address can't be reached; "" if it can, or was not tried.
 
-"elsewhere": reachable only on its own computer. "refused": the port is closed. "timeout": no reply.
-"unknown": another error of the system.
+"elsewhere": reachable only from its own computer. "refused": the port is closed. "timeout": no reply.
+"unknown": another error of the operating system.
 """
 
 
 @dataclass(frozen=True)
 class ProcessFact:
-    """Process: its id, its program's name, and its start time (s since 1970)."""
+    """Process of this computer.
+
+    Attributes:
+        pid: Process id.
+        name: Name of its program.
+        is_master: True if the process runs a master.
+        since_s: Start time (s since 1970).
+    """
 
     pid: int | None
     name: str
@@ -43,9 +50,13 @@ class ProcessFact:
 
 @dataclass(frozen=True)
 class PortFact:
-    """Port of this computer, its purpose, whether it is taken, and its holder.
+    """Port of this computer.
 
-    `holder` is None if the port is free or the system doesn't report the process.
+    Attributes:
+        port: Number of the port.
+        purpose: What the port is used for.
+        is_taken: True if a process is bound to the port.
+        holder: That process; None if the port is free or the system doesn't report the process.
     """
 
     port: int
@@ -56,7 +67,7 @@ class PortFact:
 
 @dataclass(frozen=True)
 class PackageFact:
-    """Installed package; `is_ours` is False for a package of another project with the same name."""
+    """Installed package; `is_ours` is False for another project's package with the same name."""
 
     name: str
     version: str
@@ -66,7 +77,14 @@ class PackageFact:
 
 @dataclass(frozen=True)
 class FileFact:
-    """Open-file limits of this process (None: unlimited), and the master's number of open files and limit."""
+    """Limits of open files, and the number of files that the master has open.
+
+    Attributes:
+        soft: Soft limit of this process; None for no limit.
+        hard: Hard limit of this process; None for no limit.
+        master_open: Number of files that the master has open.
+        master_limit: Limit of the master.
+    """
 
     soft: int | None
     hard: int | None
@@ -76,7 +94,14 @@ class FileFact:
 
 @dataclass(frozen=True)
 class ProgramFact:
-    """Process of this computer with a node `name`: its number of open files and its limit."""
+    """Open files of a program with a node.
+
+    Attributes:
+        pid: Process id.
+        name: Name of the node.
+        opened: Number of open files.
+        limit: Limit of open files.
+    """
 
     pid: int
     name: str
@@ -86,7 +111,13 @@ class ProgramFact:
 
 @dataclass(frozen=True)
 class FolderFact:
-    """Folder that must be writable, its purpose, and why it is not ("" if it is)."""
+    """Folder that must be writable.
+
+    Attributes:
+        path: Path of the folder.
+        purpose: What the folder is used for.
+        problem: Reason why the folder isn't writable; "" if it is.
+    """
 
     path: str
     purpose: str
@@ -95,7 +126,7 @@ class FolderFact:
 
 @dataclass(frozen=True)
 class ClockFact:
-    """Computer whose messages are stamped `ahead_s` seconds in the future."""
+    """Computer whose clock is ahead by `ahead_s` seconds, according to the time stamps of its messages."""
 
     host: str
     ahead_s: float
@@ -103,7 +134,7 @@ class ClockFact:
 
 @dataclass(frozen=True)
 class Facts:
-    """Everything that the doctor inspects.
+    """All facts that the doctor evaluates.
 
     Attributes:
         now_s: Current time (s since 1970).
@@ -111,28 +142,29 @@ class Facts:
         platform: Value of `sys.platform`.
         versions: Versions of NEP Studio, Python and libraries.
         nep_file: Folder from which the package `nep` is imported.
-        view: Graph of the master, None if no master replies.
-        answered_s: Time the master took to reply.
-        master_port: Port of the master's address, None if the address is not of this computer.
+        view: Graph of the master; None if no master replies.
+        answered_s: Time that the master took to reply.
+        master_port: Port of the master's address; None if the address is not of this computer.
         ports: Fixed ports of the original NEP.
         masters: All processes here that run a master, each with its port.
         joins_originals: True if the gateway is enabled.
-        packages: Installed packages named nep or nep-studio of this Python.
+        packages: Installed packages of this Python named nep or nep-studio.
         strange_files: Files of the original NEP found in `nep_file`.
         shadow: File that hides the package from programs started here.
-        files: Open-file limits.
+        files: Limits of open files.
         folders: Folders that must be writable.
         clocks: Computers whose clocks are ahead.
-        loopback: Why programs of this computer can't reach each other, "" if they can.
-        master_install: Installation of the running master, None if unknown.
-        programs: Programs of this computer that have nodes, if their files are known.
+        loopback: Reason why programs of this computer can't reach each other; "" if they can.
+        master_install: Installation of the running master; None if unknown.
+        programs: Programs of this computer that have nodes and whose open files are known.
         is_known: False if the host name of the master's address can't be resolved.
-        answers_at: Loopback address at which a master replies although `address`, of this computer too, does
-            not; else "".
-        reach: Why the address of a remote master that doesn't reply can't be reached; "" if it can, None if
-            not tried.
-        path_package: Original `nep` imported by `python3` of the PATH, if that is another Python.
-        node_packages: `nep-js` packages found by Node.js in this folder, the imported one first.
+        answers_at: Loopback address at which a master replies, if `address` is of this computer but doesn't
+            reply; else "".
+        reach: Reason why the address of a remote master that doesn't reply can't be reached; "" if it can,
+            None if it was not tried.
+        path_package: Package `nep` of the original NEP that `python3` of the PATH imports, if that is another
+            Python.
+        node_packages: Packages `nep-js` that Node.js finds from this folder; the first one is imported.
     """
 
     now_s: float
@@ -170,11 +202,11 @@ class PublisherFact:
         node: Name of its node.
         host: Name of its computer.
         generation: "native" or the version of the original NEP.
-        sent: Number of messages sent, None if not counted (original NEP).
-        last_s: Time of the last message (s since 1970, this computer's clock), None before the first.
-        endpoint: Address to which programs here connect, "" if none is needed.
-        reach: Why the endpoint can't be reached.
-        remedies: Services of its node that can restart it.
+        sent: Number of messages sent; None if not counted (original NEP).
+        last_s: Time of the last message (s since 1970, this computer's clock); None before the first.
+        endpoint: Address to which programs on this computer connect; "" if none is needed.
+        reach: Reason why the endpoint can't be reached.
+        remedies: Services of its node that can restart the node.
     """
 
     node: str
@@ -197,14 +229,14 @@ class TopicFacts:
         address: Address of the master.
         is_shared: True if the master accepts other computers.
         publishers: Publishers of the topic.
-        others: Published topics with their rates in Hz (None: unknown).
+        others: Rates of other published topics in Hz (None: unknown).
         services: Names of all services.
         alerts: Alerts of the master about this topic.
-        listened_s: How long the doctor subscribed to the topic.
-        received: Number of messages received meanwhile.
-        refused: Number of received messages with an unknown wire version.
-        unreadable: Why the newest message can't be decoded, "" if it can.
-        bad_name: Why the topic's name is invalid, "" if it is valid.
+        listened_s: How long the doctor was subscribed to the topic.
+        received: Number of messages received in that time.
+        refused: Number of messages rejected because of an unknown wire version.
+        unreadable: Reason why the newest message can't be decoded; "" if it can.
+        bad_name: Reason why the topic's name is invalid; "" if it is valid.
     """
 
     topic: str

@@ -1,4 +1,4 @@
-"""Finding of the doctor."""
+"""`Finding`: result of a check by the doctor."""
 
 from __future__ import annotations
 
@@ -14,10 +14,15 @@ Severity = Literal["error", "warning", "info", "ok"]
 
 @dataclass(frozen=True)
 class Finding:
-    """Result of one check: severity, sentence, and the next step ("" if none).
+    """Result of one check.
 
-    `id` starts with its subject ("master:none", "ports:taken"). `command` can be run in a terminal. `instead`
-    is a suggested name: of a similar topic, or of a service to call.
+    Attributes:
+        id: Subject and name of the finding, such as "master:none" or "ports:taken".
+        severity: "error", "warning", "info" or "ok".
+        sentence: Description of the result.
+        mend: Next step for the user; "" if there is none.
+        command: Command for the next step that can be run in a terminal, or "".
+        instead: Suggested name of a similar topic, or of a service to call, or "".
     """
 
     id: str
@@ -29,7 +34,7 @@ class Finding:
 
     @property
     def as_error(self) -> str:
-        """Finding formatted as an error: lower case, no full stop, the next step after a semicolon."""
+        """Finding formatted as an error: lower case at the start, no full stop, semicolon before the hint."""
         first = self.sentence.rstrip(".")
         step = self.fix.rstrip(".")
         words = f"{first}; {step[:1].lower()}{step[1:]}" if step else first
@@ -37,7 +42,7 @@ class Finding:
 
 
 def ago(seconds: float) -> str:
-    """Format how long something has been running."""
+    """Format a duration in the largest suitable unit, from seconds to days."""
     if seconds < 90:
         return f"{max(0, round(seconds))} s"
     if seconds < 5400:

@@ -26,7 +26,7 @@ _SITE_PACKAGES = ("lib/python*/site-packages", "Lib/site-packages")
 
 @dataclass(frozen=True)
 class Install:
-    """Version of NEP Studio in a Python environment, with the installation time (s since 1970)."""
+    """Version of NEP Studio in a Python environment, with the time of installation (s since 1970)."""
 
     version: str
     since_s: float
@@ -45,9 +45,15 @@ def install_of(pid: int) -> Install | None:
 
 
 def environment_of(command: Sequence[str], executable: str, folder: str, active: str = "") -> Path | None:
-    """Return the Python environment of a program started in ``folder`` with ``active`` activated.
+    """Return the Python environment of a program, or None for a frozen program.
 
-    The interpreter of an environment is a link to the one that the system reports as the executable.
+    The interpreter of an environment is a link to another file, which the system reports as the executable.
+
+    Args:
+        command: Command line of the program.
+        executable: Executable that the system reports.
+        folder: Folder in which the program was started.
+        active: Environment that was activated, or "".
     """
     called = command[0] if command else ""
     if not Path(called).stem.lower().startswith("python"):
@@ -60,7 +66,7 @@ def environment_of(command: Sequence[str], executable: str, folder: str, active:
 
 
 def install_in(environment: Path) -> Install | None:
-    """Return the installation of NEP Studio in an environment; None if there is none, or two."""
+    """Return the installation of NEP Studio in an environment; None if there is none, or more than one."""
     found = [info for place in _SITE_PACKAGES for info in environment.glob(f"{place}/nep_studio-*.dist-info")]
     if len(found) != 1:
         return None

@@ -1,4 +1,4 @@
-"""Collection of facts about one topic: its publishers, their addresses, and received messages."""
+"""Collection of facts about one topic: its publishers, their reachability, and received messages."""
 
 from __future__ import annotations
 
@@ -24,13 +24,13 @@ _GRAPH_TIMEOUT_S = 1.0
 _LISTEN_S = 1.5
 _CONNECT_TIMEOUT_S = 0.7
 _MAX_TRIED = 4
-"""Publisher addresses tried; each that doesn't reply takes `_CONNECT_TIMEOUT_S`."""
+"""Maximum number of publisher addresses tried; an address without reply takes `_CONNECT_TIMEOUT_S`."""
 _REMEDIES = ("restart", "reset", "start")
-"""Prefixes of service names that can restart a program."""
+"""Name prefixes of services that may restart a program."""
 
 
 def collect_topic(topic: str, address: str | None = None) -> TopicFacts | None:
-    """Collect the facts about a topic, subscribing for up to 1.5 s; None if no master replies."""
+    """Subscribe to a topic for up to 1.5 s and return the facts about it; None if no master replies."""
     chosen = master_address(address)
     try:
         check_topic(topic)
@@ -44,7 +44,7 @@ def collect_topic(topic: str, address: str | None = None) -> TopicFacts | None:
 
 
 def reach_of(endpoint: str) -> Reach:
-    """Try to connect to an endpoint from here; return why it fails, or ""."""
+    """Try to connect to an endpoint; return the reason of the failure, or "" if it can be reached."""
     place, colon, port = endpoint.removeprefix("tcp://").rpartition(":")
     if not endpoint.startswith("tcp://") or not colon:
         return ""

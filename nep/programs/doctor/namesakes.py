@@ -1,6 +1,6 @@
-"""Detection of packages named `nep` and `nep-js` of NEP Studio or of the original NEP.
+"""Detection of packages named `nep` and `nep-js`, of NEP Studio or of the original NEP.
 
-On the public registries these names belong to the original NEP. The search neither imports nor runs anything.
+On the public registries these names belong to the original NEP. The search imports and runs no package.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ _ORIGINAL_BELOW = (0, 6)
 
 
 def node_packages(here: Path, environ: Mapping[str, str] = os.environ) -> tuple[PackageFact, ...]:
-    """Return all `nep-js` packages on Node.js's search path of a folder; the first is imported."""
+    """Return all packages `nep-js` on Node.js's search path of a folder; the first one is imported."""
     folder = here.absolute()
     modules = [each / "node_modules" for each in (folder, *folder.parents) if each.name != "node_modules"]
     more = [Path(each) for each in environ.get("NODE_PATH", "").split(os.pathsep) if each]
@@ -43,9 +43,10 @@ def _node_package(folder: Path) -> PackageFact | None:
 def path_python_package(
     path: str | None = None, own: Path = Path(sys.prefix), home: Path | None = None
 ) -> PackageFact | None:
-    """Return the original `nep` imported by `python3` in the PATH, or None.
+    """Return the package `nep` of the original NEP that `python3` of the PATH imports, or None.
 
-    None also if `python3` belongs to ``own``, the environment of this program, which is checked separately.
+    Also returns None if `python3` belongs to `own`, the environment of this program, which is checked
+    separately.
     """
     python = shutil.which("python3", path=path) or shutil.which("python", path=path)
     if python is None:

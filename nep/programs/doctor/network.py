@@ -1,4 +1,4 @@
-"""Part of the diagnosis about masters, their ports and the programs in the network."""
+"""Checks about masters, their ports, and the programs in the network."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ _NATIVE = {"native", "gateway"}
 
 
 def loopback(facts: Facts) -> Iterator[Finding]:
-    """Check whether programs of this computer can reach each other."""
+    """Check that programs of this computer can reach each other."""
     if facts.loopback:
         yield Finding(
             "loopback",
@@ -31,7 +31,7 @@ def loopback(facts: Facts) -> Iterator[Finding]:
 
 
 def masters(facts: Facts) -> Iterator[Finding]:
-    """Check whether exactly one master is running and replies."""
+    """Check that exactly one master is running and replies."""
     port = facts.master_port
     holder = port.holder if port is not None else None
     if facts.view is not None:
@@ -239,7 +239,7 @@ def _multiple_masters(facts: Facts) -> Iterator[Finding]:
 
 
 def originals(facts: Facts) -> Iterator[Finding]:
-    """Report programs of the original NEP, and those that can't be served."""
+    """Report programs of the original NEP, including those that the gateway can't serve."""
     if facts.view is None:
         return
     nodes = [node for node in facts.view.nodes.values() if node.generation not in _NATIVE]
@@ -258,7 +258,7 @@ def originals(facts: Facts) -> Iterator[Finding]:
 
 
 def master_alerts(facts: Facts) -> Iterator[Finding]:
-    """Report the master's alerts, except those about ports, which are checked here."""
+    """Report the alerts of the master, except those about ports, which `ports` checks."""
     if facts.view is None:
         return
     for alert in facts.view.alerts:
@@ -299,7 +299,7 @@ def _other_port(number: str) -> int:
 
 
 def not_served(finding_id: str, program: str, generation: str) -> Finding:
-    """Return the finding for a program with an incompatible version of the original NEP."""
+    """Create the finding for a program with an incompatible version of the original NEP."""
     return Finding(
         finding_id,
         "error",

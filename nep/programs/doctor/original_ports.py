@@ -1,4 +1,4 @@
-"""Part of the diagnosis about the fixed ports of the original NEP, merged into few findings."""
+"""Checks about the fixed ports of the original NEP, summarized in few findings."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ _AIRPLAY = ("ControlCe", "AirPlay", "rapportd")
 
 
 def ports(facts: Facts) -> Iterator[Finding]:
-    """Report which programs hold the ports that programs of the original NEP connect to."""
+    """Report the programs that hold the ports to which programs of the original NEP connect."""
     if not facts.joins_originals:
         yield Finding(
             "ports",

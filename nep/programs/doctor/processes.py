@@ -1,4 +1,4 @@
-"""Holders of ports on this computer, and processes that run a master."""
+"""Processes that hold ports of this computer, and processes that run a master."""
 
 from __future__ import annotations
 
@@ -23,11 +23,11 @@ _LOOPBACK = frozenset({"127.0.0.1", "0.0.0.0", "::", "::ffff:127.0.0.1"})  # noq
 _CODE_OPTIONS = frozenset({"-c", "-e", "--eval", "-p", "--print"})
 """Options of Python and Node.js that are followed by source code instead of a file name."""
 _MAX_PORT_DISTANCE = 20
-"""Maximum distance of a master's port from the usual one if it listens on several."""
+"""Maximum distance of a master's port from the usual port, if the process listens at several ports."""
 
 
 def listening() -> dict[int, int | None]:
-    """Return the listening TCP ports with their process, None if the system doesn't report it."""
+    """Return the listening TCP ports with their process ids; None if the system doesn't report one."""
     try:
         connections: Iterable[object] = psutil.net_connections(kind="tcp")
     except psutil.AccessDenied:  # macOS: all connections for root only, own ones for everyone
@@ -36,9 +36,9 @@ def listening() -> dict[int, int | None]:
 
 
 def holders(connections: Iterable[object]) -> dict[int, int | None]:
-    """Return the process of each listening port, None if the system doesn't report it.
+    """Return the process id for each listening port; None if the system doesn't report the process.
 
-    Several programs may listen on one port at different addresses: the one reached at 127.0.0.1 wins.
+    If several programs listen at one port with different addresses, the one reached at 127.0.0.1 is returned.
     """
     at_loopback: dict[int, int | None] = {}
     elsewhere: dict[int, int | None] = {}
@@ -63,7 +63,7 @@ def _own_connections() -> Iterable[object]:
 
 
 class _OwnedConnection:
-    """Connection with the pid of its process, as in the system-wide list."""
+    """Connection with the id of its process, like the entries of the system-wide list."""
 
     def __init__(self, connection: object, pid: int) -> None:
         self.status = getattr(connection, "status", "")
@@ -72,7 +72,7 @@ class _OwnedConnection:
 
 
 def is_free(port: int) -> bool:
-    """Return whether the port can be bound now, by binding it for a moment."""
+    """Return True if a port can be bound now; the port is bound for a moment."""
     with socket.socket() as probe:
         if sys.platform != "win32":  # without it, connections in TIME_WAIT block the port for a while
             probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
@@ -84,7 +84,7 @@ def is_free(port: int) -> bool:
 
 
 def describe(pid: int | None, master_pid: int | None = None) -> ProcessFact | None:
-    """Return the facts of a process, or None if it is unknown or has ended."""
+    """Return the facts about a process, or None if the process is unknown or has exited."""
     if pid is None:
         return None
     try:
@@ -98,7 +98,7 @@ def describe(pid: int | None, master_pid: int | None = None) -> ProcessFact | No
 
 
 def masters(ports: Mapping[int, int | None], usual: int) -> tuple[tuple[ProcessFact, int | None], ...]:
-    """Return processes that run a master with their ports, the usual port first."""
+    """Return the processes that run a master, each with its port; the usual port comes first."""
     held: dict[int, list[int]] = {}
     for port, pid in ports.items():
         if pid is not None:
@@ -117,7 +117,7 @@ def _masters_port(ports: Sequence[int], usual: int) -> int | None:
 
 
 def is_master_command(command: Sequence[str]) -> bool:
-    """Return whether a command line runs a master: `nep master`, `python -m nep master`."""
+    """Return True if a command line runs a master, such as `nep master` or `python -m nep master`."""
     for word, following in itertools.pairwise(command):
         if following == "master" and PurePath(word).stem in {"nep", "__main__"}:
             return True
@@ -125,7 +125,7 @@ def is_master_command(command: Sequence[str]) -> bool:
 
 
 def open_files(pid: int) -> tuple[int | None, int | None]:
-    """Return a process's number of open files and its limit, None for unknown ones."""
+    """Return the number of open files of a process and its limit; None where unknown."""
     try:
         process = psutil.Process(pid)
         opened = process.num_fds() if hasattr(process, "num_fds") else None

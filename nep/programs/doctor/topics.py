@@ -1,4 +1,4 @@
-"""Diagnosis of one topic: a pure function from facts to findings, without sockets or clock."""
+"""Diagnosis of one topic: functions that derive findings from facts, without sockets or a clock."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from nep.system.addresses import is_loopback
 __all__ = ["meant_topic", "topic_findings"]
 
 QUIET_S = 2.0
-"""Silence before a publisher that sends rarely counts as silent."""
+"""Time without messages in seconds after which a publisher with a low rate counts as silent."""
 _MAX_NAMED = 5
 
 
@@ -40,10 +40,10 @@ def topic_findings(facts: TopicFacts) -> tuple[Finding, ...]:
 
 
 def meant_topic(topic: str, names: Iterable[str]) -> str | None:
-    """Return the published name that `topic` most likely means, or None.
+    """Return the published topic that `topic` most likely means, or None.
 
-    Tries in this order: the name without slashes and case, a unique name with the same last part, similar
-    spelling.
+    The criteria are, in this order: the same name apart from slashes and case, a unique name with the same
+    last level, similar spelling.
     """
     names = [name for name in names if name != topic]
     wanted = _normalized(topic)

@@ -1,5 +1,5 @@
 """Gateway: lets programs of the original NEP (all three wire generations) join the native graph.
 
-`gateway` is the thread that runs everything; the formats of the wire generations are in `framing` and
-`requests`.
+`gateway` contains the thread that runs the gateway. `framing` and `requests` contain the formats of the wire
+generations.
 """

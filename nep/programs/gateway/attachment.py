@@ -1,6 +1,6 @@
 """Gateway as an attachment of a master, and its access to the native network.
 
-`NativeNetwork` has a native node, registers original programs in the graph and reports their alerts.
+`NativeNetwork` owns a native node, registers original programs in the graph and reports their alerts.
 """
 
 from __future__ import annotations
@@ -39,10 +39,10 @@ else:
     psutil = lazy_module("psutil")
 
 _JOIN_TIMEOUT_S = 3.0
-"""A master that has just started delays new nodes by a second."""
+"""Time limit for joining in seconds. A master that has just started delays new nodes by a second."""
 
 _RETRY_S = 1.0
-"""Pause before a failed topic is retried; each attempt blocks the gateway's thread."""
+"""Pause in seconds before a failed topic is retried; each attempt blocks the gateway's thread."""
 _MAX_ALERTS = 200
 _SocketT = TypeVar("_SocketT", Publisher, Subscriber)
 
@@ -50,7 +50,9 @@ _SocketT = TypeVar("_SocketT", Publisher, Subscriber)
 class GatewayAttachment:
     """Attachment that lets programs of the original NEP join its master (`Attachment`).
 
-    `file` stores the ports of programs; by default it is in the system's folder for state files.
+    Args:
+        file: File that stores the ports of programs; by default in the system's folder for state files.
+        ports: Fixed ports of the gateway.
     """
 
     def __init__(self, file: Path | None = None, ports: Ports | None = None) -> None:
@@ -81,7 +83,7 @@ class GatewayAttachment:
         self._gateway.start()
 
     def changed(self, view: GraphView) -> None:
-        """Ignore graph changes: the gateway polls its own sockets."""
+        """Do nothing: the gateway polls its own sockets."""
 
     def close(self) -> None:
         """Stop the gateway and release its ports."""
@@ -93,8 +95,11 @@ class GatewayAttachment:
 class NativeNetwork:
     """Native network of the gateway (see `GatewayNetwork`).
 
-    `make_node` joins the network when the first topic is forwarded, so that a master without original
-    programs has no gateway node.
+    Args:
+        make_node: Creates the node. Called when the first topic is forwarded, so that a master without
+            original programs has no gateway node.
+        listing: Registers original programs in the graph.
+        report: Publishes the current alerts.
     """
 
     def __init__(
@@ -118,11 +123,11 @@ class NativeNetwork:
     # ---- messages
 
     def start(self, inbox: NativeInbox) -> None:
-        """Post native messages to `inbox` from now on."""
+        """Start posting native messages to `inbox`."""
         self._inbox = inbox
 
     def publish(self, topic: str, codec: str, data: bytes) -> None:
-        """Publish data of an original program, creating the publisher if needed."""
+        """Publish the data of an original program, creating the publisher if needed."""
         self._registrar.count((topic, codec), len(data))
         publisher = self._publishers.get((topic, codec))
         if publisher is None:
@@ -156,7 +161,7 @@ class NativeNetwork:
             subscriber.close()
 
     def data_of(self, message: Message) -> bytes | memoryview | None:
-        """Return the bytes that original programs can decode: for images JPEG or PNG; None if impossible."""
+        """Return the bytes that original programs can decode (for images JPEG or PNG), or None."""
         if message.codec != "image":
             return message.data
         try:
@@ -215,7 +220,7 @@ class NativeNetwork:
     # ---- graph and alerts
 
     def show(self, programs: tuple[OriginalProgram, ...]) -> None:
-        """Register these original programs in the graph."""
+        """Register these original programs in the graph, and remove all others."""
         self._registrar.show(programs)
 
     def tick(self) -> None:
@@ -236,7 +241,7 @@ class NativeNetwork:
             self.resolve("gateway:full")
 
     def report(self, id: str, sentence: str, hint: str = "") -> None:
-        """Report a problem as an alert; repeating it has no effect."""
+        """Report a problem as an alert; repeated reports have no effect."""
         alert = Alert(escaped(id), escaped(sentence), escaped(hint))
         if self._alerts.get(id) != alert and (id in self._alerts or len(self._alerts) < _MAX_ALERTS):
             self._alerts[id] = alert

@@ -1,8 +1,8 @@
-"""Frame formats of the original NEP, and their conversion to native codecs. Pure functions.
+"""Frame formats of the original NEP, and their conversion to native codecs. Performs no input or output.
 
-Depending on the version and the type of the topic, a frame is *prefixed* (`topic {"a":1}`) or *bare* (`{"a":
-1}`). The rest are the bytes of a native codec, except for images, which are base64 of a JPEG. So converting
-means removing or adding the prefix; nothing is decoded.
+Depending on the version and the type of the topic, a frame is *prefixed* (`topic {"a":1}`) or *bare*
+(`{"a":1}`). The remaining bytes are those of a native codec, except for images, which are base64 of a JPEG.
+Conversion therefore only removes or adds the prefix; nothing is decoded.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ Framing = Literal["prefixed", "bare"]
 PORT_A = 7000
 """Request port of programs up to 0.5.4.5, nep-js and C#."""
 PORT_B = 50000
-"""Request port of programs from 0.5.4.6 on."""
+"""Request port of programs since 0.5.4.6."""
 
 _CODECS = {
     "json": "json",
@@ -39,17 +39,17 @@ _JSON_TOKEN = re.compile(rb'"(?:[^"\\]|\\.)*"|\s+', re.DOTALL)
 
 
 def codec_of(msg_type: str) -> str:
-    """Return the native codec of an original `msg_type`; unknown types are JSON."""
+    """Return the native codec for an original `msg_type`; unknown types use JSON."""
     return _CODECS.get(msg_type, "json")
 
 
 def framing_of(port: int, msg_type: str) -> Framing:
-    """Return the framing of a program that uses request port `port` for a topic of `msg_type`."""
+    """Return the framing of a program that sends its request to `port`, for a topic of `msg_type`."""
     return "prefixed" if has_prefix("A" if port == PORT_A else "B", msg_type) else "bare"
 
 
 class FrameError(ValueError):
-    """Invalid frame; `version` is the release of NEP that writes such frames, if known."""
+    """Error for an invalid frame; `version` is the release of NEP that writes such frames, if known."""
 
     def __init__(self, sentence: str, version: str | None = None) -> None:
         super().__init__(sentence)
@@ -84,13 +84,13 @@ class Shape:
         return b"".join((self.prefix, body))
 
     def wants(self, subscription: bytes) -> bool:
-        """Return whether a subscriber with this ZeroMQ filter receives frames of this shape."""
+        """Return True if a subscriber with this ZeroMQ filter receives frames of this format."""
         if self.framing == "prefixed":
             return self.prefix.startswith(subscription) or subscription.startswith(self.prefix)
         return not self.is_from_0546(subscription)
 
     def is_from_0546(self, subscription: bytes) -> bool:
-        """Return whether this filter belongs to nep 0.5.4.6.
+        """Return True if a ZeroMQ filter belongs to nep 0.5.4.6.
 
         That version filters by topic although its frames are bare.
         """
@@ -123,7 +123,7 @@ class Shape:
 
 
 def lost_numbers(frame: bytes, data: bytes) -> bool:
-    """Return whether NaN or infinity in `frame` became `null` in `data`."""
+    """Return True if NaN or infinity in `frame` became `null` in `data`."""
     return _NON_FINITE.search(frame) is not None and data.count(b"null") > frame.count(b"null")
 
 
@@ -131,8 +131,8 @@ def shield_javascript(data: bytes, topic: str) -> bytes:
     r"""Escape occurrences of the topic in JSON.
 
     nep-js splits a frame at every occurrence of the topic and parses the second piece, so a payload that
-    contains its own topic would crash the program. The first character is written as ``\uXXXX``, which JSON
-    readers decode.
+    contains its own topic would crash the program. The topic's first character is written as ``\uXXXX``,
+    which JSON readers decode.
     """
     word = topic.encode()
     if not word or word not in data:
@@ -155,7 +155,10 @@ def shield_javascript(data: bytes, topic: str) -> bytes:
 
 
 def shield_csharp(data: bytes) -> bytes:
-    """Remove or escape spaces in JSON: C# splits the frame at spaces and keeps the second piece only."""
+    """Remove or escape white space in JSON.
+
+    The C# client splits a frame at spaces and keeps only the second piece.
+    """
     if not any(space in data for space in (b" ", b"\n", b"\t", b"\r")):
         return data
     return _JSON_TOKEN.sub(

@@ -24,26 +24,26 @@ from nep.system.descriptors import SPARE, has_room
 from nep.system.forks import give_up, watch
 
 _MAINTENANCE_S = 1.0
-"""Interval at which ended programs are removed and ports in use are retried."""
+"""Interval in seconds at which programs that exited are removed and ports in use are retried."""
 _MAX_SOCKETS = 8192
 _FILES_PER_PAIR = 20
 _ERROR_PAUSE_S = 0.2
 _MAX_REGISTRATIONS = 2000
-"""Limit of registrations: each request rewrites the file with all of them."""
+"""Maximum number of registrations; each request rewrites the file with all registrations."""
 _logger = logging.getLogger("nep.programs.gateway")
 
 
 class GatewayNetwork(NativeSide, AlertSink, Protocol):
-    """Native network as used by the gateway, in the gateway's thread."""
+    """Interface of the gateway to the native network, called in the gateway's thread."""
 
     def start(self, inbox: NativeInbox) -> None:
-        """Join the native network; native messages are posted to `inbox`."""
+        """Join the native network, and start posting native messages to `inbox`."""
 
     def data_of(self, message: Message) -> bytes | memoryview | None:
-        """Return the bytes that original programs can decode: for images JPEG or PNG; None if impossible."""
+        """Return the bytes that original programs can decode (for images JPEG or PNG), or None."""
 
     def tick(self) -> None:
-        """Called once a second."""
+        """Process periodic work. Called once a second."""
 
     def show(self, programs: tuple[OriginalProgram, ...]) -> None:
         """Register the original programs in the graph."""
@@ -53,10 +53,17 @@ class GatewayNetwork(NativeSide, AlertSink, Protocol):
 
 
 class Gateway:
-    """Gateway of original NEP programs to `outside`. One thread; binds to the loopback address only.
+    """Gateway between programs of the original NEP and the native network `outside`.
 
-    `file` stores the ports of programs, so that they keep working after a restart of the gateway; `boot` is
-    the boot time of this computer (s since 1970).
+    Runs in one thread and binds to the loopback address only.
+
+    Args:
+        outside: Native network.
+        processes: Processes of this computer.
+        file: File that stores the ports of programs, so that the programs keep working after a restart of the
+            gateway.
+        ports: Fixed ports of the gateway.
+        boot: Boot time of this computer (s since 1970).
     """
 
     def __init__(
@@ -88,14 +95,14 @@ class Gateway:
         watch(self)
 
     def forked(self) -> None:
-        """Release inherited ports in a forked child. See `nep.system.forks`."""
+        """Release inherited ports in a forked child process. See `nep.system.forks`."""
         for port in self._request_server.ports:
             give_up(f"tcp://{LOOPBACK}:{port}")
         for pair in tuple(self._relay.pairs):
             give_up(*(f"tcp://{LOOPBACK}:{end.port}" for end in pair.ends))
 
     def start(self, timeout_s: float = 5.0) -> bool:
-        """Start the thread; return whether requests are served within `timeout_s`."""
+        """Start the thread; return True if requests are served within `timeout_s` seconds."""
         self._thread.start()
         return self._ready.wait(timeout_s)
 

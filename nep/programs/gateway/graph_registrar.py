@@ -1,4 +1,4 @@
-"""Registration of original programs in the master's graph, as nodes of generation A or B with rates."""
+"""Registration of original programs in the master's graph, with rates, as nodes of generation A or B."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ _MAX_NAME_LENGTH = 100
 
 @dataclass
 class _Count:
-    """Number and size of the messages that original programs published on one topic."""
+    """Number and size of the messages that original programs have published on one topic."""
 
     messages: int = 0
     bytes: int = 0
@@ -50,10 +50,15 @@ class _Count:
 
 
 class GraphRegistrar:
-    """Registrar of original programs. `submit` runs a request in the master.
+    """Registrar of original programs.
 
-    It is unknown which of several original programs on a topic published a message: the first one is assigned
-    the topic's statistics.
+    If several original programs publish on a topic, the publisher of a message is unknown; then the first
+    program is assigned the topic's statistics.
+
+    Args:
+        submit: Executes a request in the master.
+        epoch: Epoch of the master.
+        load_of: Returns the meter of a process's CPU load.
     """
 
     def __init__(
@@ -72,14 +77,14 @@ class GraphRegistrar:
         self._stat_keys: dict[int, Key] = {}
 
     def count(self, key: Key, size_bytes: int) -> None:
-        """Count a message that an original program published."""
+        """Count a message that an original program has published."""
         counted = self._counts.setdefault(key, _Count())
         counted.messages += 1
         counted.bytes += size_bytes
         counted.last_ns = time.time_ns()
 
     def show(self, programs: tuple[OriginalProgram, ...]) -> None:
-        """Register these programs, and remove the others."""
+        """Register these programs and remove all others."""
         wanted = {program.node_id: self._record(program) for program in programs}
         for node_id in [known for known in self._shown if known not in wanted]:
             del self._shown[node_id]
@@ -101,7 +106,7 @@ class GraphRegistrar:
             self._submit(Renew(node_id, self._epoch, 0, publishers, subscribers, load))
 
     def close(self) -> None:
-        """Remove all programs."""
+        """Remove all programs from the graph."""
         self.show(())
 
     def _load(self, node_id: str, pid: int | None) -> float | None:

@@ -1,4 +1,4 @@
-"""Bounded queue from native threads to the gateway's thread that wakes a poll."""
+"""Bounded queue from native threads to the gateway's thread; wakes the poll of that thread."""
 
 from __future__ import annotations
 
@@ -14,7 +14,10 @@ MAX_BYTES = 64 * 1024 * 1024
 
 
 class NativeInbox:
-    """Bounded queue for many writers and one reader; when full, new messages are dropped and counted."""
+    """Bounded queue for many writers and one reader.
+
+    When it is full, new messages are dropped and counted.
+    """
 
     def __init__(self, max_messages: int = MAX_MESSAGES, max_bytes: int = MAX_BYTES) -> None:
         self._lock = threading.Lock()
@@ -50,7 +53,7 @@ class NativeInbox:
             self.wake()
 
     def wake(self) -> None:
-        """Wake the reader even if nothing was posted."""
+        """Wake the reader even if no message was posted."""
         with contextlib.suppress(OSError):  # full: the reader is already woken; closed: there is none
             self._writer.send(b"\x00")
 
@@ -65,6 +68,6 @@ class NativeInbox:
         return messages
 
     def close(self) -> None:
-        """Close the two sockets."""
+        """Close both sockets of the queue."""
         self._reader.close()
         self._writer.close()

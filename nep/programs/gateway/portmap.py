@@ -1,4 +1,7 @@
-"""Ports of original topics and their programs, kept in a file: original programs never ask twice."""
+"""Ports assigned to topics and programs of the original NEP.
+
+The assignments are stored in a file, because an original program requests its port only once.
+"""
 
 from __future__ import annotations
 
@@ -26,7 +29,7 @@ _SAME_BOOT_S = 120.0
 class TopicLine:
     """Key of a pair of ports: a topic, its frame format, and its connection mode.
 
-    `codec` is "service" for clients and servers, whose bytes are not converted.
+    For clients and servers, whose bytes are not converted, `codec` is "service".
     """
 
     topic: str
@@ -42,7 +45,7 @@ class TopicLine:
 
 @dataclass(frozen=True)
 class Registration:
-    """Request of one original program for a line; `started` is the start time of its process, if known."""
+    """Request of an original program for a line. `started` is the start time of its process, if known."""
 
     line: TopicLine
     node: str
@@ -55,15 +58,18 @@ class Registration:
 
     @property
     def node_id(self) -> str:
-        """Unique id of the node; nodes of the same name differ by process id."""
+        """Unique id of the node. Nodes with the same name differ in the process id."""
         return f"original:{escaped(self.node)}:{self.pid if self.pid is not None else '-'}"
 
 
 class PortMap:
-    """Ports of lines, and the programs that asked for them.
+    """Assignment of ports to lines, and the programs that requested them.
 
-    `save` replaces the file atomically. Unused lines keep their ports until the range is full. `boot` is the
-    boot time of this computer: registrations from before are invalid.
+    Unused lines keep their ports until the range is exhausted.
+
+    Args:
+        file: File that `save` replaces atomically, or None.
+        boot: Boot time of this computer; registrations from before are invalid.
     """
 
     def __init__(self, file: Path | None, boot: float = 0.0) -> None:
@@ -85,34 +91,34 @@ class PortMap:
         return self._ports
 
     def port_of(self, line: TopicLine) -> int | None:
-        """Return the base port of `line`, or None."""
+        """Return the base port of a line, or None if the line is unknown."""
         return self._ports.get(line)
 
     def candidates(self, is_used: Callable[[TopicLine], bool]) -> Iterator[int]:
-        """Yield base ports for a new line: unassigned ones first, then those of unused lines."""
+        """Yield base ports for a new line: first unassigned ports, then those of unused lines."""
         assigned = {port: line for line, port in self._ports.items()}
         yield from (port for port in range(FIRST_PORT, LAST_PORT + 1, 2) if port not in assigned)
         yield from (port for port, line in assigned.items() if not is_used(line))
 
     def assign(self, line: TopicLine, port: int) -> None:
-        """Assign `port` to `line`, taking it from another line."""
+        """Assign `port` to `line`; another line with this port loses it."""
         for other in [known for known, used in self._ports.items() if used == port and known != line]:
             del self._ports[other]
         self._ports[line] = port
 
     def add(self, registration: Registration) -> None:
-        """Add a registration; it replaces an earlier one for the same line and socket."""
+        """Add a registration. An earlier one for the same line and socket is replaced."""
         key = (registration.node_id, registration.line, registration.socket)
         self._registrations[key] = registration
 
     def remove(self, registrations: set[Registration]) -> None:
-        """Remove these registrations; their lines keep their ports."""
+        """Remove registrations; their lines keep their ports."""
         self._registrations = {
             key: known for key, known in self._registrations.items() if known not in registrations
         }
 
     def save(self) -> None:
-        """Write the file. Raises `OSError`."""
+        """Write the file atomically. Raises `OSError`."""
         if self._file is None:
             return
         document = {

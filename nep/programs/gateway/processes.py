@@ -1,4 +1,4 @@
-"""Information about processes of original programs: alive or not, language, connections."""
+"""Information about the processes of original programs: whether they run, language, connections."""
 
 from __future__ import annotations
 
@@ -15,23 +15,26 @@ else:
 
 
 class Processes(Protocol):
-    """Interface to the processes of this computer; tests use a fake."""
+    """Interface to the processes of this computer; replaced in tests."""
 
     def started(self, pid: int) -> float | None:
         """Return the start time of a process (s since 1970), or None if it doesn't exist."""
 
     def language(self, pid: int) -> str | None:
-        """Return the programming language of a process as far as its interpreter shows."""
+        """Return the programming language of a process, derived from its interpreter, or None if unknown."""
 
     def is_joined(self, pid: int, port: int, *, binds: bool) -> bool | None:
-        """Return whether the process has a connection over `port`, bound by itself (`binds`) or not.
+        """Return True if the process has an established connection over `port`, None if access is denied.
 
-        None if the system doesn't permit to know.
+        Args:
+            pid: Process id.
+            port: Number of the port.
+            binds: True if the process itself binds the port.
         """
 
 
 def load_of(pid: int) -> CpuLoad:
-    """Return a meter of a process's CPU load."""
+    """Return a meter of the CPU load of a process."""
 
     def used_s() -> float | None:
         try:
@@ -58,10 +61,10 @@ _INTERPRETERS = {
 
 
 class SystemProcesses:
-    """Processes of this computer."""
+    """`Processes` of this computer."""
 
     def started(self, pid: int) -> float | None:
-        """Return the start time of a process; None for missing and zombie processes."""
+        """Return the start time of a process; None if the process is missing or a zombie."""
         try:
             process = psutil.Process(pid)
             if process.status() == psutil.STATUS_ZOMBIE:
@@ -81,7 +84,7 @@ class SystemProcesses:
         return next((language for word, language in _INTERPRETERS.items() if name.startswith(word)), None)
 
     def is_joined(self, pid: int, port: int, *, binds: bool) -> bool | None:
-        """Return whether the process has an established connection over `port`, None if unknown."""
+        """Return True if the process has an established connection over `port`; None if unknown."""
         try:
             connections = psutil.Process(pid).net_connections(kind="tcp")
         except psutil.NoSuchProcess:

@@ -1,4 +1,4 @@
-"""Original programs and their roles, determined from their connections instead of their requests."""
+"""Original programs and their roles, which are determined from their connections."""
 
 from __future__ import annotations
 
@@ -14,7 +14,9 @@ from nep.programs.gateway.requests import Member, Role
 
 _SAME_PROCESS_S = 5.0
 _CONNECT_GRACE_S = 10.0
-"""Time after its request in which a program may still connect; short connections until then may be of others.
+"""Time in seconds after a request within which the program may still connect.
+
+Until then, short connections may be those of other programs.
 """
 
 
@@ -23,7 +25,7 @@ ServiceRole = Literal["server", "client"]
 
 @dataclass(frozen=True)
 class TopicLink:
-    """Role of an original program: on a topic, or for a service at `port`."""
+    """Role of an original program on a topic, or for a service at `port`."""
 
     topic: str
     msg_type: str
@@ -36,7 +38,13 @@ class TopicLink:
 class OriginalProgram:
     """Original node as shown in the graph.
 
-    `generation` is "A" or "B", or the version of an unsupported program ("0.5.4.6", "0.5.4.7").
+    Attributes:
+        node_id: Unique id of the node.
+        name: Name of the node.
+        pid: Process id, if known.
+        generation: "A" or "B", or the version of an unsupported program ("0.5.4.6", "0.5.4.7").
+        language: Programming language, if known.
+        links: Roles on topics and services.
     """
 
     node_id: str
@@ -48,7 +56,7 @@ class OriginalProgram:
 
 
 class ProgramTable:
-    """Tracker of the programs registered in a port map. Belongs to the gateway's thread."""
+    """Tracker of the programs registered in a port map. Used in the gateway's thread only."""
 
     def __init__(
         self,
@@ -76,12 +84,12 @@ class ProgramTable:
                     self._was_joined.add(registration)
 
     def expect(self, registration: Registration) -> None:
-        """Note a new request: the program may have left this line and will connect again."""
+        """Record a new request: the program may have left the line and will connect again."""
         self._was_joined.discard(registration)
         self._openings.pop(registration, None)
 
     def remove_ended(self) -> bool:
-        """Remove programs that ended or closed their connections; return whether any was removed."""
+        """Remove programs that exited or closed their connections; return True if there were any."""
         ended = {registration for registration in self._port_map.registrations if self._is_gone(registration)}
         self._forget(ended)
         return bool(ended)
@@ -95,7 +103,7 @@ class ProgramTable:
                 self._openings.pop(registration, None)
 
     def make_room(self) -> bool:
-        """Remove the oldest program that asked and never connected; return whether there was one."""
+        """Remove the oldest program that sent a request but never connected; return True if there was one."""
         for registration in self._port_map.registrations:
             if not self._roles.get(registration):
                 self._forget({registration})
@@ -129,7 +137,7 @@ class ProgramTable:
         return members
 
     def members(self) -> list[Member]:
-        """Return the entries of the original NEP's broadcast."""
+        """Return the entries for the broadcast of the original NEP."""
         members: list[Member] = []
         for registration in self._port_map.registrations:
             line = registration.line
@@ -150,7 +158,7 @@ class ProgramTable:
         return members
 
     def is_used(self, line: TopicLine) -> bool:
-        """Return whether a current program asked for this line, or is connected to it."""
+        """Return True if a current program has requested this line or is connected to it."""
         pair = self._pair_of(line)
         if pair is not None and any(pair.connections.values()):
             return True

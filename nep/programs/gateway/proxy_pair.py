@@ -1,4 +1,4 @@
-"""Pair of sockets of one line: original programs publish to one and subscribe at the other."""
+"""`ProxyPair`: the two sockets of a line. Original programs publish to one and subscribe at the other."""
 
 from __future__ import annotations
 
@@ -20,17 +20,17 @@ _CLOSED = zmq.EVENT_DISCONNECTED
 _QUEUE_LENGTH = 1000
 _IMAGE_QUEUE_LENGTH = 20
 MAX_BUFFERED_BYTES = 128 * 2**20
-"""Approximate buffer limit per slow subscriber: libzmq counts messages, not bytes."""
+"""Approximate buffer limit per slow subscriber in bytes; libzmq itself counts messages only."""
 _LINGER_MS = 200
 _MAX_FRAME_BYTES = 2**28
 _MAX_FILTER_BYTES = 2**16
 _MAX_FILTERS = 1000
-"""Limit of filters per pair; an original program sets one or two."""
+"""Maximum number of filters per pair; an original program sets one or two."""
 
 
 @dataclass(frozen=True)
 class Endpoint:
-    """Port of a line: the role of its programs, and whether the program or the gateway binds it."""
+    """Port of a line: the role of the programs that use it, and who binds it (program or gateway)."""
 
     role: Role
     port: int
@@ -38,7 +38,7 @@ class Endpoint:
 
 
 def endpoints_of(line: TopicLine, base: int) -> tuple[Endpoint, Endpoint]:
-    """Return the endpoints of publishers and subscribers of `line` with base port `base`."""
+    """Return the endpoints for publishers and for subscribers of a line, given its base port."""
     return (
         Endpoint("publisher", base, bound_by_program=line.mode == "one2many"),
         Endpoint("subscriber", base + 1, bound_by_program=line.mode == "many2one"),
@@ -46,14 +46,14 @@ def endpoints_of(line: TopicLine, base: int) -> tuple[Endpoint, Endpoint]:
 
 
 def reply_port(line: TopicLine, base: int, socket_name: str) -> int:
-    """Return the port of the reply: `many2many` programs add one themselves, others don't."""
+    """Return the port to reply to a request; `many2many` subscribers add one to the base port themselves."""
     if line.is_service or line.mode == "many2many" or socket_name == "publisher":
         return base
     return base + 1
 
 
 def is_free(port: int) -> bool:
-    """Return whether `port` of the loopback address can be bound."""
+    """Return True if `port` of the loopback address can be bound."""
     with socket.socket(socket.AF_INET, socket.SOCK_STREAM) as probe:
         if sys.platform != "win32":  # without it, connections in TIME_WAIT block the port
             probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
@@ -65,10 +65,10 @@ def is_free(port: int) -> bool:
 
 
 class ProxyPair:
-    """XSUB socket that receives from original publishers, and XPUB socket of original subscribers.
+    """XSUB socket that receives from original publishers, and XPUB socket for original subscribers.
 
-    `unserved` holds the incompatible versions seen, by role. Belongs to the gateway's thread. Raises
-    `zmq.ZMQError` if a port is in use.
+    Used in the gateway's thread only. `unserved` contains the incompatible versions seen, by role. The
+    constructor raises `zmq.ZMQError` if a port is in use.
     """
 
     def __init__(self, context: zmq.Context[zmq.Socket[bytes]], line: TopicLine, base: int) -> None:
@@ -127,11 +127,11 @@ class ProxyPair:
 
     @property
     def has_0546(self) -> bool:
-        """True if a subscriber uses nep 0.5.4.6, as its filter shows."""
+        """True if a subscriber uses nep 0.5.4.6, according to its filter."""
         return any(self.shape.is_from_0546(filter_) for filter_ in self.filters)
 
     def frames(self, limit: int) -> Iterator[bytes]:
-        """Yield at most `limit` frames that original programs have published."""
+        """Yield at most `limit` frames published by original programs."""
         for _ in range(limit):
             try:
                 parts = self.incoming.recv_multipart(zmq.NOBLOCK)
@@ -140,7 +140,7 @@ class ProxyPair:
             yield parts[0]
 
     def read_filters(self) -> bool:
-        """Process subscriptions; return whether the filters changed."""
+        """Process subscriptions; return True if the filters changed."""
         before = set(self.filters)
         while True:
             try:
@@ -153,7 +153,7 @@ class ProxyPair:
                 self.filters.discard(note[1:])
 
     def read_connections(self) -> bool:
-        """Process connection events; return whether there were any."""
+        """Process connection events; return True if there were any."""
         happened = False
         for role, monitor in self.monitors.items():
             while monitor.poll(0):
@@ -169,12 +169,15 @@ class ProxyPair:
         return happened
 
     def pass_on(self, frame: bytes, data: bytes) -> None:
-        """Send a frame of this line to its own subscribers, unchanged unless a language needs shielding."""
+        """Send a frame of this line to the line's own subscribers.
+
+        The frame is unchanged unless the programming language of a subscriber requires shielding.
+        """
         if self.has_subscribers:
             self._send(self.shape.write(self._shielded(data)) if self._needs_shield else frame)
 
     def deliver(self, data: bytes | memoryview) -> None:
-        """Send bytes of the native codec to this line's subscribers in this line's format."""
+        """Encode bytes of the native codec in this line's format and send them to the line's subscribers."""
         if self.has_subscribers:
             self._send(self.shape.write(self._shielded(bytes(data)) if self._needs_shield else data))
 

@@ -1,4 +1,4 @@
-"""Relay between lines: a frame is converted once per format and once to native, and never sent back."""
+"""Relay between lines. A frame is converted at most once per format, and never returned to its line."""
 
 from __future__ import annotations
 
@@ -15,46 +15,46 @@ from nep.programs.gateway.proxy_pair import ProxyPair
 from nep.programs.gateway.requests import Role
 
 _MAX_BATCH = 200
-"""Maximum number of frames read from one line in a row."""
+"""Maximum number of frames read from one line before the others are served."""
 
 
 class NativeSide(Protocol):
-    """Native network as used by the relay. A topic uses one codec at a time."""
+    """Interface of the relay to the native network. A topic uses one codec at a time."""
 
     def publish(self, topic: str, codec: str, data: bytes) -> None:
-        """Publish data to native subscribers; the first call creates the publisher."""
+        """Publish data to native subscribers; the first call opens the publisher."""
 
     def stop_publishing(self, topic: str, codec: str) -> None:
-        """Stop publishing: no original program publishes the topic any more."""
+        """Close the publisher, because no original program publishes the topic any more."""
 
     def subscribe(self, topic: str, codec: str) -> bool:
-        """Subscribe to a topic for `Relay.deliver`; return False if that failed and must be retried."""
+        """Subscribe to a topic, whose messages go to `Relay.deliver`; return False if a retry is needed."""
 
     def unsubscribe(self, topic: str, codec: str) -> None:
-        """Unsubscribe: no original program subscribes to the topic any more."""
+        """Unsubscribe, because no original program subscribes to the topic any more."""
 
 
 class AlertSink(Protocol):
-    """Receiver of current problems."""
+    """Receiver of problems, which become alerts."""
 
     def report(self, id: str, sentence: str, hint: str = "") -> None:
-        """Report a problem; repeating it has no effect."""
+        """Report a problem; repeated reports have no effect."""
 
     def resolve(self, id: str) -> None:
-        """Remove a problem."""
+        """Remove a problem that is solved."""
 
 
 Key = tuple[str, str]
-"""Topic and codec: lines with the same key exchange messages."""
+"""Topic and codec. Lines with the same key exchange messages."""
 
 
 ProgramNames = Callable[[TopicLine, Role], Sequence[str]]
-"""Lookup of the names of programs that publish or subscribe on a line, as far as known."""
+"""Function that returns the names of known programs that publish or subscribe on a line."""
 
 
 @dataclass
 class _RejectedMessages:
-    """Invalid messages of a topic since the last valid one."""
+    """Count of invalid messages of a topic since its last valid one."""
 
     reason: str
     count: int = 0
@@ -63,7 +63,14 @@ class _RejectedMessages:
 
 
 class Relay:
-    """Open lines. Belongs to the gateway's thread. `program_names` names programs in alerts."""
+    """Open lines and the messages between them. Used in the gateway's thread only.
+
+    Args:
+        context: ZeroMQ context.
+        native: Native network.
+        alerts: Receiver of problems.
+        program_names: Returns the names of programs for use in alerts.
+    """
 
     def __init__(
         self,
@@ -83,11 +90,11 @@ class Relay:
 
     @property
     def pairs(self) -> Iterable[ProxyPair]:
-        """Open pairs."""
+        """Pairs of sockets of all open lines."""
         return self._pairs.values()
 
     def pair(self, line: TopicLine) -> ProxyPair | None:
-        """Return the pair of `line`, or None."""
+        """Return the pair of sockets of a line, or None if the line is not open."""
         return self._pairs.get(line)
 
     def open(self, line: TopicLine, base: int) -> ProxyPair:
@@ -110,13 +117,13 @@ class Relay:
             self.close_line(line)
 
     def sockets(self) -> Iterator[tuple[zmq.Socket[bytes], ProxyPair]]:
-        """Yield all sockets to poll with their pairs."""
+        """Yield all sockets to be polled, each with its pair."""
         for pair in self._pairs.values():
             for socket in (pair.incoming, pair.outgoing, *pair.monitors.values()):
                 yield socket, pair
 
     def serve(self, pair: ProxyPair) -> bool:
-        """Process the input of a pair; return whether connections or subscriptions changed."""
+        """Process the input of a pair; return True if connections or subscriptions changed."""
         changed = pair.read_connections()
         changed |= pair.read_filters()
         if changed:
@@ -126,12 +133,12 @@ class Relay:
         return changed
 
     def set_languages(self, languages: Mapping[TopicLine, frozenset[str]]) -> None:
-        """Set the programming languages on each line: some need shielded frames."""
+        """Set the programming languages used on each line; frames for some of them are shielded."""
         for line, pair in self._pairs.items():
             pair.languages = languages.get(line, frozenset())
 
     def deliver(self, topic: str, codec: str, data: bytes | memoryview) -> None:
-        """Send a native message to all original subscribers, each in its format."""
+        """Send a native message to all original subscribers of a topic, each in its format."""
         for pair in self._pairs_of((topic, codec)):
             pair.deliver(data)
 
@@ -147,7 +154,7 @@ class Relay:
                 self._alerts.resolve(f"message:{topic}")
 
     def update_endpoints(self, key: Key) -> None:
-        """Open or close native publishers and subscribers as original programs need them."""
+        """Open or close the native publisher and subscriber of a key, as original programs require."""
         pairs = self._pairs_of(key)
         wanted = any(pair.has_subscribers for pair in pairs)
         if wanted and key not in self._subscribed:

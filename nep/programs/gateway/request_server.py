@@ -24,12 +24,12 @@ from nep.programs.gateway.requests import (
 
 _logger = logging.getLogger("nep.programs.gateway")
 _MAX_REQUEST_BYTES = 2**24
-"""Limit at which ZeroMQ disconnects the sender; requests have a few hundred bytes."""
+"""Size above which ZeroMQ disconnects the sender; requests have a few hundred bytes."""
 
 
 @dataclass(frozen=True)
 class Ports:
-    """Fixed ports of the original NEP. 0 disables one."""
+    """Fixed ports of the original NEP; 0 disables a port."""
 
     requests_a: int = PORT_A
     requests_b: int = PORT_B
@@ -37,9 +37,15 @@ class Ports:
 
 
 class RequestServer:
-    """Server that replies to every request, also an invalid one. A port in use is an alert and is retried.
+    """Server that replies to every request, even an invalid one. Used in the gateway's thread only.
 
-    `decide` returns the port for a request, or raises `RequestError`. Belongs to the gateway's thread.
+    A port in use is reported as an alert and retried.
+
+    Args:
+        context: ZeroMQ context.
+        ports: Fixed ports.
+        alerts: Receiver of problems.
+        decide: Returns the port for a request, or raises `RequestError`.
     """
 
     def __init__(
@@ -58,12 +64,12 @@ class RequestServer:
 
     @property
     def ports(self) -> tuple[int, ...]:
-        """Ports to bind."""
+        """Numbers of the enabled ports."""
         wanted = (self._ports.requests_a, self._ports.requests_b, self._ports.broadcast)
         return tuple(port for port in wanted if port)
 
     def open(self) -> bool:
-        """Bind the ports that are not bound yet; return whether any was bound."""
+        """Bind the ports that are not bound yet; return True if any was bound."""
         before = len(self._request_sockets)
         for port, versions in (
             (self._ports.requests_a, _("nep up to 0.5.4.5, nep-js and C#")),
@@ -90,7 +96,7 @@ class RequestServer:
             yield counter, port
 
     def answer(self, counter: zmq.Socket[bytes], port: int) -> None:
-        """Reply to a waiting request. Never raises because of the request."""
+        """Reply to a pending request. Never raises because of the request's content."""
         try:
             parts = counter.recv_multipart(zmq.NOBLOCK)
         except zmq.Again:

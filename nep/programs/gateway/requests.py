@@ -1,4 +1,4 @@
-"""Requests to the master of the original NEP, its replies and its broadcast. Pure functions."""
+"""Requests to the master of the original NEP, its replies and its broadcast. No input or output."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ _MODES: Mapping[str, Mode] = {"many2many": "many2many", "one2many": "one2many", 
 
 
 class RequestError(ValueError):
-    """Request that can't be granted; `topic` is the requested topic, if known."""
+    """Error for a request that can't be granted; `topic` is the requested topic, if known."""
 
     def __init__(self, sentence: str, topic: object = None) -> None:
         super().__init__(sentence)
@@ -43,22 +43,22 @@ class Request:
 
     @property
     def generation(self) -> str:
-        """Wire generation of the original NEP: `A` or `B`, which are incompatible."""
+        """Wire generation of the original NEP: "A" or "B"; the two are incompatible."""
         return "B" if self.asked_port == PORT_B else "A"
 
     @property
     def framing(self) -> Framing:
-        """Frame format of this program."""
+        """Frame format that the program uses."""
         return framing_of(self.asked_port, self.msg_type)
 
     @property
     def codec(self) -> str:
-        """Native codec of the topic for this program."""
+        """Native codec that corresponds to the requested message type."""
         return codec_of(self.msg_type)
 
     @property
     def is_service(self) -> bool:
-        """True if it asks for a service port, whose bytes are not converted."""
+        """True if the request is for a service port, whose bytes are not converted."""
         return self.socket in _SERVICE_SOCKETS
 
 
@@ -86,7 +86,7 @@ def read_request(data: bytes, asked_port: int) -> Request:
 
 
 def grant(request: Request, port: int) -> bytes:
-    """Return the reply that assigns `port`, in the format that original programs expect."""
+    """Encode the reply that assigns `port`, in the format that original programs expect."""
     answer: dict[str, object] = {"topic": request.topic, "port": port}
     if not request.is_service:
         answer["mode"] = request.mode
@@ -94,13 +94,13 @@ def grant(request: Request, port: int) -> bytes:
 
 
 def refuse(error: RequestError) -> bytes:
-    """Return the reply to a rejected request. Original programs read `state`, people read `error`."""
+    """Encode the reply to a rejected request. Programs read `state`; `error` is for people."""
     return _dump({"topic": error.topic, "state": "failure", "error": str(error)})
 
 
 @dataclass(frozen=True)
 class Member:
-    """Program on a topic, as in the broadcast."""
+    """Program on a topic, as listed in the broadcast."""
 
     topic: str
     node: str
@@ -112,7 +112,7 @@ class Member:
 
 
 def broadcast(members: Iterable[Member]) -> bytes:
-    """Return the frame for port 7777: every topic and its nodes, with prefix."""
+    """Encode the broadcast for port 7777, with its prefix: all topics and their nodes."""
     topics: dict[str, dict[str, object]] = {}
     nodes: dict[str, dict[str, object]] = {}
     for member in members:

@@ -1,6 +1,6 @@
-"""Motion guard of programs without a window: they move only robots that they were allowed to move.
+"""Motion guard of programs without a window, which may move only robots that were allowed.
 
-It subscribes to the descriptions of all robots on the network. The claim "virtual" of a description is not
+The guard subscribes to the descriptions of all robots on the network. A description's claim "virtual" is not
 trusted here, because only the program that started a virtual robot can verify it (docs/trust.md).
 """
 
@@ -42,10 +42,10 @@ _GRAPH_TIMEOUT_S = 0.5
 
 
 class MotionGuard:
-    """Check whether a program may publish on a topic. Thread-safe.
+    """Check of whether a program may publish on a topic. Thread-safe.
 
-    Call `see` with each new graph; `refusal` is a dictionary look-up until something has changed. Before the
-    first graph no robot is known, and only the message type and RIZE's topic decide.
+    Call `see` with each new graph. `refusal` is a dictionary look-up unless something has changed. Before the
+    first graph no robots are known, and only the message type and RIZE's topic decide.
 
     Args:
         node: Node that subscribes to the robots' descriptions.
@@ -65,7 +65,7 @@ class MotionGuard:
         self._received_lock = threading.Lock()  # never held while subscribing, which may wait for the sink
         self._subscribers: dict[str, Subscriber] = {}
         self._received: dict[tuple[str, int | None], Message] = {}
-        """Descriptions to be parsed, the newest of each publisher."""
+        """Descriptions that are still to be parsed: the newest of each publisher."""
         self._controls: dict[str, dict[int | None, RobotControls]] = {}
         """Last valid description of each publisher, by description topic."""
         self._moving = MovingTopics()
@@ -75,17 +75,17 @@ class MotionGuard:
 
     @property
     def moving(self) -> MovingTopics:
-        """Topics that move robots now."""
+        """Topics that currently move robots."""
         return self._moving
 
     @property
     def is_settled(self) -> bool:
-        """True if a graph was received and all its descriptions were read."""
+        """True if a graph was processed and all descriptions in it were read."""
         with self._lock:
             return self._view is not None and not self._is_dirty and not self._unread(self._view)
 
     def see(self, view: GraphView) -> None:
-        """Process a new graph; cheap if nothing has changed."""
+        """Process a new graph. Cheap if nothing has changed."""
         with self._lock:
             before = self._view
             if before is not None and (before.epoch, before.revision) == (view.epoch, view.revision):
@@ -96,7 +96,7 @@ class MotionGuard:
             self._rebuild(view)
 
     def poll(self) -> None:
-        """Query the graph and process it; do nothing while the master doesn't reply."""
+        """Query and process the graph. Does nothing while the master doesn't reply."""
         try:
             view = self._node.graph(_GRAPH_TIMEOUT_S)
         except NepError:
@@ -104,7 +104,7 @@ class MotionGuard:
         self.see(view)
 
     def wait_for_descriptions(self, timeout_s: float) -> bool:
-        """Wait up to `timeout_s` until all descriptions were read; return whether they were."""
+        """Wait until all descriptions are read; return False after `timeout_s` seconds."""
         until = time.monotonic() + timeout_s
         while True:
             self.poll()
@@ -113,13 +113,13 @@ class MotionGuard:
             threading.Event().wait(_POLL_S)
 
     def set_allowed(self, names: Collection[str]) -> None:
-        """Replace the robots (or topics) that may be moved; applies to the next call of `refusal`."""
+        """Replace the names of robots (or topics) that may be moved, from the next call of `refusal` on."""
         with self._lock:
             self._allowed = frozenset(names)
             self._cache = {}
 
     def refused_robots(self, topic: str, msg_type: str = "") -> tuple[str, ...]:
-        """Return the robots for which `refusal` refuses a topic; the topic itself for an unknown robot."""
+        """Return the robots because of which a topic is denied; the topic itself for an unknown robot."""
         with self._lock:
             return _not_allowed(topic, self._moving.moved_by(topic, msg_type), self._allowed)
 
@@ -210,7 +210,7 @@ def _not_allowed(topic: str, robots: Sequence[str], allowed: Collection[str]) ->
 
 
 def refusal_words(topic: str, robots: Sequence[str], allowed: Collection[str]) -> str:
-    """Return a sentence naming the robots and the option that allows it; "" if all are allowed."""
+    """Return a message naming the robots and the option that allows moving them; "" if all are allowed."""
     missing = list(_not_allowed(topic, robots, allowed))
     if not missing:
         return ""

@@ -1,7 +1,7 @@
-"""Topics that move robots, decided from descriptions, types and subscribers. Pure.
+"""Topics that move robots, determined from descriptions, types and subscribers. No input or output.
 
-Everything that publishes for a person or a program asks `MovingTopics.moved_by`: alarms, `nep play`, `nep
-bridge`, behaviours, and the Publish panel of Studio.
+Everything that publishes on behalf of a person or a program calls `MovingTopics.moved_by`: alarms, `nep
+play`, `nep bridge`, behaviours, and the Publish panel of Studio.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ DESCRIPTION_TYPE = "robot/description"
 COMMAND_TYPE = "robot/command"
 ANSWER_TYPE = "robot/answer"
 RIZE_COMMANDS = "robot_action"
-"""Topic of commands to all RIZE robots. Robots of the driver kit subscribe to it, too."""
+"""Topic for commands to all RIZE robots. Robots of the driver kit subscribe to this topic, too."""
 _CONTROL_KEYS = ("command", "world")
 _DESCRIPTION, _ANSWER = "/description", "/answer"
 _HREF_SCHEME = "nep:"
@@ -44,7 +44,7 @@ _MAX_NAME_LENGTH = 256
 
 @dataclass(frozen=True, slots=True)
 class RobotControls:
-    """Topics on which messages move one robot or change its world; they may contain wildcards."""
+    """Topics or patterns on which messages move one robot or change its world."""
 
     name: str
     topics: frozenset[str]
@@ -54,9 +54,9 @@ class MovingTopics:
     """Topics that move robots at one moment. Immutable, hence thread-safe.
 
     Args:
-        robots: Robots and the topics by which they are moved.
+        robots: Robots and the topics that move them.
         unidentified: Topics or patterns that move robots of unknown names.
-        uses_names: Also treat topics named like commands (``.../command``, ``.../cmd_vel``) as moving. For
+        uses_names: Also include topics named like commands (``.../command``, ``.../cmd_vel``). For
             recordings, which may lack the robot's description.
     """
 
@@ -87,14 +87,14 @@ class MovingTopics:
 
     @property
     def topics(self) -> dict[str, tuple[str, ...]]:
-        """Each topic or pattern that moves an identified robot, with the names of these robots."""
+        """Topics and patterns that move identified robots, each with the names of these robots."""
         found = dict(self._by_topic)
         if self._all_names:
             found[RIZE_COMMANDS] = self._all_names
         return found
 
     def robots_on(self, topic: str) -> tuple[str, ...]:
-        """Return the names of the identified robots that a message moves."""
+        """Return the names of identified robots that a message on a topic moves."""
         if topic == RIZE_COMMANDS:
             return self._all_names
         names = dict.fromkeys(self._by_topic.get(topic, ()))
@@ -104,14 +104,14 @@ class MovingTopics:
         return tuple(names)
 
     def moved_by(self, topic: str, msg_type: str = "") -> tuple[str, ...]:
-        """Return the names of the robots that a message moves; empty if it moves none.
+        """Return the names of the robots that a message moves; empty if the message moves none.
 
-        If a robot of unknown name is moved (by the type ``robot/command``, RIZE's topic, or subscribers in
-        the graph), the name is the topic itself.
+        If a robot of unknown name is moved (because of the type ``robot/command``, RIZE's topic, or
+        subscribers in the graph), the topic stands for its name.
 
         Args:
-            topic: The topic to publish on.
-            msg_type: The type to publish with, if known.
+            topic: Topic to publish on.
+            msg_type: Message type to publish with, if known.
         """
         return self.robots_on(topic) or ((topic,) if self._is_unidentified(topic, msg_type) else ())
 
@@ -164,14 +164,14 @@ def _topics_in(description: Mapping[object, object]) -> Iterator[str]:
 
 
 def description_topics(view: GraphView) -> frozenset[str]:
-    """Return the topics on which robots are announced now."""
+    """Return the topics on which robot descriptions are currently published."""
     return frozenset(
         topic for topic, info in view.topics.items() if info.msg_type == DESCRIPTION_TYPE and info.publishers
     )
 
 
 def described_name(topic: str) -> str:
-    """Return the robot's name in its description topic: ``Rover`` of ``/Rover/description``."""
+    """Return the robot's name according to its description topic: ``Rover`` for ``/Rover/description``."""
     return topic.strip("/").removesuffix(_DESCRIPTION) or topic
 
 
@@ -181,14 +181,14 @@ def moving_topics(
     unread: Collection[str] = (),
     own_nodes: Collection[str] = (),
 ) -> MovingTopics:
-    """Combine the robots known by their descriptions with those found in the graph.
+    """Combine the robots known from their descriptions with robots found in the graph.
 
     Args:
         view: Current graph.
         robots: Robots whose descriptions were read.
-        unread: Description topics not read yet. All topics that their programs subscribe to count as moving,
-            and so do a robot's default topics.
-        own_nodes: Ids of the caller's nodes, whose subscriptions don't count.
+        unread: Description topics that were not read yet. All topics to which their programs subscribe count
+            as moving, and so do a robot's default topics.
+        own_nodes: Ids of the caller's nodes, whose subscriptions are ignored.
     """
     known = [*robots, *_unread_robots(view, unread, own_nodes)]
     typed = [(info.name, info.subscribers) for info in view.topics.values() if info.msg_type == COMMAND_TYPE]
@@ -239,7 +239,7 @@ def _subscriptions(view: GraphView) -> dict[str, set[str]]:
 
 
 def original_robots(view: GraphView) -> Iterator[RobotControls]:
-    """Yield original NEP programs that subscribe to RIZE commands: robots without a description."""
+    """Yield programs of the original NEP that subscribe to RIZE commands: robots without a description."""
     info = view.topics.get(RIZE_COMMANDS)
     for subscriber in info.subscribers if info is not None else ():
         node = view.nodes.get(subscriber.node_id)

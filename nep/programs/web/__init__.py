@@ -1,7 +1,8 @@
-"""Web pages and tablets: a WebSocket server that speaks the rosbridge v2 protocol (docs/web.md).
+"""WebSocket server for web pages and tablets, with the rosbridge v2 protocol (docs/web.md).
 
-Here: the protocol, the server, and NEP's messages in the shapes of ROS. Robots' own safety is in
-`nep.programs.robots`, ROS message definitions are parsed and packed by `nep.backends.ros`.
+The package contains the protocol, the server, and the conversion of NEP's messages to ROS shapes.
+`nep.programs.robots` contains the motion guard; `nep.backends.ros` parses ROS message definitions and encodes
+ROS messages.
 """
 
 from nep.programs.web.access import Access

@@ -1,8 +1,8 @@
-"""Who may connect: the origin of the page, the token, and rosbridge's ``auth``. Pure.
+"""Access control by the page's origin, the token, or rosbridge's ``auth``. No input or output.
 
-Any web page that a browser of this computer shows can open a WebSocket to 127.0.0.1. The browser tells the
-page's origin, so only pages of this computer and those that were allowed by name are let in. Programs send no
-origin; where other computers can connect they need the token.
+Any web page shown in a browser on this computer can open a WebSocket to 127.0.0.1. The browser sends the
+page's origin, so only pages of this computer and explicitly allowed origins are accepted. Programs send no
+origin; if other computers can connect, the token is required.
 """
 
 from __future__ import annotations
@@ -24,23 +24,23 @@ from nep.text import quotable
 __all__ = ["Access", "AuthCheck", "checked_origin", "is_own_host", "new_token", "query_of"]
 
 _CLOCK_TOLERANCE_S = 5
-"""As rosauth has it: so much may the clocks of the two sides differ."""
+"""Maximum difference between the clocks of server and client in seconds, as in rosauth."""
 _MAX_REMEMBERED = 1_000
 _DEFAULT_PORTS = {"http": 80, "https": 443}
 
 
 def new_token() -> str:
-    """Return a random token that can stand in a URL."""
+    """Create a random token that is valid in a URL."""
     return secrets.token_urlsafe(24)
 
 
 def query_of(token: str) -> str:
-    """Return path and query of a URL with the token: "/?token=..."; "/" without one."""
+    """Return the path and query of a URL with the token ("/?token=..."), or "/" without a token."""
     return f"/?token={quote(token, safe='')}" if token else "/"
 
 
 def is_own_host(host: str) -> bool:
-    """Return whether a host name means this computer: localhost or a loopback address."""
+    """Return True if a host name refers to this computer: localhost or a loopback address."""
     if host == "localhost" or host.endswith(".localhost"):
         return True
     try:
@@ -50,10 +50,10 @@ def is_own_host(host: str) -> bool:
 
 
 def checked_origin(origin: str) -> str:
-    """Return `origin` as browsers write it. Raises `NepError` for what is none.
+    """Validate an origin and return it in the form that browsers send. Raises `NepError`.
 
-    "null" is the origin of pages that were opened as files, and of every sandboxed frame of any page;
-    "file://" is that of desktop programs, such as Lichtblick's.
+    "null" is the origin of pages opened as files, and of every sandboxed frame of any page. "file://" is that
+    of desktop programs such as Lichtblick.
     """
     if origin in {"null", "file://"}:
         return origin
@@ -76,21 +76,22 @@ def checked_origin(origin: str) -> str:
 
 @dataclass(frozen=True)
 class Access:
-    """Who may connect.
+    """Access rules.
 
-    `origins`: origins of pages besides those of this computer. `token`: what a page or program must know, ""
-    when nothing.
+    Attributes:
+        origins: Allowed origins of pages, in addition to those of this computer.
+        token: Token required from pages and programs; "" if none is required.
     """
 
     origins: Collection[str] = ()
     token: str = ""
 
     def origin_refusal(self, origin: str | None, own: str = "") -> str:
-        """Return why a page of this origin may not connect; "" when it may.
+        """Return the reason why a page with this origin may not connect; "" if the page may connect.
 
         Args:
-            origin: None for a program without one.
-            own: Origin of the server's own pages: the address and port at which the connection came.
+            origin: Origin of the page; None for a program.
+            own: Origin of the server's own pages: the address and port at which the connection arrived.
         """
         if origin is None:
             return ""
@@ -105,9 +106,9 @@ class Access:
         ).format(origin=quotable(origin), option=quotable(origin))
 
     def is_given(self, path: str, authorization: str | None) -> bool | None:
-        """Return whether the token in the URL or in the header is right, None when there is none.
+        """Return True if the token in the URL or the header is valid, False if not, None if there is none.
 
-        ``ws://host:9090/?token=TOKEN`` or ``Authorization: Bearer TOKEN``.
+        Accepted forms are ``ws://host:9090/?token=TOKEN`` and ``Authorization: Bearer TOKEN``.
         """
         given = [*parse_qs(urlsplit(path).query, keep_blank_values=True).get("token", ())]
         scheme, _space, value = (authorization or "").partition(" ")
@@ -122,7 +123,7 @@ class Access:
 
 
 class AuthCheck:
-    """Checks rosbridge's ``auth`` operations, each of which is valid once and for some seconds."""
+    """Validator of rosbridge's ``auth`` operations, each of which is valid once and for a few seconds."""
 
     def __init__(self, token: str, clock: Callable[[], float] = time.time) -> None:
         self._token = token
@@ -130,7 +131,7 @@ class AuthCheck:
         self._used: dict[str, None] = {}
 
     def is_right(self, auth: Auth) -> bool:
-        """Return whether the MAC is rosauth's with the token as its secret, of now and not used before."""
+        """Return True if the MAC is valid for the token, current, and not used before."""
         parts = (self._token, auth.client, auth.dest, auth.rand, auth.time_s, auth.level, auth.end_s)
         text = "".join(map(str, parts)).encode("utf-8", "replace")
         mac = hashlib.sha512(text).hexdigest()

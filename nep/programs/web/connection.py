@@ -1,4 +1,4 @@
-"""Connection of one page: its node, its send queue, and the task that sends. Base of both protocols."""
+"""Base class for connections of both protocols: node, send queue and sending task of one page."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ _ids = itertools.count(1)
 
 
 class PageConnection:
-    """A page at a WebSocket connection. Lives in the server's event loop.
+    """WebSocket connection of a page. Runs in the server's event loop.
 
     Subclasses implement a protocol: `_frames_of`, `_warn`, `_reject` and `_topic_list`.
     """
@@ -57,13 +57,16 @@ class PageConnection:
         self._queue = SendQueue(asyncio.get_running_loop().time, self._end_slow)
         self._closing: asyncio.Task[None] | None = None
         self.is_closing = False
-        """Its messages are ignored: it may not stay. Set from any thread before `close` is scheduled."""
+        """True if the page's messages are ignored because it is being disconnected.
+
+        Set from any thread before `start_closing` is scheduled.
+        """
 
     # ---- implemented by subclasses
 
     @property
     def _topic_list(self) -> tuple[PageTopic, ...]:
-        """Topics of the page. Thread-safe."""
+        """Topics that the page publishes or subscribes to. Thread-safe."""
         raise NotImplementedError
 
     async def _frames_of(self, queued: Queued) -> list[Frame]:
@@ -75,14 +78,14 @@ class PageConnection:
         raise NotImplementedError
 
     def _reject(self, error: NepError) -> None:
-        """Count an error and send it to the page."""
+        """Count an error and report it to the page."""
         raise NotImplementedError
 
     # ---- the connection
 
     @property
     def snapshot(self) -> ConnectedPage:
-        """Topics and connection of the page. Thread-safe."""
+        """Snapshot of the page's connection and topics. Thread-safe."""
         address = self._connection.remote_address
         path, origin, referer, user_agent = self._request
         return ConnectedPage(
@@ -101,7 +104,7 @@ class PageConnection:
 
     @property
     def _request(self) -> tuple[str, str, str, str]:
-        """Path, origin, referer and user agent of the handshake; "" for what is not there or ambiguous."""
+        """Path, Origin, Referer and User-Agent of the handshake; "" for a missing or repeated header."""
         request = self._connection.request
         if request is None:
             return "", "", "", ""
@@ -111,11 +114,14 @@ class PageConnection:
 
     @property
     def connection(self) -> ServerConnection:
-        """The WebSocket connection."""
+        """WebSocket connection of the page."""
         return self._connection
 
     def start_closing(self, reason: str) -> None:
-        """Close the connection within some seconds, whatever the page does; `run` then ends."""
+        """Close the connection within a few seconds, even if the page does not respond.
+
+        `run` returns when the connection is closed.
+        """
         self.is_closing = True
         self._closing = asyncio.create_task(self._close_connection(_POLICY_VIOLATION, reason))
 
@@ -127,7 +133,7 @@ class PageConnection:
             self._connection.transport.abort()
 
     async def _receive(self) -> bytes:
-        """Return the next message of the page. Raises `ConnectionClosed`."""
+        """Return the next message from the page. Raises `ConnectionClosed`."""
         while True:
             data = bytes(await self._connection.recv(decode=False))
             if not self.is_closing:
@@ -138,7 +144,10 @@ class PageConnection:
         self.start_closing("the page does not read its answers")
 
     def _announce(self) -> None:
-        """In the page's thread: a node is in the graph once it has something, if only its log."""
+        """Log the connection with the page's node, because a node without topics is not in the graph.
+
+        Called in the page's thread.
+        """
         self._node.log.info("the page connected from %s", self._connection.remote_address)
 
     async def _close_node(self) -> None:
@@ -149,7 +158,7 @@ class PageConnection:
     # ---- sending
 
     async def _write(self) -> None:
-        """Send queued messages, as fast as the page reads them."""
+        """Send queued messages as fast as the page reads them."""
         try:
             while True:
                 await self._send(await self._queue.pop())

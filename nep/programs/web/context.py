@@ -1,4 +1,4 @@
-"""What the parts of a page share: its node, its send queue, its thread, and how it is told of problems."""
+"""Objects shared by the parts of a page's connection, and descriptions of pages and refusals."""
 
 from __future__ import annotations
 
@@ -30,11 +30,17 @@ _T = TypeVar("_T")
 
 @dataclass(frozen=True, slots=True)
 class PageTopic:
-    """A topic that a page publishes or subscribes to.
+    """Topic that a page publishes or subscribes to.
 
-    `at_most_per_s` is the limit that the page asked for (``throttle_rate``), None without one. `rate` and
-    `bytes_per_s` are averages of the last two seconds, of what was sent to the page or received from it.
-    `dropped_count` counts the messages that the page was too slow for, not those beyond its limit.
+    Attributes:
+        topic: Name of the topic.
+        is_published: True if the page publishes the topic, False if it subscribes.
+        at_most_per_s: Rate limit that the page requested (``throttle_rate``), or None.
+        rate: Messages per second, sent to or received from the page, averaged over two seconds.
+        bytes_per_s: Bytes per second, averaged in the same way.
+        sent_count: Number of messages sent to the page.
+        dropped_count: Number of messages dropped because the page was too slow, without those beyond its
+            limit.
     """
 
     topic: str
@@ -48,13 +54,22 @@ class PageTopic:
 
 @dataclass(frozen=True, slots=True)
 class ConnectedPage:
-    """A page or program that is connected: its node, address, origin, and topics.
+    """Connected page or program.
 
-    `id` is given to `WebServer.disconnect`; `origin` is "" for programs; `since_s` is by `time.time`.
-    `name` is that of its node, whose ``language`` in the graph is "web". `client` is the program, such as
-    "Chrome" or "roslibpy", "" if it is not known. `title` is the file name of the page if it sends that
-    (``ws://HOST:PORT/?title=buttons.html``, or a Referer), else the host of its origin, else `name`. Both
-    are the client's own words: escaped and bounded, but not verified.
+    `client` and `title` are claims of the client: escaped and bounded, but not verified.
+
+    Attributes:
+        id: Id for `WebServer.disconnect`.
+        name: Name of its node, whose ``language`` in the graph is "web".
+        address: Address of the client.
+        origin: Origin of the page; "" for programs.
+        since_s: Time of the connection (s since 1970).
+        client: Name of the program, such as "Chrome" or "roslibpy"; "" if unknown.
+        protocol: Protocol of the connection.
+        title: File name of the page if the page sends it (``ws://HOST:PORT/?title=buttons.html``, or a
+            Referer), else the host of its origin, else `name`.
+        topics: Topics that the page publishes or subscribes to.
+        dropped_count: Number of messages dropped because the page was too slow.
     """
 
     id: int
@@ -68,26 +83,32 @@ class ConnectedPage:
     topics: tuple[PageTopic, ...] = ()
     dropped_count: int = 0
     device: Device = ""
-    """Kind of device as far as the User-Agent tells; tablets often claim to be computers."""
+    """Kind of device according to the User-Agent; many tablets claim to be computers."""
 
     @property
     def subscribed(self) -> tuple[str, ...]:
-        """Names of the topics that it subscribes to."""
+        """Names of the topics to which the page subscribes."""
         return tuple(each.topic for each in self.topics if not each.is_published)
 
     @property
     def published(self) -> tuple[str, ...]:
-        """Names of the topics that it publishes."""
+        """Names of the topics that the page publishes."""
         return tuple(each.topic for each in self.topics if each.is_published)
 
 
 @dataclass(frozen=True, slots=True)
 class Refusal:
-    """A connection that was refused, or a message of a page that would have moved a robot (kind "robot").
+    """Rejected connection, or (kind "robot") rejected message that would have moved a robot.
 
-    `who` is the page's origin, or its address; `origin` is not "" where allowing that origin would help.
-    `robot` is the name of the robot that the page asked to move, or the topic of a robot without a known
-    name. The same page and robot appear at most once in ten seconds.
+    A page and robot are listed at most once in ten seconds.
+
+    Attributes:
+        time_s: Time of the refusal (s since 1970).
+        who: Origin of the page, or its address.
+        reason: Reason as a sentence.
+        origin: Origin of the page if allowing it would let the page connect, else "".
+        kind: Kind of the refusal.
+        robot: Name of the robot that the page tried to move, or the topic of a robot of unknown name.
     """
 
     time_s: float
@@ -100,28 +121,28 @@ class Refusal:
 
 @dataclass
 class WebCounts:
-    """What a server has done since it was started. Written in its event loop's thread."""
+    """Counters of a server since its start. Written only in the thread of its event loop."""
 
     opened: int = 0
-    """Connections that were let in."""
+    """Number of accepted connections."""
     turned_away: int = 0
-    """Connections that were not: of another origin, without the token, or too many."""
+    """Number of rejected connections: wrong origin, no valid token, or too many connections."""
     operations: int = 0
     rejected: int = 0
-    """Operations that could not be carried out; each was answered by a status."""
+    """Number of failed operations; the page received a status for each."""
     motions_refused: int = 0
-    """Messages that would have moved a robot."""
+    """Number of rejected messages that would have moved a robot."""
     sent: int = 0
     dropped: int = 0
-    """Messages that pages were too slow for."""
+    """Number of messages dropped because pages were too slow."""
 
     def as_map(self) -> Mapping[str, int]:
-        """The counts by their names."""
+        """Return the counters by name."""
         return asdict(self)
 
 
 class PageContext:
-    """See the module."""
+    """Objects shared by the parts of one page's connection."""
 
     def __init__(
         self,
@@ -134,15 +155,15 @@ class PageContext:
         on_robot_refused: Callable[[str, str], object] = lambda _robot, _reason: None,
         send_status: Callable[[Level, str], object] | None = None,
     ) -> None:
-        """Create it.
+        """Initialize the context.
 
         Args:
             node: Node of the page.
-            queue: Messages that wait for the page.
-            thread: Thread for what waits for the network.
-            guard: Decides what the page may publish.
-            counts: Counts of the server.
-            on_robot_refused: Called with a robot that the page may not move, and the reason.
+            queue: Messages to be sent to the page.
+            thread: Thread for calls that wait for the network.
+            guard: Decides on which topics the page may publish.
+            counts: Counters of the server.
+            on_robot_refused: Called with the name of a robot that the page may not move, and the reason.
             send_status: Sends a status in a protocol other than rosbridge.
         """
         self.node = node
@@ -157,12 +178,15 @@ class PageContext:
         self._refused_lock = threading.Lock()
 
     async def in_thread(self, function: Callable[_P, _T], *args: _P.args, **named: _P.kwargs) -> _T:
-        """Call what waits for the network in the page's own thread; calls keep their order."""
+        """Call a function that waits for the network in the page's thread. Calls are executed in order."""
         loop = asyncio.get_running_loop()
         return await loop.run_in_executor(self._thread, lambda: function(*args, **named))
 
     def motion_refusal(self, topic: str, msg_type: str) -> str:
-        """Return why the page may not publish on a topic, and report it; "" when it may. Thread-safe."""
+        """Return and report the reason why the page may not publish on a topic; "" if allowed.
+
+        Thread-safe.
+        """
         refusal = self.guard.refusal(topic, msg_type)
         if refusal:
             for robot in self.guard.refused_robots(topic, msg_type):
@@ -181,7 +205,7 @@ class PageContext:
         self._on_robot_refused(robot, reason)
 
     def send_status(self, level: Level, sentence: str, id_: OperationId = None) -> None:
-        """Send a status, unless the page wants none of this level."""
+        """Send a status unless its level is below the one that the page requested."""
         if LEVELS.index(level) < LEVELS.index(self.level):
             return
         if self._send_status is not None:

@@ -1,4 +1,4 @@
-"""What the handshake of a connection tells of a page: its address and its origin."""
+"""Properties of a handshake: the client's address and origin."""
 
 from __future__ import annotations
 
@@ -12,31 +12,31 @@ __all__ = ["address_of", "host_of", "is_handshake", "origin_of", "own_origin"]
 
 
 def is_handshake(request: Request) -> bool:
-    """Return whether a request asks for a WebSocket, not for a page."""
+    """Return True if an HTTP request is a WebSocket handshake."""
     return any("websocket" in each.lower() for each in request.headers.get_all("Upgrade"))
 
 
 def own_origin(connection: ServerConnection) -> str:
-    """Return the origin of pages that the server serves itself, at the address that the client chose.
+    """Return the origin of the server's own pages, at the address that the client chose.
 
-    Never a host name: a page of another site can let its own name point to this computer.
+    The host is always numeric, because another site can make its own host name resolve to this computer.
     """
     address = connection.local_address
     return f"http://{address[0]}:{address[1]}" if isinstance(address, tuple) else ""
 
 
 def host_of(connection: ServerConnection) -> str:
-    """Return the address of the client without its port."""
+    """Return the address of the client without the port."""
     return address_of(connection).rpartition(":")[0]
 
 
 def origin_of(connection: ServerConnection) -> str | None:
-    """Return the origin of a page, None for a program."""
+    """Return the origin of a page, or None for a program."""
     request = connection.request
     return None if request is None else request.headers.get("Origin")
 
 
 def address_of(connection: ServerConnection) -> str:
-    """Return the address of the client with its port."""
+    """Return the address of the client with the port."""
     address = connection.remote_address
     return f"{address[0]}:{address[1]}" if isinstance(address, tuple) else str(address)

@@ -1,4 +1,4 @@
-"""Pages that the user of the server disconnected, and that are refused when they connect again."""
+"""Blocked pages, which the user of the server disconnected and which may not connect again."""
 
 from __future__ import annotations
 
@@ -23,26 +23,26 @@ class _Visitor(NamedTuple):
 
 
 class KeptOut:
-    """Recognizes pages by their address, origin and User-Agent. Thread-safe."""
+    """Set of blocked pages, identified by address, origin and User-Agent. Thread-safe."""
 
     def __init__(self) -> None:
         self._lock = threading.Lock()
         self._visitors: dict[int, _Visitor] = {}
 
     def add(self, page_id: int, connection: ServerConnection) -> None:
-        """Refuse a page from now on; of more than 100 pages the first one is forgotten."""
+        """Block a page. Beyond 100 pages, the page that was blocked first is removed."""
         with self._lock:
             self._visitors[page_id] = _visitor(connection, connection.request)
             while len(self._visitors) > _MAX_PAGES:
                 del self._visitors[next(iter(self._visitors))]
 
     def remove(self, page_id: int) -> None:
-        """Refuse a page no longer."""
+        """Unblock a page."""
         with self._lock:
             self._visitors.pop(page_id, None)
 
     def refuses(self, connection: ServerConnection, request: Request) -> bool:
-        """Return whether a page that asks to connect was added."""
+        """Return True if the page that sent this handshake is blocked."""
         with self._lock:
             return _visitor(connection, request) in self._visitors.values()
 

@@ -1,4 +1,4 @@
-"""Limits of `nep web`: what one page may take of the computer, all of them checked before memory is taken."""
+"""Resource limits for one page of `nep web`. All are checked before memory is allocated."""
 
 __all__ = [
     "AUTH_TIMEOUT_S",
@@ -23,32 +23,32 @@ __all__ = [
 
 MAX_PAGES = 100
 MAX_MESSAGE_BYTES = 8 * 2**20
-"""Of one incoming WebSocket message, and of an operation that is put together from fragments."""
+"""Maximum size of an incoming WebSocket message, and of an operation reassembled from fragments."""
 MAX_VALUES = 1_000_000
-"""Values in one incoming operation: `[[],[],…]` takes 30 times its bytes once it is parsed."""
+"""Maximum number of values in an incoming operation; parsed, `[[],[],…]` takes 30 times its bytes."""
 MAX_NAME_LENGTH = 256
 MAX_TOPICS = 200
-"""Topics that a page publishes, and as many again that it subscribes to."""
+"""Maximum number of topics that a page publishes, and that it subscribes to."""
 MAX_SUBSCRIPTION_IDS = 100
-"""Subscriptions of one page to one topic."""
+"""Maximum number of subscriptions of a page to one topic."""
 MAX_SERVICES = 100
-"""Services that a page serves, and as many again that it calls."""
+"""Maximum number of services that a page serves, and that it calls."""
 MAX_CALLS = 500
-"""Calls of a page that are in flight, and as many again that it has to answer."""
+"""Maximum number of calls in flight that a page has made, and that it has to reply to."""
 CALL_TIMEOUT_S = 10.0
 MAX_CALL_TIMEOUT_S = 3_600.0
 MAX_FRAGMENTED = 16
-"""Incomplete operations of a page."""
+"""Maximum number of incomplete operations of a page."""
 MAX_FRAGMENTS = 10_000
-"""Fragments of one operation."""
+"""Maximum number of fragments of one operation."""
 MIN_FRAGMENT_SIZE = 128
-"""Smaller fragments would be mostly envelope."""
+"""Minimum size of outgoing fragments in characters; smaller ones would consist mostly of the envelope."""
 MAX_NESTED_OPERATIONS = 3
-"""A fragmented PNG is two operations around the third."""
+"""Maximum nesting of operations; a fragmented PNG wraps an operation twice."""
 MAX_QUEUED_MESSAGES = 1_000
-"""Messages of one topic that wait for a page which doesn't say how many."""
+"""Maximum queue length for one topic if the page doesn't set a limit."""
 MAX_QUEUED_BYTES = 32 * 2**20
-"""Messages of all topics that wait for a page."""
+"""Maximum size of a page's queued messages of all topics together."""
 MAX_CONTROL_BYTES = 16 * 2**20
-"""Answers, calls and statuses that wait for a page; none of them can be dropped, so it is closed."""
+"""Maximum size of queued replies, calls and statuses. They can't be dropped: beyond, the page is closed."""
 AUTH_TIMEOUT_S = 10.0

@@ -1,4 +1,4 @@
-"""What goes to a page: operations as WebSocket messages, compressed or cut as it asked for. Pure."""
+"""Encoding of operations to a page as WebSocket messages, compressed or fragmented. No input or output."""
 
 from __future__ import annotations
 
@@ -34,19 +34,19 @@ _TYPED_ARRAYS = {
     "int8": (72, "b"), "uint16": (69, "H"), "uint32": (70, "I"), "uint64": (71, "Q"), "int16": (77, "h"),
     "int32": (78, "i"), "int64": (79, "q"), "float32": (85, "f"), "float64": (86, "d"),
 }  # fmt: skip
-"""Tags of little-endian typed arrays (RFC 8746), and the letters of `array`."""
+"""Tags of little-endian typed arrays (RFC 8746), and the type codes of `array`."""
 _fragment_numbers = itertools.count(1)
 
 
 class Frame(NamedTuple):
-    """One WebSocket message."""
+    """WebSocket message."""
 
     data: bytes
     is_text: bool
 
 
 class EncodingOptions(NamedTuple):
-    """How a page wants a message."""
+    """Form in which a page requests its messages."""
 
     compression: Compression = "none"
     fragment_size: int | None = None
@@ -54,9 +54,9 @@ class EncodingOptions(NamedTuple):
 
 
 def publish_frames(topic: str, message: Message, form: EncodingOptions) -> list[Frame]:
-    """Return a message of a topic as its subscriber gets it.
+    """Encode a message of a topic for a subscriber.
 
-    Raises `NepError` for a message that can't be read, or doesn't have that form.
+    Raises `NepError` if the message can't be decoded or has no such form.
     """
     if form.compression == "cbor-raw":
         secs, nsecs = divmod(message.stamp_ns or time.time_ns(), _NS)
@@ -77,7 +77,7 @@ def publish_frames(topic: str, message: Message, form: EncodingOptions) -> list[
 
 
 def operation_frames(operation: Mapping[str, object], form: EncodingOptions) -> list[Frame]:
-    """Return another operation, such as a service's answer. Raises `EncodeError`."""
+    """Encode another operation, such as the reply of a service. Raises `EncodeError`."""
     if form.compression in {"cbor", "cbor-raw"}:
         return [Frame(_cbor(operation), is_text=False)]
     return _text_frames(json_bytes(operation), form)
@@ -100,7 +100,7 @@ def _text_frames(text: bytes, form: EncodingOptions) -> list[Frame]:
 
 
 def _json_payload(message: Message) -> bytes | None:
-    """A payload of JSON without decoding it into Python for longer than a check; None when that can't be."""
+    """Return a JSON payload unchanged if it is valid for pages, else None."""
     data = bytes(message.data)
     if json_is_too_deep(data):
         return None
@@ -112,7 +112,7 @@ def _json_payload(message: Message) -> bytes | None:
 
 
 def json_bytes(value: object) -> bytes:
-    """Return a value as JSON, with bytes in base64. Raises `EncodeError`."""
+    """Encode a value as JSON, with bytes in base64. Raises `EncodeError`."""
     try:
         return orjson.dumps(value, _as_text, orjson.OPT_NON_STR_KEYS | orjson.OPT_SERIALIZE_NUMPY)
     except (TypeError, RecursionError) as error:
@@ -137,7 +137,7 @@ def _with_typed_arrays(msg: Mapping[str, object], definition: Definition) -> obj
 
 
 def _typed(value: object, kinds: list[tuple[str, FieldKind]]) -> dict[str, object]:
-    """The fields of a map that are arrays of numbers, packed, and the messages that have such inside."""
+    """Return the fields of a map that are, or contain, arrays of numbers, converted to typed arrays."""
     packed: dict[str, object] = {}
     if not isinstance(value, Mapping):
         return packed
@@ -153,7 +153,7 @@ def _typed(value: object, kinds: list[tuple[str, FieldKind]]) -> dict[str, objec
 
 
 def _packed(values: object, kind: str) -> object:
-    """A list of numbers as a typed array; `null`, as JSON has NaN, is NaN again."""
+    """Convert a list of numbers to a typed array; `null`, which represents NaN in JSON, becomes NaN."""
     tag, letter = _TYPED_ARRAYS[kind]
     if not isinstance(values, list):
         return values

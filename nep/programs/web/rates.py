@@ -1,4 +1,4 @@
-"""RateMeter: messages and bytes per second over the last two seconds. Pure."""
+"""`RateMeter`: messages and bytes per second over the last two seconds. No input or output."""
 
 from __future__ import annotations
 
@@ -12,21 +12,21 @@ _WINDOW_S = _SLOT_S * _SLOTS
 
 
 class RateMeter:
-    """Counts in slots of half a second; a message costs a few additions.
+    """Sliding window of counters with slots of half a second; counting takes a few additions.
 
-    `count` is called in one thread; `rates` may be called in any: a slot that is replaced at that moment
-    makes one value imprecise.
+    Call `count` in one thread. `rates` can be called in any thread; if a slot is replaced meanwhile, one
+    value is imprecise.
     """
 
     def __init__(self, clock: Callable[[], float]) -> None:
         self._clock = clock
         self._since_s = clock()
         self._slots = [(-1, 0, 0)] * (_SLOTS + 1)
-        """(number of the slot since the clock's zero, messages, bytes), with one more that is not over."""
+        """Slots (number since the clock's zero, messages, bytes), including the incomplete one."""
         self.total = 0
 
     def count(self, size_bytes: int) -> None:
-        """Count a message."""
+        """Count a message of this size."""
         self.total += 1
         number = int(self._clock() / _SLOT_S)
         known, messages, size = self._slots[number % len(self._slots)]
@@ -35,7 +35,7 @@ class RateMeter:
         self._slots[number % len(self._slots)] = number, messages + 1, size + size_bytes
 
     def rates(self) -> tuple[float, float]:
-        """Return messages and bytes per second; 0 until the first half second is over."""
+        """Return messages and bytes per second; 0 during the first half second."""
         now = self._clock()
         current = int(now / _SLOT_S)
         begin = current - _SLOTS

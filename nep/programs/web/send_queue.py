@@ -1,8 +1,8 @@
-"""What waits for a page: messages of topics, which can be dropped, and the rest, which can't.
+"""Send queue of a page: messages of topics, which can be dropped, and other messages, which can't.
 
-A `Feed` has the messages of one topic, within the wishes of the page's subscriptions. An `SendQueue` has all
-feeds of a page and takes turns between them, so that a topic with many messages does not hold up the others.
-Used in the event loop's thread only.
+A `Feed` contains the messages of one topic, limited as the page's subscriptions request. `SendQueue` serves
+all feeds of a page in turn, so that a topic with many messages does not delay the others. Used in the event
+loop's thread only.
 """
 
 from __future__ import annotations
@@ -23,23 +23,23 @@ from nep.programs.web.rates import RateMeter
 __all__ = ["Feed", "Queued", "SendQueue"]
 
 _MAX_QUEUED_IMAGES = 4
-"""Images of a topic that wait for a page which doesn't say how many: of older ones it would show the past."""
+"""Maximum queue length for images if the page doesn't set a limit; longer queues would only add delay."""
 _MAX_LATCHED_BYTES = MAX_QUEUED_BYTES // 4
-"""Latched messages of a topic that are kept for further subscriptions of a page."""
+"""Maximum size of a topic's latched messages that are kept for further subscriptions of a page."""
 
 
 class Queued(NamedTuple):
-    """A message and its feed."""
+    """Message and the feed that contained it."""
 
     feed: Feed
     message: Message
 
 
 class Feed:
-    """Messages of one topic on their way to a page, the oldest of which are dropped when it is slow.
+    """Queue of messages of one topic to a page. The oldest are dropped if the page is too slow.
 
-    Several subscriptions of the page are served as one: with the shortest throttle time, the longest queue
-    and the smallest fragments.
+    Several subscriptions of the page share one feed, with the shortest throttle time, the longest queue and
+    the smallest fragments.
     """
 
     def __init__(self, topic: str, msg_type: str = "", clock: Callable[[], float] = time.monotonic) -> None:
@@ -49,10 +49,10 @@ class Feed:
         self.sent = RateMeter(clock)
         self.form = EncodingOptions()
         self.dropped_count = 0
-        """Messages that the page was too slow for, since it was told so last."""
+        """Number of messages dropped since the page was last notified of drops."""
         self.total_dropped_count = 0
         self.throttled_count = 0
-        """Messages that were left out because the page asked for fewer."""
+        """Number of messages omitted because of the rate limit that the page requested."""
         self.size_bytes = 0
         self._wishes: dict[OperationId, Subscribe] = {}
         self._throttle_s = 0.0
@@ -66,11 +66,11 @@ class Feed:
 
     @property
     def subscription_count(self) -> int:
-        """How many subscriptions of the page it serves."""
+        """Number of the page's subscriptions that share the feed."""
         return len(self._wishes)
 
     def subscribe(self, wish: Subscribe, *, as_pixels: bool) -> None:
-        """Add or replace a subscription; a further one gets what is latched, which the first one had."""
+        """Add or replace a subscription. Latched messages are sent again for each further subscription."""
         if self._wishes and wish.id not in self._wishes:
             for each in tuple(self._latched.values()):
                 self.add(each)
@@ -78,7 +78,7 @@ class Feed:
         self._combine(as_pixels=as_pixels)
 
     def unsubscribe(self, id_: OperationId) -> bool:
-        """End the subscription with this id, all without one; whether there was one."""
+        """End the subscription with this id, or all if the id is None; return True if there was one."""
         found = bool(self._wishes) if id_ is None else id_ in self._wishes
         if id_ is None:
             self._wishes.clear()
@@ -113,7 +113,7 @@ class Feed:
             del self._latched[next(iter(self._latched))]
 
     def drop_oldest(self) -> None:
-        """Drop one message, and count it."""
+        """Drop the oldest message and count it."""
         self.size_bytes -= self._messages.popleft().size_bytes
         if self._throttle_s:
             self.throttled_count += 1
@@ -123,33 +123,36 @@ class Feed:
 
     @property
     def at_most_per_s(self) -> float | None:
-        """Messages per second that the page asked for at most; None without a limit."""
+        """Maximum messages per second that the page requested; None for no limit."""
         return 1 / self._throttle_s if self._throttle_s else None
 
     @property
     def next_at(self) -> float:
-        """When the next message may be taken, by the clock of `take`."""
+        """Time from which the next message may be taken, on the clock of `pop`."""
         return self._next_at
 
     def pop(self, now: float) -> Message:
-        """Return the oldest message."""
+        """Remove and return the oldest message."""
         message = self._messages.popleft()
         self.size_bytes -= message.size_bytes
         self._next_at = now + self._throttle_s
         return message
 
     def clear(self) -> None:
-        """Forget what waits: nobody wants it any more."""
+        """Discard all queued and latched messages."""
         self._messages.clear()
         self._latched.clear()
         self.size_bytes = 0
 
 
 class SendQueue:
-    """Everything that waits for one page.
+    """Queue of everything to be sent to one page.
 
-    `clock` is the event loop's. Messages of topics have `max_bytes` together. `on_overflow` is called once,
-    when more waits than may of what can't be dropped: the page does not read, and gets nothing any more.
+    Args:
+        clock: Clock of the event loop.
+        on_overflow: Called once when messages that can't be dropped exceed their limit, because the page does
+            not read. Nothing more is sent then.
+        max_bytes: Maximum size of all queued messages of topics.
     """
 
     def __init__(
@@ -180,7 +183,10 @@ class SendQueue:
             self._on_overflow()
 
     def add(self, feed: Feed, message: Message) -> None:
-        """Append a message of a topic; beyond the limit the oldest of the largest feed is dropped."""
+        """Append a message of a topic.
+
+        Beyond the limit, the oldest message of the largest feed is dropped.
+        """
         feed.add(message)
         self.activate(feed)
         while sum(each.size_bytes for each in self._active) > self._max_bytes:
@@ -192,19 +198,19 @@ class SendQueue:
                 self._active.remove(largest)
 
     def activate(self, feed: Feed) -> None:
-        """Serve a feed that may have messages."""
+        """Include a feed in the turns, because it may contain messages."""
         if len(feed) and feed not in self._active:
             self._active.append(feed)
         self._is_filled.set()
 
     def remove(self, feed: Feed) -> None:
-        """Forget a feed and what waits in it."""
+        """Remove a feed and discard its messages."""
         feed.clear()
         if feed in self._active:
             self._active.remove(feed)
 
     async def pop(self) -> Frame | Queued:
-        """Return what is to be sent next, as soon as there is something."""
+        """Wait for the next item to be sent, and return it."""
         while True:
             if self._frames:
                 frame = self._frames.popleft()

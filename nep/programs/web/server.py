@@ -1,4 +1,4 @@
-"""WebServer: serves pages and programs that speak rosbridge, in a thread of its own with an event loop."""
+"""`WebServer`: serves pages and programs in a background thread with an event loop."""
 
 from __future__ import annotations
 
@@ -44,32 +44,37 @@ if TYPE_CHECKING:
 __all__ = ["DEFAULT_PORT", "WebServer", "WebSettings"]
 
 DEFAULT_PORT = 9090
-"""Rosbridge's."""
+"""Default port of rosbridge."""
 _logger = logging.getLogger("nep.programs.web")
 _LOOPBACK = "127.0.0.1"
 _NODE_NAME = "nep_web"
 _REFRESH_S = 1.0
-"""How often the guard looks for robots that came while pages are connected."""
+"""Interval in seconds at which the guard checks for new robots while pages are connected."""
 _WAIT_FOR_MASTER_S = 2.0
 _OPEN_TIMEOUT_S = 5.0
 _CLOSE_TIMEOUT_S = 2.0
 _END_TIMEOUT_S = 1.0
-"""How long pages have to answer a close frame when the server ends."""
+"""Time in seconds that pages have to reply to a close frame when the server stops."""
 _JOIN_S = 10.0
 _POLICY_VIOLATION = 1008
 _MAX_REFUSALS = 50
 LANGUAGE = "web"
-"""Language of pages' nodes in the graph, by which others recognize them."""
+"""Language of pages' nodes in the graph, by which other programs recognize them."""
 _MAX_LOCKED = 16
-"""Connections without a token that may still send an ``auth``."""
+"""Maximum number of connections without a token that may still send an ``auth`` operation."""
 
 
 @dataclass(frozen=True)
 class WebSettings:
-    """What a server is told.
+    """Settings of a server.
 
-    `port`: 0 takes a free one. `listen`: addresses of this computer at which others can connect, too; then a
-    token is needed. `allow_moving`: names of the robots that pages may move.
+    Attributes:
+        port: TCP port; 0 for a free one.
+        listen: Further addresses of this computer at which other computers can connect. They require a token.
+        access: Access rules.
+        allow_moving: Names of the robots that pages may move.
+        master: Address of the master.
+        transport: Name of the back end.
     """
 
     port: int = DEFAULT_PORT
@@ -79,20 +84,20 @@ class WebSettings:
     master: str | None = None
     transport: str = "zeromq"
     foxglove: ChannelFormat | None = None
-    """Encodes topics for clients of Foxglove's WebSocket protocol; None: serve none."""
+    """Encoder for clients of Foxglove's WebSocket protocol; None rejects these clients."""
     rosbridge: bool = True
-    """Whether clients of rosbridge, which are all without Foxglove's subprotocol, are served."""
+    """True to serve rosbridge clients, which are all clients without Foxglove's subprotocol."""
 
     @property
     def hosts(self) -> tuple[str, ...]:
-        """All addresses at which it answers."""
+        """All addresses at which the server listens."""
         if ANY in self.listen:
             return (ANY,)
         return tuple(dict.fromkeys((_LOOPBACK, *self.listen)))
 
     @property
     def is_open(self) -> bool:
-        """Whether other computers can connect."""
+        """True if other computers can connect."""
         return any(not is_own_host(each) for each in self.hosts)
 
 
@@ -103,13 +108,13 @@ class _Rejection(NamedTuple):
 
 
 class WebServer:
-    """Serves from `start` until `close`; a context manager.
+    """WebSocket server, running from `start` until `close`. Usable as a context manager.
 
-    Each page is a node whose ``language`` in the graph is "web" (`NodeInfo.language`), and whose name is
-    `ConnectedPage.name`; the server's own node is "nep_web" with the language "Python".
+    Each page has a node with the ``language`` "web" in the graph (`NodeInfo.language`) and the name
+    `ConnectedPage.name`. The server's own node is "nep_web" with the language "Python".
 
-    `start` raises `AddressInUseError`, and `NepError` for an address that this computer doesn't have, and
-    where the libraries are not installed.
+    `start` raises `AddressInUseError`, and `NepError` for an address that this computer doesn't have or if
+    the libraries are not installed.
     """
 
     def __init__(self, settings: WebSettings) -> None:
@@ -117,12 +122,12 @@ class WebServer:
         self.counts = WebCounts()
         self.port = settings.port
         self._pages: dict[Page | FoxglovePage, Access] = {}
-        """Pages, each with the rules by which it was let in."""
+        """Connected pages, each with the access rules by which it was accepted."""
         self._lock = threading.Lock()
-        """For changes of `settings` while pages connect."""
+        """Lock for changes of `settings` while pages connect."""
         self._guard: MotionGuard | None = None
         self._connections: WeakSet[ServerConnection] = WeakSet()
-        """All connections, also those without a handshake."""
+        """All open connections, including those without a handshake."""
         self._locked = 0
         self._kept_out = KeptOut()
         self._refusals_lock = threading.Lock()
@@ -136,12 +141,12 @@ class WebServer:
 
     @property
     def url(self) -> str:
-        """Where pages of this computer connect, without the token."""
+        """WebSocket URL for pages on this computer, without the token."""
         return f"ws://{_LOOPBACK}:{self.port}"
 
     @property
     def test_page_url(self) -> str:
-        """Where a browser of this computer opens the test page, with the token if one is required."""
+        """URL of the test page for a browser on this computer, with the token if one is required."""
         return f"http://{_LOOPBACK}:{self.port}{query_of(self.settings.access.token)}"
 
     @property
@@ -151,27 +156,27 @@ class WebServer:
 
     @property
     def pages(self) -> tuple[ConnectedPage, ...]:
-        """Connected pages and programs, the first that came first. Thread-safe."""
+        """Connected pages and programs, in the order of their connection. Thread-safe."""
         pages = sorted(self._pages.copy(), key=lambda page: page.id)
         return tuple(each.snapshot for each in pages if not each.is_closing)
 
     @property
     def refusals(self) -> tuple[Refusal, ...]:
-        """The newest refused connections and messages, the last one last. Thread-safe.
+        """Latest refused connections and messages, the newest one last. Thread-safe.
 
-        One that is repeated, such as by a page that tries again, is there once, with its last time.
+        A repeated refusal, such as of a page that reconnects, is listed once with its last time.
         """
         return self._refusals
 
     def disconnect(self, page_id: int) -> None:
-        """Close the connection of a page; it may connect again. Thread-safe, returns at once."""
+        """Close the connection of a page without waiting; the page may connect again. Thread-safe."""
         self._disconnect(lambda page, _access: page.id == page_id, "disconnected by the user of the server")
 
     def keep_out(self, page_id: int) -> None:
-        """Disconnect a page, and refuse it when it connects again, until `let_in`. Thread-safe.
+        """Disconnect a page, and reject it when it connects again, until `let_in` is called. Thread-safe.
 
-        A page is recognized by its address, origin and User-Agent; others with the same that are connected
-        already stay.
+        A page is identified by its address, origin and User-Agent. Other connected pages with the same
+        identity stay connected.
         """
         page = next((each for each in self._pages.copy() if each.id == page_id), None)
         if page is not None:
@@ -179,15 +184,15 @@ class WebServer:
             self.disconnect(page_id)
 
     def let_in(self, page_id: int) -> None:
-        """Let a page that `keep_out` disconnected connect again. Thread-safe."""
+        """Allow a page that `keep_out` disconnected to connect again. Thread-safe."""
         self._kept_out.remove(page_id)
 
     def set_access(self, access: Access) -> int:
-        """Change who may connect, at once; return the number of pages that are disconnected.
+        """Replace the access rules; return the number of pages that are disconnected. Thread-safe.
 
-        Pages that may not connect by the new rules are disconnected: those of a removed origin, and those
-        that connected with another token or without one. All others stay connected. Thread-safe. Raises
-        `NepError` for rules without a token while other computers can connect.
+        Pages that the new rules don't allow are disconnected: those of a removed origin, and those that
+        connected with another token or without one. All others stay connected. Raises `NepError` for rules
+        without a token if other computers can connect.
         """
         check_token(replace(self.settings, access=access))
         with self._lock:
@@ -200,17 +205,20 @@ class WebServer:
             )
 
     def set_allow_moving(self, names: Collection[str]) -> None:
-        """Change the robots that pages may move, also for connected pages. Thread-safe."""
+        """Replace the names of robots that pages may move, also for connected pages. Thread-safe."""
         with self._lock:
             self.settings = replace(self.settings, allow_moving=frozenset(names))
             if self._guard is not None:
                 self._guard.set_allowed(names)
 
     def set_foxglove(self, channels: ChannelFormat | None) -> int:
-        """Serve clients of Foxglove's protocol, or none; return the number of pages that are disconnected.
+        """Enable or disable Foxglove's protocol; return the number of pages that are disconnected.
 
-        `channels` is a `nep.recordings.formats.channels.LiveChannels`; None serves none and disconnects those
-        that are connected. Thread-safe.
+        Thread-safe.
+
+        Args:
+            channels: A `nep.recordings.formats.channels.LiveChannels`; None disables the protocol and
+                disconnects its clients.
         """
         with self._lock:
             self.settings = replace(self.settings, foxglove=channels)
@@ -221,7 +229,7 @@ class WebServer:
             )
 
     def set_rosbridge(self, on: bool) -> int:
-        """Serve rosbridge clients, or none; return the number of pages that are disconnected. Thread-safe."""
+        """Enable or disable rosbridge; return the number of pages that are disconnected. Thread-safe."""
         with self._lock:
             self.settings = replace(self.settings, rosbridge=on)
             if on:
@@ -244,7 +252,7 @@ class WebServer:
         return len(found)
 
     def start(self) -> Self:
-        """Listen; return once pages can connect."""
+        """Start the thread and return when pages can connect."""
         check_installed()
         check_token(self.settings)
         for host in self.settings.listen:
@@ -258,16 +266,16 @@ class WebServer:
 
     @property
     def problem(self) -> Exception | None:
-        """Why it ended by itself, None when it did not."""
+        """Error that stopped the server; None if there was none."""
         return self._problem
 
     def wait(self, timeout_s: float) -> bool:
-        """Wait until it has ended, `timeout_s` at most; whether it has."""
+        """Wait until the server has stopped; return False after `timeout_s` seconds."""
         self._thread.join(timeout_s)
         return not self._thread.is_alive()
 
     def close(self) -> None:
-        """Close all pages with the code of a server that goes away, and end. May be called twice."""
+        """Close all connections with the code "going away" and stop the server. Idempotent."""
         loop, stop = self._loop, self._stop
         if loop is not None and stop is not None:
             with suppress(RuntimeError):  # it has ended
@@ -361,7 +369,7 @@ class WebServer:
         )
 
     async def _watch_robots(self, guard: MotionGuard) -> None:
-        """Ask who is there while a page could publish: a robot may come after it advertised a topic."""
+        """Poll the graph while pages are connected: a robot may appear after a page advertised its topic."""
         loop = asyncio.get_running_loop()
         stop = self._stop
         with ThreadPoolExecutor(1, "nep-web-robots") as thread:
@@ -374,7 +382,7 @@ class WebServer:
     # ---- who connects
 
     def _refusal(self, connection: ServerConnection, request: Request) -> Response | None:
-        """Answer a handshake that is refused, and other HTTP requests; None lets a handshake go on."""
+        """Return the response to a rejected handshake or an HTTP request; None accepts a handshake."""
         if not is_handshake(request):
             return self._page_response(connection, request)
         access = self.settings.access
@@ -403,7 +411,7 @@ class WebServer:
         return connection.respond(refusal.status, refusal.sentence + "\n")
 
     def _page_response(self, connection: ServerConnection, request: Request) -> Response:
-        """Answer a request for one of the server's own pages."""
+        """Respond to an HTTP request for one of the server's own pages."""
         from websockets.datastructures import Headers  # noqa: PLC0415 - only this command needs it
         from websockets.http11 import Response  # noqa: PLC0415 - only this command needs it
 
@@ -445,7 +453,7 @@ class WebServer:
     def _subprotocol(
         self, _connection: ServerConnection, offered: Sequence[Subprotocol]
     ) -> Subprotocol | None:
-        """Choose Foxglove's protocol where a client offers it; rosbridge has none."""
+        """Select Foxglove's subprotocol if the client offers it; rosbridge has none."""
         if self.settings.foxglove is None:
             return None
         return next((each for each in offered if each in SUBPROTOCOLS), None)
@@ -511,7 +519,7 @@ class WebServer:
         return Page(connection, name, self._new_node, guard, self.counts, report)
 
     def _may_stay(self, connection: ServerConnection, known: Access) -> bool:
-        """Whether the current rules admit a page that was let in by `known`."""
+        """Return True if the current rules allow a page that was accepted under the rules `known`."""
         access = self.settings.access
         if not self.settings.rosbridge and connection.subprotocol not in SUBPROTOCOLS:
             return False
@@ -538,7 +546,7 @@ class WebServer:
 
 
 def check_installed() -> None:
-    """Raise `NepError` where the libraries of the extra ``web`` are not installed."""
+    """Raise `NepError` if the libraries of the extra ``web`` are not installed."""
     try:
         import cbor2  # noqa: F401, PLC0415 - whether it is there
         import websockets.asyncio.server  # noqa: F401, PLC0415 - whether it is there, and new enough
@@ -549,15 +557,15 @@ def check_installed() -> None:
 
 
 def check_token(settings: WebSettings) -> None:
-    """Raise `NepError` for a server that other computers can reach and that needs no token."""
+    """Raise `NepError` if other computers can reach the server and no token is set."""
     if settings.is_open and not settings.access.token:
         raise NepError(_("a web server that other computers can reach needs a token"))
 
 
 def check_own_address(host: str) -> None:
-    """Raise `NepError` for an address that this computer doesn't have.
+    """Raise `NepError` if this computer doesn't have the address.
 
-    asyncio of Python 3.13 leaves out such an address without an error while another one can be bound.
+    asyncio of Python 3.13 silently ignores such an address if another one can be bound.
     """
     try:
         with socket.socket() as probe:
@@ -567,14 +575,17 @@ def check_own_address(host: str) -> None:
 
 
 def node_name(origin: str | None, address: str) -> str:
-    """Return the name of a page's node: its origin and port, or the address of a program."""
+    """Return the name for a page's node: its origin and port, or the address of a program."""
     host = urlsplit(origin).netloc if origin else ""
     port = address.rpartition(":")[2]
     return escaped(f"web_{host}_{port}" if host else f"web_{address}")[:150]
 
 
 def _quiet_logger() -> logging.Logger:
-    """The library logs each broken handshake with its stack; scanners of ports would fill the log."""
+    """Return a logger that discards the websockets library's records.
+
+    The library logs each failed handshake with a traceback, so port scanners would fill the log.
+    """
     logger = logging.getLogger("nep.programs.web.connections")
     logger.setLevel(logging.CRITICAL)
     return logger

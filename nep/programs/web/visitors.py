@@ -1,4 +1,4 @@
-"""Names for connected pages: client, kind of device and title, from the headers of the handshake. Pure."""
+"""Display names of connected pages: client, kind of device and title, from the handshake. No I/O."""
 
 from __future__ import annotations
 
@@ -27,16 +27,19 @@ _CLIENTS = (
     ("Chrome/", "Chrome"),
     ("Safari/", "Safari"),
 )
-"""Marks in User-Agents, in this order: most browsers also claim to be Chrome and Safari."""
+"""Substrings of User-Agents and client names, in order of priority.
+
+Most browsers also claim to be Chrome and Safari.
+"""
 _PRODUCT = re.compile(r"[A-Za-z][\w.+-]*")
 
 
 def client_name(user_agent: str, *, is_foxglove: bool = False) -> str:
-    """Return the name of the client program; "" if it is not known.
+    """Return the name of the client program; "" if unknown.
 
     Args:
-        user_agent: Its header, whatever it contains. A program's own name is shown as it is, bounded.
-        is_foxglove: The client speaks Foxglove's protocol: without a better name it is "Foxglove".
+        user_agent: User-Agent header, which is untrusted. A program's own name is bounded in length.
+        is_foxglove: True if the client uses Foxglove's protocol; "Foxglove" is then the default name.
     """
     given = user_agent[:_MAX_READ_LENGTH]
     if is_foxglove:
@@ -49,7 +52,7 @@ def client_name(user_agent: str, *, is_foxglove: bool = False) -> str:
 
 
 def device_kind(user_agent: str) -> Device:
-    """Return the kind of device that a User-Agent names; "" for a computer or an unknown device."""
+    """Return the kind of device according to a User-Agent; "" for a computer or an unknown device."""
     given = user_agent[:_MAX_READ_LENGTH]
     if "iPhone" in given or ("Android" in given and "Mobile" in given):
         return "phone"
@@ -57,12 +60,12 @@ def device_kind(user_agent: str) -> Device:
 
 
 def page_title(path: str, referer: str, origin: str) -> str:
-    """Return a short name for a page: "buttons.html"; "" for a program without any.
+    """Return a short title for a page, such as "buttons.html"; "" if there is none.
 
     Args:
-        path: Path of the WebSocket URL; its parameter ``title`` comes first.
-        referer: URL of the page, which few browsers send here: the last part of its path.
-        origin: Origin of the page, which every browser sends: its host and port.
+        path: Path of the WebSocket URL. Its parameter ``title`` has priority.
+        referer: URL of the page, which few browsers send; its last path segment is used next.
+        origin: Origin of the page, which every browser sends; its host and port are used last.
     """
     for title in (_given_title(path), _last_part(referer), _host(origin)):
         if shown := escaped(title.strip())[:MAX_SHOWN_LENGTH]:

@@ -1,4 +1,4 @@
-"""Rules of the native wire, by subject."""
+"""Rules of the native wire, one module per subject."""
 
 from nep.programs.conformance.rules import (  # noqa: F401 - importing them registers the rules
     closing,

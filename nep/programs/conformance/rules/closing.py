@@ -1,4 +1,4 @@
-"""Rules about closing publishers, subscribers and nodes."""
+"""Rules for closing publishers, subscribers and nodes."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ def _is_connected(publisher: ScriptedPublisher) -> bool:
 
 
 def _close_without_bye(bench: Bench, publisher: ScriptedPublisher, last_seq: int, wait_s: float) -> None:
-    """Report a publisher as closed to the master; the adapter must still be connected after ``wait_s``."""
+    """Report a publisher as closed; check that the adapter is still connected after `wait_s`."""
     bench.master.submit(RemovePublisher(publisher.node.id, publisher.id, last_seq))
     bench.wait(wait_s)
     if not _is_connected(publisher):

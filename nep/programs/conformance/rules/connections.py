@@ -1,4 +1,4 @@
-"""Rules about connecting and reconnecting subscribers."""
+"""Rules for connecting and reconnecting subscribers."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ _MAX_CLOSE_S = 3.0
 
 
 def _expect_next(bench: Bench, publisher: ScriptedPublisher, sub: int) -> None:
-    """Send a message, which the adapter must deliver exactly once."""
+    """Send a message and check that the adapter delivers it exactly once."""
     publisher.send(b'{"a":1}')
     wanted = str(publisher.seq)
     bench.need(lambda: any(each.get("seq") == wanted for each in bench.events(sub)), "message")

@@ -1,4 +1,4 @@
-"""Rules about the handshake of hello and echo, which prevents losses at the start."""
+"""Rules for the handshake of hello and echo, which prevents losses at the start."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Rules about leases, statistics and a restarted master."""
+"""Rules for leases, statistics and a restarted master."""
 
 from __future__ import annotations
 

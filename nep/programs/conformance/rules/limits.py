@@ -1,4 +1,4 @@
-"""Rules about malformed and oversized input."""
+"""Rules for malformed and oversized input."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ _NESTING_DEPTH = 100_000
 
 
 def _expect_working(bench: Bench, publisher: ScriptedPublisher, sub: int) -> None:
-    """Send a valid message; the adapter must deliver it and no other."""
+    """Send a valid message and check that the adapter delivers it and no other."""
     publisher.send(b'{"good":1}', seq=1)
     bench.need(lambda: any(_seq(each) == 1 for each in bench.events(sub)), "message")
     others = [each for each in bench.events(sub) if each.get("publisher") != str(publisher.id)]

@@ -1,4 +1,4 @@
-"""Rules about counting lost messages."""
+"""Rules for counting lost messages."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ _SECTION = "notices"
 
 
 def _expect_counts(bench: Bench, sub: int, received: int, lost: int) -> None:
-    """Wait for these counts of the adapter's subscriber; others break the rule."""
+    """Wait until the adapter's subscriber has these counts. Other counts break the rule."""
     bench.need(lambda: len(bench.events(sub)) >= received, "message")
     for _turn in range(40):
         if bench.counts(sub) == (received, lost):
@@ -24,7 +24,7 @@ def _expect_counts(bench: Bench, sub: int, received: int, lost: int) -> None:
 
 
 def _report_last_seq(bench: Bench, publisher: int, seq: int) -> None:
-    """Report a last seq in three renewals, the second of which makes missing messages count as lost."""
+    """Report a last sequence number in three renewals; at the second, missing messages count as lost."""
     bench.master.change = lambda _request, reply: (
         {**reply, "what": {**reply["what"], "last_seqs": {publisher: seq}}}
         if reply["is"] == "renewed"

@@ -1,4 +1,4 @@
-"""Rules about the messages that a client sends."""
+"""Rules for the messages that a client sends."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ _SENT: Mapping[str, tuple[dict[str, object], bytes]] = {
 def connected_subscriber(
     bench: Bench, topic: str, level: int | None, msg_type: str = "json"
 ) -> ScriptedSubscriber:
-    """Return a subscriber of the tester, connected to the adapter's publisher; waits for the echo."""
+    """Connect a subscriber of the tester to the adapter's publisher, and wait for the echo."""
     endpoint = bench.record("publisher", topic)["endpoints"][0]
     subscriber = bench.subscriber(topic, msg_type, level=level, endpoint=endpoint)
     if level is not None:
@@ -43,14 +43,18 @@ def connected_subscriber(
 def connected_publisher(
     bench: Bench, level: int | None = 3, msg_type: str = "json"
 ) -> tuple[str, int, ScriptedSubscriber]:
-    """Return a new topic, the number of the adapter's publisher of it, and a connected subscriber."""
+    """Create a publisher of the adapter and a connected subscriber.
+
+    Returns:
+        The topic, the number of the publisher, and the subscriber.
+    """
     topic = bench.new_topic()
     pub = bench.new_pub(topic, msg_type)
     return topic, pub, connected_subscriber(bench, topic, level, msg_type)
 
 
 def messages_of(subscriber: ScriptedSubscriber) -> list[Parts]:
-    """Return all received messages. A malformed one breaks the rule."""
+    """Return all received messages. A malformed message breaks the rule."""
     try:
         return subscriber.messages
     except WireError as error:
@@ -60,7 +64,7 @@ def messages_of(subscriber: ScriptedSubscriber) -> list[Parts]:
 
 
 def _plain_subscriber(bench: Bench, topic: str, pub: int) -> ScriptedSubscriber:
-    """Return a subscriber without a hello once it receives from the adapter's publisher."""
+    """Return a subscriber without a hello, once it receives messages of the adapter's publisher."""
     subscriber = connected_subscriber(bench, topic, None)
     for _turn in range(200):
         bench.ask("publish", pub=pub, value={"warm": True})

@@ -1,4 +1,4 @@
-"""Rules about the messages that a client receives."""
+"""Rules for the messages that a client receives."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ _SENT: Mapping[str, tuple[bytes, object]] = {
 
 
 def _expect_seqs(bench: Bench, sub: int, count: int, first: int = 1) -> None:
-    """Wait for ``count`` messages with consecutive seqs from ``first``."""
+    """Wait for `count` messages and check that their sequence numbers are consecutive from `first`."""
     bench.need(lambda: len(bench.events(sub)) >= count, "message")
     bench.wait(0.05)
     seqs = [each.get("seq") for each in bench.events(sub)]

@@ -1,4 +1,4 @@
-"""Rules about records and requests sent to the master."""
+"""Rules for the records and requests that a client sends to the master."""
 
 from __future__ import annotations
 

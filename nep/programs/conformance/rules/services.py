@@ -1,4 +1,4 @@
-"""Rules about services and topics with wildcards: docs/services.md has the wire of services."""
+"""Rules for services and for topics with wildcards. docs/services.md describes the wire of services."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ def _socket(bench: Bench, kind: int) -> Iterator[zmq.Socket[bytes]]:
 
 
 def _answers(bench: Bench, socket: zmq.Socket[bytes], wanted: set[int]) -> dict[int | None, Reply]:
-    """Wait for the answers to these calls, and return all answers received."""
+    """Wait for the replies to these calls, and return all replies received."""
     found: dict[int | None, Reply] = {}
 
     def has_all() -> bool:
@@ -123,7 +123,7 @@ def _listed_server(bench: Bench, name: str, endpoint: str) -> Iterator[None]:
 
 
 def _called(bench: Bench, socket: zmq.Socket[bytes], number: int, reply: Reply) -> Any:  # noqa: ANN401 - JSON
-    """Answer the pending call of the adapter, and return the value that its client got."""
+    """Reply to the adapter's pending call, and return the value that the adapter's client received."""
     bench.need(lambda: bool(socket.poll(0)), "call")
     sender, *parts = socket.recv_multipart()
     call = NATIVE.read_call(parts)

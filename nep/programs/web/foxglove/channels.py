@@ -1,4 +1,4 @@
-"""Channels of a Foxglove connection: topics of the graph, and those that the client subscribes to."""
+"""Channels of a Foxglove connection: the advertised topics and the client's subscriptions."""
 
 from __future__ import annotations
 
@@ -27,11 +27,11 @@ from nep.programs.web.send_queue import Feed, Queued
 __all__ = ["ChannelFormat", "Channels"]
 
 _ADVERTISED_TOGETHER = 100
-"""Channels in one message: each has its schema."""
+"""Maximum number of channels advertised in one message, because each includes its schema."""
 
 
 class ChannelSchema(Protocol):
-    """A channel and its schema, as `nep.recordings.formats.channels` has them."""
+    """Channel and its schema, as defined by `nep.recordings.formats.channels`."""
 
     @property
     def topic(self) -> str: ...
@@ -46,13 +46,13 @@ class ChannelSchema(Protocol):
 
 
 class ChannelFormat(Protocol):
-    """Encodes messages for channels: `nep.recordings.formats.channels.LiveChannels`."""
+    """Encoder of messages for channels, implemented by `nep.recordings.formats.channels.LiveChannels`."""
 
     def expected(self, topic: str, msg_type: str) -> ChannelSchema:
-        """Return the most likely channel of a topic that has had no message yet."""
+        """Return the most likely channel for a topic on which no message was received yet."""
 
     def encoded(self, message: Message, log_ns: int) -> tuple[ChannelSchema, bytes]:
-        """Return the channel of a message, and its bytes in that channel."""
+        """Return the channel of a message and the message's encoded data."""
 
 
 @dataclass
@@ -72,9 +72,12 @@ class _Subscription:
 
 
 class Channels:
-    """See the module. Its methods raise `NepError` for what can't be done.
+    """Channels of one Foxglove connection. Methods raise `NepError` for invalid requests.
 
-    `tell` sends a JSON message with these fields.
+    Args:
+        context: Shared objects of the connection.
+        channels: Encodes messages.
+        tell: Sends a JSON message with the given fields.
     """
 
     def __init__(
@@ -89,11 +92,11 @@ class Channels:
 
     @property
     def subscribed(self) -> tuple[PageTopic, ...]:
-        """Topics that the client subscribes to. Thread-safe."""
+        """Topics to which the client subscribes. Thread-safe."""
         return tuple(subscribed_topic(each.feed) for each in self._subscriptions.copy().values())
 
     def ros_type(self, topic: str, schema_name: str) -> str:
-        """Return the ROS type of a topic that the client knows under this schema; "" for another schema."""
+        """Return the ROS type of a topic if it was advertised to the client with this schema, else ""."""
         known = self._channels.get(topic)
         is_known = known is not None and known.definition.schema_name == schema_name
         return ros_type_of(known.msg_type) if known is not None and is_known else ""
@@ -101,7 +104,7 @@ class Channels:
     # ---- topics
 
     async def update(self, found: Mapping[str, str]) -> None:
-        """Advertise new topics and withdraw others; `found` has the type of each topic."""
+        """Advertise new topics and unadvertise removed ones; `found` maps each topic to its type."""
         for topic, channel in list(self._channels.items()):
             if found.get(topic) != channel.msg_type:
                 del self._channels[topic]
@@ -141,7 +144,7 @@ class Channels:
     # ---- subscriptions
 
     async def subscribe(self, id_: object, channel_id: object) -> None:
-        """Send the client the messages of a channel from now on."""
+        """Start to send the messages of a channel to the client."""
         channel = next((each for each in self._channels.values() if each.id == channel_id), None)
         if type(id_) is not int or not 0 <= id_ <= MAX_ID or id_ in self._subscriptions or channel is None:
             raise NepError(_("a subscription needs an unused 'id' and the 'channelId' of a topic"))
@@ -161,7 +164,10 @@ class Channels:
         self._subscriptions[id_] = _Subscription(id_, channel, subscriber, feed, reader)
 
     async def unsubscribe(self, id_: int) -> None:
-        """End a subscription; one that doesn't exist is ignored, because channels go by themselves."""
+        """End a subscription.
+
+        Unknown ids are ignored, because a channel may have been unadvertised meanwhile.
+        """
         known = self._subscriptions.pop(id_, None)
         if known is None:
             return
@@ -170,7 +176,7 @@ class Channels:
         await self._context.in_thread(known.subscriber.close)
 
     async def frames_of(self, queued: Queued) -> list[Frame]:
-        """Return a message as the client gets it. Raises `NepError` for one that can't be read."""
+        """Encode a message for the client. Raises `NepError` if the message can't be decoded."""
         message = queued.message
         known = next((each for each in self._subscriptions.values() if each.feed is queued.feed), None)
         if known is None:
@@ -184,14 +190,14 @@ class Channels:
         return [message_frame(known.id, log_ns, data)]
 
     def cancel(self) -> None:
-        """Read no more: the client is gone. Its node closes what is open."""
+        """Stop reading, because the client has disconnected. Its node closes the subscribers."""
         for each in self._subscriptions.values():
             each.reader.cancel()
             each.feed.clear()
 
 
 def _readable_type(msg_type: str) -> str:
-    """The type of a topic's channel: Foxglove and Lichtblick can't read msgpack."""
+    """Return the type for a topic's channel; msgpack becomes JSON, because clients can't read msgpack."""
     return "json" if codec_for(msg_type).name == "msgpack" else msg_type
 
 

@@ -1,4 +1,4 @@
-"""GraphUpdates: services, and who publishes, subscribes and serves, told to a client as changes. Pure."""
+"""`GraphUpdates`: sends services and connections of the graph to a client as changes. No input or output."""
 
 from __future__ import annotations
 
@@ -29,26 +29,26 @@ _NONE = _Connections({}, {}, {})
 
 
 class GraphUpdates:
-    """What a client knows of the graph. `update` returns the messages with which it knows all of it."""
+    """Tracker of the part of the graph that was sent to a client."""
 
     def __init__(self) -> None:
         self._service_ids: dict[tuple[str, str], int] = {}
-        """Ids of services by their names and types."""
+        """Ids of services by (name, type)."""
         self._last_id = 0
         self._are_connections_wanted = False
         self._connections = _NONE
 
     def want_connections(self, *, is_wanted: bool) -> None:
-        """Begin to send who publishes, subscribes and serves, from the start; or end that."""
+        """Start or stop sending the publishers, subscribers and servers; a start sends all of them."""
         self._are_connections_wanted = is_wanted
         self._connections = _NONE
 
     def service(self, id_: int) -> str:
-        """Return the name of a service; "" if there is none with this id."""
+        """Return the name of the service with this id; "" if there is none."""
         return next((name for (name, _type), known in self._service_ids.items() if known == id_), "")
 
     def update(self, view: GraphView) -> list[dict[str, object]]:
-        """Return the messages that tell a client what has changed."""
+        """Return the messages that update the client's view of the graph."""
         messages = self._update_services(view)
         if not self._are_connections_wanted:
             return messages

@@ -1,9 +1,9 @@
-"""FoxglovePage: a connection of Foxglove or Lichtblick, by Foxglove's WebSocket protocol.
+"""Connection of Foxglove or Lichtblick with Foxglove's WebSocket protocol.
 
-The server of the package foxglove-sdk accepts every Origin and has no token (0.30.3), so any web page in the
-user's browser could read all topics. Here Foxglove's clients pass the same checks as rosbridge's, and the
-same code publishes for them, calls services and guards robots. Channels have the encodings and schemas of
-recordings (`nep.recordings.formats.channels`).
+The server of the package foxglove-sdk (0.30.3) accepts every Origin and has no token, so any web page in the
+user's browser could read all topics. Here, Foxglove's clients pass the same checks as those of rosbridge, and
+share the code that publishes, calls services and guards robots. Encodings and schemas are those of recordings
+(`nep.recordings.formats.channels`).
 """
 
 from __future__ import annotations
@@ -58,11 +58,21 @@ _ROS_TYPES = {
     "foxglove.CompressedImage": "sensor_msgs/CompressedImage",
     "foxglove.RawImage": "sensor_msgs/Image",
 }
-"""Types for schemas of Foxglove's that have the same fields."""
+"""ROS types for schemas of Foxglove that have the same fields."""
 
 
 class FoxglovePage(PageConnection):
-    """See the module. `name` is that of its node. Lives in the server's event loop."""
+    """Connection of a client with Foxglove's WebSocket protocol. Runs in the server's event loop.
+
+    Args:
+        connection: WebSocket connection.
+        name: Name of the page's node.
+        new_node: Creates the node.
+        counts: Counters of the server.
+        channels: Encodes messages.
+        guard: Decides on which topics the client may publish.
+        on_robot_refused: Called with the name of a robot that the client may not move, and the reason.
+    """
 
     protocol = "foxglove"
 
@@ -92,7 +102,7 @@ class FoxglovePage(PageConnection):
         self._topics = PageTopics(context)
         self._services = PageServices(context, self._respond)
         self._advertised: dict[int, op.Advertise] = {}
-        """What the client publishes, by the ids of its channels."""
+        """Advertised topics of the client by channel id."""
         self._updates = GraphUpdates()
         self._rejected = 0
         self._is_gone = asyncio.Event()
@@ -102,7 +112,7 @@ class FoxglovePage(PageConnection):
         return (*self._channels.subscribed, *self._topics.topics)
 
     async def run(self) -> None:
-        """Serve the client until it goes; then close its node."""
+        """Serve the client until it disconnects; then close its node."""
         self._send_fields(
             {
                 "op": "serverInfo",
@@ -151,7 +161,7 @@ class FoxglovePage(PageConnection):
     # ---- the graph
 
     async def _watch_graph(self) -> None:
-        """Advertise topics and services as they come to the graph and go."""
+        """Advertise and unadvertise topics and services as the graph changes."""
         while not self._is_gone.is_set():
             try:
                 view = await self._context.in_thread(self._node.graph, _GRAPH_TIMEOUT_S)
@@ -174,7 +184,7 @@ class FoxglovePage(PageConnection):
     # ---- what the client asks
 
     async def _handle(self, data: bytes) -> None:
-        """Process one message of the client. Never raises because of its contents."""
+        """Process one message from the client. Never raises because of the message's content."""
         self._counts.operations += 1
         try:
             request = wire.parse(data)

@@ -1,6 +1,6 @@
-"""Messages of Foxglove's WebSocket protocol: binary ones to values and back, and JSON ones to a page. Pure.
+"""Messages of Foxglove's WebSocket protocol: parsing and encoding. No input or output.
 
-A client's text messages begin with "{", its binary ones with the byte 1 or 2.
+Text messages from a client start with "{", binary messages with the byte 1 or 2.
 """
 
 from __future__ import annotations
@@ -36,7 +36,7 @@ __all__ = [
 SUBPROTOCOLS = ("foxglove.sdk.v1", "foxglove.websocket.v1")
 CAPABILITIES = ("clientPublish", "services", "connectionGraph")
 ENCODING = "json"
-"""Of what clients publish, and of requests and responses of services."""
+"""Encoding of messages that clients publish, and of requests and responses of services."""
 MAX_ID = 2**32 - 1
 _MESSAGE, _SERVICE = 1, 2  # opcodes of clients
 _MESSAGE_DATA = struct.Struct("<BIQ")
@@ -48,19 +48,19 @@ _SERVICE_REQUEST = struct.Struct("<BIII")
 
 
 def is_offered(subprotocols: Iterable[str]) -> bool:
-    """Return whether a client offers Foxglove's protocol in its headers ``Sec-WebSocket-Protocol``."""
+    """Return True if the headers ``Sec-WebSocket-Protocol`` contain a version of Foxglove's protocol."""
     return any(each.strip() in SUBPROTOCOLS for each in ",".join(subprotocols).split(","))
 
 
 class ClientMessage(NamedTuple):
-    """A message that a client publishes."""
+    """Message that a client publishes."""
 
     channel_id: int
     data: bytes
 
 
 class ServiceRequest(NamedTuple):
-    """A call of a service."""
+    """Request of a client to a service."""
 
     service_id: int
     call_id: int
@@ -69,7 +69,7 @@ class ServiceRequest(NamedTuple):
 
 
 def parse(data: bytes) -> ClientMessage | ServiceRequest | Mapping[str, object]:
-    """Return one message of a client; a JSON message as its fields. Raises `NepError`."""
+    """Parse a message from a client; a JSON message is returned as a map. Raises `NepError`."""
     if data[:1] == b"\x01" and len(data) >= _CLIENT_MESSAGE.size:
         return ClientMessage(_CLIENT_MESSAGE.unpack_from(data)[1], data[_CLIENT_MESSAGE.size :])
     if data[:1] == b"\x02" and len(data) >= _SERVICE_REQUEST.size:
@@ -86,21 +86,21 @@ def parse(data: bytes) -> ClientMessage | ServiceRequest | Mapping[str, object]:
 
 
 def items(value: object) -> list[object]:
-    """Return a list; an empty one in place of anything else."""
+    """Return the value if it is a list, else an empty list."""
     return value if isinstance(value, list) else []
 
 
 def control_frame(fields: Mapping[str, object]) -> Frame:
-    """Return a JSON message to a client."""
+    """Encode a JSON message to a client."""
     return Frame(orjson.dumps(fields), is_text=True)
 
 
 def message_frame(subscription_id: int, log_ns: int, data: bytes) -> Frame:
-    """Return a message of a topic."""
+    """Encode a message of a topic for a subscription."""
     return Frame(_MESSAGE_DATA.pack(1, subscription_id, log_ns) + data, is_text=False)
 
 
 def response_frame(service_id: int, call_id: int, data: bytes) -> Frame:
-    """Return the response of a service."""
+    """Encode the response of a service."""
     head = _RESPONSE.pack(3, service_id, call_id, len(ENCODING)) + ENCODING.encode()
     return Frame(head + data, is_text=False)

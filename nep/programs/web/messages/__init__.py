@@ -1,1 +1,1 @@
-"""Operations of rosbridge and payloads in ROS message shapes, as values and as JSON."""
+"""Operations of rosbridge, and conversion of payloads to ROS message shapes."""

@@ -1,4 +1,4 @@
-"""Fragments of operations: put together within limits, and cut for pages that ask for it. Pure."""
+"""Fragments of operations: reassembly within limits, and splitting. No input or output."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ __all__ = ["FragmentBuffer", "cut"]
 
 
 class FragmentBuffer:
-    """Incomplete operations of one page, oldest first; a new one takes the place of the oldest."""
+    """Buffer for the incomplete operations of one page. When it is full, a new one replaces the oldest."""
 
     def __init__(self) -> None:
         self._parts: dict[OperationId, dict[int, str]] = {}
@@ -21,10 +21,10 @@ class FragmentBuffer:
         return len(self._parts)
 
     def add(self, part: Fragment | Png) -> str | None:
-        """Add a part; return the whole text once it is complete.
+        """Add a fragment; return the whole text when it is complete, else None.
 
-        Raises `OperationError` for a part without id, and for one that does not belong to the others or makes
-        them too long: these are forgotten then.
+        Raises `OperationError` for a fragment without id, or one that contradicts the other fragments or
+        makes the text too long; the other fragments are then discarded.
         """
         if part.total == 1:
             return part.data
@@ -60,5 +60,5 @@ class FragmentBuffer:
 
 
 def cut(text: str, size: int) -> list[str]:
-    """Return `text` in pieces of at most `size` characters."""
+    """Split a text into pieces of at most `size` characters."""
     return [text[at : at + size] for at in range(0, len(text), size)] or [""]

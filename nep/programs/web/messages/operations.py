@@ -1,6 +1,6 @@
-"""Operations of the rosbridge v2 protocol that a page sends: bytes to typed values. Pure.
+"""Operations of the rosbridge v2 protocol that a page sends: parsing to typed values. No input or output.
 
-Whatever a page sends, `parse` returns an operation or raises `OperationError` with a sentence for the page.
+For any input, `parse` returns an operation or raises `OperationError` with a message for the page.
 """
 
 from __future__ import annotations
@@ -60,7 +60,7 @@ OperationId = str | int | None
 Compression = Literal["none", "png", "cbor", "cbor-raw"]
 Level = Literal["info", "warning", "error", "none"]
 COMPRESSIONS: tuple[Compression, ...] = ("none", "png", "cbor", "cbor-raw")
-"""In the order in which they win when two subscriptions of a page to one topic differ."""
+"""Compressions in order of priority, if two subscriptions of a page to one topic differ."""
 LEVELS: tuple[Level, ...] = ("info", "warning", "error", "none")
 _RESERVED = "/nep/"
 _MAX_NUMBER = 2**53
@@ -68,7 +68,7 @@ _MAX_THROTTLE_MS = 3_600_000
 
 
 class OperationError(NepError):
-    """An operation can't be carried out. The sentence is for the page; `id` is the operation's."""
+    """Error for an operation that failed. The message is for the page; `id` is the id of the operation."""
 
     def __init__(self, sentence: str, id: OperationId = None, level: Level = "error") -> None:
         self.id = id
@@ -78,7 +78,7 @@ class OperationError(NepError):
 
 @dataclass(frozen=True, slots=True)
 class Advertise:
-    """Announce messages on a topic."""
+    """Request to announce that the page will publish on a topic."""
 
     id: OperationId
     topic: str
@@ -88,7 +88,7 @@ class Advertise:
 
 @dataclass(frozen=True, slots=True)
 class Unadvertise:
-    """End the announcement with this id, or all of the topic without one."""
+    """Request to end the announcement with this id, or all announcements of the topic if there is no id."""
 
     id: OperationId
     topic: str
@@ -96,18 +96,18 @@ class Unadvertise:
 
 @dataclass(frozen=True, slots=True)
 class Publish:
-    """Publish a message."""
+    """Request to publish a message."""
 
     id: OperationId
     topic: str
     msg: object
     size_bytes: int = field(default=0, compare=False)
-    """Of the operation as it was received."""
+    """Size of the operation as received."""
 
 
 @dataclass(frozen=True, slots=True)
 class Subscribe:
-    """Subscribe to a topic. `ros_type` is "" when the page leaves it to the topic."""
+    """Request to subscribe to a topic; `ros_type` is "" to use the topic's own type."""
 
     id: OperationId
     topic: str
@@ -120,7 +120,7 @@ class Subscribe:
 
 @dataclass(frozen=True, slots=True)
 class Unsubscribe:
-    """End the subscription with this id, or all of the topic without one."""
+    """Request to end the subscription with this id, or all subscriptions to the topic if there is no id."""
 
     id: OperationId
     topic: str
@@ -128,7 +128,7 @@ class Unsubscribe:
 
 @dataclass(frozen=True, slots=True)
 class CallService:
-    """Call a service."""
+    """Request to call a service."""
 
     id: OperationId
     service: str
@@ -140,7 +140,7 @@ class CallService:
 
 @dataclass(frozen=True, slots=True)
 class AdvertiseService:
-    """Serve a service."""
+    """Request to serve a service."""
 
     id: OperationId
     service: str
@@ -149,7 +149,7 @@ class AdvertiseService:
 
 @dataclass(frozen=True, slots=True)
 class UnadvertiseService:
-    """Serve it no more."""
+    """Request to stop serving a service."""
 
     id: OperationId
     service: str
@@ -157,7 +157,7 @@ class UnadvertiseService:
 
 @dataclass(frozen=True, slots=True)
 class ServiceResponse:
-    """Answer a call that the page was asked."""
+    """Reply of the page to a call that it received."""
 
     id: OperationId
     service: str
@@ -167,7 +167,7 @@ class ServiceResponse:
 
 @dataclass(frozen=True, slots=True)
 class Fragment:
-    """One part of an operation's text."""
+    """Fragment of the text of an operation."""
 
     id: OperationId
     data: str
@@ -177,7 +177,7 @@ class Fragment:
 
 @dataclass(frozen=True, slots=True)
 class Png:
-    """An operation's text as the pixels of a PNG file, in base64; perhaps one part of that."""
+    """Text of an operation (or a fragment) as the pixels of a PNG file, in base64."""
 
     id: OperationId
     data: str
@@ -187,7 +187,7 @@ class Png:
 
 @dataclass(frozen=True, slots=True)
 class SetLevel:
-    """Report from this level on."""
+    """Request to send statuses from this level on."""
 
     id: OperationId
     level: Level
@@ -195,7 +195,7 @@ class SetLevel:
 
 @dataclass(frozen=True, slots=True)
 class PageStatus:
-    """A note of the page, for the log."""
+    """Status message of the page, for the log."""
 
     id: OperationId
     level: Level
@@ -204,7 +204,7 @@ class PageStatus:
 
 @dataclass(frozen=True, slots=True)
 class Auth:
-    """Credentials of rosauth: `mac` is a SHA-512 of the token and the other fields."""
+    """Credentials in the form of rosauth; `mac` is a SHA-512 of the token and the other fields."""
 
     id: OperationId
     mac: str
@@ -235,7 +235,7 @@ Operation = (
 
 
 def parse(data: bytes) -> Operation:
-    """Return the operation in one message of a page. Raises `OperationError`."""
+    """Parse the operation in a message from a page. Raises `OperationError`."""
     fields = parse_json(data)
     if not isinstance(fields, dict):
         raise OperationError(_("an operation must be a JSON object with an 'op'"))
@@ -243,12 +243,12 @@ def parse(data: bytes) -> Operation:
 
 
 def operation_of(fields: Mapping[str, object], size_bytes: int = 0) -> Operation:
-    """Return the operation with these fields. Raises `OperationError`."""
+    """Convert the fields of a message to an operation. Raises `OperationError`."""
     return _operation(_Fields(fields, size_bytes))
 
 
 def parse_json(data: bytes) -> object:
-    """Return a JSON value of a page, within the limits of an operation. Raises `OperationError`."""
+    """Decode JSON from a page within the limits of an operation. Raises `OperationError`."""
     if len(data) > MAX_MESSAGE_BYTES:
         raise OperationError(
             _("an operation has {count} bytes; at most {most} are allowed").format(
@@ -270,12 +270,12 @@ def parse_json(data: bytes) -> object:
 
 
 def shown(text: str) -> str:
-    """Return a page's own words as a log may have them."""
+    """Return text from a page, escaped and bounded for the log."""
     return escaped(bounded_str(text, 1_000))
 
 
 class _Fields:
-    """The fields of an operation, each checked when it is read."""
+    """Fields of an operation, each validated when it is read."""
 
     def __init__(self, fields: Mapping[str, object], size_bytes: int) -> None:
         self._fields = fields
@@ -286,11 +286,11 @@ class _Fields:
         self.op = self.text("op")
 
     def get(self, name: str, default: object = None) -> object:
-        """The value as it is."""
+        """Return the raw value of a field."""
         return self._fields.get(name, default)
 
     def text(self, name: str, default: str | None = None, *, most: int = MAX_NAME_LENGTH) -> str:
-        """A text; required without a default."""
+        """Return a text field. The field is required if there is no default."""
         value = self._fields.get(name)
         if value is None and default is not None:
             return default
@@ -305,14 +305,14 @@ class _Fields:
         return value
 
     def topic(self, name: str) -> str:
-        """The name of a topic or a service."""
+        """Return a field with the name of a topic or service."""
         try:
             return check_topic(self.text(name))
         except BadTopicError as error:
             raise self.error(str(error)) from None
 
     def type_name(self, default: str | None = None) -> str:
-        """The name of a type, "" for none if that may be."""
+        """Return the field "type"; "" if missing and allowed by the default."""
         given = self.text("type", default)
         try:
             return check_topic(given) if given else given
@@ -320,7 +320,7 @@ class _Fields:
             raise self.error(_("'type' is invalid: {reason}").format(reason=error.reason)) from None
 
     def own_name(self, name: str) -> str:
-        """The name of a topic or a service that the page makes."""
+        """Return a field with the name of a topic or service that the page creates."""
         given = self.topic(name)
         if given.startswith(_RESERVED):
             said = _("names that start with '{prefix}' are reserved; choose another name")
@@ -328,7 +328,10 @@ class _Fields:
         return given
 
     def number(self, name: str, default: int | None, least: int, most: int) -> int:
-        """A whole number, also as the float that some programs send; required without a default."""
+        """Return an integer field; integral floats, which some programs send, are accepted.
+
+        The field is required if there is no default.
+        """
         value = self._fields.get(name)
         if value is None and default is not None:
             return default
@@ -345,33 +348,33 @@ class _Fields:
         return number
 
     def choice(self, name: str, default: str | None, choices: tuple[str, ...]) -> str:
-        """One of these words."""
+        """Return a text field whose value is one of `choices`."""
         value = self.text(name, default)
         if value not in choices:
             raise self.wrong(name, listed([f"'{each}'" for each in choices], "or"))
         return value
 
     def compression(self) -> Compression:
-        """The compression of what the page gets."""
+        """Return the compression that the page requests."""
         return cast("Compression", self.choice("compression", "none", COMPRESSIONS))
 
     def fragment_size(self) -> int | None:
-        """The most characters of one message to the page."""
+        """Return the maximum number of characters in a message to the page, or None."""
         if self._fields.get("fragment_size") is None:
             return None
         return max(MIN_FRAGMENT_SIZE, self.number("fragment_size", None, 1, _MAX_NUMBER))
 
     def parts(self) -> tuple[int, int]:
-        """The number of a fragment, and how many there are."""
+        """Return the number of a fragment, and the total number of fragments."""
         total = self.number("total", 1, 1, MAX_FRAGMENTS)
         return self.number("num", 0, 0, total - 1), total
 
     def error(self, sentence: str) -> OperationError:
-        """What to raise for this operation."""
+        """Create the error for this operation."""
         return OperationError(sentence, self.id)
 
     def wrong(self, name: str, wanted: str) -> OperationError:
-        """What to raise for a field that is something else than `wanted`."""
+        """Create the error for a missing field, or a field that is not `wanted`."""
         op = quotable(self._fields.get("op"))
         if name not in self._fields:
             return self.error(_("'{op}' needs '{name}', {wanted}").format(op=op, name=name, wanted=wanted))

@@ -1,16 +1,16 @@
-"""NEP messages in the shapes of ROS messages, and back. Pure.
+"""Conversion of NEP messages to the shapes of ROS messages, and back. No input or output.
 
-| NEP message type  | ROS type                     | shape                                           |
-|-------------------|------------------------------|-------------------------------------------------|
-| string            | std_msgs/String              | `{data: text}`                                  |
-| bytes             | std_msgs/UInt8MultiArray     | `{layout, data}`                                |
-| image             | sensor_msgs/CompressedImage  | `{header, format, data}`: the JPEG or PNG file  |
-|                   | sensor_msgs/Image, if asked  | `{header, height, width, encoding, …, data}`    |
-| json              | nep/Json                     | as it is                                        |
-| msgpack           | nep/Msgpack                  | as it is                                        |
-| package/Type      | itself                       | as it is: NEP's typed messages have ROS's fields |
+    | NEP message type    | ROS type                     | shape                                           |
+    |---------------------|------------------------------|-------------------------------------------------|
+    | string              | std_msgs/String              | `{data: text}`                                  |
+    | bytes               | std_msgs/UInt8MultiArray     | `{layout, data}`                                |
+    | image               | sensor_msgs/CompressedImage  | `{header, format, data}`: the JPEG or PNG file  |
+    |                     | sensor_msgs/Image, on request | `{header, height, width, encoding, …, data}`   |
+    | json                | nep/Json                     | unchanged                                       |
+    | msgpack             | nep/Msgpack                  | unchanged                                       |
+    | package/Type        | same name                    | unchanged: NEP's typed messages have ROS's fields |
 
-Bytes are base64 text in JSON, and bytes in CBOR. The ROS back end packs and unpacks ROS messages.
+Bytes are base64 text in JSON, and bytes in CBOR. The ROS back end encodes and decodes ROS messages.
 """
 
 from __future__ import annotations
@@ -52,17 +52,17 @@ _NS = 1_000_000_000
 
 
 class PayloadError(NepError):
-    """A message doesn't have the shape of its type."""
+    """Error for a message that doesn't have the shape of its type."""
 
 
 def nep_type_of(ros_type: str) -> str:
-    """Return the NEP message type for a ROS type: "string" for std_msgs/String, else the name itself."""
+    """Return the NEP message type for a ROS type: "string" for std_msgs/String; other names are unchanged."""
     bare = bare_type(ros_type)
     return _CODECS.get(bare, bare)
 
 
 def ros_type_of(msg_type: str) -> str:
-    """Return the ROS type under which pages see a NEP message type."""
+    """Return the ROS type that represents a NEP message type for pages."""
     if msg_type in _UNKNOWN:
         return JSON_TYPE
     codec = codec_for(msg_type).name
@@ -70,9 +70,9 @@ def ros_type_of(msg_type: str) -> str:
 
 
 def is_compatible(ros_type: str, msg_type: str) -> bool:
-    """Return whether a page may use `ros_type` on a topic of `msg_type`.
+    """Return True if a page may use `ros_type` on a topic of `msg_type`.
 
-    Plain JSON takes everything: its messages pass as they are.
+    A topic of plain JSON accepts any type, because its messages are passed on unchanged.
     """
     if msg_type in _UNKNOWN or not ros_type or ros_type_of(msg_type) == JSON_TYPE:
         return True
@@ -81,7 +81,7 @@ def is_compatible(ros_type: str, msg_type: str) -> bool:
 
 
 def codec_or_type(msg_type: str) -> str:
-    """Return "image" for "images" and the like, and a type's own name."""
+    """Return the name of the codec ("image" for "images"), or the type itself if it is a typed name."""
     codec = codec_for(msg_type).name
     return msg_type if codec == "json" and "/" in msg_type else codec
 
@@ -90,9 +90,9 @@ def codec_or_type(msg_type: str) -> str:
 
 
 def to_ros(message: Message, *, as_pixels: bool = False) -> object:
-    """Return a message's payload in its ROS shape; `bytes` in it stay bytes.
+    """Return the payload of a message in its ROS shape; bytes in it stay `bytes`.
 
-    Raises `DecodeError` and `EncodeError` for a message that can't be read, or has no such shape.
+    Raises `DecodeError` or `EncodeError` if the message can't be decoded or has no such shape.
     """
     if message.codec == "string":
         return {"data": message.payload}
@@ -109,7 +109,7 @@ def to_ros(message: Message, *, as_pixels: bool = False) -> object:
 
 
 def ros_bytes(message: Message, *, as_pixels: bool = False) -> bytes:
-    """Return a message as ROS 1 serializes its type. Raises as `to_ros` does."""
+    """Return a message in the ROS 1 serialization of its type. Raises the exceptions of `to_ros`."""
     if message.codec == "image":
         return _picture(message, _PIXELS if as_pixels else _FILE)
     if message.codec in {"string", "bytes"}:
@@ -123,7 +123,7 @@ def ros_bytes(message: Message, *, as_pixels: bool = False) -> bytes:
 
 
 def _picture(message: Message, ros_type: str) -> bytes:
-    """A picture as ROS bytes with the time at which it was published."""
+    """Return an image in ROS serialization, stamped with the time of publication."""
     encoded = Encoded(message.data, dict(message.extension) or examine(message.data).extension)
     layout = image_codec.raw_layout((encoded.extension or {}).get("encoding"))
     if ros_type == _FILE and layout is not None:
@@ -138,7 +138,7 @@ def _picture(message: Message, ros_type: str) -> bytes:
 
 
 def _with_ros1_times(value: object) -> object:
-    """`{sec, nanosec}`, as NEP and ROS 2 call them, becomes `{secs, nsecs}`."""
+    """Replace `{sec, nanosec}`, as in NEP and ROS 2, with `{secs, nsecs}`."""
     if isinstance(value, dict):
         if value.keys() == {"sec", "nanosec"}:
             return {"secs": value["sec"], "nsecs": value["nanosec"]}
@@ -152,9 +152,9 @@ def _with_ros1_times(value: object) -> object:
 
 
 def from_ros(msg: object, ros_type: str, msg_type: str) -> object:
-    """Return what to publish on a topic of `msg_type` for a page's message of `ros_type`.
+    """Convert a page's message of `ros_type` to the payload for a topic of `msg_type`.
 
-    Raises `PayloadError` with the field that doesn't fit.
+    Raises `PayloadError` naming the field that doesn't match.
     """
     codec = codec_or_type(msg_type)
     if codec == "string":
@@ -180,7 +180,7 @@ def _map(msg: object, ros_type: str) -> Mapping[str, object]:
 
 
 def _bytes(value: object, field: str) -> bytes:
-    """Bytes, which are base64 in JSON, or numbers from 0 to 255."""
+    """Convert base64 text, or a list of numbers from 0 to 255, to bytes."""
     if isinstance(value, str):
         try:
             return base64.b64decode(value, validate=True)

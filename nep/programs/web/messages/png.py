@@ -1,4 +1,4 @@
-"""Text in the pixels of a PNG file: rosbridge's compression `png`. Needs the extra `image`."""
+"""Text in the pixels of a PNG file: rosbridge's compression `png`. Requires the extra `image`."""
 
 from __future__ import annotations
 
@@ -19,9 +19,9 @@ _MAX_WIDTH = 4_096
 
 
 def text_as_png(text: bytes) -> str:
-    """Return text as base64 of a PNG file whose pixels, filled up with newlines, are its bytes.
+    """Encode text in the pixels of a PNG file, padded with newlines; return the file in base64.
 
-    Raises `NepError` where the picture codec is not installed.
+    Raises `NepError` if the image codec is not installed.
     """
     try:
         import numpy as np  # noqa: PLC0415 - optional and heavy
@@ -35,7 +35,7 @@ def text_as_png(text: bytes) -> str:
 
 
 def text_in_png(data: str) -> bytes:
-    """Return the text in a PNG file. Raises `OperationError`, before it takes memory for a large one."""
+    """Decode the text in a PNG file. Raises `OperationError`; large files are rejected before decoding."""
     try:
         file = examine(base64.b64decode(data, validate=True))
         is_right = file.kind == "png" and (file.channels, file.bits) == (3, 8)

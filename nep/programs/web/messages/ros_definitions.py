@@ -1,7 +1,7 @@
-"""ROS definitions of the message types that NEP knows without ROS: for rosapi, CBOR arrays and cbor-raw.
+"""ROS definitions of the message types that NEP knows without ROS, for rosapi and CBOR.
 
-The fields and their order are those of ROS 1 (common_msgs 1.13), because a reader of cbor-raw decodes bytes
-by them. Comments and constants are left out.
+The fields and their order are those of ROS 1 (common_msgs 1.13), because readers of cbor-raw decode bytes
+with these definitions. Comments and constants are omitted.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ from nep.backends.ros.definition import Definition, FieldKind, parse
 __all__ = ["JSON_TYPE", "MSGPACK_TYPE", "bare_type", "definition_of", "full_text", "type_definitions"]
 
 JSON_TYPE = "nep/Json"
-"""Topics whose messages are any JSON. Where ROS bytes are asked for, they are this text."""
+"""Type of topics with arbitrary JSON messages. In ROS serialization, the JSON text is a string."""
 MSGPACK_TYPE = "nep/Msgpack"
 
 _HEADER = "std_msgs/Header header\n"
@@ -79,19 +79,19 @@ _SEPARATOR = "=" * 80
 
 
 def bare_type(ros_type: str) -> str:
-    """Return a type's name without the "msg" that ROS 2 has in it: "std_msgs/msg/String"."""
+    """Remove the "msg" of ROS 2 from a type name: "std_msgs/msg/String" becomes "std_msgs/String"."""
     return ros_type.replace("/msg/", "/", 1)
 
 
 @cache
 def definition_of(ros_type: str) -> Definition | None:
-    """Return the definition of a type with those of all types inside, or None when it is not known here."""
+    """Return the definition of a type including all nested types, or None if the type is unknown here."""
     text = full_text(ros_type)
     return None if text is None else parse(ros_type, text)
 
 
 def full_text(ros_type: str) -> str | None:
-    """Return the definition as `gendeps --cat` prints it, or None when the type is not known here."""
+    """Return the definition as printed by `gendeps --cat`, or None if the type is unknown here."""
     if ros_type not in _TEXTS:
         return None
     inside = sorted(set(_types_inside(ros_type)))
@@ -107,7 +107,7 @@ def _types_inside(ros_type: str) -> Iterator[str]:
 
 
 def type_definitions(ros_type: str) -> list[dict[str, object]] | None:
-    """Return a type and all types inside as rosapi describes them, or None when it is not known here."""
+    """Return a type and its nested types in the form of rosapi, or None if the type is unknown here."""
     definition = definition_of(ros_type)
     if definition is None:
         return None

@@ -1,1 +1,1 @@
-"""Pages and programs that speak the rosbridge v2 protocol."""
+"""Connections of pages and programs with the rosbridge v2 protocol."""

@@ -1,4 +1,4 @@
-"""Page: one connection, with a node of its own in the graph, gone when it closes."""
+"""`Page`: a rosbridge connection with its own node, which is closed with the connection."""
 
 from __future__ import annotations
 
@@ -38,7 +38,16 @@ _logger = logging.getLogger("nep.programs.web")
 
 
 class Page(PageConnection):
-    """See the module. `name` is that of its node. Lives in the server's event loop."""
+    """Connection of a page or program with the rosbridge protocol. Runs in the server's event loop.
+
+    Args:
+        connection: WebSocket connection.
+        name: Name of the page's node.
+        new_node: Creates the node.
+        guard: Decides on which topics the page may publish.
+        counts: Counters of the server.
+        on_robot_refused: Called with the name of a robot that the page may not move, and the reason.
+    """
 
     protocol = "rosbridge"
 
@@ -81,7 +90,7 @@ class Page(PageConnection):
         return self._topics.topics
 
     async def run(self) -> None:
-        """Serve the page until it goes; then close its node."""
+        """Serve the page until it disconnects; then close its node."""
         writer = asyncio.create_task(self._write())
         try:
             await self._context.in_thread(self._announce)
@@ -109,7 +118,7 @@ class Page(PageConnection):
     # ---- operations
 
     async def handle(self, data: bytes) -> None:
-        """Carry out one message of the page. Whatever it is, nothing is raised."""
+        """Execute the operation in a message from the page. Never raises because of the message's content."""
         self._counts.operations += 1
         try:
             await self._carry_out(op.parse(data))
@@ -142,7 +151,7 @@ class Page(PageConnection):
             raise op.OperationError(str(error), operation.id) from error
 
     def _unwrapped(self, part: op.Fragment | op.Png) -> op.Operation | None:
-        """The operation inside once all of its parts are there."""
+        """Return the wrapped operation once all fragments have arrived, else None."""
         try:
             whole = self._fragments.add(part)
             if whole is None:
@@ -171,7 +180,7 @@ class Page(PageConnection):
 
 
 async def authenticate(connection: ServerConnection, check: AuthCheck) -> bool:
-    """Wait for a valid ``auth`` operation; return whether it came before anything else."""
+    """Return True if the first message is a valid ``auth`` operation and arrives in time."""
     try:
         data = await asyncio.wait_for(connection.recv(decode=False), AUTH_TIMEOUT_S)
         return isinstance(auth := op.parse(bytes(data)), op.Auth) and check.is_right(auth)
@@ -180,4 +189,4 @@ async def authenticate(connection: ServerConnection, check: AuthCheck) -> bool:
 
 
 def _ignore(_operation: op.Auth) -> None:
-    """Where nobody asked for it, credentials are ignored."""
+    """Ignore credentials on a connection that does not require them."""

@@ -1,4 +1,4 @@
-"""Services of one page: those that it calls and those that it serves."""
+"""Services that one page calls and serves."""
 
 from __future__ import annotations
 
@@ -30,18 +30,18 @@ __all__ = ["PageServices"]
 
 
 Respond = Callable[[CallService, object, bool], None]
-"""Sends the values of an answer, or the reason of a failure; raises `NepError` if they can't be encoded."""
+"""Sends a reply, or the reason of a failure, to the page; raises `NepError` if it can't be encoded."""
 
 
 class ServiceFailedError(NepError):
-    """The page answered that a call failed, or does not answer any more."""
+    """Error for a call that the page answered with a failure or does not answer any more."""
 
 
 class PageServices:
-    """See the module. Its methods raise `NepError` for what can't be done."""
+    """Services of one page. Methods raise `NepError` for invalid requests."""
 
     def __init__(self, context: PageContext, respond: Respond | None = None) -> None:
-        """Create it. `respond` sends the answer of a call in a protocol other than rosbridge."""
+        """Initialize; `respond` sends the reply to a call in a protocol other than rosbridge."""
         self._context = context
         self._send_response = respond or self._respond
         self._loop = asyncio.get_running_loop()
@@ -54,7 +54,7 @@ class PageServices:
     # ---- calling
 
     def call(self, operation: CallService) -> None:
-        """Call a service; its answer follows while other operations go on."""
+        """Start a call to a service; the reply is sent later."""
         if len(self._calls) >= MAX_CALLS:
             raise OperationError(
                 _("this page already has {count} calls in flight, the maximum").format(count=MAX_CALLS),
@@ -101,7 +101,7 @@ class PageServices:
     # ---- serving
 
     async def advertise(self, operation: AdvertiseService) -> None:
-        """Serve a service."""
+        """Serve a service on behalf of the page."""
         if is_rosapi(operation.service):
             raise OperationError(_("a page can't serve services of rosapi"), operation.id)
         if operation.service in self._servers:
@@ -119,7 +119,10 @@ class PageServices:
         self._context.send_status("info", said, operation.id)
 
     def _ask_page(self, service: str, request: object) -> Future[object]:
-        """In a thread of the server's: ask the page, and return the future of its answer."""
+        """Forward a request to the page and return the future of its reply.
+
+        Called in a thread of the server.
+        """
         answer: Future[object] = Future()
         self._loop.call_soon_threadsafe(self._ask, service, request, answer)
         return answer
@@ -139,7 +142,7 @@ class PageServices:
         self._context.queue.put(frames)
 
     def respond(self, operation: ServiceResponse) -> None:
-        """Hand the page's answer to who called."""
+        """Pass a reply of the page to the caller."""
         service, answer = self._pending.get(operation.id, ("", None))
         if answer is None or service != operation.service:
             raise OperationError(
@@ -155,7 +158,7 @@ class PageServices:
             answer.set_exception(ServiceFailedError(said))
 
     async def unadvertise(self, operation: UnadvertiseService) -> None:
-        """Serve a service no more; who waits for an answer is told."""
+        """Stop serving a service; pending calls fail."""
         known = self._servers.pop(operation.service, None)
         if known is None:
             raise OperationError(
@@ -167,7 +170,7 @@ class PageServices:
         await self._context.in_thread(known.close)
 
     def cancel(self) -> None:
-        """Call and answer no more: the page is gone. Its node closes what is open."""
+        """Cancel all calls, because the page has disconnected. Its node closes servers and clients."""
         for task in self._calls:
             task.cancel()
         self._fail_pending()

@@ -1,4 +1,4 @@
-"""Topics of one page: what it publishes and what it subscribes to."""
+"""Topics that one page publishes and subscribes to."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ __all__ = ["PageTopics", "read_messages", "subscribed_topic"]
 
 _GRAPH_TIMEOUT_S = 2.0
 _SETTLE_S = 0.5
-"""How long the descriptions of robots are waited for before a page may publish."""
+"""Maximum time in seconds to wait for the descriptions of robots before a page may publish."""
 _PIXELS = "sensor_msgs/Image"
 _NS = 1_000_000_000
 
@@ -52,7 +52,7 @@ class _Subscription:
 
 
 class PageTopics:
-    """See the module. Its methods raise `NepError` for what can't be done."""
+    """Topics of one page. Methods raise `NepError` for invalid requests."""
 
     def __init__(self, context: PageContext) -> None:
         self._context = context
@@ -61,18 +61,21 @@ class PageTopics:
 
     @property
     def topics(self) -> tuple[PageTopic, ...]:
-        """Topics that the page subscribes to, then those that it publishes. Thread-safe."""
+        """Topics to which the page subscribes, followed by those that it publishes. Thread-safe."""
         feeds = [each.feed for each in self._subscriptions.copy().values()]
         return (*map(subscribed_topic, feeds), *map(_published_topic, self._publications.copy().items()))
 
     # ---- publishing
 
     def is_advertised(self, topic: str) -> bool:
-        """Return whether the page publishes a topic."""
+        """Return True if the page has advertised a topic."""
         return topic in self._publications
 
     async def advertise(self, operation: Advertise) -> None:
-        """Publish a topic from now on."""
+        """Open a publisher for the page, or add the id to the existing one.
+
+        Raises `OperationError` if the type differs.
+        """
         known = self._publications.get(operation.topic)
         if known is None:
             known = await self._open_publication(operation)
@@ -95,7 +98,7 @@ class PageTopics:
         return opened
 
     def _open_publisher(self, operation: Advertise) -> Publisher:
-        """In the page's thread."""
+        """Open the publisher of a topic. Called in the page's thread."""
         known = self._type_of(operation.topic)
         if not is_compatible(operation.ros_type, known):
             raise _another_type(operation.topic, operation.ros_type, known, operation.id)
@@ -105,7 +108,7 @@ class PageTopics:
         return self._context.node.new_pub(operation.topic, msg_type, latched=operation.is_latched)
 
     def _type_of(self, topic: str) -> str:
-        """The NEP type under which others have a topic; "" when nobody has it."""
+        """Return the NEP type that other nodes use on a topic; "" if there are none."""
         own = self._context.node
         known = own.graph(_GRAPH_TIMEOUT_S).topics.get(topic)
         if known is None or known.msg_type == "*":
@@ -120,7 +123,7 @@ class PageTopics:
             raise OperationError(refusal, id_)
 
     async def publish(self, operation: Publish) -> None:
-        """Publish a message; a topic that others have need not be advertised first."""
+        """Publish a message. The topic need not be advertised if its type is known from other nodes."""
         known = self._publications.get(operation.topic)
         if known is None:
             known = await self._open_by_type(operation)
@@ -143,7 +146,7 @@ class PageTopics:
         return await self._open_publication(opened)
 
     async def unadvertise(self, operation: Unadvertise) -> None:
-        """Publish a topic no more, once all who advertised it said so."""
+        """Remove an advertisement of a topic; the publisher is closed with the last one."""
         known = self._publications.get(operation.topic)
         if known is None:
             raise OperationError(
@@ -162,7 +165,7 @@ class PageTopics:
     # ---- subscribing
 
     async def subscribe(self, operation: Subscribe) -> None:
-        """Send the page the messages of a topic from now on."""
+        """Start to send the messages of a topic to the page."""
         as_pixels = bare_type(operation.ros_type) == _PIXELS
         known = self._subscriptions.get(operation.topic)
         if known is None:
@@ -198,7 +201,7 @@ class PageTopics:
         self._subscriptions[operation.topic] = _Subscription(subscriber, feed, reader)
 
     def _open_subscriber(self, operation: Subscribe) -> Subscriber:
-        """In the page's thread."""
+        """Open the subscriber of a topic. Called in the page's thread."""
         known = self._type_of(operation.topic)
         if not is_compatible(operation.ros_type, known):
             raise _another_type(operation.topic, operation.ros_type, known, operation.id)
@@ -206,7 +209,7 @@ class PageTopics:
         return self._context.node.new_sub(operation.topic, msg_type, wildcards=False)
 
     async def unsubscribe(self, operation: Unsubscribe) -> None:
-        """End one subscription, or all of a topic."""
+        """End one subscription to a topic, or all of them if there is no id."""
         known = self._subscriptions.get(operation.topic)
         if known is None or not known.feed.unsubscribe(operation.id):
             return  # as rosbridge: roslib unsubscribes again when it reconnects
@@ -223,21 +226,21 @@ class PageTopics:
         await self._context.in_thread(known.subscriber.close)
 
     def cancel(self) -> None:
-        """Read no more: the page is gone. Its node closes what is open."""
+        """Stop reading, because the page has disconnected. Its node closes publishers and subscribers."""
         for each in self._subscriptions.values():
             each.reader.cancel()
             each.feed.clear()
 
 
 async def read_messages(subscriber: Subscriber, feed: Feed, queue: SendQueue) -> None:
-    """Append the messages of a subscriber to a page's queue, until it is cancelled."""
+    """Append the messages of a subscriber to a page's queue until the task is cancelled."""
     async for message in subscriber:
         queue.add(feed, message)
         del message  # it may lie in shared memory, which is released with the last reference
 
 
 def subscribed_topic(feed: Feed) -> PageTopic:
-    """Return the limit, rates and counts of a feed. Thread-safe."""
+    """Return the rate limit, rates and counts of a feed. Thread-safe."""
     rate, bytes_per_s = feed.sent.rates()
     return PageTopic(
         feed.topic,
@@ -266,7 +269,7 @@ def _another_type(topic: str, ros_type: str, known: str, id_: OperationId) -> Op
 
 
 def _with_header(msg: object, ros_type: str) -> object:
-    """A message whose type has a header, with the time of now where the page gives none."""
+    """Add the current time to the header of a message, if its type has a header and no stamp is given."""
     definition = definition_of(bare_type(ros_type))
     if definition is None or not definition.has_header or not isinstance(msg, Mapping):
         return msg

@@ -1,6 +1,6 @@
-"""Services of rosapi, by which roslib, roslibpy and Foxglove ask what there is: answered from the graph.
+"""Services of rosapi, through which roslib, roslibpy and Foxglove query the graph.
 
-Parameters are called ``NODE:PARAMETER``, as in rosapi of ROS 2; their values are JSON texts.
+Parameters are named ``NODE:PARAMETER``, as in rosapi of ROS 2; their values are JSON texts.
 """
 
 from __future__ import annotations
@@ -32,25 +32,30 @@ _NS = 1_000_000_000
 
 
 def is_rosapi(service: str) -> bool:
-    """Return whether a service is rosapi's; roslib leaves out the first slash."""
+    """Return True if a service belongs to rosapi; roslib omits the first slash."""
     return f"/{service.removeprefix('/')}".startswith(PREFIX)
 
 
 def is_shown(name: str) -> bool:
-    """Return whether a topic or service is for people: those below /nep/ are NEP's own."""
+    """Return True unless a topic or service is internal to NEP (below /nep/)."""
     return not name.startswith(_HIDDEN)
 
 
 class RosApi:
-    """Answers one call. Made for each; reads the graph once, when it is needed."""
+    """Handler of one call. Reads the graph at most once, when it is needed."""
 
     def __init__(self, node: Node, motion_refusal: Callable[[str, str], str]) -> None:
-        """Create it. `motion_refusal` returns why a page may not publish on a topic of a type."""
+        """Initialize the handler.
+
+        Args:
+            node: Node of the page.
+            motion_refusal: Returns the reason why the page may not publish on a topic with a type.
+        """
         self._node = node
         self._motion_refusal = motion_refusal
 
     def answer(self, service: str, args: object) -> Mapping[str, object]:
-        """Return the values of a service of rosapi. Raises `NepError`."""
+        """Return the reply of a rosapi service. Raises `NepError`."""
         name = f"/{service.removeprefix('/')}".removeprefix(PREFIX)
         known = _SERVICES.get(name)
         if known is None:
@@ -63,7 +68,7 @@ class RosApi:
 
     @cached_property
     def _types(self) -> dict[str, str]:
-        """The ROS type of each topic that is shown."""
+        """ROS types by topic, without topics internal to NEP."""
         topics = self._view.topics.values()
         return {each.name: ros_type_of(each.msg_type) for each in topics if is_shown(each.name)}
 
@@ -74,13 +79,13 @@ class RosApi:
     # ---- topics
 
     def topics(self, _args: Mapping[str, object]) -> Mapping[str, object]:
-        """All topics with their types."""
+        """Return all topics with their types."""
         return {"topics": list(self._types), "types": list(self._types.values())}
 
     def topic_rates(self, _args: Mapping[str, object]) -> Mapping[str, object]:
-        """All topics with types, messages per second and bytes per second; NEP's addition to rosapi.
+        """Return all topics with types, messages per second and bytes per second.
 
-        A rate is None where it is not known yet.
+        This is NEP's extension of rosapi. A rate is None if it is not known yet.
         """
         known = [self._view.topics[each] for each in self._types]
         return {
@@ -90,33 +95,33 @@ class RosApi:
         }
 
     def topics_for_type(self, args: Mapping[str, object]) -> Mapping[str, object]:
-        """The topics of a type."""
+        """Return the topics of a type."""
         wanted = bare_type(_text(args, "type"))
         return {"topics": [topic for topic, ros_type in self._types.items() if ros_type == wanted]}
 
     def topic_type(self, args: Mapping[str, object]) -> Mapping[str, object]:
-        """The type of a topic; "" when there is none."""
+        """Return the type of a topic; "" if the topic doesn't exist."""
         return {"type": self._types.get(_text(args, "topic"), "")}
 
     def topics_and_raw_types(self, args: Mapping[str, object]) -> Mapping[str, object]:
-        """All topics with their types and the types' definitions."""
+        """Return all topics with their types and the definitions of these types."""
         texts = [full_text(each) or full_text(JSON_TYPE) for each in self._types.values()]
         return {**self.topics(args), "typedefs_full_text": texts}
 
     def publishers(self, args: Mapping[str, object]) -> Mapping[str, object]:
-        """Names of the nodes that publish a topic."""
+        """Return the names of the nodes that publish a topic."""
         topic = self._view.topics.get(_text(args, "topic"))
         found = () if topic is None else topic.publishers
         return {"publishers": list(dict.fromkeys(self._name(each.node_id) for each in found))}
 
     def subscribers(self, args: Mapping[str, object]) -> Mapping[str, object]:
-        """Names of the nodes that subscribe to a topic."""
+        """Return the names of the nodes that subscribe to a topic."""
         topic = self._view.topics.get(_text(args, "topic"))
         found = () if topic is None else topic.subscribers
         return {"subscribers": list(dict.fromkeys(self._name(each.node_id) for each in found))}
 
     def message_details(self, args: Mapping[str, object]) -> Mapping[str, object]:
-        """The fields of a type."""
+        """Return the fields of a message type."""
         asked = _text(args, "type")
         found = type_definitions(bare_type(asked))
         if found is None:
@@ -126,7 +131,7 @@ class RosApi:
     # ---- services
 
     def services(self, _args: Mapping[str, object]) -> Mapping[str, object]:
-        """All services with a server, and rosapi's own."""
+        """Return all services that have a server, and those of rosapi."""
         return {"services": [*self._served, *(f"{PREFIX}{each}" for each in _SERVICES)]}
 
     @property
@@ -135,7 +140,7 @@ class RosApi:
         return [each.name for each in found if each.servers and is_shown(each.name)]
 
     def service_type(self, args: Mapping[str, object]) -> Mapping[str, object]:
-        """The type of a service; "" when there is none."""
+        """Return the type of a service; "" if the service doesn't exist."""
         return {"type": self._service_type(_text(args, "service"))}
 
     def _service_type(self, service: str) -> str:
@@ -146,17 +151,17 @@ class RosApi:
         return "" if known_service is None else ros_type_of(known_service.msg_type)
 
     def services_for_type(self, args: Mapping[str, object]) -> Mapping[str, object]:
-        """The services of a type."""
+        """Return the services of a type."""
         wanted = _text(args, "type")
         names = [*self._served, *(f"{PREFIX}{each}" for each in _SERVICES)]
         return {"services": [each for each in names if self._service_type(each) == wanted]}
 
     def service_providers(self, args: Mapping[str, object]) -> Mapping[str, object]:
-        """Names of the nodes that serve a service."""
+        """Return the names of the nodes that serve a service."""
         return {"providers": self._nodes_serving(_text(args, "service"))}
 
     def service_node(self, args: Mapping[str, object]) -> Mapping[str, object]:
-        """The name of the node that is asked first; "" when there is none."""
+        """Return the name of the first node that serves a service; "" if there is none."""
         return {"node": next(iter(self._nodes_serving(_text(args, "service"))), "")}
 
     def _nodes_serving(self, service: str) -> list[str]:
@@ -165,7 +170,7 @@ class RosApi:
         return list(dict.fromkeys(self._name(each.node_id) for each in servers))
 
     def service_details(self, args: Mapping[str, object]) -> Mapping[str, object]:
-        """NEP's services have no declared fields, so a type without fields."""
+        """Return a type definition without fields, because services of NEP have no schema."""
         asked = _text(args, "type")
         empty: list[str] = []
         kinds = ("fieldnames", "fieldtypes", "fieldarraylen", "examples", "constnames", "constvalues")
@@ -174,11 +179,11 @@ class RosApi:
     # ---- nodes
 
     def nodes(self, _args: Mapping[str, object]) -> Mapping[str, object]:
-        """Names of all nodes."""
+        """Return the names of all nodes."""
         return {"nodes": list(dict.fromkeys(each.name for each in self._view.nodes.values()))}
 
     def node_details(self, args: Mapping[str, object]) -> Mapping[str, object]:
-        """What a node publishes, subscribes to and serves."""
+        """Return the topics that a node publishes and subscribes to, and the services that it serves."""
         ids = {each.id for each in self._nodes_named(_text(args, "node"))}
         topics, services = self._view.topics.values(), self._view.services.values()
         return {
@@ -196,7 +201,7 @@ class RosApi:
     # ---- parameters
 
     def get_param_names(self, _args: Mapping[str, object]) -> Mapping[str, object]:
-        """Names of all parameters of nodes that answer."""
+        """Return the names of all parameters, for nodes that reply in time."""
         able = [each for each in self._view.nodes.values() if place_of(each.id) in self._view.services]
         names: list[str] = []
         deadline = time.monotonic() + _NAMES_TIMEOUT_S
@@ -211,7 +216,7 @@ class RosApi:
         return {"names": names}
 
     def get_param(self, args: Mapping[str, object]) -> Mapping[str, object]:
-        """The value of a parameter, or the default that the page gives, as JSON text."""
+        """Return the value of a parameter as JSON text, or the default that the page passes."""
         default = args.get("default")
         try:
             node, name = _parameter(args)
@@ -223,7 +228,7 @@ class RosApi:
             raise
 
     def has_param(self, args: Mapping[str, object]) -> Mapping[str, object]:
-        """Whether there is such a parameter."""
+        """Return {"exists": True} if a parameter exists."""
         try:
             self.get_param({"name": args.get("name")})
         except NepError:
@@ -231,7 +236,7 @@ class RosApi:
         return {"exists": True}
 
     def set_param(self, args: Mapping[str, object]) -> Mapping[str, object]:
-        """Set a parameter; that of a robot's node only where the page may move the robot."""
+        """Set a parameter. For the node of a robot, the page needs permission to move the robot."""
         node, name = _parameter(args)
         try:
             value = orjson.loads(_text(args, "value"))
@@ -248,17 +253,17 @@ class RosApi:
         return {}
 
     def delete_param(self, _args: Mapping[str, object]) -> Mapping[str, object]:
-        """NEP's parameters are declared by their node, and stay."""
+        """Raise `NepError`: parameters are declared by their node and can't be deleted."""
         raise NepError(_("parameters are declared by their node and can't be deleted"))
 
     # ---- others
 
     def action_servers(self, _args: Mapping[str, object]) -> Mapping[str, object]:
-        """NEP has no actions of ROS."""
+        """Return an empty list, because NEP has no ROS actions."""
         return {"action_servers": []}
 
     def get_time(self, _args: Mapping[str, object]) -> Mapping[str, object]:
-        """The time of this computer."""
+        """Return the current time of this computer."""
         secs, nsecs = divmod(time.time_ns(), _NS)
         return {"time": {"secs": secs, "nsecs": nsecs}}
 

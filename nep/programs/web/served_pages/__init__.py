@@ -1,4 +1,4 @@
-"""Pages that `nep web` serves itself by HTTP: a test page, and a starter page for pages of your own."""
+"""Pages served by `nep web` over HTTP: a test page, and a template for your own pages."""
 
 from nep.programs.web.served_pages.answers import PageRequest, PageResponse, answer, starter_page
 

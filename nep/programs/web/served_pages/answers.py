@@ -1,8 +1,8 @@
-"""Answers to HTTP requests that are no WebSocket handshakes. Pure, apart from reading the pages' files.
+"""Responses to HTTP requests that are not WebSocket handshakes. Reads no files except the pages.
 
 Pages have no external files, and a Content-Security-Policy with the hashes of their scripts and styles. They
-are served only for a Host from which a page could also connect, because a name of another site can lead to
-this computer (DNS rebinding).
+are served only for a Host from which a page could also connect, because a host name of another site can
+resolve to this computer (DNS rebinding).
 """
 
 from __future__ import annotations
@@ -40,9 +40,14 @@ _HEADERS = {
 
 
 class PageRequest(NamedTuple):
-    """An HTTP request.
+    """HTTP request.
 
-    `hosts` are its Host headers. `own` is the origin of the server's pages at the address of the connection.
+    Attributes:
+        method: HTTP method.
+        path: Path with query.
+        hosts: Values of the Host headers.
+        own: Origin of the server's pages at the address of the connection.
+        authorization: Value of the Authorization header, if any.
     """
 
     method: str
@@ -53,7 +58,7 @@ class PageRequest(NamedTuple):
 
 
 class PageResponse(NamedTuple):
-    """An HTTP response. `is_token_refused`: the token was missing or wrong."""
+    """HTTP response; `is_token_refused` is True if the token was missing or wrong."""
 
     status: HTTPStatus
     headers: Mapping[str, str]
@@ -62,7 +67,7 @@ class PageResponse(NamedTuple):
 
 
 def answer(request: PageRequest, access: Access) -> PageResponse:
-    """Return the response to a request, whatever it contains."""
+    """Return the response to a request. Never raises because of the request's content."""
     path = request.path.partition("?")[0]
     if request.method not in _METHODS:
         return _plain(HTTPStatus.METHOD_NOT_ALLOWED, _("only GET is supported"), {"Allow": "GET, HEAD"})
@@ -88,16 +93,16 @@ def answer(request: PageRequest, access: Access) -> PageResponse:
 
 
 def starter_page(url: str) -> str:
-    """Return the HTML of a page to start from: it connects to `url` and shows a topic.
+    """Return the HTML of a template page, which connects to `url` and shows a topic.
 
     Args:
-        url: WebSocket URL of the server, with the token if it requires one.
+        url: WebSocket URL of the server, with the token if one is required.
     """
     return _source("starter.html").replace("{{address}}", _script_json(url))
 
 
 def _origin(request: PageRequest, access: Access) -> str | None:
-    """The origin that the page will have in the browser; None where it could not connect."""
+    """Return the origin that the page will have in the browser; None if the page could not connect."""
     if len(request.hosts) != 1:
         return None
     for scheme in ("http", "https"):
@@ -136,7 +141,7 @@ def _source(name: str) -> str:
 
 
 def _filled(name: str, words: Mapping[str, str]) -> str:
-    """A page with its words; "data" is JSON of those that the script uses, the others are text."""
+    """Fill in the texts of a page. "data" is the JSON for the page's script; other texts are escaped."""
 
     def value(hole: re.Match[str]) -> str:
         if hole[1] == "data":
@@ -147,7 +152,7 @@ def _filled(name: str, words: Mapping[str, str]) -> str:
 
 
 def _script_json(value: object) -> str:
-    """JSON that can stand in a script element."""
+    """Encode a value as JSON that is safe inside a script element."""
     return json.dumps(value).replace("<", "\\u003c")
 
 
