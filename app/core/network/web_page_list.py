@@ -49,7 +49,7 @@ class PageList:
 
     @property
     def listed(self) -> tuple[ListedPage, ...]:
-        """Pages in order of arrival: connected ones, and those that left in the last `GONE_SHOWN_S` seconds."""
+        """Pages in order of arrival, including those that left in the last `GONE_SHOWN_S` seconds."""
         return tuple(
             ListedPage(page, self._now - self._left_at[id_] if id_ in self._left_at else None)
             for id_, page in self._pages.items()

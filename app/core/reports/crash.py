@@ -1,7 +1,8 @@
-"""Crashes: the part of Studio that ended, how, and its output. The code that detects a crash logs it.
+"""Crash records: which part of Studio crashed, how, and its output.
 
-A log record with the ``extra`` of `crash_extra` is also stored as a crash report
-(`app.core.reports.crash_reports.CrashLog`).
+The code that detects a crash logs it. A log record with the ``extra`` of `crash_extra` is also stored as a
+crash
+report (`app.core.reports.crash_reports.CrashLog`).
 """
 
 from __future__ import annotations
@@ -20,11 +21,11 @@ CRASH_SIGNALS = frozenset(
     for name in ("SIGABRT", "SIGBUS", "SIGFPE", "SIGILL", "SIGKILL", "SIGSEGV", "SIGSYS", "SIGTRAP")
     if hasattr(signal, name)
 )
-"""Signals of an unexpected end. SIGKILL is what the system sends when memory runs out."""
+"""Signals that mean a crash. The system sends SIGKILL when it runs out of memory."""
 FIRST_BAD_STATUS = 0xC0000000
-"""Lowest exit code of a crash on Windows, where it is a status."""
+"""Lowest exit code that means a crash on Windows, where exit codes of crashes are NTSTATUS values."""
 ASKED_STATUS = 0xC000013A
-"""Exit code after Ctrl+C and at the end of a session on Windows."""
+"""Exit code on Windows after Ctrl+C or when the user logs out, which is not a crash."""
 STATUS_WORDS = {
     0xC0000005: "access violation",
     0xC000001D: "illegal instruction",
@@ -34,15 +35,19 @@ STATUS_WORDS = {
     0xC0000409: "abort",
 }
 TRACE_BEGINS = ("Fatal Python error:", "Windows fatal exception:")
-"""First words of a trace of Python's faulthandler."""
+"""First words of a stack trace written by Python's faulthandler."""
 MAYBE_CAUGHT = "Windows fatal exception: code "
 
 
 @dataclass(frozen=True, slots=True)
 class Crash:
-    """Crash: the part that ended, how (in English), and details such as a traceback.
+    """Crash of a part of Studio.
 
-    ``version`` is that of the crashed Studio, which after an update is not the running one.
+    Attributes:
+        part: Part that crashed.
+        how: Cause, in English.
+        text: Details such as a traceback.
+        version: Version of Studio that crashed; after an update, that differs from the running version.
     """
 
     part: Part
@@ -57,14 +62,14 @@ def crash_extra(part: Part, how: str, text: str = "") -> dict[str, object]:
 
 
 def is_crash(code: int) -> bool:
-    """Return whether an exit code means a crash; negative ones are numbers of signals."""
+    """Return True if an exit code means a crash. Negative codes are signal numbers."""
     if code < 0:
         return -code in CRASH_SIGNALS
     return code >= FIRST_BAD_STATUS and code != ASKED_STATUS
 
 
 def end_words(code: int) -> str:
-    """Describe the end of a process in English: "ended by signal 11 (SIGSEGV)"."""
+    """Describe an exit code in English: "ended by signal 11 (SIGSEGV)"."""
     if code < 0:
         try:
             name = f" ({signal.Signals(-code).name})"
@@ -78,7 +83,7 @@ def end_words(code: int) -> str:
 
 
 def split_trace(said: str) -> tuple[str, str]:
-    """Split a process's output into its own part and the trace of Python's faulthandler, or ""."""
+    """Split the output of a process into normal output and faulthandler's stack trace, or ""."""
     lines = said.splitlines(keepends=True)
     for place, line in enumerate(lines):
         if line.startswith(TRACE_BEGINS):
@@ -89,7 +94,7 @@ def split_trace(said: str) -> tuple[str, str]:
 def fatal_line(trace: str) -> str:
     """Return the line of a trace that names the cause, or "".
 
-    On Windows faulthandler also writes exceptions that a system library raises and catches itself.
+    On Windows, faulthandler also writes exceptions that a system library raises and handles internally.
     """
     headers = [line for line in trace.splitlines() if line.startswith(TRACE_BEGINS)]
     return next((line for line in reversed(headers) if not line.startswith(MAYBE_CAUGHT)), "")

@@ -1,4 +1,7 @@
-"""Stored crash reports: one text file each, the newest ten. The next start offers each once."""
+"""Stored crash reports: one text file each, at most the newest ten.
+
+Each is offered once, at the next start.
+"""
 
 from __future__ import annotations
 
@@ -45,7 +48,7 @@ _log = logging.getLogger("studio.crashes")
 
 @dataclass(frozen=True, slots=True)
 class CrashReport:
-    """Stored crash report: file, crashed part, time of detection, and whether it was not offered yet."""
+    """Stored crash report; ``is_new`` is True until the report has been offered to the user."""
 
     path: Path
     part: Part
@@ -62,7 +65,7 @@ class CrashReports:
         self._clock = clock
 
     def add(self, crash: Crash) -> Path | None:
-        """Store a report and evict old ones; return its file, or None when it can't be written."""
+        """Store a report and remove the oldest ones; return its file, or None if it can't be written."""
         now = self._clock()
         try:
             path = self._unused_path(f"crash {time.strftime(_STAMP, time.localtime(now))} {crash.part}")
@@ -91,9 +94,9 @@ class CrashReports:
         return sorted(known, key=lambda each: (each.noticed_s, each.path.name), reverse=True)
 
     def take_new(self) -> list[CrashReport]:
-        """Return new reports, newest first, and mark them as offered.
+        """Return the new reports, newest first, and mark them as offered.
 
-        A report that can't be marked is omitted: it would be offered at each start.
+        A report that can't be marked is omitted; otherwise it would be offered at every start.
         """
         taken = []
         for each in self.all():
@@ -106,21 +109,21 @@ class CrashReports:
 
 
 class CrashLog(logging.Handler):
-    """Logging handler that stores a report for each crash record; repetitions are throttled."""
+    """Logging handler that stores a report for each crash; repetitions are throttled."""
 
     def __init__(self, reports: CrashReports) -> None:
         super().__init__(logging.WARNING)
         self._reports, self._repeat_filter = reports, RepeatFilter()
 
     def emit(self, record: logging.LogRecord) -> None:
-        """Store a report if the record has a crash (`app.core.reports.crash.crash_extra`)."""
+        """Store a report if the record contains a crash (`app.core.reports.crash.crash_extra`)."""
         crash = getattr(record, "crash", None)
         if isinstance(crash, Crash) and self._repeat_filter.filter(record) is not None:
             self._reports.add(crash)
 
 
 def offer(alerts: Alerts, reports: CrashReports) -> None:
-    """Alert crashes since the last start once, with a button for a problem report."""
+    """Show an alert about crashes since the last start, with a button that creates a problem report."""
     found = reports.take_new()
     if found:
         worst = min(found, key=lambda each: PARTS.index(each.part))

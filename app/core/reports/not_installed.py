@@ -1,7 +1,8 @@
-"""Missing dependencies: Python packages, and system libraries of Qt on Linux.
+"""Missing dependencies: Python packages, and system libraries that Qt needs on Linux.
 
 Wheels of PySide6 contain no system libraries, and Python's error names only the first missing one. This
-module imports nothing that the extra ``studio`` installs.
+module
+imports nothing that the extra ``studio`` installs.
 """
 
 from __future__ import annotations
@@ -56,8 +57,10 @@ LIBRARIES: Mapping[str, str] = {
     "libxkbfile.so.1": "libxkbfile1",
     "libz.so.1": "zlib1g",
 }
-"""Library names with their packages in Debian and Ubuntu; `tools/system_packages.py` installs them. Libraries
-that only the X11 plug-in needs, such as libxcb-cursor0, are reported by Qt itself at the start."""
+"""Debian and Ubuntu packages by library name; `tools/system_packages.py` installs them.
+
+Libraries that only the X11 plug-in needs, such as libxcb-cursor0, are reported by Qt at startup.
+"""
 EXTRA_MODULES = (
     "PySide6",
     "cv2",
@@ -77,19 +80,19 @@ _UNOPENED = re.compile(r"(\S+\.so[.\d]*): cannot open shared object file")
 
 @dataclass(frozen=True)
 class MissingLibraries:
-    """Missing libraries, and their packages where known."""
+    """Missing libraries, and the packages that contain them, if known."""
 
     names: tuple[str, ...]
     packages: tuple[str, ...]
 
     @property
     def command(self) -> str:
-        """Command that installs them on Debian and Ubuntu; "" when no package is known."""
+        """Command that installs the packages on Debian and Ubuntu; "" if none is known."""
         return f"sudo apt install {' '.join(self.packages)}" if self.packages else ""
 
     @property
     def start_title(self) -> str:
-        """Sentence that the window can't be opened."""
+        """Error message that the window can't be opened."""
         words = ngettext(
             "NEP Studio can't start: the system library {names} is missing.",
             "NEP Studio can't start: the system libraries {names} are missing.",
@@ -99,7 +102,7 @@ class MissingLibraries:
 
     @property
     def start_remedy(self) -> str:
-        """Sentence how to fix that."""
+        """Advice how to install what the window needs."""
         if not self.command:
             return _("Install the package that contains it, then start Studio again.")
         words = _("On Debian and Ubuntu type “{command}” in a terminal, then start Studio again.")
@@ -107,7 +110,7 @@ class MissingLibraries:
 
     @property
     def title(self) -> str:
-        """Sentence that the block editor can't be opened."""
+        """Error message that the block editor can't be opened."""
         words = ngettext(
             "The block editor can't open: the system library {names} is missing.",
             "The block editor can't open: the system libraries {names} are missing.",
@@ -117,7 +120,7 @@ class MissingLibraries:
 
     @property
     def remedy(self) -> str:
-        """Sentence how to fix that."""
+        """Advice how to install what the block editor needs."""
         if not self.command:
             return _(
                 "Install the package that contains it, then start Studio again. The Developer layout works "
@@ -134,10 +137,11 @@ def missing_libraries(
     load: Callable[[str], object] = ctypes.CDLL,
     release: Callable[[], Mapping[str, str]] = platform.freedesktop_os_release,
 ) -> MissingLibraries | None:
-    """Return all missing libraries after an import failed because of one; None for other errors.
+    """Return all missing libraries after a failed import; None if the error has another cause.
 
-    Python's error names one; the others are found by loading each that Qt may need. A library also fails to
-    load when a dependency is missing: then the dependency is returned.
+    Python's error names one library; the others are found by loading each library that Qt may need. If a
+    library can't
+    be loaded because of a missing dependency, the dependency is returned.
     """
     named = _named_in(str(error))
     if not named:
@@ -152,7 +156,7 @@ def missing_libraries(
 
 
 def tell_missing(alerts: Alerts, missing: MissingLibraries) -> None:
-    """Show the alert that the block editor can't be opened, already on the start page."""
+    """Show the alert that the block editor can't be opened, even on the start page."""
     alerts.put(ALERT, "error", missing.title, missing.remedy, count=0)
 
 
@@ -166,7 +170,7 @@ def why_not_imported(
     error: ImportError,
     is_installed: Callable[[str], bool] = lambda name: bool(importlib.util.find_spec(name)),
 ) -> str:
-    """Return the missing packages and how to install them; "" for other import errors."""
+    """Return which packages are missing and how to install them; "" if the error has another cause."""
     package = (error.name or "").partition(".")[0]
     if isinstance(error, ModuleNotFoundError) and package in EXTRA_MODULES:
         missing = [each for each in EXTRA_MODULES if each == package or not is_installed(each)]

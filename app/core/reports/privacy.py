@@ -1,4 +1,4 @@
-"""Privacy of reports: the home folder, settings and secrets that stay on this computer."""
+"""Privacy of reports: the home folder, and settings and secrets that must stay on this computer."""
 
 from __future__ import annotations
 
@@ -12,14 +12,18 @@ HARMLESS = frozenset({
     "begun", "first_steps", "format", "high_contrast", "language", "layout", "less_motion", "robots_heard",
     "shortcuts", "text_percent", "theme", "toolbox_pinned", "virtual_robots_come_back", "window",
 })  # fmt: skip
-"""Settings that a report includes. Of others only the names are included: future settings, such as keys of
-networks and access codes, stay private until they are added here."""
+"""Settings whose values are included in a report.
+
+Of all other settings only the names are included, so that future settings, such as keys of networks and
+access
+codes, stay private until they are added here.
+"""
 LEFT_OUT = "(left out)"
 _END = r"""(?=[\\/'":;,)\]}>\s]|\.(?=\s|$)|%2F|%5C|$)"""
 
 
 def without_home(text: str, folder: Path | None = None) -> str:
-    """Replace the home folder by ``~`` in all its spellings: also in JSON, or in a URL."""
+    """Replace the home folder by ``~`` in all its spellings, including those in JSON and URLs."""
     home = str(folder if folder is not None else Path.home()).rstrip("/\\")
     if len(home) < 2:  # a home folder "/" would shorten every path
         return text
@@ -32,5 +36,5 @@ def without_home(text: str, folder: Path | None = None) -> str:
 
 
 def shown_settings(values: Mapping[str, object]) -> dict[str, object]:
-    """Return the settings for a report: harmless ones with values, of others only the names."""
+    """Return the settings for a report: the values of `HARMLESS` ones, and only the names of all others."""
     return {name: value if name in HARMLESS else LEFT_OUT for name, value in sorted(values.items())}

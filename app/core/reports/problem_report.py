@@ -58,7 +58,7 @@ Facts = Sequence[tuple[str, str]]
 
 @dataclass(frozen=True)
 class ReportedWork:
-    """Open behaviour in its current state: name, and file content."""
+    """Open behaviour in its current state: its name and the content of its file."""
 
     name: str
     data: bytes
@@ -66,9 +66,14 @@ class ReportedWork:
 
 @dataclass(frozen=True)
 class ReportParts:
-    """Sources of a report: information of the window, folders, and ``doctor``, which may take a while.
+    """Sources of a report.
 
-    ``facts`` are known only to the window: versions of Qt, and the screen.
+    Attributes:
+        facts: Information that only the window has: versions of Qt, and the screen.
+        settings: Current settings.
+        doctor: Returns the findings of the connection doctor; may take a while.
+        log: Log folder.
+        crashes: Stored crash reports.
     """
 
     facts: Facts
@@ -84,7 +89,7 @@ def file_name(now_s: float) -> str:
 
 
 def what_goes_in(parts: ReportParts) -> list[str]:
-    """Return the list of contents, one line each, for the user's decision."""
+    """Return descriptions of the contents, one line each, so that the user can decide to share them."""
     size = sum(path.stat().st_size for path in _logs(parts.log)) / 1000
     lines = [
         _("The versions of Studio, Python, Qt and this system, and the size of the screen"),
@@ -107,7 +112,7 @@ def work_words(names: Sequence[str]) -> str:
 
 
 def make_report(parts: ReportParts, happened: str, work: Sequence[ReportedWork] = ()) -> bytes:
-    """Create the zip. Slow because of the doctor, so don't call it in the window's thread."""
+    """Create the zip file. Slow because of the doctor, so don't call this in the window's thread."""
     files: list[tuple[str, bytes]] = [
         ("README.txt", READ_ME.format(version=__version__).encode()),
         ("what-happened.txt", (happened.strip() or "(nothing was written)").encode("utf-8", "replace")),
@@ -129,7 +134,7 @@ def make_report(parts: ReportParts, happened: str, work: Sequence[ReportedWork] 
 
 
 def write_report(path: Path, data: bytes) -> None:
-    """Write the zip atomically. Raises ReportError with the next step."""
+    """Write the zip file atomically. Raises ReportError with advice what to do."""
     try:
         write_atomically(path, data)
     except (OSError, ValueError) as error:
@@ -140,24 +145,24 @@ def write_report(path: Path, data: bytes) -> None:
 
 
 class ReportWriter:
-    """Creates and writes one report in a thread of its own."""
+    """Creates and writes one report in a background thread."""
 
     def __init__(self, path: Path, make: Callable[[], bytes]) -> None:
         # Starts at once; `make` is called in the thread.
         self.path = path
         self.problem = ""
-        """Sentence without a full stop why it could not be written, or ""."""
+        """Why the report could not be written, as a sentence without a full stop; "" if there is no error."""
         self._make = make
         self._thread = threading.Thread(target=self._work, name="studio-report")
         self._thread.start()
 
     @property
     def is_done(self) -> bool:
-        """True if it has been written, or failed."""
+        """True if the report was written or writing failed."""
         return not self._thread.is_alive()
 
     def wait(self, timeout_s: float) -> bool:
-        """Wait for it; return whether it is done."""
+        """Wait until the report is written; return False after ``timeout_s`` seconds."""
         self._thread.join(timeout_s)
         return self.is_done
 

@@ -1,7 +1,8 @@
-"""Detection of crashes of Studio: each run creates a marker, and the next start checks remaining ones.
+"""Detection of crashes of Studio: each run creates a marker, and the next start checks remaining markers.
 
-Each run (each window) has its own marker, locked by its process, and a trace file for crashes in native code;
-it deletes both at a normal end.
+Each run (each window) has a marker file locked by its process, and a trace file for crashes in native code.
+Both are
+deleted when the run ends normally.
 """
 
 from __future__ import annotations
@@ -38,7 +39,7 @@ else:
 LOG_LINES = 80
 MAX_TRACE_BYTES = 1_000_000
 CLOCK_TOLERANCE_S = 2.0
-"""Tolerance between the system's start time of a process and the clock."""
+"""Tolerance between the start time of a process as reported by the system and the clock."""
 WITHOUT_A_WORD = (
     "it ended without a word: the system ended it (for lack of memory, say), or a person did, or the "
     "computer's session ended"
@@ -48,7 +49,10 @@ _log = logging.getLogger("studio.run")
 
 
 class StudioRun:
-    """Run of Studio, from `begin` to `end`. As a context manager it stores an exception that ends it."""
+    """Run of Studio, from `begin` to `end`.
+
+    As a context manager, it stores a crash report if an exception leaves the context.
+    """
 
     def __init__(
         self,
@@ -67,11 +71,11 @@ class StudioRun:
 
     @property
     def is_noted(self) -> bool:
-        """True if the marker exists; otherwise a crash of this run will not be detected."""
+        """True if the marker exists; otherwise a crash of this run can't be detected."""
         return self._mark.exists()
 
     def begin(self) -> None:
-        """Create the marker. Logs one line if it can't be written."""
+        """Create the marker. If that fails, one line is logged."""
         self._began_s = self._clock()
         try:
             self._write(asked=False)
@@ -82,13 +86,13 @@ class StudioRun:
             _log.warning("a crash of this run will not be detected: %s", error, extra=IN_CONSOLE)
 
     def expect_end(self) -> None:
-        """Record that Studio was asked to end, so that its end does not count as a crash."""
+        """Record that Studio was asked to exit, so that this does not count as a crash."""
         if self.is_noted:
             with contextlib.suppress(OSError):
                 self._write(asked=True)
 
     def end(self) -> None:
-        """Delete the marker: Studio ends normally."""
+        """Delete the marker, because Studio exits normally."""
         self._delete_files()
 
     def __enter__(self) -> Self:
@@ -105,9 +109,9 @@ class StudioRun:
         self.end()
 
     def left(self) -> list[Crash]:
-        """Return crashed runs; each is returned to one caller only.
+        """Return the crashes of earlier runs; each is returned to one caller only.
 
-        Runs ended by a restart of the computer, or after a request to end, don't count.
+        Runs that ended because the computer restarted or because Studio was asked to exit don't count.
         """
         try:
             marks = [mark for mark in self._folder.glob("*.json") if mark != self._mark]

@@ -1,4 +1,4 @@
-"""History of Studio's versions on this computer, for diagnosing problems after an update."""
+"""History of the versions of Studio on this computer, for diagnosing problems after an update."""
 
 from __future__ import annotations
 
@@ -9,25 +9,25 @@ from collections.abc import Mapping
 from nep.version import __version__
 
 KEY = "studio_versions"
-"""Setting with the versions, newest last, each with the time of its first start (epoch seconds)."""
+"""Setting that stores the versions, newest last, with the time of their first start (seconds since 1970)."""
 MAX_VERSIONS = 10
 PLAIN = re.compile(r"[0-9A-Za-z][0-9A-Za-z.+-]{0,39}")
-"""Valid version; anything else in a file is ignored."""
+"""Pattern of a valid version; anything else in a file is ignored."""
 EARLIER = "earlier"
-"""Placeholder for versions before this setting existed; start time 0."""
+"""Placeholder for versions used before this setting existed; their start time is 0."""
 _LATEST_S = 1e10
-"""Latest valid time: a damaged file may have one that the calendar doesn't support."""
+"""Latest valid time. A damaged file may contain a time that the calendar doesn't support."""
 
 Kept = list[dict[str, object]]
 
 
 def plain_version(value: object) -> str:
-    """Return a version from a file; "" if it is invalid."""
+    """Validate a version read from a file; return "" if it is invalid."""
     return value if isinstance(value, str) and PLAIN.fullmatch(value) else ""
 
 
 def known(values: Mapping[str, object]) -> list[tuple[str, float]]:
-    """Return valid versions in the settings with their first starts (epoch seconds), newest last."""
+    """Return the valid versions in the settings and their first starts (seconds since 1970), newest last."""
     entries = values.get(KEY)
     found = []
     for entry in entries if isinstance(entries, list) else ():
@@ -47,9 +47,9 @@ def known(values: Mapping[str, object]) -> list[tuple[str, float]]:
 def with_this_version(
     values: Mapping[str, object], now_s: float, *, is_first: bool, version: str = __version__
 ) -> Kept | None:
-    """Return the value to save for this version; None when it was also the last one.
+    """Return the updated setting that includes this version; None if this version is already the newest.
 
-    ``is_first``: no Studio ran here before.
+    ``is_first`` is True if no Studio ran on this computer before.
     """
     before = known(values) or ([] if is_first else [(EARLIER, 0.0)])
     if before and before[-1][0] == version:

@@ -1,4 +1,5 @@
 """Robots: connections, manual actions, motion permission, Stop.
 
-`fleet` has all robots, each a `robot_link.RobotLink`; `stop` proves that they have stopped.
+`fleet` manages all robots, each represented by a `robot_link.RobotLink`; `stop` proves that robots have
+stopped.
 """

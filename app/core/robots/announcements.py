@@ -1,8 +1,10 @@
-"""Robot announcements: the program that announced a name first owns it.
+"""Announcements of robots: the program that announced a name first owns it.
 
-Announcements of other programs under the same name are ignored and reported as claims. A robot's program is
+Announcements of other programs under the same name are ignored and reported as claims. The program of a robot
+is
 replaced only after the master has removed its announcement. Robots of RIZE announce nothing; nodes that
-subscribe to ``robot_action`` count as such robots.
+subscribe to
+``robot_action`` count as such robots.
 """
 
 from __future__ import annotations
@@ -26,11 +28,11 @@ from nep.protocol.graph_view import GraphView
 MAX_ROBOTS = 200
 MAX_CLAIMANTS = 8
 MAX_OWNERS = 4
-"""Maximum number of earlier programs of one robot whose descriptions are kept, in case they return."""
+"""Maximum number of earlier programs of a robot whose descriptions are stored, in case they return."""
 READING_SHARE = 0.2
-"""Maximum share of the window's time for parsing descriptions in the long run."""
+"""Maximum share of the time of the window's thread that parsing descriptions takes on average."""
 READING_S = 1.0
-"""Maximum time for parsing at once after an idle period, such as for all robots of a room."""
+"""Maximum time for parsing after an idle period, for example for all robots of a room."""
 
 NATIVE = frozenset({"native", "gateway"})
 SUFFIXES = ("_driver", "_robot", "_node")
@@ -38,7 +40,7 @@ SUFFIXES = ("_driver", "_robot", "_node")
 
 @dataclass(frozen=True, slots=True)
 class Claim:
-    """Rejected announcement: the problem, and the consequence."""
+    """Rejected announcement: the problem (title), and the consequence (detail)."""
 
     title: str
     detail: str
@@ -46,11 +48,13 @@ class Claim:
 
 @dataclass(slots=True)
 class _Announced:
-    """Description topic with its owner and the newest description of each publisher.
+    """Description topic, its owner, and the newest description of each publisher.
 
-    ``place`` is the number of topics that the same node announced before it. ``owners`` are the nodes that
-    owned it, newest first. Their descriptions are kept while they aren't listed: a latched message arrives
-    only once, and a suspended program resumes over the same connection.
+    ``place`` is the number of topics that the same node announced before this one. ``owners`` are the nodes
+    that owned
+    the topic, newest first. Their descriptions are stored while they aren't listed: a latched message arrives
+    only once,
+    and a suspended program resumes over the same connection.
     """
 
     watch: Watch | None = None
@@ -66,7 +70,7 @@ class _Announced:
 
 
 class Announcements:
-    """Descriptions on the network with the programs that own them. Not thread-safe."""
+    """Descriptions on the network, and the programs that own them. Not thread-safe."""
 
     def __init__(
         self,
@@ -85,13 +89,13 @@ class Announcements:
         """Description topics of robots beyond `MAX_ROBOTS`."""
 
     def is_announced(self, topic: str) -> bool:
-        """Return whether a robot is announced on this topic."""
+        """Return True if a robot is announced on this topic."""
         known = self._topics.get(topic)
         return known is not None and known.watch is not None
 
     @property
     def robots(self) -> Iterator[tuple[str, Robot, Identity]]:
-        """Announced robots: topic, description, program."""
+        """Announced robots, as topic, description and program."""
         for topic, known in self._topics.items():
             if known.watch is not None and known.robot is not None and known.owner is not None:
                 yield topic, known.robot, known.owner
@@ -170,7 +174,7 @@ class Announcements:
         self._parse_waiting()
 
     def add(self, batches: Mapping[str, Batch]) -> bool:
-        """Add received descriptions; return whether any was parsed, including earlier ones."""
+        """Return True if at least one description was parsed; that may be one received earlier."""
         for topic in batches.keys() & self._topics.keys():
             known = self._topics[topic]
             for message in batches[topic].messages:
@@ -286,13 +290,13 @@ def _in_fair_order(there: Mapping[str, Sequence[str]]) -> list[tuple[int, str]]:
 
 
 class RizeNames:
-    """Names of the present robots of RIZE, from their ready messages, else from their nodes."""
+    """Names of the connected robots of RIZE, taken from their ready messages or else from their nodes."""
 
     def __init__(self) -> None:
         self._told: dict[str, None] = {}
 
     def add(self, name: str) -> None:
-        """Add a name from a ready message on ``rize_event``."""
+        """Add a name received in a ready message on ``rize_event``."""
         self._told.setdefault(name)
         if len(self._told) > MAX_ROBOTS:
             del self._told[next(iter(self._told))]
@@ -300,7 +304,7 @@ class RizeNames:
     def present(self, view: GraphView, native: Collection[str] = ()) -> set[str]:
         """Return the names of the robots of RIZE in this graph.
 
-        ``native`` are robots with a description, which also send ready messages on ``rize_event``.
+        ``native`` are the robots with a description, which also send ready messages on ``rize_event``.
         """
         candidates = [name for name in self._told if name not in native]
         info = view.topics.get(rize.COMMANDS)

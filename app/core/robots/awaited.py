@@ -1,4 +1,4 @@
-"""Values that open behaviours wait for: words that a robot should hear, and other event data."""
+"""Values that blocks in open behaviours wait for, such as words that a robot should recognize."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ MIN_LENGTH, MAX_LENGTH = 1, 60
 def awaited_values(
     workspaces: Iterable[Mapping[str, object]], robot: Robot, event: Event, name: str
 ) -> tuple[str, ...]:
-    """Return the values of an event's datum ``name`` that blocks wait for, then the suggested default.
+    """Return the values of the event data ``name`` that blocks wait for, then the suggested default.
 
     Unique, at most `MAX_WORDS`. ``workspaces`` are saved workspaces, that of the current behaviour first.
     """

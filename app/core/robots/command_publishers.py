@@ -1,4 +1,4 @@
-"""Publishers by which Studio commands robots, opened and closed in the thread of the message source."""
+"""Publishers for commands to robots, opened and closed in the thread of the message source."""
 
 from __future__ import annotations
 
@@ -14,13 +14,16 @@ Submit = Callable[[str, Callable[[Node], None]], None]
 
 
 class CommandPublishers:
-    """Opens and closes the publishers of robots. Used by the window's thread."""
+    """Opens and closes the publishers for commands to robots.
+
+    Not thread-safe: use it from the window's thread.
+    """
 
     def __init__(self, submit: Submit) -> None:
         self._submit = submit
 
     def open(self, link: RobotLink) -> None:
-        """Open the publishers of a robot's command and world topics, unless they are open or being opened."""
+        """Open the publishers for a robot's command and world topics, unless that was already started."""
         topics = link.robot.topics
         if link.publisher is not None or link.is_opening:
             return
@@ -40,7 +43,7 @@ class CommandPublishers:
         self._submit(_("connect to {robot}").format(robot=link.name), open_them)
 
     def leave(self, link: RobotLink) -> None:
-        """Close the publishers of topics that the robot's description no longer names."""
+        """Close the publishers for topics that the robot's description no longer contains."""
         old = [publisher for publisher in (link.publisher, link.world) if publisher is not None]
         link.publisher = link.world = None
 
@@ -52,7 +55,7 @@ class CommandPublishers:
             self._submit(_("leave the old topics of {robot}").format(robot=link.name), close_them)
 
     def end(self, link: RobotLink) -> None:
-        """Close the publishers of a robot that Studio discards, including those that are being opened."""
+        """Close the publishers for a robot that is discarded, including those that are being opened."""
         if link.is_opening or link.publisher is not None or link.world is not None:
             self._submit("", lambda _node: close_publishers(link))
 

@@ -1,4 +1,4 @@
-"""Robots on the network: discovered by description, monitored by sensors, commanded by actions."""
+"""Robots on the network, found by their descriptions, with their sensor values and actions."""
 
 from __future__ import annotations
 
@@ -84,14 +84,14 @@ class Fleet:
         self.gate = MotionGate(self.permission, self._movable)
         has_ended = self._processes.has_ended
         self.moved = MovedRobots(self._identity_of, has_ended, clock, self._own.other_programs)
-        """Robots that a Stop must name."""
+        """Robots that may move, and so must be named by a Stop."""
         self._tries = Tries(self._send, self._heartbeat.stop, clock)
         self._messages = RobotMessages(self._own, self._tries, self.moved, clock)
         self._chosen = ""
         self._has_graph = False
         self.revision = 0
         self.stops = 0
-        """Number of stops sent to robots."""
+        """Number of stops sent to robots so far."""
         self.used: Callable[[], Collection[str]] = tuple
         """Returns the names of the robots that the running program uses."""
 
@@ -111,7 +111,7 @@ class Fleet:
         return self._movable.moving
 
     def is_there(self, name: str) -> bool | None:
-        """Return whether a robot of this name is connected or announced; None before the first graph."""
+        """Return True if a robot with this name is connected or announced; None before the first graph."""
         link = self._links.get(name)
         if (link is not None and link.connected) or self._announcements.is_announced(
             topic_of(name, "description")
@@ -120,12 +120,15 @@ class Fleet:
         return False if self._has_graph else None
 
     def link(self, name: str) -> RobotLink | None:
-        """Return the robot of that name, or None."""
+        """Return the robot with this name, or None."""
         return self._links.get(name)
 
     @property
     def current(self) -> RobotLink | None:
-        """Robot of the panels for one robot: the chosen one if connected, else a virtual one or the first."""
+        """Robot current by panels for one robot.
+
+        The chosen one if it is connected, else a virtual one, else the first.
+        """
         chosen = self._links.get(self._chosen)
         if chosen is not None and chosen.connected:
             return chosen
@@ -133,7 +136,7 @@ class Fleet:
         return next((link for link in connected if link.virtual), connected[0] if connected else chosen)
 
     def choose(self, name: str) -> None:
-        """Choose the robot of the panels for one robot."""
+        """Choose the robot shown by panels for one robot."""
         if name != self._chosen:
             self._chosen = name
             self.revision += 1
@@ -153,8 +156,10 @@ class Fleet:
 
         Raises:
             RobotUnknownError: No robot has that name.
-            RobotInputError: The robot lacks the action or rejects the input; has a sentence for each value.
-            MayNotMoveError: The user has to permit the motion first; the action is sent once permitted.
+            RobotInputError: The robot lacks the action or rejects the input; contains a message for each
+                invalid value.
+            MayNotMoveError: The user must allow the motion first. The action is sent once the user has done
+                so.
         """
         link = self._get(name)
         described = link.robot.action(action)
@@ -181,13 +186,13 @@ class Fleet:
             return  # the robot changed or disconnected meanwhile, which its panel shows
 
     def cancel(self, name: str, action: str) -> None:
-        """Cancel the last invocation of an action, unless it has ended."""
+        """Cancel the last invocation of an action, if it is still running."""
         self._tries.cancel(self._get(name), action)
 
     def world(self, name: str, change: Payload) -> None:
         """Change the world of a virtual robot: touch its head, move the ball, say a word.
 
-        A robot that isn't known to be virtual needs the user's permission first, as for a motion.
+        As for a motion, the user must allow this first if Studio doesn't know that the robot is virtual.
         """
         link = self._get(name)
         actions = [action.name for action in link.robot.actions]
@@ -197,16 +202,16 @@ class Fleet:
 
     @property
     def begins_at_start(self) -> bool:
-        """True if virtual robots return to their start position when a behaviour begins."""
+        """True if virtual robots return to their start position when a behaviour starts."""
         return self._settings is None or self._settings.get(BEGINS_AT_START, True)
 
     def choose_start(self, *, begins: bool) -> None:
-        """Set `begins_at_start`. Raises SettingsError when the setting can't be saved."""
+        """Set `begins_at_start`. Raises SettingsError if the setting can't be saved."""
         if self._settings is not None:
             self._settings.set(BEGINS_AT_START, begins)
 
     def to_start(self, names: Iterable[str]) -> None:
-        """Return the virtual robots among ``names`` to their start position, if `begins_at_start`."""
+        """Move the virtual robots among ``names`` to their start position if `begins_at_start` is set."""
         links = [link for name in names if (link := self._links.get(name)) is not None and link.virtual]
         for link in links if self.begins_at_start else ():
             if link.world is not None:
@@ -217,7 +222,7 @@ class Fleet:
             self.world(name, change)
 
     def told_to_stop(self, names: Iterable[str]) -> None:
-        """Mark robots as stopping until `stopped` applies their result."""
+        """Set robots to the state "stopping" until `stopped` applies the result."""
         self.stops += 1
         for link in map(self._links.get, names):
             if link is not None and link.stop_began_s is None:
@@ -225,12 +230,12 @@ class Fleet:
 
     @property
     def stopping(self) -> tuple[str, ...]:
-        """Names of robots that have not answered a Stop yet."""
+        """Names of robots that have not replied to a Stop yet."""
         return tuple(link.name for link in self._links.values() if link.stop_began_s is not None)
 
     @property
     def unheard(self) -> tuple[str, ...]:
-        """Names of robots that may move and don't answer: every Stop names them."""
+        """Names of robots that may be moving and don't reply. Every Stop reports them."""
         return tuple(name for name in self.moved.names if not self._is_heard(self._links.get(name)))
 
     @property
@@ -241,7 +246,7 @@ class Fleet:
 
     @property
     def stop_targets(self) -> tuple[StopTarget, ...]:
-        """Targets of a Stop of all robots, including robots whose answer is not waited for."""
+        """Targets of a Stop of all robots, including robots whose reply is not awaited."""
         return targets_of(self._links.values(), self.moved, self._unlisted)
 
     @staticmethod
@@ -249,9 +254,13 @@ class Fleet:
         return link is not None and link.connected and not link.mute
 
     def stopped(self, words: Mapping[str, tuple[str, str]], report: StopReport) -> None:
-        """Apply the result of a Stop; ``words`` has a sentence and a status for each robot.
+        """Apply the result of a Stop.
 
-        Invocations of a robot without a confirmed stop end only by its own replies.
+        Invocations of a robot whose stop was not confirmed end only when the robot reports their end.
+
+        Args:
+            words: Message and status for each robot.
+            report: Result of the Stop.
         """
         wrong = {name: robot.wrong for name, robot in report.by_name.items()}
         for name, (last_stop, status) in words.items():
@@ -267,7 +276,7 @@ class Fleet:
             self._heartbeat.stop(name)
 
     def stands_still(self, names: Iterable[str]) -> None:
-        """Apply the user's confirmation that these robots have stopped."""
+        """Apply the user's confirmation that these robots are not moving."""
         known = tuple(names)
         self.moved.confirm(known)
         for link in map(self._links.get, known):
@@ -276,13 +285,16 @@ class Fleet:
                 self._judge_motion(link)
 
     def take_settled(self) -> tuple[str, ...]:
-        """Return robots whose Stop was not proven and which now report that every action ended; each once."""
+        """Return and clear the robots without a proven Stop that have since ended all actions.
+
+        The end of the actions is what the robots report.
+        """
         return self._messages.take_settled()
 
     # -- input from the session ------------------------------------------------------------------------------
 
     def update(self, view: GraphView) -> None:
-        """Apply a new graph: connect, replace and disconnect robots."""
+        """Apply a new graph, which may connect, replace or disconnect robots."""
         self._has_graph, before = True, self._own.view
         self._movable.view = view
         self._own.update(view)
@@ -326,7 +338,7 @@ class Fleet:
 
     @property
     def claims(self) -> Mapping[str, Claim]:
-        """Rejected announcements of programs, by an id."""
+        """Rejected announcements of programs by id."""
         return {**self._announcements.claims, **self._foreign_claims}
 
     def take_notes(self) -> tuple[str, ...]:
@@ -429,7 +441,10 @@ class Fleet:
         )
 
     def join(self, robot: Robot, topic: str, identity: Identity | None = None) -> None:
-        """Connect a robot described on ``topic``. No effect if neither robot nor program changed."""
+        """Connect a robot described on ``topic``.
+
+        No effect if neither the robot nor its program has changed.
+        """
         link = self._links.get(robot.name)
         was_real = not robot.virtual or (link is not None and link.identity == identity and link.was_real)
         if identity is not None:

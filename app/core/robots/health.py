@@ -1,4 +1,4 @@
-"""Health checks for alerts: undecodable data, silent robots, duplicate names, unsaved settings."""
+"""Health checks that raise alerts: undecodable data, silent robots, duplicate names, unsaved settings."""
 
 from __future__ import annotations
 
@@ -17,14 +17,14 @@ from nep.protocol.graph_view import Alert, GraphView
 SILENT_S = 3.0
 RECOVERY_S = 1.0
 RESTART_TIMEOUT_S = 5.0
-"""Time within which a restarted driver is back."""
+"""Time within which a restarted driver is expected to be connected again."""
 PORTS = "ports"
 ASK_DOCTOR = lazy("Open the connection doctor")
 GIVES_UP = "leaving"
 INSTALLATION = "installation"
-"""Alert about Studio's own installation; "program" is that of the behaviour."""
+"""Id of the alert about Studio's installation; "program" is the alert about the program of a behaviour."""
 ROBOT_ALERTS = ("robot", "moving", "camera", "rejected", "errors")
-"""Prefixes of alert ids of one robot; the name follows after a colon."""
+"""Prefixes of the ids of alerts about one robot. A colon and the name of the robot follow."""
 
 REAL = lazy("Check that it is switched on and on the same Wi-Fi.")
 VIRTUAL = lazy("Start the virtual robot again.")
@@ -32,7 +32,14 @@ VIRTUAL = lazy("Start the virtual robot again.")
 
 @dataclass(slots=True)
 class _Bad:
-    """Topic with undecodable messages: their number, the number of unchecked ones, time of the last one."""
+    """Topic with messages that can't be decoded.
+
+    Attributes:
+        count: Number of these messages.
+        unchecked: Number of messages that were not checked.
+        since: Time of the last error.
+        is_well: True if only decodable messages arrived since.
+    """
 
     count: int = 0
     unchecked: int = 0
@@ -53,10 +60,11 @@ class Health:
         self._robots: set[str] = set()
 
     def update(self, found: Mapping[str, Checked]) -> None:
-        """Alert topics with undecodable messages, with their exact count.
+        """Raise alerts about topics with undecodable messages, including their exact number.
 
-        `check` resolves the alert when only good messages arrived for a second, so a topic with both has one
-        alert.
+        `check` resolves the alert after a second without undecodable messages, so that a topic with both
+        kinds of messages
+        has one continuous alert.
         """
         for topic, checked in found.items():
             bad = self._bad.get(topic)
@@ -72,15 +80,16 @@ class Health:
                 self._alert_bad_topic(topic, bad, checked)
 
     def forget(self, topic: str) -> None:
-        """Discard the problems of a topic that is no longer watched or is well again."""
+        """Discard the problems of a topic that is no longer watched or has recovered."""
         self._bad.pop(topic, None)
         self._alerts.resolve(f"message:{topic}")
 
     def check(self, used: Container[str] = (), started: Container[str] = ()) -> None:
         """Update all alerts. Called once a second.
 
-        ``used`` are the names of robots in use by a program, ``started`` those of virtual robots whose
-        processes this Studio started and that still run.
+        Args:
+            used: Names of the robots that a program uses.
+            started: Names of the virtual robots that this Studio started and that are still running.
         """
         now = self._clock()
         for topic in [t for t, bad in self._bad.items() if bad.is_well and now - bad.since >= RECOVERY_S]:
@@ -110,7 +119,7 @@ class Health:
                 self._check_presence(link, now, runs_here=link.name in started)
 
     def journal(self, sentence: str | None) -> None:
-        """Alert that unsaved work can't be backed up for the reason ``sentence``, or None to resolve it."""
+        """Raise the alert that unsaved work can't be backed up, with the reason; None resolves the alert."""
         if sentence is None:
             self._alerts.resolve("journal")
             self._alerts.resolve(GIVES_UP)
@@ -126,9 +135,9 @@ class Health:
         )
 
     def gives_up(self, name: str, sentence: str) -> bool:
-        """Return whether the user closes the window although the work of ``name`` can't be saved.
+        """Return True if the user closes the window although the work of ``name`` can't be saved.
 
-        The first call alerts the user with the reason ``sentence`` and returns False.
+        The first call raises an alert with the reason ``sentence`` and returns False.
         """
         if self._alerts.has(GIVES_UP):
             return True
@@ -145,7 +154,7 @@ class Health:
         return False
 
     def settings(self, sentence: str | None) -> None:
-        """Alert that settings can't be saved for the reason ``sentence``, or None to resolve it."""
+        """Raise the alert that settings can't be saved, with the reason; None resolves the alert."""
         if sentence is None:
             self._alerts.resolve("settings")
             return
@@ -158,7 +167,7 @@ class Health:
         )
 
     def program(self, fate: Fate) -> None:
-        """Alert that Studio's installation was replaced or removed."""
+        """Raise the alert that Studio's installation was replaced or removed."""
         if fate == "replaced":
             self._alerts.put(
                 INSTALLATION,
@@ -179,7 +188,10 @@ class Health:
             self._alerts.resolve(INSTALLATION)
 
     def graph_alerts(self, view: GraphView) -> None:
-        """Alert problems that the master reports (duplicate names, conflicting types, occupied ports)."""
+        """Raise alerts for problems that the master reports.
+
+        These are duplicate names, conflicting types and ports in use.
+        """
         ids = set()
         ports = [found for found in view.alerts if found.id.startswith("port:")]
         for found in view.alerts:
@@ -265,7 +277,7 @@ class Health:
         self._claims = set(claims)
 
     def unreachable(self, problems: Mapping[str, str]) -> None:
-        """Alert robots that a Stop can't reach: reasons by name."""
+        """Raise alerts for robots that a Stop can't reach; ``problems`` are the reasons by name."""
         for name in self._unreachable - problems.keys():
             self._alerts.resolve(f"stop:{name}")
         for name, why in problems.items():

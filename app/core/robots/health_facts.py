@@ -1,6 +1,6 @@
-"""Health of one robot as facts in plain words: connection, battery, sensors, Stop.
+"""Health of one robot as a list of facts: connection, battery, sensors, Stop.
 
-The status of a fact shows whether it needs attention; unknown values are shown as such.
+The status of a fact says whether it needs attention. Unknown values are listed as unknown.
 """
 
 from __future__ import annotations
@@ -17,10 +17,10 @@ from nep.i18n import _, lazy, ngettext, number
 
 SILENT_S = 3.0
 MISSED = 5
-"""Number of consecutive missing messages that count as silence."""
+"""Number of consecutive missing messages after which a sensor counts as silent."""
 LOW_PERCENT = 20
 WARM_C = 60
-"""Temperature from which motors of small robots begin to lose force."""
+"""Temperature above which motors of small robots begin to lose force, in °C."""
 
 CONNECTION, BATTERY, TEMPERATURE = lazy("Connection"), lazy("Battery"), lazy("Temperature")
 STOP, CAMERA, SENSORS = lazy("Stop"), lazy("Camera"), lazy("Sensors")
@@ -33,9 +33,12 @@ AgeWords = Callable[[float], str]
 
 @dataclass(frozen=True, slots=True)
 class HealthFact:
-    """One line; ``status`` is ok, warn, error, or off when missing or unknown.
+    """One fact about a robot.
 
-    ``title`` is one of the constants above, marked for `nep.i18n`.
+    Attributes:
+        title: One of the constants above, to be translated with `nep.i18n`.
+        status: "ok", "warn", "error", or "off" if missing or unknown.
+        words: Value of the fact.
     """
 
     title: str
@@ -49,10 +52,11 @@ class HealthFact:
 
 
 def facts_of(link: RobotLink, topics: Topics, now: float, age_words: AgeWords) -> tuple[HealthFact, ...]:
-    """Return all facts about a robot, those that need attention first.
+    """Return all facts about a robot; those that need attention come first.
 
-    ``now`` is on the clock of the robot's replies (monotonic seconds); ``age_words`` formats a duration: "14
-    s".
+    Args:
+        now: Monotonic seconds, on the same clock as the robot's replies.
+        age_words: Formats a duration, such as "14 s".
     """
     facts = [_connection(link, now, age_words)]
     if link.connected:
@@ -66,7 +70,7 @@ def facts_of(link: RobotLink, topics: Topics, now: float, age_words: AgeWords) -
 
 
 def has_told(link: RobotLink, facts: Sequence[HealthFact]) -> bool:
-    """Return whether the robot has sent anything itself; otherwise only its description is known."""
+    """Return True if the robot itself has sent anything; otherwise only its description is known."""
     return link.answered_s is not None or any(fact.title in TOLD and fact.status == "ok" for fact in facts)
 
 

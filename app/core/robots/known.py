@@ -1,4 +1,4 @@
-"""Known robots: names of real robots and the time they were last seen, stored in the settings."""
+"""Known robots: names of real robots and when they were last connected, stored in the settings."""
 
 from __future__ import annotations
 
@@ -19,16 +19,16 @@ Told = Mapping[str, object]
 
 @dataclass(frozen=True, slots=True)
 class KnownRobot:
-    """Real robot and the time it was last seen (epoch seconds)."""
+    """Real robot and the time when it was last connected (seconds since 1970)."""
 
     name: str
     seen_s: float
 
 
 class KnownRobots:
-    """Known real robots, most recently seen first.
+    """Known real robots, the most recently connected first.
 
-    Virtual robots can be started at any time and are not stored.
+    Virtual robots are not stored, because they can be started at any time.
     """
 
     def __init__(self, settings: ListSettings | None = None, clock: Callable[[], float] = time.time) -> None:
@@ -36,13 +36,13 @@ class KnownRobots:
 
     @property
     def robots(self) -> tuple[KnownRobot, ...]:
-        """All known robots, most recently seen first; invalid entries are skipped."""
+        """All known robots, the most recently connected first; invalid entries are skipped."""
         entries: list[Told] = self._settings.get(KEY, []) if self._settings is not None else []
         found = {robot.name: robot for robot in map(_robot, entries) if robot is not None}
         return tuple(sorted(found.values(), key=lambda robot: -robot.seen_s))
 
     def saw(self, robots: Sequence[Robot]) -> None:
-        """Record that these robots are connected, or were until now."""
+        """Record that these robots are connected or were connected until now."""
         names = [robot.name for robot in robots if not robot.virtual]
         if names:
             now = self._clock()
@@ -50,7 +50,7 @@ class KnownRobots:
             self._save([*(KnownRobot(name, now) for name in names), *others])
 
     def forget(self, name: str) -> None:
-        """Remove a robot from the list; it is added again when it connects."""
+        """Remove a robot from the list. It is added again when it connects."""
         self._save([robot for robot in self.robots if robot.name != name])
 
     def _save(self, robots: Sequence[KnownRobot]) -> None:

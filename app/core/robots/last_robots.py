@@ -1,4 +1,4 @@
-"""Virtual robots of the last session, restarted at the next start unless the user disabled that."""
+"""Virtual robots of the last session, which are started again at the next start unless that is disabled."""
 
 from __future__ import annotations
 
@@ -15,16 +15,16 @@ MAX_ROBOTS = 8
 
 
 class StartsRobots(Protocol):
-    """Part of the launcher that is used here."""
+    """Part of the interface of `app.core.robots.launcher.Launcher` that is used here."""
 
     wanted: dict[str, str]
 
     def start_virtual_robot(self, name: str = ..., model: str = ...) -> None:
-        """Start a virtual robot of that name and model."""
+        """Start a virtual robot with this name and model."""
 
 
 class LastRobots:
-    """Stores the virtual robots in use in the settings. Not thread-safe: use it from the window's thread."""
+    """Stores the running virtual robots in the settings. Not thread-safe: use it from the window's thread."""
 
     def __init__(self, settings: Settings) -> None:
         self._settings = settings
@@ -32,7 +32,7 @@ class LastRobots:
 
     @property
     def come_back(self) -> bool:
-        """True if the robots are restarted at the next start."""
+        """True if the virtual robots are started again at the next start."""
         return self._settings.get(COME_BACK, True)
 
     def set_come_back(self, wanted: bool) -> None:
@@ -40,7 +40,7 @@ class LastRobots:
         self._settings.set(COME_BACK, wanted)
 
     def start(self, launcher: StartsRobots) -> None:
-        """Start the robots of the last session. Returns immediately; nothing moves."""
+        """Start the robots of the last session. Returns immediately; no robot moves."""
         if not self.come_back:
             return
         kept: Mapping[str, object] = self._settings.get(KEPT, {})
@@ -49,9 +49,9 @@ class LastRobots:
                 launcher.start_virtual_robot(name, model)
 
     def save(self, launcher: StartsRobots) -> None:
-        """Save the current robots if they changed.
+        """Save the names of the current robots if they have changed.
 
-        Called during the session, so that a crash loses none. Errors are reported by the settings.
+        Called during the session, so that they are known after a crash. The settings report errors.
         """
         if launcher.wanted != self._saved:
             self._saved = dict(launcher.wanted)

@@ -25,14 +25,14 @@ from nep.system.addresses import is_loopback
 
 END_TIMEOUT_S = 2.0
 VIRTUAL_ROBOTS = {"pepper": "app.robots.simulated", "diffdrive": "app.robots.turtle"}
-"""Module of each model of virtual robot."""
+"""Module that implements each model of virtual robot."""
 TAIL_BYTES, TAIL_LETTERS = 100_000, 2000
 FIRST_GRAPH_TIMEOUT_S = 3.0
-"""Time that a start waits for the first graph, which may contain a robot of that name."""
+"""Time that a start waits for the first graph, which may show that the robot already exists."""
 STARTING_S = 30.0
-"""Time during which a started robot counts as starting: slow computers need that long."""
+"""Time during which a started robot counts as starting; slow computers need that long."""
 REQUEST_LIFETIME_S = 4.0
-"""Time that a request is kept although the robot is listed: its end is noticed only within 3.3 s."""
+"""Lifetime of a start request while the robot is still listed; its end is noticed only within 3.3 s."""
 
 RUNS_MODULE = ("-m", "--module")
 MAX_KNOWN = 1000
@@ -42,7 +42,7 @@ _log = logging.getLogger("studio.launcher")
 
 @dataclass(frozen=True, slots=True)
 class _StartRequest:
-    """Request to start a virtual robot of this model, and its deadlines (monotonic seconds)."""
+    """Request to start a virtual robot of this model, with its deadlines (monotonic seconds)."""
 
     model: str
     known_until: float
@@ -51,7 +51,7 @@ class _StartRequest:
 
 @dataclass(frozen=True, slots=True)
 class LaunchFailed:
-    """A process did not start or ended unexpectedly; ``detail`` is the end of its output."""
+    """Event: a process could not be started or ended unexpectedly; ``detail`` is the end of its output."""
 
     what: str
     sentence: str
@@ -60,29 +60,29 @@ class LaunchFailed:
 
 
 class Process(Protocol):
-    """Methods of `subprocess.Popen` that are used here."""
+    """Part of the interface of `subprocess.Popen` that is used here."""
 
     pid: int
 
     def poll(self) -> int | None:
-        """Return the exit code, None while it runs."""
+        """Return the exit code; None while the process is running."""
 
     def wait(self, timeout: float | None = None) -> int:
-        """Wait and return the exit code. Raises `subprocess.TimeoutExpired`."""
+        """Wait for the process to exit and return its exit code. Raises `subprocess.TimeoutExpired`."""
 
     def terminate(self) -> None:
-        """Ask the process to end."""
+        """Ask the process to exit."""
 
     def kill(self) -> None:
         """Kill the process."""
 
 
 StartProcess = Callable[[Sequence[str], Mapping[str, str], IO[bytes]], Process]
-"""Starts a command in an environment; its output is written to the file. Raises OSError."""
+"""Starts a command with an environment; its output is written to the file. Raises OSError."""
 
 
 def start_process(command: Sequence[str], environment: Mapping[str, str], log: IO[bytes]) -> Process:
-    """Start a process of the operating system (see `StartProcess`)."""
+    """Start a process of the operating system. The default `StartProcess`."""
     return subprocess.Popen(
         command,
         stdin=subprocess.DEVNULL,
@@ -94,7 +94,7 @@ def start_process(command: Sequence[str], environment: Mapping[str, str], log: I
 
 
 class Launcher:
-    """Starts child processes, detects their end, and ends them with the window."""
+    """Starts child processes, detects when they exit, and stops them when the window closes."""
 
     def __init__(
         self,
@@ -138,7 +138,7 @@ class Launcher:
         return tuple(name for name, until in self._starting.items() if now < until)
 
     def came(self, name: str) -> None:
-        """Mark a robot as started."""
+        """Record that a robot has finished starting."""
         self._starting.pop(name, None)
 
     @property
@@ -161,10 +161,11 @@ class Launcher:
         self._master.ensure_running()
 
     def start_virtual_robot(self, name: str = "Pepper", model: str = "pepper") -> None:
-        """Start a virtual robot of that name and model unless one is listed, also one of another Studio.
+        """Start a virtual robot with this name and model, unless one with this name is listed.
 
-        The request is kept for some seconds: `follow` starts the robot as soon as it is known that none is
-        listed. If Studio started the master itself, none can be.
+        Robots of other Studios count too. The request stays valid for some seconds, in which `follow` starts
+        the robot as
+        soon as it is known that none is listed. If Studio started the master itself, no robot can be listed.
         """
         now = self._clock()
         self.wanted[name] = model
@@ -216,7 +217,7 @@ class Launcher:
             self.ended -= {name}
 
     def restart_virtual_robot(self, name: str, model: str = "pepper") -> None:
-        """Restart a virtual robot; a process that hangs is killed."""
+        """Restart a virtual robot; a process that doesn't respond is killed."""
         self.wanted[name] = model
         self._requests.pop(name, None)
         with self._lock:
@@ -229,7 +230,7 @@ class Launcher:
         self._start_robot(name, model)
 
     def stop_virtual_robot(self, name: str) -> None:
-        """Stop a virtual robot that was started here and drop its request."""
+        """Stop a virtual robot that was started here, and discard a pending request to start it."""
         self.wanted.pop(name, None)
         self._end_robot(name)
 
@@ -243,7 +244,7 @@ class Launcher:
             held[1].close()
 
     def check(self) -> None:
-        """Detect processes that ended unexpectedly. Called regularly by the session's tick."""
+        """Detect processes that exited unexpectedly. Called at each tick of the session."""
         with self._lock:
             codes = {name: process.poll() for name, (process, _log) in self._robots.items()}
             for name, code in codes.items():
@@ -268,7 +269,7 @@ class Launcher:
                 log.close()
 
     def close(self) -> None:
-        """Stop the virtual robots. The master continues while other programs are registered."""
+        """Stop the virtual robots. The master keeps running while other programs are registered."""
         self._requests.clear()
         for name in list(self._robots):
             self._end_robot(name)
@@ -298,7 +299,7 @@ def _tail(log: IO[bytes]) -> str:
 
 
 class VirtualProcesses:
-    """Identifies processes of virtual robots on this computer; caches results. Not thread-safe."""
+    """Identifies processes of virtual robots on this computer. Caches the results. Not thread-safe."""
 
     def __init__(self, modules: Collection[str], started: Callable[[], Collection[int]] = tuple) -> None:
         self._modules = frozenset(modules)
@@ -306,10 +307,11 @@ class VirtualProcesses:
         self._known: dict[Identity, bool] = {}
 
     def is_ours(self, identity: Identity) -> bool:
-        """Return whether a program is a virtual robot of this Studio or of another one of the same user.
+        """Return True if a program is a virtual robot started by a Studio of this user.
 
-        That is this process, one that it started (or its child, as in a frozen build), or a process of the
-        same user on this computer that runs a virtual robot's module.
+        That is this process, a process that it started (or the child of one, as in a frozen build), or a
+        process of the
+        same user on this computer that runs a module of `VIRTUAL_ROBOTS`.
         """
         if identity.pid is None or identity.host != platform.node():
             return False
@@ -322,7 +324,7 @@ class VirtualProcesses:
         return self._known[identity]
 
     def has_ended(self, identity: Identity) -> bool:
-        """Return whether a program has certainly ended; always False for other computers."""
+        """Return True if a program has certainly exited; always False for programs on other computers."""
         if identity.pid is None or identity.host != platform.node():
             return False
         import psutil  # noqa: PLC0415 (slow import, not needed to show the window)

@@ -1,4 +1,4 @@
-"""Filter of messages by their sender: only those of a robot's own program count."""
+"""Filter for robots' messages that accepts only those sent by the robot's own program."""
 
 from __future__ import annotations
 
@@ -22,10 +22,13 @@ class OwnMessages:
         self.view = GraphView(0, 0)
         """Newest graph."""
         self._lapsed: dict[str, dict[int, Identity]] = {}
-        """Unlisted programs that are still connected, by robot and subscriber id."""
+        """Programs that left the graph but are still connected, by robot and subscriber id."""
 
     def update(self, view: GraphView) -> None:
-        """Apply a new graph; keep programs that left it but are still connected, as they may only hang."""
+        """Apply a new graph.
+
+        Programs that left it are kept while they are connected, as they may only be suspended.
+        """
         before, self.view = self.view, view
         for link in self._links.values() if before.nodes.keys() - view.nodes.keys() else ():
             topic, serving = before.topics.get(link.robot.topics.command), self._serving(link, before)
@@ -45,13 +48,14 @@ class OwnMessages:
 
     @staticmethod
     def topics(robot: Robot) -> set[str]:
-        """Topics on which only the robot's own program counts, if it publishes there."""
+        """Return the topics on which only the robot's own program is accepted, if it publishes there."""
         return {robot.topics.answer, *topics_of(robot)}
 
     def other_programs(self, name: str) -> list[Identity]:
-        """Return programs other than the robot's own that receive its commands and publish its answers.
+        """Return the programs other than the robot's own that receive its commands and publish replies.
 
-        Includes hanging programs while they are connected: they process pending commands when they resume.
+        Includes suspended programs while they are connected, because they process pending commands when they
+        resume.
         """
         link = self._links.get(name)
         if link is None or link.robot.dialect != "native":
@@ -62,7 +66,10 @@ class OwnMessages:
         return listed + [each for id, each in self._lapsed.get(name, {}).items() if id in connected]
 
     def newcomers(self, link: RobotLink, before: GraphView) -> list[Identity]:
-        """Return programs that serve the robot (receive commands, publish replies) but not in ``before``."""
+        """Return the programs that serve the robot now but did not in ``before``.
+
+        A program serves a robot if it receives the robot's commands and publishes replies.
+        """
         if link.robot.dialect != "native":
             return []
         earlier = self._serving(link, before)
@@ -76,9 +83,10 @@ class OwnMessages:
         return [node for node in hearing(view, link.robot.topics.command) if node in answering]
 
     def is_from(self, link: RobotLink, message: Message) -> bool | None:
-        """Return whether the robot's own program sent a message; None while that is unknown.
+        """Return True if the robot's own program sent a message; None while the sender is unknown.
 
-        Robots of RIZE can't be distinguished: any subscriber of their commands or the gateway counts.
+        Programs of RIZE can't be distinguished: True for any subscriber of the robot's commands and for the
+        gateway.
         """
         if link.identity is None and link.robot.dialect == "native":
             return True
@@ -90,9 +98,9 @@ class OwnMessages:
         return None if node is None or link.identity is None else node == link.identity.node_id
 
     def newest(self, link: RobotLink, batch: Batch | None, topic: str) -> Payload | None:
-        """Return the newest message that counts.
+        """Return the payload of the newest valid message.
 
-        Only of the robot's own program if it publishes the topic.
+        If the robot's own program publishes the topic, messages of other programs are ignored.
         """
         if batch is None or not batch.messages:
             return None
@@ -105,7 +113,7 @@ class OwnMessages:
 
 
 def mapping_of(message: Message) -> Payload | None:
-    """Return the payload when it can be decoded and is a mapping, else None."""
+    """Return the payload if it can be decoded and is a mapping, else None."""
     try:
         value = message.payload
     except NepError:

@@ -1,4 +1,4 @@
-"""State of one robot in Studio, and the user's manual actions on it."""
+"""State of one robot as known to Studio, and the user's manual invocations of its actions."""
 
 from __future__ import annotations
 
@@ -18,8 +18,7 @@ SENDER = "studio"
 """Sender id of manual commands."""
 TRIES_KEPT = 40
 MAX_AWAY = 200
-"""Maximum number of disconnected robots that are kept; a whole room may disconnect when its access point
-fails."""
+"""Maximum number of disconnected robots in the list; all robots of a room may disconnect together."""
 NOT_STOPPED = "not stopped"
 CONNECTING = "connecting"
 STOPPING = "stopping"
@@ -33,17 +32,21 @@ STATE_WORDS = {
     "busy": lazy("busy"),
     "ready": lazy("ready"),
 }
-"""Label of each `RobotLink.state`."""
+"""Text for each value of `RobotLink.state`."""
 
 Payload = Mapping[str, object]
 
 
 @dataclass(slots=True, eq=False)
 class Invocation:
-    """Manual invocation of an action; its state is the robot's reply (``sent`` until the first one).
+    """Manual invocation of an action.
 
-    While ``accepted``, it may wait for the actions ``waits_for``; it ended those in ``replaces``.
-    ``timeout_s`` counts from the start of execution. ``at_s`` is the time of day (epoch seconds).
+    Attributes:
+        state: State in the robot's last reply; "sent" before the first one.
+        waits_for: Actions that must end before this one starts, while the state is "accepted".
+        replaces: Actions that were cancelled by this one.
+        timeout_s: Time limit, from the start of execution; None for no limit.
+        at_s: Time of sending in seconds since 1970.
     """
 
     id: str
@@ -71,7 +74,7 @@ class Invocation:
 
     @property
     def running(self) -> bool:
-        """True if the robot has not finished it."""
+        """True if the robot has not reported the end of the action."""
         return self.state not in FINAL_STATES
 
     @property
@@ -82,21 +85,28 @@ class Invocation:
 
 @dataclass(slots=True, eq=False)
 class RobotLink:
-    """State of one robot.
+    """State of one robot as known to Studio.
 
-    ``values`` has the newest value of each sensor while it is watched; ``tried`` the last manual invocations,
-    newest last. ``mute`` is whether it did not reply to a command. ``heard_s`` is the time of its last reply
-    or of the last command, ``answered_s`` of its last reply, ``gone_s`` of its disconnection.
-
-    Empty while all is well: ``not_stopped`` is why the last Stop is not confirmed ("Arm may still move: the
-    brake does not answer"), ``goes_on`` the robot's own report of actions that it could not end, ``may_move``
-    that it received a command and no longer replies (`MovedRobots`). ``stop_began_s`` is the time of an
-    unanswered Stop, ``stopping`` whether it lasts long enough to be shown. ``is_reached`` is whether a Stop
-    would arrive now.
-
-    ``identity`` is its program, ``topics_before`` are the topics of earlier descriptions. ``rejected`` counts
-    messages that its driver rejected, ``errors`` exceptions that it caught. ``was_real`` is whether it was
-    ever not virtual, ``has_proven_stop`` whether its program ever confirmed a Stop.
+    Attributes:
+        values: Newest value of each sensor while it is watched.
+        tried: Last manual invocations, newest last.
+        mute: True if the robot did not reply to a command.
+        heard_s: Time of its last reply or of the last command to it, whichever is later.
+        answered_s: Time of its last reply.
+        gone_s: Time of its disconnection.
+        not_stopped: Why the last Stop is not confirmed ("Arm may still move: the brake does not answer"); ""
+            if it is.
+        goes_on: The robot's own report of actions that it could not end; "" if there is none.
+        may_move: Why the robot may be moving although it doesn't reply (`MovedRobots`); "" otherwise.
+        has_proven_stop: True if its program has ever confirmed a Stop.
+        stop_began_s: Time of a Stop without a reply yet.
+        stopping: True if such a Stop takes long enough to be shown.
+        is_reached: True if a Stop would reach the robot now.
+        identity: Program of the robot.
+        topics_before: Topics of its earlier descriptions.
+        rejected: Number of messages that its driver rejected.
+        errors: Number of exceptions that its driver caught.
+        was_real: True if the robot was not virtual at any time.
     """
 
     name: str
@@ -132,19 +142,20 @@ class RobotLink:
 
     @property
     def virtual(self) -> bool:
-        """True if it exists only on this computer."""
+        """True if the robot is simulated on this computer."""
         return self.robot.virtual
 
     @property
     def can_confirm_stop(self) -> bool:
-        """True if it confirms a Stop; robots of RIZE don't."""
+        """True if the robot confirms a Stop; robots of RIZE don't."""
         return self.robot.safe_stop.confirmed
 
     @property
     def state(self) -> str:
-        """One of ``not stopped``, ``stopping``, ``away``, ``connecting``, ``silent``, ``busy`` and ``ready``.
+        """One of "not stopped", "stopping", "away", "connecting", "silent", "busy" and "ready".
 
-        A disconnected robot that has not stopped, or not replied yet, may still move.
+        A disconnected robot whose Stop is not confirmed, or that stopped replying after a command, may still
+        move.
         """
         if self.not_stopped or self.may_move or (self.connected and self.goes_on):
             return NOT_STOPPED
@@ -166,7 +177,7 @@ class RobotLink:
 
     @property
     def state_words(self) -> str:
-        """State in words: ``ready``, ``may still move``, ``does not answer``."""
+        """State in words, such as "ready" or "may still move"."""
         state = self.state
         if self.connected and self.mute and state == NOT_STOPPED and not self.not_stopped:
             return _("not responding")
@@ -180,16 +191,19 @@ class RobotLink:
 
     @property
     def chip(self) -> str:
-        """Label of its chip: ``virtual, ready``."""
+        """Text of the robot's chip, such as "virtual, ready"."""
         words = self.state_words
         return _("virtual, {state}").format(state=words) if self.virtual else words
 
 
 def excess_away(links: Iterable[RobotLink], in_use: Collection[str]) -> Sequence[RobotLink]:
-    """Return the robots to evict: disconnected ones beyond `MAX_AWAY`, as any program can invent new names.
+    """Return the robots to remove from the list: disconnected ones beyond `MAX_AWAY`.
 
-    Robots that never replied come first, then those disconnected longest. Robots ``in_use``, robots that ever
-    confirmed a Stop, and robots whose Stop is pending or failed are neither counted nor returned.
+    The limit is needed because any program can invent new names. Robots that never replied come first, then
+    those
+    disconnected longest. Robots ``in_use``, robots that ever confirmed a Stop, and robots whose Stop is
+    pending or
+    failed are neither counted nor returned.
     """
     away = [
         link

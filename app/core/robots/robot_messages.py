@@ -16,13 +16,13 @@ from nep.i18n import _
 from nep.messages.message import Message
 
 MAX_HELD = 64
-"""Maximum number of held replies of a publisher that the graph does not list yet."""
+"""Maximum number of stored replies of a publisher that the graph does not list yet."""
 
 
 class RobotMessages:
-    """Updates robots from messages of their own programs. Not thread-safe: use it from the window's thread.
+    """Applies messages of robots' own programs. Not thread-safe: use it from the window's thread.
 
-    Replies of publishers that the graph does not list yet are held until the next graph.
+    Replies of publishers that the graph does not list yet are stored until the next graph.
     """
 
     def __init__(
@@ -33,7 +33,7 @@ class RobotMessages:
         self._settled: dict[str, None] = {}
 
     def read(self, link: RobotLink, batches: Mapping[str, Batch]) -> None:
-        """Apply a robot's replies, newest sensor values and drawing from ``batches`` by topic."""
+        """Apply the replies, newest sensor values and drawing of a robot. ``batches`` is by topic."""
         answers = batches.get(link.robot.topics.answer)
         for message in answers.messages if answers is not None else ():
             is_own = self._own.is_from(link, message)
@@ -51,7 +51,7 @@ class RobotMessages:
         link.drawing = self._own.newest(link, batches.get(topic), topic) or link.drawing
 
     def release_held(self, links: Mapping[str, RobotLink]) -> None:
-        """Apply held replies whose publishers the new graph lists; discard the others."""
+        """Apply the stored replies whose publishers the new graph lists; discard the others."""
         held, self._held = self._held, {}
         for name, messages in held.items():
             link = links.get(name)
@@ -60,11 +60,11 @@ class RobotMessages:
                     self._answer(link, message)
 
     def forget(self, name: str) -> None:
-        """Discard the held replies of a robot."""
+        """Discard the stored replies of a robot."""
         self._held.pop(name, None)
 
     def take_settled(self) -> tuple[str, ...]:
-        """Return and clear the robots with an unconfirmed Stop that now report the end of every action."""
+        """Return and clear the robots without a confirmed Stop that have since ended all actions."""
         settled, self._settled = tuple(self._settled), {}
         return settled
 

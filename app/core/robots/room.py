@@ -1,4 +1,4 @@
-"""Shared room of the virtual robots: shown, changed and saved by Studio."""
+"""Room shared by the virtual robots, which Studio shows, changes and saves."""
 
 from __future__ import annotations
 
@@ -26,9 +26,9 @@ NO_ROOM = lazy("can't share the room of the virtual robots: {error}")
 
 
 class SessionRoom:
-    """Room shared by all virtual robots and Studios of the network. Not thread-safe: window's thread only.
+    """Room shared by all virtual robots and Studios of the network.
 
-    It is joined when the first robot appears.
+    Joined when the first robot appears. Not thread-safe: use it from the window's thread.
     """
 
     def __init__(
@@ -64,7 +64,7 @@ class SessionRoom:
     # -- commands of the user -------------------------------------------------------------------------
 
     def move(self, name: str, x: float, y: float, robots: Mapping[str, tuple[float, float, float]]) -> bool:
-        """Move a thing, within the walls; return False when a robot (x, y, radius) is in the way."""
+        """Move an object within the walls; return False if a robot (x, y, radius) is in the way."""
         moved = self.room.moved(name, x, y).thing(name)
         for there in robots.values():
             if isinstance(moved, (Box, Person)) and _touches(moved, *there):
@@ -72,13 +72,13 @@ class SessionRoom:
         return self._publish() if self._map.move(name, x, y) else False
 
     def add(self, kind: str, x: float, y: float) -> str | None:
-        """Add a thing; return its name, or None when the limit is reached."""
+        """Add an object; return its name, or None if the limit is reached."""
         name = self._map.add(kind, x, y)
         self._publish()
         return name
 
     def remove(self, name: str) -> bool:
-        """Remove a thing; return False when it doesn't exist."""
+        """Remove an object; return False if it doesn't exist."""
         return self._publish() if self._map.remove(name) else False
 
     def put_back(self) -> None:
@@ -89,7 +89,7 @@ class SessionRoom:
     # -- input from the session -----------------------------------------------------------------------
 
     def update(self, view: GraphView) -> None:
-        """Apply a new graph; join the room when a robot is in it."""
+        """Apply a new graph; join the room as soon as a robot has published it."""
         if self._watch is not None or TOPIC not in view.topics:
             return
         self._watch = self._watches.open([TOPIC])
@@ -101,7 +101,7 @@ class SessionRoom:
         self._published_revision = -1  # the robots don't know the saved room
 
     def add_messages(self, batches: Mapping[str, Batch]) -> None:
-        """Merge changes that others published."""
+        """Apply changes of the room that other programs published."""
         batch = batches.get(TOPIC)
         for message in batch.messages if batch is not None else ():
             try:
@@ -125,7 +125,7 @@ class SessionRoom:
                 self._publish()
 
     def save(self) -> None:
-        """Save the room for the next start; errors are reported by the settings."""
+        """Save the room for the next start; the settings report errors."""
         if self._map.revision != self._saved_revision:
             self._saved_revision = self._map.revision
             with suppress(SettingsError):

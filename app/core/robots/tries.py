@@ -1,4 +1,4 @@
-"""Manual invocations of actions: sent, monitored, and ended with one result."""
+"""Manual invocations of actions, each with exactly one result."""
 
 from __future__ import annotations
 
@@ -14,9 +14,9 @@ from nep.i18n import _, number
 from nep.text import bounded_str
 
 FIRST_ANSWER_S = 3.0
-"""Timeout of the first reply to a command."""
+"""Time limit for the first reply to a command."""
 GRACE_S = 0.5
-"""Delay after the time limit of an action, which the robot enforces itself, before Studio ends it."""
+"""Time after an action's time limit, which the robot should enforce, until Studio ends the invocation."""
 BEATS_MISSED = 4
 MIN_SILENCE_S = 2.0
 
@@ -35,7 +35,7 @@ class Tries:
         self._send, self._rest, self._clock, self._wall = send, rest, clock, wall
 
     def begin(self, link: RobotLink, action: Action, input: Payload) -> Invocation:
-        """Send an invocation; it fails immediately if the robot can't be reached."""
+        """Send an invocation. It fails immediately if the robot can't be reached."""
         invocation = Invocation(
             uuid.uuid4().hex,
             action.name,
@@ -58,13 +58,13 @@ class Tries:
         return invocation
 
     def cancel(self, link: RobotLink, action: str) -> None:
-        """Cancel the invocation of an action, unless it has ended."""
+        """Cancel the invocation of an action if it is still running."""
         invocation = link.invocations.get(action)
         if invocation is not None and invocation.running:
             self._send_cancel(link, invocation)
 
     def answer(self, link: RobotLink, answer: Payload) -> None:
-        """Apply a reply of the robot; replies to other programs only show that it is alive."""
+        """Apply a reply of the robot. Replies to other programs only show that the robot responds."""
         link.heard_s = link.answered_s = self._clock()
         link.mute = False
         for invocation in link.running:
@@ -94,7 +94,7 @@ class Tries:
             made.begun_s = self._clock()
 
     def check_timeouts(self, links: Iterable[RobotLink]) -> None:
-        """End invocations of robots that stopped replying, and those beyond their time limit."""
+        """End invocations of robots that don't reply, and those that exceed their time limit."""
         now = self._clock()
         for link in links:
             for invocation in link.running:

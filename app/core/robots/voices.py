@@ -1,4 +1,4 @@
-"""Speech and sounds of virtual robots, audible in all of Studio: one voice at a time."""
+"""Speech and sounds of virtual robots on the computer's loudspeaker, one voice at a time."""
 
 from __future__ import annotations
 
@@ -17,21 +17,21 @@ if TYPE_CHECKING:
     from app.core.storage.settings import Settings
 
 SOUND = "robots_heard"
-"""Setting: whether robots are audible."""
+"""Setting: True if robots are audible."""
 ENDED = 0.9
-"""Share of a text after which it counts as finished: a voice may take longer than the speech bubble."""
+"""Share of a text after which it counts as finished, because a voice may be slower than the speech bubble."""
 MAX_WAITING = 4
 PATIENCE_S, PATIENCE_PER_LETTER_S = 10.0, 0.2
-"""Timeout of a voice (base, and per letter), after which its engine counts as hung."""
+"""Time limit of a voice (base, and for each letter), after which the speech engine counts as hung."""
 MAX_NOTES, MAX_S = 32, 10.0
 LOWEST_HZ, HIGHEST_HZ = 20.0, 20_000.0
 
 Notes: TypeAlias = Sequence[tuple[float, float]]
-"""Sequence of tones: frequency in hertz (0 is silence) and duration in seconds."""
+"""Sequence of tones, each with frequency in hertz (0 for a pause) and duration in seconds."""
 
 
 class Speaker(Protocol):
-    """Sound output for robots. Nothing blocks or raises; a computer without sound stays silent."""
+    """Sound output for robots. No method blocks or raises; a computer without sound stays silent."""
 
     @property
     def busy(self) -> bool:
@@ -39,16 +39,16 @@ class Speaker(Protocol):
 
     @property
     def problem(self) -> str:
-        """Sentence why robots are not audible on this computer.
+        """Why robots are not audible on this computer.
 
-        "" when they are, or before the first attempt.
+        "" if they are, or before the first attempt.
         """
 
     def speak(self, words: str, language: str, volume: float) -> None:
-        """Speak a text; ``language`` is a code such as ``en``, ``volume`` from 0 to 1."""
+        """Speak a text. ``language`` is a code such as ``en``; ``volume`` is 0 to 1."""
 
     def play(self, notes: Notes, volume: float) -> None:
-        """Play tones, also while a voice speaks."""
+        """Play tones, even while a voice is speaking."""
 
     def stop_voice(self) -> None:
         """Stop the voice immediately."""
@@ -59,7 +59,7 @@ class Speaker(Protocol):
 
 @dataclass(frozen=True, slots=True)
 class Utterance:
-    """Text that a robot speaks, pending or playing."""
+    """Text to be spoken by a robot, pending or playing."""
 
     robot: str
     words: str
@@ -69,7 +69,7 @@ class Utterance:
 
 @dataclass(frozen=True, slots=True)
 class Heard:
-    """Audible part of a robot's drawing; `played` and `spoken` are progress from 0 to 1."""
+    """Audible part of a robot's drawing. `played` and `spoken` are the progress from 0 to 1."""
 
     speech: str = ""
     spoken: float = 0.0
@@ -81,7 +81,7 @@ class Heard:
 
     @classmethod
     def parse(cls, drawing: Mapping[str, object]) -> Heard:
-        """Parse a drawing; missing and malformed parts are silent."""
+        """Parse a drawing; missing and malformed parts become silence."""
         speech, sound = drawing.get("speech"), drawing.get("sound")
         played = sound if isinstance(sound, Mapping) else {}
         number = played.get("number")
@@ -97,10 +97,11 @@ class Heard:
 
 
 class RobotVoices:
-    """Plays the speech and sounds of virtual robots on its `speaker`, if set.
+    """Plays the speech and sounds of virtual robots on `speaker`, if that is set.
 
-    Not thread-safe: use it from the window's thread. Robots speak one after the other; interrupted speech
-    ends at once.
+    Robots speak one after the other; interrupted speech stops immediately. Not thread-safe: use it from the
+    window's
+    thread.
     """
 
     def __init__(
@@ -129,7 +130,7 @@ class RobotVoices:
         return bool(self._settings.get(SOUND, True))
 
     def switch(self, *, on: bool) -> None:
-        """Make robots audible or not. Raises SettingsError when that can't be saved."""
+        """Make robots audible or silent. Raises SettingsError if the choice can't be saved."""
         try:
             self._settings.set(SOUND, on)
         finally:
@@ -138,7 +139,7 @@ class RobotVoices:
 
     @property
     def problem(self) -> str:
-        """Sentence why robots are not audible, or ""."""
+        """Why robots are not audible, or ""."""
         return self.speaker.problem if self.speaker is not None else ""
 
     @property
@@ -147,7 +148,7 @@ class RobotVoices:
         return self._current
 
     def follow(self) -> None:
-        """Apply what robots say now. Called at every tick."""
+        """Play new speech and sounds of the connected robots. Called at each tick."""
         if self.speaker is None:
             return
         there = {link.name: link for link in self._fleet.connected if _is_heard(link)} if self.on else {}

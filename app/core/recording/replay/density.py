@@ -18,7 +18,7 @@ MAX_MARKS = 2_000
 
 @dataclass(frozen=True, slots=True)
 class Density:
-    """Number of messages of each topic in each of ``buckets`` equal intervals of [``start_ns``, ``end_ns``)."""
+    """Messages of each topic in each of ``buckets`` equal intervals of [``start_ns``, ``end_ns``)."""
 
     start_ns: int
     end_ns: int

@@ -189,7 +189,7 @@ class ReplaySource:
             self.order(f"history {topic}", lambda playback: self._read_history(playback, [topic]))
 
     def forward(self, topics: Collection[str], to: Forward | None) -> None:
-        """Also pass messages of these topics to ``to`` as they are played, except those of a seek."""
+        """Also pass played messages of these topics to ``to``, except the messages delivered by a seek."""
         with self._changed:
             self._sent, self._forward = frozenset(topics), to
         self.order("choose", self._choose)
@@ -202,7 +202,7 @@ class ReplaySource:
         return handed
 
     def end(self) -> None:
-        """Signal the thread to end without waiting."""
+        """Signal the thread to stop, without waiting for it."""
         with self._changed:
             self._closing = True
             self._changed.notify_all()
@@ -210,7 +210,7 @@ class ReplaySource:
 
     @property
     def has_ended(self) -> bool:
-        """True if the thread has ended."""
+        """True if the thread has stopped."""
         return not self._thread.is_alive()
 
     def close(self, timeout_s: float = 5.0) -> None:
@@ -262,7 +262,7 @@ class ReplaySource:
     def turn(self) -> float | None:
         """Apply queued changes and play due messages.
 
-        Return the seconds until the next, None when there is none.
+        Returns the seconds until the next message is due; None if there is none.
         """
         playback = self._playback
         if playback is None:
@@ -417,7 +417,7 @@ class _ClosingError(Exception):
 
 
 def late_of(due: Due, status: PlayerStatus) -> list[float]:
-    """Return the delay of each message in seconds of real time."""
+    """Return the delay of each message, in seconds of real time."""
     return [(status.position_ns - at_ns) / 1e9 / status.speed for at_ns in due.log_ns]
 
 

@@ -1,7 +1,8 @@
 """Spans in a recording: runs of behaviours, and alarms. Read-only.
 
-They are in the recorder's own channels, written by Studio (`app.core.recording.events`; repeatedly in the
-flight recorder), and in the changes of the graph's alerts. Files of other programs, or damaged ones, may
+The spans are stored in the recorder's channels, where Studio writes them (`app.core.recording.events`;
+repeatedly in
+the flight recorder), and in the changes of the graph's alerts. Files of other programs and damaged files may
 contain anything there.
 """
 
@@ -20,10 +21,14 @@ RESULTS = ("ended", "stopped", "failed")
 
 @dataclass(frozen=True, slots=True)
 class RecordedSpan:
-    """Span from ``start_ns`` to ``end_ns``, within the recording; ``is_over`` if it includes the end.
+    """Run or alarm from ``start_ns`` to ``end_ns``, limited to the recording.
 
-    ``name`` is the behaviour, or the alarm's sentence. ``result`` of a run is one of `RESULTS`, "" while
-    unknown; ``words`` gives details. ``topic`` is the alarm's subject, or "".
+    Attributes:
+        name: Name of the behaviour, or the sentence of the alarm.
+        is_over: True if the run or alarm ended within the recording.
+        result: Result of a run, one of `RESULTS`; "" while unknown.
+        words: Details of the result.
+        topic: Topic that the alarm is about, or "".
     """
 
     start_ns: int
@@ -38,7 +43,10 @@ class RecordedSpan:
 
 @dataclass(frozen=True, slots=True)
 class RecordedSpans:
-    """Spans of a recording in order of time, and the number of further ones."""
+    """Spans of a recording in order of time.
+
+    ``left_out`` is the number of further spans that are not included.
+    """
 
     runs: Sequence[RecordedSpan] = ()
     alarms: Sequence[RecordedSpan] = ()
@@ -50,7 +58,7 @@ class RecordedSpans:
 
 
 class _Lane:
-    """Spans by id; the last record of an id counts."""
+    """Spans of one kind by id. A later record of the same id replaces an earlier one."""
 
     def __init__(self, first_ns: int, last_ns: int) -> None:
         self._first_ns, self._last_ns = first_ns, last_ns

@@ -1,4 +1,4 @@
-"""Motion of real robots: the question to the user, the gate before messages, commands of bridges.
+"""Motion of real robots: the question to the user, the gate for messages, and commands of bridges.
 
-The proof that robots have stopped is in `app.core.robots.stop`.
+Proving that robots have stopped is the task of `app.core.robots.stop`.
 """

@@ -1,4 +1,4 @@
-"""Commands that bridges publish for robots, detected in the graph."""
+"""Detection of commands that bridges publish to robots, by means of the graph."""
 
 from __future__ import annotations
 
@@ -10,10 +10,11 @@ from nep.protocol.graph_view import BRIDGES_TOPIC, GraphView
 
 
 class BridgedCommands:
-    """Reports robots that bridges sent commands to. Not thread-safe: use it from the window's thread.
+    """Reports robots that received commands from bridges. Not thread-safe: use it from the window's thread.
 
-    A bridge announces itself on `BRIDGES_TOPIC`. The master counts its messages on a robot's command topic,
-    so the topic need not be subscribed to.
+    A bridge announces itself on `BRIDGES_TOPIC`. The master counts its messages on the command topic of a
+    robot, so that
+    it isn't necessary to subscribe to that topic.
     """
 
     def __init__(self, on_moved: OnMoved) -> None:
@@ -21,7 +22,7 @@ class BridgedCommands:
         self._counts: dict[int, int] = {}
 
     def update(self, view: GraphView, robots: Iterable[Robot]) -> None:
-        """Apply a new graph: report robots that received commands of a bridge since the previous one."""
+        """Apply a new graph; report robots that received commands from a bridge since the last one."""
         known = view.topics.get(BRIDGES_TOPIC)
         bridges = {publisher.node_id for publisher in known.publishers} if known is not None else set()
         counts: dict[int, int] = {}

@@ -1,7 +1,9 @@
-"""Gate for all messages that move robots: alarms, library, replays, clicks.
+"""Gate for all messages that move robots: alarms, shelf, replays, clicks.
 
-The window's thread asks the user (`permits`); any thread checks immediately before each message (`refusal`),
-so that a robot that connects meanwhile is not moved. `nep.programs.robots` decides which topics move robots.
+The window's thread asks the user (`MotionGate.permits`). Any thread checks immediately before each message
+(`MotionGate.refusal`), so that a robot that connects in the meantime is not moved. `nep.programs.robots`
+decides
+which topics move robots.
 """
 
 from __future__ import annotations
@@ -23,11 +25,11 @@ _GRAPH_TIMEOUT_S = 0.5
 
 
 class GatedRobots(Protocol):
-    """Information about the robots that the gate needs."""
+    """Information about robots that the gate needs."""
 
     @property
     def moving(self) -> MovingTopics:
-        """Topics that move robots; a new object whenever they change."""
+        """Topics whose messages move robots; a new object whenever they change."""
 
     @property
     def movable(self) -> Iterable[Robot]:
@@ -35,7 +37,7 @@ class GatedRobots(Protocol):
 
     @property
     def described(self) -> frozenset[str]:
-        """Description topics of `movable` robots that were parsed."""
+        """Topics of the descriptions of `movable` robots that were parsed."""
 
 
 class MovableRobots:
@@ -50,7 +52,7 @@ class MovableRobots:
 
     @property
     def movable(self) -> tuple[Robot, ...]:
-        """Robots that can be moved, including disconnected real ones: only their connection may be lost."""
+        """Robots that can be moved, including real ones that lost their connection."""
         return tuple(link.robot for link in self._movable)
 
     @property
@@ -65,7 +67,7 @@ class MovableRobots:
 
     @property
     def moving(self) -> MovingTopics:
-        """Topics that move robots; a new object whenever they change."""
+        """Topics whose messages move robots; a new object whenever they change."""
         links = self._movable
         now = [(link.robot, link.topics_before, link.identity) for link in links]
         described = self.described
@@ -87,8 +89,9 @@ class _Snapshot(NamedTuple):
 class MotionGate:
     """Decides which messages may be published on topics that move robots.
 
-    Use it from the window's thread, except `refusal` and `refusal_now`, which are thread-safe and use the
-    state of the last `follow`.
+    Use it from the window's thread. Only `refusal` and `refusal_now` are thread-safe; they use the state at
+    the time of
+    the last `follow`.
     """
 
     def __init__(self, permission: MotionPermission, robots: GatedRobots) -> None:
@@ -101,17 +104,18 @@ class MotionGate:
         return self._robots.moving.moved_by(topic, msg_type)
 
     def is_permitted(self, topic: str, msg_type: str = "") -> bool:
-        """Return whether a message may be published without asking."""
+        """Return True if a message may be published without asking the user."""
         self.follow()
         return not self.refusal(topic, msg_type)
 
     def permits(
         self, topic: str, go_on: Callable[[], object], msg_type: str = "", *, reason: str = ""
     ) -> bool:
-        """Return whether a message may be published now.
+        """Return True if a message may be published now.
 
-        If not, the user is asked, and `go_on` is called once permitted. `reason` is a sentence for the user
-        about what wants to publish.
+        If not, the user is asked, and ``go_on`` is called if the answer is yes. ``reason`` tells the user
+        which part of
+        Studio wants to publish.
         """
         known = {robot.name: robot for robot in self._robots.movable}
         names = self.moved_by(topic, msg_type)
@@ -122,7 +126,7 @@ class MotionGate:
         return is_permitted
 
     def follow(self) -> None:
-        """Update the state that `refusal` uses: robots and permissions."""
+        """Update the robots and permissions that `refusal` uses."""
         now = self._robots.moving, self._permission.revision
         if now == self._followed_state:
             return
@@ -138,16 +142,18 @@ class MotionGate:
         self._followed_state = now
 
     def refusal(self, topic: str, msg_type: str = "") -> str:
-        """Return why a message may not be published now, or "". Thread-safe."""
+        """Return why a message may not be published now; "" if it may. Thread-safe."""
         known = self._snapshot
         return _refusal_words(
             topic, [name for name in known.moving.moved_by(topic, msg_type) if name not in known.allowed]
         )
 
     def refusal_now(self, node: Node, topic: str, msg_type: str = "") -> str:
-        """Like `refusal`, but query the master first: for the first message to new subscribers.
+        """Check like `refusal`, but get the graph from the master first.
 
-        Thread-safe; waits for the master at most 0.5 s.
+        For the first message to new subscribers.
+
+        Thread-safe. Waits at most 0.5 s for the master.
         """
         refusal = self.refusal(topic, msg_type)
         if refusal:

@@ -1,8 +1,10 @@
 """Motion permission: the user is asked once for each real robot before it first moves.
 
-Virtual robots need no permission if Studio knows their programs (`app.core.robots.launcher`). Everything that
-makes a robot act passes here: forms, palette, keys and programs, also those that publish on a robot's topics.
-Stop doesn't. A permission is valid for the robot's current program; *always* for its name, model, program and
+Virtual robots need no permission if Studio knows their programs (`app.core.robots.launcher`). All ways to
+make a
+robot act are checked here: forms, palette, keys and programs, including programs that publish on a robot's
+topics.
+Stop is not. A permission is valid for the robot's current program; *always* for its name, model, program and
 computer.
 """
 
@@ -24,7 +26,7 @@ MAX_NAMED = 4
 
 
 class MayNotMoveError(AppError):
-    """These robots have no permission to move yet; the question is open."""
+    """Raised when robots have no permission to move yet and the user is being asked."""
 
     def __init__(self, names: Sequence[str]) -> None:
         self.names = tuple(names)
@@ -35,10 +37,13 @@ class MayNotMoveError(AppError):
 
 @dataclass(frozen=True)
 class Question:
-    """Question whether robots may move. ``moves`` has the titles of the moving actions by robot.
+    """Question to the user whether robots may move.
 
-    ``strangers`` would move too: names of robots without a readable description, or topics of unknown robots.
-    ``reason`` is a sentence about the origin, or "" for the user's own command.
+    Attributes:
+        moves: Titles of the actions that move a robot, by robot.
+        go_on: Called if the user allows the motion.
+        strangers: Robots without a readable description, or topics of unknown robots, that would move too.
+        reason: Sentence about the origin of the command, or "" for a command of the user.
     """
 
     moves: Mapping[str, tuple[str, ...]]
@@ -48,12 +53,12 @@ class Question:
 
     @property
     def names(self) -> tuple[str, ...]:
-        """Names of all robots, for people."""
+        """Display names of all robots in the question."""
         return (*self.moves, *map(_stranger, self.strangers))
 
     @property
     def title(self) -> str:
-        """Title: "Let Rover move?"."""
+        """Title, such as "Allow Rover to move?"."""
         return _("Allow {robots} to move?").format(robots=listed(list(self.names)))
 
     @property
@@ -87,14 +92,14 @@ class MotionPermission:
         self._settings, self._identity_of = settings, identity_of
         self._allowed: set[str] = set()
         self.strangers: frozenset[str] = frozenset()
-        """Permitted robots without a readable description, and topics of permitted unknown robots."""
+        """Allowed robots without a readable description, and topics of unknown robots that were allowed."""
         self._asked: tuple[tuple[str, str], ...] = ()
         self.question: Question | None = None
         """Open question, or None."""
         self.revision = 0
 
     def allowed(self, robot: Robot) -> bool:
-        """Return whether this robot may move without asking."""
+        """Return True if this robot may move without asking the user."""
         return (
             robot.virtual
             or self._program_key(robot) in self._allowed
@@ -108,9 +113,9 @@ class MotionPermission:
         strangers: Iterable[str] = (),
         reason: str = "",
     ) -> bool:
-        """Return whether these robots may perform these actions now, and ``strangers`` any (see `Question`).
+        """Return True if these robots may perform these actions now, and ``strangers`` any action.
 
-        If not, the question is opened, and `go_on` is called once permitted.
+        If not, the question is opened, and ``go_on`` is called if the user allows the motion. See `Question`.
         """
         asked = [(robot, risky(robot, actions)) for robot, actions in wanted if not self.allowed(robot)]
         open_ = [(robot, moves) for robot, moves in asked if moves]
@@ -123,7 +128,10 @@ class MotionPermission:
         return False
 
     def answer(self, *, let: bool, always: bool = False) -> None:
-        """Apply the user's answer; a yes calls `go_on`. Raises SettingsError if *always* can't be saved."""
+        """Apply the user's answer; if it is yes, call ``go_on``.
+
+        Raises SettingsError if *always* can't be saved.
+        """
         question, self.question = self.question, None
         self.revision += 1
         if question is None or not let:
@@ -139,7 +147,7 @@ class MotionPermission:
             question.go_on()
 
     def withdraw(self) -> None:
-        """Withdraw the question (Stop was pressed, the robot disconnected)."""
+        """Close the question without an answer, because Stop was pressed or the robot disconnected."""
         if self.question is not None:
             self.question = None
             self.revision += 1
@@ -172,7 +180,7 @@ def _stranger(name: str) -> str:
 
 
 def risky(robot: Robot, actions: Iterable[str]) -> tuple[str, ...]:
-    """Return the titles of the actions that move the robot, unique; of many only the first."""
+    """Return the titles of the actions that move the robot, without duplicates; at most the first few."""
     found = [action.title for name in actions if (action := robot.action(name)) is not None and action.risk]
     titles = [f"“{title}”" for title in dict.fromkeys(found)]
     return (
@@ -181,7 +189,10 @@ def risky(robot: Robot, actions: Iterable[str]) -> tuple[str, ...]:
 
 
 def wanted_by(program: Program, robots: Iterable[Robot]) -> list[tuple[Robot, Sequence[str]]]:
-    """Return the actions that a program requests of each robot; all of them if it publishes to the robot."""
+    """Return the actions of each robot that a program invokes.
+
+    All actions if it publishes to the robot directly.
+    """
     asked, moved = program.actions, program.moves
     return [
         (

@@ -1,4 +1,4 @@
-"""Stop: recipients, required confirmations, proof, and the robots that may still move.
+"""Stop: recipients, required confirmations, proof, and robots that may still move.
 
-The question before a robot moves is in `app.core.robots.motion`.
+Asking the user before a robot moves is the task of `app.core.robots.motion`.
 """

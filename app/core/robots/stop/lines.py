@@ -1,4 +1,4 @@
-"""Connections for Stop: command and reply topics of a robot's present and earlier descriptions."""
+"""Connections for Stop: command and reply topics of a robot's current and earlier descriptions."""
 
 from __future__ import annotations
 
@@ -13,11 +13,11 @@ from nep.messages.message import Message
 from nep.protocol.graph_view import GraphView
 
 MAX_TOPICS = 32
-"""Maximum number of command topics of one robot: the present ones, then those of earlier descriptions."""
+"""Maximum number of command topics of one robot: current ones first, then those of earlier descriptions."""
 
 
 class StopPublisher(Protocol):
-    """Methods of nep's publisher that are used here."""
+    """Part of the interface of nep's publisher that is used here."""
 
     @property
     def subscribers(self) -> int:
@@ -30,7 +30,7 @@ class StopPublisher(Protocol):
         ...
 
     def publish(self, payload: object) -> None:
-        """Send one message."""
+        """Publish one message."""
         ...
 
     def close(self) -> None:
@@ -39,7 +39,7 @@ class StopPublisher(Protocol):
 
 
 class StopSubscriber(Protocol):
-    """Methods of nep's subscriber that are used here."""
+    """Part of the interface of nep's subscriber that is used here."""
 
     def close(self) -> None:
         """Close the subscriber."""
@@ -47,18 +47,18 @@ class StopSubscriber(Protocol):
 
 
 class StopNode(Protocol):
-    """Methods of nep's node that are used here."""
+    """Part of the interface of nep's node that is used here."""
 
     id: str
 
     def new_pub(self, topic: str, msg_type: str = "json", *, batch: bool) -> StopPublisher:
-        """Return a publisher; without `batch` no message waits for another."""
+        """Open a publisher. Without ``batch``, each message is sent immediately."""
         ...
 
     def new_sub(
         self, topic: str, msg_type: str = "json", *, sink: Callable[[Sequence[Message]], None]
     ) -> StopSubscriber:
-        """Return a subscriber that passes messages to `sink` in the node's thread."""
+        """Open a subscriber that passes messages to ``sink`` in the node's thread."""
         ...
 
     def graph(self, timeout_s: float = 2.0) -> GraphView:
@@ -70,9 +70,12 @@ class StopNode(Protocol):
 class StopTarget:
     """Robot to be stopped.
 
-    ``identity`` is its program (None: the first that announced it), ``earlier`` are programs of this name
-    that may still run and move it, ``topics`` are those of earlier descriptions. A robot that is not
-    ``is_expected`` receives the Stop in case it is still subscribed, but its reply is not awaited.
+    Attributes:
+        identity: Program of the robot; None means the first program that announced it.
+        earlier: Earlier programs with the robot's name that may still be running and move it.
+        topics: Topics of earlier descriptions.
+        is_expected: False if the reply is not awaited; the Stop is sent in case the robot is still
+            subscribed.
     """
 
     robot: Robot
@@ -83,13 +86,13 @@ class StopTarget:
 
     @property
     def ways(self) -> tuple[RobotTopics, ...]:
-        """Topics for the Stop: those of its description, then those of earlier ones."""
+        """Topics for the Stop: those of the current description, then those of earlier ones."""
         return tuple(dict.fromkeys((self.robot.topics, *self.topics)))[:MAX_TOPICS]
 
 
 @dataclass
 class StopWay:
-    """Command topic of one robot and the subscription to its replies."""
+    """Publisher for one command topic of a robot, and the subscriber to the replies."""
 
     topic: str
     publisher: StopPublisher
@@ -97,9 +100,9 @@ class StopWay:
     was_connected: bool = False
 
     def is_connected(self, target: StopTarget, hearers: Collection[str]) -> bool:
-        """Return whether a message published now reaches the robot; ``hearers`` are the subscribed nodes.
+        """Return True if a message published now would reach the robot; ``hearers`` are the subscribed nodes.
 
-        Robots of RIZE can't be distinguished on their common topic and count as connected.
+        Robots of RIZE share one topic and can't be distinguished; they count as connected.
         """
         program = target.identity
         if self.subscriber is None or program is None:
@@ -122,7 +125,7 @@ class StopWay:
 
 @dataclass
 class StopLine:
-    """Connections to one robot; ``error`` is why one of them is missing."""
+    """Connections to one robot; ``error`` is the reason why one of them could not be opened."""
 
     target: StopTarget
     ways: dict[RobotTopics, StopWay] = field(default_factory=dict)
@@ -135,7 +138,7 @@ class StopLine:
 
     @property
     def answers(self) -> set[str]:
-        """Topics of its replies."""
+        """Topics of the robot's replies."""
         return {way.answer for way in self.target.ways}
 
     @property
@@ -145,13 +148,13 @@ class StopLine:
 
     @property
     def unconnected(self) -> str:
-        """Sentence why it can't have received anything; empty once a connection was established."""
+        """Why the robot can't have received anything; "" once a connection was established."""
         if any(way.was_connected for way in self.ways.values()):
             return ""
         return _("{robot} is not connected yet").format(robot=self.name)
 
     @property
     def untold(self) -> str:
-        """Sentence why the Stop can't be sent to the robot."""
+        """Why the Stop can't be sent to the robot."""
         why = self.error or _("not connected yet; press Stop again")
         return _("Stop can't be sent to {robot}: {why}").format(robot=self.name, why=why)

@@ -1,9 +1,11 @@
 """Robots that received a command and have not been proven to stand still since.
 
-`MovedRobots` decides which robots a Stop must name. A robot is entered before any message that moves it is
-sent. It is removed when its own program confirms a Stop, when its own final reply ends the motion, or when
-the user confirms that it has stopped. Freezing, crashing, leaving the graph and returning as another program
-do not remove it (docs/adr/0030-moved-robots.md).
+`MovedRobots` decides which robots a Stop must report. A robot is recorded before any message that moves it is
+sent. It is
+removed when its own program confirms a Stop, when its own final reply ends the motion, or when the user
+confirms that
+it has stopped. Being suspended, crashing, leaving the graph and returning as another program do not remove it
+(docs/adr/0030-moved-robots.md).
 """
 
 from __future__ import annotations
@@ -18,11 +20,11 @@ from app.robots.identity import Identity
 from nep.i18n import _, lazy
 
 OnMoved: TypeAlias = Callable[[Sequence[str], str], object]
-"""Called before a message is sent, with the robots that it moves and the kind of its sender."""
+"""Called before a message is sent, with the robots that it moves and the kind of the sender."""
 UNKNOWN: tuple[str, str] = ("action", "stop")
-"""Entries without a known sender: an action that the robot could not end, or an unproven Stop."""
+"""Kinds of motions without a known sender: an action that the robot could not end, and an unproven Stop."""
 MAX_MOTIONS = 64
-"""Limit of motions of one robot that are tracked by id; further ones end only with a Stop."""
+"""Maximum number of motions of one robot that are tracked by id; further ones end only with a Stop."""
 
 _SENTENCES = {
     "form": lazy("{robot} received a command from a form and has not responded since"),
@@ -37,20 +39,24 @@ _SENTENCES = {
     "action": lazy("{robot} could not end an action and has not responded since"),
     "stop": lazy("{robot} has not confirmed Stop"),
 }
-"""Sentences by kind of sender; `_OTHER` for unknown kinds."""
+"""Reason for each kind of sender; `_OTHER` is used for unknown kinds."""
 _OTHER = lazy("{robot} received a command and has not responded since")
 
 
 def ignore_moved(_names: Sequence[str], _by: str) -> None:
-    """Ignore the motion; the default `OnMoved`."""
+    """Do nothing; the default `OnMoved`."""
 
 
 @dataclass(frozen=True, slots=True)
 class UnprovenMotion:
     """Command to a robot whose end has not been observed.
 
-    ``number`` counts all motions, ``since_s`` is monotonic, ``program`` is the robot's program at that time.
-    ``id`` is the id of the invocation, or empty if its end can't be observed.
+    Attributes:
+        number: Running number of all motions.
+        by: Kind of sender.
+        since_s: Time of the command (monotonic seconds).
+        program: Program of the robot at that time.
+        id: Id of the invocation; "" if its end can't be observed.
     """
 
     number: int
@@ -67,12 +73,12 @@ class UnprovenMotion:
 
     @property
     def sentence(self) -> str:
-        """Reason why the robot may still move, without a full stop."""
+        """Reason why the robot may still move, as a sentence without a full stop."""
         return _(_SENTENCES.get(self.by, _OTHER)).format(robot=self.robot)
 
 
 class MovedRobots:
-    """Ledger of robots that may move. Not thread-safe: use it from the window's thread."""
+    """Record of the robots that may move. Not thread-safe: use it from the window's thread."""
 
     def __init__(
         self,
@@ -87,32 +93,32 @@ class MovedRobots:
         self._motions: dict[str, list[UnprovenMotion]] = {}
         self._count = 0
         self._sent: dict[str, UnprovenMotion] = {}
-        """Newest command to each robot since the graph before the last one."""
+        """Newest command to each robot, as far as sent since the last but one graph."""
         self._proven: dict[str, int] = {}
-        """Marks of Stops proven by programs since then, by node id."""
+        """Value of `mark` at each proven Stop since the last but one graph, by node id of the program."""
         self._graph_mark = 0
-        """`mark` at the newest graph."""
+        """Value of `mark` when the newest graph arrived."""
 
     def __contains__(self, name: object) -> bool:
         return name in self._motions
 
     @property
     def names(self) -> tuple[str, ...]:
-        """Names of robots that may move, in the order of their commands."""
+        """Names of the robots that may move, in the order of their commands."""
         return tuple(self._motions)
 
     @property
     def mark(self) -> int:
-        """Number of the newest motion. A Stop that begins now does not apply to later ones."""
+        """Number of the newest motion. A Stop that starts now does not apply to later motions."""
         return self._count
 
     @property
     def sent_to(self) -> tuple[str, ...]:
-        """Robots with a command since the graph before the last one."""
+        """Robots that received a command since the last but one graph."""
         return tuple(self._sent)
 
     def motion(self, name: str) -> UnprovenMotion | None:
-        """Return the newest motion of a robot, or None if the robot is not in the ledger.
+        """Return the newest motion of a robot; None if the robot isn't recorded.
 
         Motions with a known sender take precedence over unfinished actions and unproven Stops.
         """
@@ -121,7 +127,10 @@ class MovedRobots:
         return known[-1] if known else None
 
     def other_programs(self, name: str, current: Identity | None) -> tuple[Identity, ...]:
-        """Return programs other than ``current`` that received commands of a robot and may still run."""
+        """Return other programs that received commands of a robot and may still be running.
+
+        ``current`` is the robot's own program.
+        """
         others = {
             motion.program.node_id: motion.program
             for motion in self._motions.get(name, ())
@@ -132,13 +141,13 @@ class MovedRobots:
         return tuple(others.values())
 
     def note(self, names: Iterable[str], by: str, *, id: str = "", program: Identity | None = None) -> None:
-        """Enter robots into the ledger; call this before the command is sent.
+        """Record that robots are about to receive a command that may move them; call this before sending it.
 
         Args:
             names: Names of the robots.
             by: Kind of sender: "form", "behaviour", "shelf", "key", "alarm", "replay", "bridge", ...
-            id: Id of the invocation whose final reply ends the motion; empty if there is none.
-            program: Program of the robot; the current one by default.
+            id: Id of the invocation whose final reply ends the motion; "" if there is none.
+            program: Program of the robot; by default the current one.
         """
         for name in names:
             self._count += 1
@@ -166,11 +175,12 @@ class MovedRobots:
     def take_newcomers(self, newcomers: Mapping[str, Iterable[Identity]]) -> None:
         """Record commands that newly listed programs may have received.
 
-        A program can receive a command before the graph lists it. Call this once per graph. A graph is older
-        than the call, so commands since the graph before the last one count.
+        A program can receive a command before the graph lists it. Call this once for each graph. A graph is
+        older than the
+        call, so commands since the last but one graph count.
 
         Args:
-            newcomers: New programs by robot, for robots in `sent_to`.
+            newcomers: New programs of each robot in `sent_to`.
         """
         for name, programs in newcomers.items():
             sent, found = self._sent[name], self._motions.get(name, [])
@@ -186,7 +196,10 @@ class MovedRobots:
         self._proven = {node: mark for node, mark in self._proven.items() if mark > last}
 
     def ended(self, name: str, id: str, program: Identity | None = None) -> None:
-        """Apply a final reply of a robot's program, which ends the motion for this program."""
+        """End a motion, because a program of the robot sent the final reply.
+
+        Only this program's motion ends.
+        """
 
         def stays(motion: UnprovenMotion) -> bool:
             if motion.id != id or program is None or motion.program is None:
@@ -197,9 +210,12 @@ class MovedRobots:
             self._retain(name, stays)
 
     def stood_still(self, name: str, programs: Collection[str], mark: int) -> None:
-        """End the motions of programs, by node id, that confirmed a Stop which began at ``mark``.
+        """End the motions of programs that confirmed a Stop; motions of other programs remain.
 
-        Motions of other programs that may still run remain.
+        Args:
+            name: Robot.
+            programs: Node ids of the programs.
+            mark: Value of `mark` when the Stop started.
         """
         self._proven |= dict.fromkeys(programs, mark)
         self._retain(
@@ -215,7 +231,7 @@ class MovedRobots:
         )
 
     def apply_report(self, report: StopReport, mark: int) -> None:
-        """Apply the report of a Stop that began at ``mark``: proven and unproven robots."""
+        """Apply the report of a Stop that started at ``mark``, for both proven and unproven robots."""
         self.note((name for name in report.silent if name not in self), "stop")
         for name in report.still:
             self.stood_still(name, report.programs(name), mark)
@@ -223,19 +239,22 @@ class MovedRobots:
             self.note_stop_received(name, mark)
 
     def note_stop_received(self, name: str, mark: int) -> None:
-        """End the motions of a robot that can't confirm (RIZE) and received a stop at ``mark``."""
+        """End the motions of a robot that can't confirm (RIZE) and to which a Stop was sent at ``mark``."""
         self._retain(name, lambda motion: motion.number > mark)
         if name in self._sent and self._sent[name].number <= mark:
             del self._sent[name]
 
     def confirm(self, names: Iterable[str]) -> None:
-        """Remove robots that the user has confirmed to have stopped."""
+        """Remove robots that have stopped according to the user."""
         for name in names:
             self._motions.pop(name, None)
             self._sent.pop(name, None)
 
     def drop_ended(self, name: str) -> None:
-        """Remove motions of ended programs: a virtual robot has stopped once its program has ended."""
+        """End the motions whose programs have exited.
+
+        For virtual robots, which stop when their program exits.
+        """
         self._retain(name, lambda motion: motion.program is None or not self._has_ended(motion.program))
 
     def _retain(self, name: str, stays: Callable[[UnprovenMotion], bool]) -> None:

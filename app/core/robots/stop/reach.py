@@ -1,7 +1,8 @@
-"""Targets of a Stop: robots that are connected, may move, were connected, or are not shown. No sockets.
+"""Targets of a Stop: robots that are connected, may move, were connected, or are not listed. No sockets.
 
-Not shown are robots beyond the limit of the list and those with an invalid description: they are reached at
-the command topics that the graph lists.
+Unlisted are robots beyond the limit of the list and robots with an invalid description. They are reached on
+the
+command topics that the graph lists.
 """
 
 from __future__ import annotations
@@ -16,10 +17,9 @@ from app.robots.identity import hearing, identity_of, publishing
 from nep.protocol.graph_view import GraphView
 
 MAX_UNLISTED = 256
-"""Maximum number of unlisted robots with a connection for Stop; further ones are reported as not reached."""
+"""Maximum number of unlisted robots with connections for Stop; further ones are reported as not reached."""
 MAX_ABSENT = 64
-"""Maximum number of disconnected robots that had replied; they receive a Stop in case they are still
-subscribed."""
+"""Maximum number of disconnected robots that have replied before; a Stop is sent to them as well."""
 _COMMAND, _ANSWER = "robot/command", "robot/answer"
 _STOP = SafeStop("stop", None, 0.0, on_program_end=True, on_disconnect=True, confirmed=True)
 
@@ -27,7 +27,7 @@ _STOP = SafeStop("stop", None, 0.0, on_program_end=True, on_disconnect=True, con
 def targets_of(
     links: Iterable[RobotLink], moved: MovedRobots, unlisted: Sequence[StopTarget]
 ) -> tuple[StopTarget, ...]:
-    """Return the targets of a Stop; replies of disconnected robots that do not move are not awaited."""
+    """Return the targets of a Stop. Replies of disconnected robots that are not moving are not awaited."""
     here, absent = [], []
     for link in links:
         is_expected = link.connected or link.name in moved
@@ -56,9 +56,9 @@ def _bare(name: str, topics: RobotTopics) -> Robot:
 def unlisted_targets(
     view: GraphView, topics: Iterable[str], *, is_expected: bool = True
 ) -> tuple[StopTarget, ...]:
-    """Return the targets of the robots with these description topics.
+    """Return the targets for the robots with these description topics.
 
-    Robots whose command topic has no subscriber are omitted: nothing could be stopped.
+    Robots whose command topic has no subscriber are omitted, because there is nothing to stop.
     """
     wanted = [topic for topic in topics if topic_of(_name_of(topic), "description") == topic]
     if not wanted:

@@ -1,4 +1,4 @@
-"""Result of a Stop for each robot, and its sentences."""
+"""Result of a Stop for each robot, and its description for the user."""
 
 from __future__ import annotations
 
@@ -10,20 +10,25 @@ from nep.i18n import _
 
 STOPPING_SHOWN_AFTER_S = 0.1
 StopStatus = Literal["ok", "off", "error"]
-"""Status of a Stop in the window: the green check is only for ``ok``."""
+"""Status of a Stop in the window; only ``ok`` is shown with a green check mark."""
 
 
 @dataclass(frozen=True)
 class RobotStop:
     """Result of a Stop for one robot.
 
-    ``answered``: its own program confirmed that it has stopped. ``refused``: its program reported that it has
-    not, with the reason in ``error``. ``error`` without ``refused``: the Stop could not be sent.
-    ``can_confirm`` is False for robots that never reply to a Stop (RIZE), and for programs that only
-    subscribe to a robot's commands. ``program`` is the name of another program that serves the robot's
-    commands; ``node`` is the id of the program that replied. ``waits`` is whether replies of other programs
-    of the robot are pending. ``is_pending``: the Stop is sent as soon as the robot is connected;
-    ``waited_ms`` is how long it waited for that.
+    Attributes:
+        answered: True if the robot's own program confirmed that the robot has stopped.
+        can_confirm: False for robots that never reply to a Stop (RIZE), and for programs that only subscribe
+            to a
+            robot's commands.
+        error: Why the robot has not stopped (with `refused`) or why the Stop could not be sent.
+        refused: True if the robot's program reported that the robot has not stopped.
+        program: Name of another program that serves the robot's commands.
+        waits: True if replies of other programs of the robot are pending.
+        node: Id of the node that replied.
+        waited_ms: Time until the robot was connected.
+        is_pending: True if the Stop is sent as soon as the robot is connected.
     """
 
     name: str
@@ -40,12 +45,12 @@ class RobotStop:
 
     @property
     def who(self) -> str:
-        """Name of the robot, with the program if it is not the robot's own."""
+        """Name of the robot, followed by the name of the program if that is not the robot's own."""
         return f"{self.name} (“{self.program}”)" if self.program else self.name
 
     @property
     def wrong(self) -> str:
-        """Problem without a full stop: "Pepper did not answer"; "" when it stopped."""
+        """Problem, without a full stop: "Pepper did not answer"; "" if the robot stopped."""
         if self.answered or not self.can_confirm:
             return ""
         if self.program and self.refused:
@@ -54,7 +59,7 @@ class RobotStop:
 
     @property
     def sentence(self) -> str:
-        """Result in words: "Pepper stopped (41 ms)"."""
+        """Result as a sentence: "Pepper stopped (41 ms)"."""
         if self.answered and self.waited_ms:
             words = _("{robot} stopped ({elapsed} ms; it was not connected for {waited} ms of them)")
             return words.format(
@@ -72,15 +77,17 @@ class RobotStop:
 
     @property
     def status(self) -> StopStatus:
-        """Status: ``ok`` when confirmed, ``off`` when it can't confirm, else ``error``."""
+        """``ok`` if confirmed, ``off`` if the robot can't confirm, else ``error``."""
         return "off" if not self.can_confirm else "ok" if self.answered else "error"
 
 
 @dataclass(frozen=True)
 class StopReport:
-    """Results of all robots; ``elapsed_ms`` is the time from the call to the last reply.
+    """Results of all robots.
 
-    ``strangers`` are other programs that replied in a robot's name, as (robot, program).
+    Attributes:
+        elapsed_ms: Time from the call to the last reply.
+        strangers: Other programs that replied in the name of a robot, as (robot, program).
     """
 
     robots: tuple[RobotStop, ...]
@@ -89,14 +96,14 @@ class StopReport:
 
     @property
     def proven(self) -> bool:
-        """True if there was a robot to stop, and every robot that can confirm has."""
+        """True if there was a robot to stop and every robot that can confirm has confirmed."""
         return bool(self.robots) and not self.unproven
 
     @property
     def status(self) -> StopStatus:
-        """Overall status: ``ok`` only for a complete proof, when every robot itself confirmed.
+        """Overall status: ``ok`` only if every robot has confirmed.
 
-        ``off`` when no robot refused or was silent, but one can't confirm or there was none.
+        ``off`` if no robot refused or failed to reply, but one can't confirm or there was no robot.
         """
         if self.unproven:
             return "error"
@@ -104,17 +111,17 @@ class StopReport:
 
     @property
     def unproven(self) -> tuple[RobotStop, ...]:
-        """Results of robots that had to confirm and did not."""
+        """Results of the robots that should have confirmed and did not."""
         return tuple(robot for robot in self.robots if robot.can_confirm and not robot.answered)
 
     @property
     def silent(self) -> tuple[str, ...]:
-        """Names of robots without a confirmation, unique."""
+        """Names of the robots that did not confirm, without duplicates."""
         return tuple(dict.fromkeys(robot.name for robot in self.unproven))
 
     @property
     def by_name(self) -> Mapping[str, RobotStop]:
-        """Result by robot: the worst of those of its own and other programs."""
+        """Worst result of each robot, among its own program and others."""
         worst: dict[str, RobotStop] = {}
         for robot in self.robots:
             before = worst.get(robot.name)
@@ -123,12 +130,12 @@ class StopReport:
         return worst
 
     def programs(self, name: str) -> frozenset[str]:
-        """Return the node ids of a robot's programs that confirmed."""
+        """Return the node ids of the programs of a robot that confirmed."""
         return frozenset(robot.node for robot in self.robots if robot.name == name and robot.answered)
 
     @property
     def names(self) -> tuple[str, ...]:
-        """Names of the robots, unique."""
+        """Names of the robots, without duplicates."""
         return tuple(dict.fromkeys(robot.name for robot in self.robots))
 
     @property
@@ -139,13 +146,13 @@ class StopReport:
         return tuple(dict.fromkeys(name for name in confirmed if name not in silent))
 
     def with_asked(self, names: Iterable[str], why: str = "") -> StopReport:
-        """Return a report that also has a line for each of these robots that was not reached."""
+        """Return a report extended by a line for each of these robots that was not reached."""
         there = {robot.name for robot in self.robots}
         missing = [not_reached(name, why) for name in dict.fromkeys(names) if name not in there]
         return replace(self, robots=(*self.robots, *missing)) if missing else self
 
     def with_late(self, late: RobotStop) -> StopReport:
-        """Return a report with a late reply."""
+        """Return a report updated by a late reply."""
         lines = ((robot.name, robot.program) for robot in self.robots)
         if (late.name, late.program) not in lines:
             return self
@@ -155,14 +162,14 @@ class StopReport:
 
 
 def not_reached(name: str, why: str = "") -> RobotStop:
-    """Return the result of a robot that the Stop could not be sent to, with the reason."""
+    """Return the result for a robot to which the Stop could not be sent, with the reason."""
     words = _("Stop was not sent to {robot}: {why}") if why else _("Stop was not sent to {robot}")
     return RobotStop(name, False, None, error=words.format(robot=name, why=why))
 
 
 @dataclass(frozen=True, slots=True)
 class StopDone:
-    """The Stop ended: all robots replied or timed out."""
+    """Event: the Stop ended, because all robots replied or timed out."""
 
     number: int
     report: StopReport
@@ -170,7 +177,7 @@ class StopDone:
 
 @dataclass(frozen=True, slots=True)
 class RobotAnswered:
-    """One robot replied while others are pending."""
+    """Event: one robot replied while replies of others are pending."""
 
     number: int
     robot: RobotStop
@@ -178,7 +185,10 @@ class RobotAnswered:
 
 @dataclass(frozen=True, slots=True)
 class OneStopped:
-    """One robot was stopped while nothing ran; the ledger was at ``mark`` (`MovedRobots.mark`)."""
+    """Event: one robot was stopped while no behaviour was running.
+
+    ``mark`` is the value of `MovedRobots.mark` when the Stop started.
+    """
 
     report: StopReport
     mark: int = 0
@@ -186,9 +196,9 @@ class OneStopped:
 
 @dataclass(frozen=True, slots=True)
 class LateAnswer:
-    """A robot replied after the timeout, or confirmed after a refusal.
+    """Event: a robot replied after the timeout, or confirmed after having refused.
 
-    ``number`` is that of the Stop; None for the Stop of one robot, which began at ``mark``.
+    ``number`` is the number of the Stop; None for the Stop of one robot, which started at ``mark``.
     """
 
     number: int | None

@@ -1,4 +1,4 @@
-"""Pending Stop of one robot: the programs that must reply, and their replies. No sockets."""
+"""Pending Stop of one robot: programs that must reply, and their replies. No sockets."""
 
 from __future__ import annotations
 
@@ -13,19 +13,25 @@ from nep.errors import NepError
 from nep.messages.message import Message
 
 MAX_ANSWER_BYTES = 65_536
-"""Maximum size of a reply to a Stop; longer messages are ignored."""
+"""Maximum size of a reply to a Stop; larger messages are ignored."""
 SHOWN_WAIT_MS = 20.0
-"""Shorter waits for the connection are not reported."""
+"""Minimum time until a robot was connected that is reported."""
 
 
 @dataclass
 class StopRequest:
-    """State of a Stop: the programs that serve a robot and their replies, by node.
+    """State of a Stop of one robot.
 
-    ``serving`` is empty until the programs are known. ``unknown`` has replies of publishers that the graph
-    does not list yet, ``foreign`` those of programs that do not serve the robot; they are decoded only once
-    their sender is known. ``delivered`` are the topics on which the command was sent while the robot was
-    connected, the first at ``delivered_s``.
+    Attributes:
+        serving: Reply of each program that serves the robot, by node; None while pending. Empty until the
+            programs are
+            known.
+        unknown: Replies of publishers that the graph does not list yet.
+        foreign: Replies of programs that do not serve the robot. As those in `unknown`, they are decoded only
+            once
+            their sender is known.
+        delivered: Topics on which the command was sent while the robot was connected.
+        delivered_s: Time of the first of these.
     """
 
     line: StopLine
@@ -44,7 +50,7 @@ class StopRequest:
 
     @property
     def is_settled(self) -> bool:
-        """True if no reply is awaited."""
+        """True if no further reply is awaited."""
         return bool(self.error) or self.is_answered
 
     @property
@@ -64,7 +70,7 @@ class StopRequest:
             self.delivered_s = now
 
     def news(self, told: set[tuple[str, str]]) -> list[tuple[str, RobotStop]]:
-        """Return the replies that are not in ``told``, by node."""
+        """Return the replies by node that are not in ``told``."""
         found, waits = self.serving.items(), None in self.serving.values()
         said = [(node, each) for node, each in found if each is not None and (self.id, node) not in told]
         return [(node, replace(each, waits=waits)) for node, each in said]
@@ -83,10 +89,11 @@ class StopRequest:
         ]
 
     def accept(self, node: str, message: Message, now: float, words: Callable[[object], str]) -> bool:
-        """Apply a message of a program that must reply; return whether it changed the result.
+        """Apply a message of a program that must reply; return True if it changed the result.
 
-        A refusal may be followed by a confirmation; nothing else is replaced. ``words`` formats the sentence
-        of a refusal from the robot's error.
+        A refusal may be followed by a confirmation; any other reply is final. ``words`` formats the robot's
+        error as a
+        sentence.
         """
         reply = answer_in(message)
         state = None if reply is None else reply.get("state")
@@ -109,7 +116,7 @@ class StopRequest:
         return True
 
     def impostors(self) -> list[str]:
-        """Return the nodes that replied to this Stop without serving the robot."""
+        """Return the nodes that replied to this Stop although they do not serve the robot."""
         return [
             node
             for node, held in self.foreign.items()
@@ -120,7 +127,7 @@ class StopRequest:
 
 
 def answer_in(message: Message) -> Mapping[str, object] | None:
-    """Return the reply to a Stop in a message, or None if it has none."""
+    """Return the reply to a Stop contained in a message; None if there is none."""
     if message.size_bytes > MAX_ANSWER_BYTES:
         return None
     try:

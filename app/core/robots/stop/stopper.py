@@ -1,7 +1,8 @@
-"""Proven Stop: every robot receives the command, and its own program confirms it or the robot is named.
+"""Proven Stop: each robot receives the command, and its own program confirms it or the robot is reported.
 
-Publishers are opened before anything runs, because connecting at the moment of a Stop may take too long.
-A connection that failed is retried, and its robot is named until then.
+Publishers are opened in advance, because connecting at the moment of a Stop may take too long. A connection
+that
+failed is retried, and its robot is reported until then.
 """
 
 from __future__ import annotations
@@ -38,34 +39,34 @@ _log = logging.getLogger("studio")
 RIZE = "rize"
 NO_NETWORK = lazy("there is no connection to the network yet")
 LATE_REPLY_S = 120.0
-"""Time during which late replies are accepted."""
+"""Time after a Stop during which late replies are accepted."""
 LATE_KEPT = 64
 MAX_SERVING = 32
 """Maximum number of programs of one robot whose replies are awaited."""
 MAX_LISTENING = 4
-"""Maximum number of named programs that only subscribe to a robot's commands."""
+"""Maximum number of reported programs that only subscribe to a robot's commands."""
 POLL_S = 0.02
-"""Interval of checks for a connection."""
+"""Interval at which the state of a connection is checked."""
 GRAPH_POLL_S = 0.1
 """Minimum interval of graph queries while the publisher of a reply is unknown."""
 GRAPH_TIMEOUT_S = 0.3
 _UNKNOWN_PROGRAM = "nobody"
-"""Placeholder for the program of a robot until a graph lists it."""
+"""Placeholder for the program of a robot that no graph lists yet."""
 
 STOP_TIMEOUT_S = 1.0
-"""Timeout of a Stop, unless the robot's description requires a longer one."""
+"""Time limit of a Stop, unless the robot's description requires a longer one."""
 MARGIN_S = 0.5
 MAX_STOP_S = 10.0
 
 
 def patience_s(robots: Iterable[Robot], longest_s: float = MAX_STOP_S) -> float:
-    """Return the timeout for these robots, which is longer than that of their drivers."""
+    """Return the time limit for these robots, which is longer than that of their drivers."""
     needed_s = max((robot.safe_stop.within_s + MARGIN_S for robot in robots), default=0.0)
     return min(longest_s, max(STOP_TIMEOUT_S, needed_s))
 
 
 class RobotStopper:
-    """Keeps connections to all robots and stops them. Thread-safe."""
+    """Maintains connections to all robots and stops them. Thread-safe."""
 
     def __init__(
         self,
@@ -89,7 +90,7 @@ class RobotStopper:
         self._senders = Senders()
 
     def see(self, view: GraphView) -> None:
-        """Apply a new graph, which decides whose replies count and which programs serve a robot."""
+        """Apply a new graph, which determines whose replies count and which programs serve a robot."""
         with self._changed:
             self._view, self._hearers = view, {}
             targets = [line.target for line in self._lines.values()]
@@ -102,9 +103,9 @@ class RobotStopper:
             tell(reply)
 
     def expect(self, targets: Iterable[StopTarget]) -> None:
-        """Announce the current robots without connecting; `set_robots` connects.
+        """Set the current robots without connecting to them yet; `set_robots` connects.
 
-        Later Stops wait for their connections.
+        A Stop waits for the connections.
         """
         with self._changed:
             for target in targets:
@@ -138,22 +139,22 @@ class RobotStopper:
 
     @property
     def robots(self) -> tuple[str, ...]:
-        """Names of robots with a connection."""
+        """Names of the robots with a connection."""
         with self._changed:
             lines = [line for line in self._lines.values() if line.target.is_expected and line.is_whole]
             return tuple(line.name for line in lines)
 
     def reaches(self, name: str) -> bool:
-        """Return whether the robot's program is connected, so that a Stop would arrive now."""
+        """Return True if the robot's program is connected, so that a Stop would arrive now."""
         with self._changed:
             line = self._lines.get(name)
             way = None if line is None else line.ways.get(line.target.robot.topics)
             return line is not None and way is not None and self._is_connected_locked(line, way)
 
     def deliver(self) -> None:
-        """Send pending Stops to robots that have connected since. Call it at each tick.
+        """Send pending Stops to robots that have connected since. Call this at each tick.
 
-        Stops stay pending for `LATE_REPLY_S`.
+        Stops remain pending for `LATE_REPLY_S`.
         """
         with self._changed:
             now = self._clock()
@@ -164,7 +165,7 @@ class RobotStopper:
             self._deliver(each)
 
     def forget_late(self, names: Iterable[str]) -> None:
-        """Discard pending Stops of robots that the user has confirmed to have stopped."""
+        """Discard pending Stops of robots that have stopped according to the user."""
         known = set(names)
         with self._changed:
             for id in [id for id, each in self._asked.items() if each.is_over and each.line.name in known]:
@@ -172,7 +173,7 @@ class RobotStopper:
 
     @property
     def problems(self) -> Mapping[str, str]:
-        """Reasons why robots can't be stopped, by name."""
+        """Reason for each robot that can't be stopped."""
         with self._changed:
             lines = [line for line in self._lines.values() if line.error and line.target.is_expected]
             return {line.name: line.error for line in lines}
@@ -180,8 +181,9 @@ class RobotStopper:
     def send_stop(self, names: Iterable[str] | None = None, ends: str | None = None) -> None:
         """Send a Stop without waiting for replies.
 
-        ``ends`` is the key of a program (`app.robots.identity`), whose further commands robots reject. Robots
-        that don't support it (RIZE) need another Stop after the end of the program.
+        ``ends`` is the key of a program (`app.robots.identity`) whose further commands robots reject. Robots
+        that don't
+        support that (RIZE) need another Stop after the program has ended.
         """
         for line in self._chosen(names):
             self._send(line, _id(), ends)
@@ -198,13 +200,14 @@ class RobotStopper:
         """Stop the robots (``names``, or all) and wait until each has replied.
 
         Args:
-            names: Robots to stop; the report has a line for each, including those that can't be reached.
-            timeout_s: Longest wait; by default as long as the descriptions need, one second at least.
+            names: Robots to stop. The report has a line for each, including those that can't be reached.
+            timeout_s: Maximum wait; by default as long as the descriptions require, at least one second.
             on_answer: Called in this thread with each reply, and at the end for each robot without one.
             ends: As in `send_stop`.
             on_late: Called in the node's thread or in that of `see` when a robot replies after the timeout,
-                or confirms only then that it has stopped.
-            is_for_all: Also send the Stop to robots whose reply is not awaited.
+                or confirms
+                only then that it has stopped.
+            is_for_all: True to send the Stop also to robots whose reply is not awaited.
 
         Returns:
             One result for each robot.
@@ -252,7 +255,7 @@ class RobotStopper:
                 return reported
 
     def close(self) -> None:
-        """Disconnect from all robots without a stop."""
+        """Disconnect from all robots without stopping them."""
         self.set_robots(())
         for maker in self._openers:
             maker.join(timeout=5)
@@ -548,7 +551,7 @@ def report_of(
     ends: str | None = None,
     is_for_all: bool = False,
 ) -> StopReport:
-    """Stop these robots. Always returns a report: without one the run would stay "stopping"."""
+    """Stop these robots and return a report in any case; without one, the run would remain "stopping"."""
     why = _(NO_NETWORK)
     if stopper is not None:
         try:

@@ -1,4 +1,4 @@
-"""Manual acting: saved messages, services to call, and the switch for both.
+"""Manual publishing and calling: stored messages, services to call, and the switch that arms both.
 
 Independent of the window.
 """

@@ -1,7 +1,7 @@
-"""Manual publishing and calling in a session: the shelf, the switch, sending in progress.
+"""Manual publishing and calling in a session: the shelf, the switch, and sending in progress.
 
-Everything goes to the live network. While a recording is shown, nothing can be written or called manually;
-its messages can be sent then (`app.core.recording.replay.sending`).
+All messages go to the live network. While a recording is shown, messages can't be written or services called
+manually, but recorded messages can be sent (`app.core.recording.replay.sending`).
 """
 
 from __future__ import annotations
@@ -61,7 +61,7 @@ class ActingSession(Protocol):
 
 @dataclass(frozen=True, slots=True)
 class ArmQuestion:
-    """Question before messages are sent on a topic that moves these robots."""
+    """Question to the user before messages are sent on a topic that moves these robots."""
 
     topic: str
     robots: tuple[str, ...]
@@ -69,7 +69,7 @@ class ArmQuestion:
 
     @property
     def sentence(self) -> str:
-        """Sentence about the motion, without names if the robots are unknown here."""
+        """Sentence about the motion; robots that Studio doesn't know are not named."""
         template = _("{topic} moves {robots}. Make sure nobody is in the way. Press F12 to stop.")
         if not self.robots:
             template = _("{topic} commands robots. Make sure nobody is in the way. Press F12 to stop.")
@@ -78,7 +78,7 @@ class ArmQuestion:
 
 
 class SessionActing:
-    """Manual acting. Not thread-safe except `disarm`: use it from the window's thread."""
+    """Manual publishing and calling. Not thread-safe, except `disarm`: use it from the window's thread."""
 
     def __init__(
         self,
@@ -93,21 +93,21 @@ class SessionActing:
         """Runs a job with Studio's node on the live network."""
         self.gate = session.fleet.gate
         self.on_moved: OnMoved = ignore_moved
-        """Called with the robots that a message moves and its kind of sender: "shelf", "image" or "replay".
+        """Called with the robots that a message moves, and the kind of sender: "shelf", "image" or "replay".
         """
         self.outbox = Outbox(self.arming, self.submit, clock, self.gate)
         self.calls = ServiceCalls(self.arming, self.submit, clock, clock_s)
         self.recorded_commands: frozenset[str] = frozenset()
-        """Command topics of robots named in a recording; cleared when switched off."""
+        """Command topics of the robots in a recording; cleared when switched off."""
         self.question: ArmQuestion | None = None
-        """Open question before a robot's topic is armed."""
+        """Open question about arming a robot's topic."""
         self.last: dict[str, SendResult] = {}
-        """Last result of each message on the shelf, by message id."""
+        """Result of the last sending of each message on the shelf, by message id."""
         self.armed_s = ARMED_S
         self.revision = 0
         self._clock_s = clock_s
         self.sent = SentLog()
-        """Messages sent and services called since the start."""
+        """Log of messages sent and services called since the start."""
         self.sent_at_s: dict[str, float] = {}
         self._worker: BackgroundWorker[bool] = BackgroundWorker("studio-shelf")
         self._is_newer = False
@@ -119,9 +119,9 @@ class SessionActing:
     # ---- switch
 
     def arm(self, *, for_replay: bool = False) -> str:
-        """Switch on for `armed_s`; return a sentence why it can't be, or "".
+        """Switch on for `armed_s`; return the reason why that isn't possible, or "".
 
-        While a recording is shown, only ``for_replay`` is possible.
+        While a recording is shown, this is only possible with ``for_replay``.
         """
         if self._session.is_replaying and not for_replay:
             return _("A recording is open. Return to live to send.")
@@ -135,7 +135,7 @@ class SessionActing:
         return ""
 
     def disarm(self) -> None:
-        """Switch off and end all sending; nothing is sent after this returns. Thread-safe."""
+        """Switch off and stop all sending; nothing is sent after this returns. Thread-safe."""
         was_on = self.arming.disarm()
         self.question, self.recorded_commands = None, frozenset()
         self.outbox.end_all()
