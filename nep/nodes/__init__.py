@@ -1,4 +1,4 @@
-"""Nodes, publishers and subscribers: the API that `nep.node` opens.
+"""Nodes, publishers and subscribers: the API behind `nep.node`.
 
 Payloads are encoded and decoded here; a back end transports the bytes.
 """

@@ -25,9 +25,9 @@ _MAX_READS_PER_TURN = 64
 
 
 class AsyncReader:
-    """Reader of one subscriber's messages in an event loop.
+    """Reader of one subscriber's messages in an asyncio event loop.
 
-    `poll` returns the next message without waiting.
+    `poll` returns the next message without waiting, or None.
     """
 
     def __init__(self, transport: SubscriberTransport, poll: Callable[[], Message | None]) -> None:
@@ -36,7 +36,7 @@ class AsyncReader:
         self._reads_in_turn = 0
 
     async def receive(self, timeout_s: float | None) -> Message | None:
-        """Return the next message, or None after `timeout_s` seconds. Cancelling it loses no message."""
+        """Return the next message; None after `timeout_s` seconds. Cancelling loses no message."""
         self._reads_in_turn += 1
         if self._reads_in_turn >= _MAX_READS_PER_TURN:
             self._reads_in_turn = 0
@@ -74,7 +74,7 @@ class AsyncReader:
 
 
 class AsyncMessages:
-    """Asynchronous iterator over the messages of a subscriber; ends when it is closed."""
+    """Asynchronous iterator over the messages of a subscriber. Ends when the subscriber is closed."""
 
     def __init__(self, reader: AsyncReader) -> None:
         self._reader = reader

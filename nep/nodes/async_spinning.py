@@ -22,11 +22,11 @@ else:
 __all__ = ["spin"]
 
 _MAX_BUSY_TURNS = 64
-"""Number of busy turns before other coroutines get a turn."""
+"""Number of consecutive turns with work before other coroutines get a turn."""
 
 
 async def spin(work: Work, timeout_s: float | None) -> None:
-    """Run the work of a node until it is stopped or closed, or for `timeout_s` seconds."""
+    """Run the work of a node until the node is stopped or closed, or for `timeout_s` seconds."""
     loop = asyncio.get_running_loop()
     deadline = math.inf if timeout_s is None else work.clock() + timeout_s
     waiter = _LoopWaiter(work, loop, loop_wait())
@@ -72,7 +72,7 @@ async def _await_result(returned: object) -> None:
 
 
 class _LoopWaiter:
-    """Waiter of a node that spins in an event loop: woken by messages, calls and `wake` (a `Wakes`)."""
+    """Waiter of a node that spins in an event loop. Woken by messages, calls and `wake`."""
 
     def __init__(self, work: Work, loop: asyncio.AbstractEventLoop, waits: LoopWait) -> None:
         self._work = work

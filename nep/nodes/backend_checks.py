@@ -1,4 +1,4 @@
-"""Checks of optional back-end features that a caller requests."""
+"""Validation of arguments for optional features of back ends."""
 
 from __future__ import annotations
 

@@ -1,8 +1,8 @@
-"""Executor: callbacks and timers of several nodes, also of different back ends, in one thread.
+"""Executor: runs callbacks and timers of several nodes, also of different back ends, in one thread.
 
 Scheduling is round-robin: in each round every due timer is called, and every callback that has a message gets
-one. Messages of one topic are delivered in order. Their order across topics is not recorded, so no callback
-is served twice before the others, and none waits longer than one round.
+one message. Messages of one topic are delivered in order. Their order across topics is unknown, so no
+callback is served twice before the others, and none waits longer than one round.
 """
 
 from __future__ import annotations
@@ -18,12 +18,12 @@ __all__ = ["spin_all"]
 
 
 def spin_all(works: Sequence[Work], timeout_s: float | None) -> None:
-    """Run the work of several nodes in this thread until all are stopped or closed.
+    """Run the work of several nodes in this thread until all nodes are stopped or closed.
 
-    A node that is stopped leaves; the others go on. Exceptions of callbacks propagate.
+    The other nodes continue when one is stopped. Exceptions of callbacks propagate.
 
     Args:
-        works: The work of the nodes.
+        works: Work of each node.
         timeout_s: Time limit in seconds; None for no limit.
 
     Raises:
@@ -60,7 +60,7 @@ def spin_all(works: Sequence[Work], timeout_s: float | None) -> None:
 
 
 def _still_running(works: Sequence[Work]) -> list[Work]:
-    # A stopped node may be spun by another thread from now on.
+    # Another thread may now spin the stopped node.
     running = [each for each in works if each.is_running]
     for each in works:
         if each not in running:
@@ -69,7 +69,7 @@ def _still_running(works: Sequence[Work]) -> list[Work]:
 
 
 def _wait(waits: SharedWait, works: Sequence[Work], timeout_s: float) -> None:
-    # Disarms everything at the end: a subscriber that is armed but not read would block its publisher.
+    # Disarms everything at the end: a subscriber that stays armed but is not read would block its publisher.
     entered: list[CallQueue] = []
     try:
         for each in (queue for work in works for queue in work.services.queues):

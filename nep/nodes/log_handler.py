@@ -51,7 +51,7 @@ LEVELS = ("debug", "info", "warning", "error", "critical")
 """Log levels in ascending order of severity."""
 RATE_HZ = 100.0
 BURST = 200
-"""Number of records a node may publish at once, before the limit of `RATE_HZ` applies."""
+"""Number of records that a node may publish at once before the limit of `RATE_HZ` applies."""
 TEXT_LIMIT = 8_000
 """Maximum length of a record's text in characters; longer texts are truncated."""
 
@@ -104,11 +104,11 @@ class LogRecord:
 
     @classmethod
     def from_plain(cls, payload: object, stamp_ns: int | None = None) -> LogRecord:
-        """Return the record of a received payload; invalid fields are ignored.
+        """Return the record in a received payload. Invalid fields are ignored.
 
         Args:
             payload: Any received value.
-            stamp_ns: The time stamp of a record that has none.
+            stamp_ns: Time stamp to use if the record has none.
         """
         fields = payload if isinstance(payload, Mapping) else {"text": payload}
         text, stamp = fields.get("text"), _int_or_none(fields.get("stamp_ns"))
@@ -125,23 +125,23 @@ class LogRecord:
 
 
 def level_of(given: object) -> str:
-    """Return the level of a name, also of common aliases such as "WARN"; "info" for unknown names."""
+    """Return the level with a name; common aliases such as "WARN" are known. Unknown names are "info"."""
     word = given.strip().lower() if isinstance(given, str) else ""
     word = _ALIASES.get(word, word)
     return word if word in LEVELS else "info"
 
 
 class ShownErrors:
-    """Filter of errors that were already shown: each error is received live and in the latched list.
+    """Filter for errors that were already shown, because each error is received live and in the latched list.
 
-    Remembers the newest 2000.
+    Remembers the newest 2000 errors.
     """
 
     def __init__(self) -> None:
         self._shown: dict[tuple[str, int, str], None] = {}
 
     def is_new(self, record: LogRecord) -> bool:
-        """Return True for a record that is not an error, and once for each error."""
+        """Return True for a record that is not an error, and the first time for each error."""
         if record.level not in _ERROR_LEVELS:
             return True
         key = (record.node, record.stamp_ns, record.text[:100])
@@ -172,19 +172,19 @@ class LogNode(Protocol):
     name: str
 
     def new_pub(self, topic: str, msg_type: str, *, latched: bool = False) -> LogPublisher:
-        """Return a new publisher."""
+        """Create a publisher."""
 
 
 class LogHandler(logging.Handler):
-    """Logging handler that publishes records as messages of a node. Never blocks and never raises.
+    """Logging handler that publishes records as messages of a node. Never blocks, never raises.
 
     Args:
-        node: The name of the node.
-        open_publisher: Called in the handler's thread at the first record, and again every second until it
-            succeeds. Up to 1000 records are queued until then.
-        open_errors: Called at the first error; opens the latched publisher of the last errors. None: not
-            published.
-        rate_hz: Maximum rate of records.
+        node: Name of the node.
+        open_publisher: Opens the publisher. Called in the handler's thread at the first record, and then
+            every second until it succeeds. Meanwhile up to 1000 records are queued.
+        open_errors: Opens the latched publisher of the last errors. Called at the first error. None: the last
+            errors are not published.
+        rate_hz: Maximum rate in records per second.
         burst: Number of records allowed at once.
         clock: Monotonic clock in seconds.
     """
@@ -201,7 +201,7 @@ class LogHandler(logging.Handler):
     ) -> None:
         super().__init__()
         self.logger = logging.Logger(node, logging.INFO)  # noqa: LOG001 - lives as long as its node
-        """Logger whose records from INFO on are published and passed to the root logger."""
+        """Logger of the node. Its records from INFO on are published and passed to the root logger."""
         self.logger.parent = logging.getLogger()
         self.logger.addHandler(self)
         self._node = node
@@ -221,13 +221,13 @@ class LogHandler(logging.Handler):
 
     @property
     def left_out(self) -> int:
-        """Number of dropped records not yet reported."""
+        """Number of dropped records that are not reported yet."""
         return self._dropped
 
     def emit(self, record: logging.LogRecord) -> None:
         """Queue a record for the handler's thread."""
         if getattr(record, _PUBLISHED_BY, None) is self or threading.current_thread() is self._thread:
-            return  # received twice (from the node's logger and the root), or caused by publishing itself
+            return  # received twice (also through the root logger), or caused by publishing itself
         setattr(record, _PUBLISHED_BY, self)
         with self._has_work:
             if self._is_closed:
@@ -254,10 +254,7 @@ class LogHandler(logging.Handler):
             self._has_work.notify()
 
     def close(self, timeout_s: float = _FLUSH_S) -> None:
-        """Publish queued records within `timeout_s` seconds and stop. Later records are dropped.
-
-        Idempotent.
-        """
+        """Publish queued records within `timeout_s` seconds and close. Idempotent."""
         with self._has_work:
             self._is_closed = True
             thread = self._thread
@@ -322,7 +319,7 @@ class LogHandler(logging.Handler):
             self._publish_last_errors([record for record in records if record["level"] in _ERROR_LEVELS])
 
     def _publish_last_errors(self, records: list[dict[str, object]]) -> None:
-        # Republish the latched list with these errors.
+        # Publishes the latched list again, with these errors added.
         if not records or self._open_errors is None:
             return
         for record in records:
@@ -376,7 +373,7 @@ class LogHandler(logging.Handler):
 
 
 def new_log_handler(node: LogNode) -> LogHandler:
-    """Return a handler that publishes on `LOG_TOPIC` as the given node."""
+    """Return a handler that publishes on `LOG_TOPIC` as `node`."""
     return LogHandler(
         node.name,
         lambda: node.new_pub(LOG_TOPIC, LOG_TYPE),

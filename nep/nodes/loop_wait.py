@@ -1,9 +1,9 @@
-"""Wait for messages in an asyncio event loop, with one thread per loop.
+"""Wait for messages in asyncio event loops, with one thread per loop.
 
-The thread waits for all subscribers that coroutines wait for and notifies the loop when one may have a
-message; the message itself is read in the loop. So a message costs no thread switch of its own, and
-cancelling a coroutine loses no message. No descriptor is registered with the loop, so it also works with
-Windows' proactor loop.
+The thread waits for all subscribers that coroutines wait for, and notifies the loop when one of them may have
+a message; the message itself is read in the loop. A message therefore costs no thread switch of its own, and
+cancelling a coroutine loses no message. No descriptor is registered with the loop, so this also works with
+the proactor loop of Windows.
 """
 
 from __future__ import annotations
@@ -29,15 +29,15 @@ else:
 __all__ = ["LoopWait", "give_way", "loop_wait"]
 
 _LOOP_CHECK_S = 1.0
-"""Interval at which the thread checks for a loop closed without `asyncio.run`'s shutdown."""
+"""Interval in seconds for detecting a loop that was closed without the shutdown of `asyncio.run`."""
 _JOIN_S = 5.0
 
 Call = Callable[[], None]
 
 _waits: dict[int, LoopWait] = {}
-"""Waits by loop id; keeping the loop itself would keep it alive."""
+"""Wait of each loop by the id of the loop; a reference to the loop would keep it alive."""
 _inherited: list[LoopWait] = []
-"""Waits of the parent process after a fork. Referenced for ever, because they must not be finalized."""
+"""Waits of the parent process after a fork. Referenced forever, because they must not be finalized."""
 _lock = threading.Lock()
 
 
@@ -53,7 +53,7 @@ forks.in_child(_forked)
 
 
 def loop_wait() -> LoopWait:
-    """Return the wait of the running loop; create it if needed. Raises `TooManyFilesError`."""
+    """Return the wait of the running loop; create one if needed. Raises `TooManyFilesError`."""
     loop = asyncio.get_running_loop()
     with _lock:
         known = _waits.get(id(loop))
@@ -66,14 +66,14 @@ def loop_wait() -> LoopWait:
 
 @coroutine
 def give_way() -> Generator[None, None, None]:
-    """Yield to the other coroutines of the loop."""
+    """Let other coroutines of the loop run."""
     yield
 
 
 class LoopWait:
-    """Wait for subscribers in one thread for all coroutines of a loop.
+    """Wait for the subscribers of all coroutines in a loop, in one thread.
 
-    Except `close`, call it in the loop.
+    All methods except `close` must be called in the loop.
     """
 
     def __init__(self, loop: asyncio.AbstractEventLoop) -> None:
@@ -87,7 +87,7 @@ class LoopWait:
         self._shutdown_hook = self._until_shutdown()
 
     def start(self) -> None:
-        """Start the thread, and register its shutdown with the loop (`asyncio.run`)."""
+        """Start the thread. The loop closes it at shutdown (`asyncio.run`)."""
         try:
             self._thread.start()
         except BaseException:
@@ -107,7 +107,7 @@ class LoopWait:
             self._request(True, subscriber)
 
     def unwatch(self, subscriber: SubscriberTransport, call: Call) -> None:
-        """Cancel a `watch`. May be called after the call."""
+        """Cancel a `watch`. No effect after `call` was called."""
         calls = self._calls.get(subscriber)
         if calls is not None and call in calls:
             calls.remove(call)

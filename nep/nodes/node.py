@@ -14,7 +14,7 @@ import time
 from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING, Any, Literal
 
-# its exit hook must be older than ours: it frees frames that are still being sent
+# its exit handler must be registered before ours: it frees frames that are still being sent
 import zmq.utils.garbage  # noqa: F401
 
 import nep.system.exits  # noqa: F401 - its exit hook must be older than ours, too
@@ -62,14 +62,18 @@ FLUSH_S = 2.0
 """Time in seconds that closing waits for published messages to be delivered."""
 
 _FINALIZER_PRIORITY = 10
-"""Exit priority >= 0: runs before a worker joins its own children, which may need published messages."""
+"""Exit priority for `multiprocessing`.
+
+Not negative, so that nodes are closed before a worker joins its own children, which may need published
+messages.
+"""
 
 _open_nodes: set[Node] = set()
-"""Open nodes, referenced until they are closed: a publisher may outlive the variable of its node."""
+"""Open nodes, referenced until they are closed, because a publisher may outlive the variable of its node."""
 _inherited: list[Node] = []
-"""Nodes of the parent process after a fork. Referenced for ever, because they must not be finalized."""
+"""Nodes of the parent process after a fork. Referenced forever, because they must not be finalized."""
 _finalizer_pid = 0
-"""Process id in which closing is registered with `multiprocessing`."""
+"""Id of the process in which closing is registered with `multiprocessing`."""
 
 
 class Node(ServiceNode):
@@ -157,7 +161,7 @@ class Node(ServiceNode):
         mode: str = "many2many",
         transport: str = "",  # noqa: ARG002 - as in the original, the node's own transport is used
     ) -> Hybrid:
-        """Return the configuration of a connection through a master.
+        """Return the configuration for a connection through a master.
 
         Args:
             master_ip: Address of the master; "127.0.0.1" means the node's own master.
@@ -168,7 +172,7 @@ class Node(ServiceNode):
         return Hybrid(self._master if is_own else self._backend.master(master_ip), checked_mode(mode))
 
     def broker(self, mode: str = "many2many") -> Hybrid:
-        """Return `hybrid(mode=mode)`, under its name in the original module up to 0.5.2."""
+        """Return `hybrid(mode=mode)`. Name used by the original module up to 0.5.2."""
         return self.hybrid(mode=mode)
 
     def direct(
@@ -181,17 +185,17 @@ class Node(ServiceNode):
         generation: Literal["A", "B"] = "A",
         wire: Literal["original", "native", "tcp"] = "original",
     ) -> Direct:
-        """Return the configuration of a connection to a fixed address, without a master.
+        """Return the configuration for a connection to a fixed address, without a master.
 
             sub = node.new_sub("scan", "json", node.direct("192.168.0.7", 9000))
 
         Args:
             ip: Address to bind or connect to.
             port: Port, 1 to 65535.
-            mode: Which end binds; see `Direct`.
+            mode: End that binds the port. See `Direct`.
             transport: Ignored; the node's transport is used.
-            generation: Frames of the original NEP up to 0.5.4.5 ("A") or from 0.5.4.8 on ("B"). Both are
-                received.
+            generation: Frame format to send: that of the original NEP up to 0.5.4.5 ("A"), or from 0.5.4.8 on
+                ("B"). Both are received.
             wire: "original" or "native" frames; "tcp" for service calls over plain TCP, also from programs
                 without ZeroMQ.
 
@@ -418,7 +422,7 @@ class Node(ServiceNode):
         return RemoteParameters(self.new_client(place_of(found), timeout_s=timeout_s))
 
     def open_parameters(self, place: str, answer: Callable[[object], object]) -> Publisher:
-        """Open the publisher and the server of this node's parameters. Internal; used by `Parameters`."""
+        """Open the publisher and server for this node's parameters. Internal; used by `Parameters`."""
         publisher = self.new_pub(place, MSG_TYPE, latched=True)
         if hasattr(self._open_transport(), "server"):
             try:
@@ -478,9 +482,9 @@ class Node(ServiceNode):
         return self._work.new_timer(period("period_s", period_s), function("callback", callback))
 
     def spin(self, timeout_s: float | None = None) -> None:
-        """Run callbacks, timers and servers in this thread until `stop_spin` or `close`.
+        """Run callbacks, timers and servers in this thread until `stop_spin` or `close` is called.
 
-        Exceptions of callbacks propagate. A `stop_spin` called before makes the next spin return at once. Use
+        Exceptions of callbacks propagate. If `stop_spin` was called before, returns immediately. Use
         `nep.spin` for several nodes.
 
         Args:
@@ -503,7 +507,7 @@ class Node(ServiceNode):
         await spin_in_loop(self._work, seconds("timeout_s", timeout_s))
 
     def stop_spin(self) -> None:
-        """End `spin` or `spin_async`, or the next one. Thread-safe; may be called from a callback."""
+        """End the current `spin` or `spin_async`, or the next one. Thread-safe; also for callbacks."""
         if not self._is_forked:
             self._work.stop()
 
@@ -539,8 +543,9 @@ class Node(ServiceNode):
     def close(self, timeout_s: float = FLUSH_S) -> None:
         """Unregister and close everything created on this node. Idempotent.
 
-        Published messages are delivered first; those that could not be are logged as a warning. Called
-        automatically at interpreter exit. A concurrent `new_pub`, `new_sub` or the like raises `ClosedError`.
+        Published messages are delivered first; those that can't be delivered in time are logged as a warning.
+        Called automatically at interpreter exit. A concurrent `new_pub`, `new_sub` or similar call raises
+        `ClosedError`.
 
         Args:
             timeout_s: Time limit for the delivery in seconds.
@@ -641,7 +646,7 @@ def spin(*nodes: Node, timeout_s: float | None = None) -> None:
 
 
 def _close(nodes: Sequence[Node], timeout_s: float) -> None:
-    # Closes all within `timeout_s`; all begin to close before one waits, so that none waits for another.
+    # Closes all nodes within `timeout_s`. All begin to close first, so that none waits for another.
     started = time.monotonic()
     for each in nodes:
         each._close_log(0.0)  # noqa: SLF001 - private to this module

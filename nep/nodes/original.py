@@ -48,7 +48,7 @@ _REPLACEMENTS: Mapping[str, str] = {
 
 
 def original_hint(name: str) -> str:
-    """Return the replacement for a name of the original module that nep lacks, or "" for any other name."""
+    """Return the replacement for a name of the original module that nep lacks; "" for any other name."""
     replacement = _REPLACEMENTS.get(name)
     if replacement is None:
         return ""
@@ -64,8 +64,8 @@ class FixedServer:
             print(server.listen_info())
             server.send_info({"answer": 42})
 
-    Its clients are `nep.client`, the original module's `client`, and `node.new_client` with `node.direct(ip,
-    port)`.
+    Clients are created with `nep.client`, the original module's `client`, or `node.new_client` with
+    `node.direct(ip, port)`.
     """
 
     def __init__(
@@ -96,7 +96,7 @@ class FixedServer:
             raise
 
     def listen_info(self, timeout_s: float | None = None) -> object:
-        """Return the next request, or None after `timeout_s` seconds (None waits without limit)."""
+        """Return the next request; None after `timeout_s` seconds (None waits without limit)."""
         return self._server.listen_info(timeout_s)
 
     def send_info(self, info: object) -> None:
@@ -117,9 +117,11 @@ class FixedServer:
 class FixedClient:
     """Client of a server at a fixed address, without a master: the original module's `client`.
 
-    client = nep.client("127.0.0.1", 8123)
-    client.send_info({"question": "?"})
-    print(client.listen_info())
+        client = nep.client("127.0.0.1", 8123)
+        client.send_info({"question": "?"})
+        print(client.listen_info())
+
+    The server is created with `nep.server`, or with `node.new_server` and `node.direct(ip, port)`.
     """
 
     def __init__(
@@ -150,11 +152,11 @@ class FixedClient:
             raise
 
     def send_info(self, info: object) -> None:
-        """Send a request; `listen_info` returns the reply."""
+        """Send a request. `listen_info` returns the reply."""
         self._client.send_info(info)
 
     def listen_info(self) -> object:
-        """Return the reply to `send_info`. Raises the exceptions of `Client.call`."""
+        """Wait for the reply to `send_info` and return it. Raises as `Client.call` does."""
         return self._client.listen_info()
 
     def close(self) -> None:
@@ -169,7 +171,7 @@ class FixedClient:
 
 
 def getMyIP() -> str:  # noqa: N802 - name of the original module
-    """Return an address at which other computers may reach this one, or "127.0.0.1" if there is none."""
+    """Return an address at which other computers may reach this one; "127.0.0.1" if there is none."""
     return next((each.host for each in own_addresses()), _LOOPBACK)
 
 

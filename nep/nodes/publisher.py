@@ -38,7 +38,7 @@ __all__ = ["Publisher", "RejectedPayloads", "path_of"]
 
 _logger = logging.getLogger("nep")
 _VALIDATE_INTERVAL_S = 1.0
-"""Interval at which a payload of an unsubscribed topic is encoded to detect errors early."""
+"""Interval in seconds at which a payload of an unsubscribed topic is encoded to detect errors early."""
 _VALIDATE_PAUSE_FACTOR = 50
 _MAX_NODES_CHECKED = 10_000
 _MAX_DEPTH = 50
@@ -50,7 +50,7 @@ _BYTES_TYPES = (bytes, memoryview)  # created once: checked for every unsubscrib
 class Publisher:
     """Publisher of messages on one topic. Thread-safe. Created by `Node.new_pub`.
 
-    Usable as a context manager. Closing it first sends the queued messages.
+    Usable as a context manager. `close` delivers the published messages first.
 
         with node.new_pub("/robot/pose") as pub:
             pub.publish({"x": 1.5, "y": 0.0})
@@ -92,7 +92,7 @@ class Publisher:
 
     @property
     def id(self) -> int:
-        """Id of the publisher, as in `Message.publisher` and in the graph."""
+        """Id of the publisher, the same as in `Message.publisher` and in the graph."""
         return self._spec.id
 
     @property
@@ -102,10 +102,10 @@ class Publisher:
 
     @property
     def subscriber_ids(self) -> frozenset[int]:
-        """Ids of connected subscribers, as in the graph.
+        """Ids of connected subscribers, the same as in the graph.
 
-        The subscriber of a hanging program stays connected after its node has left the graph. Empty for back
-        ends that don't identify subscribers.
+        The subscriber of a program that doesn't respond stays connected after its node was removed from the
+        graph. Empty for back ends that can't identify subscribers.
         """
         if self._is_forked or not isinstance(self._transport, KnowsSubscribers):
             return frozenset()
@@ -113,7 +113,7 @@ class Publisher:
 
     @property
     def missing(self) -> tuple[str, ...]:
-        """Names of subscribed nodes whose connection is not established (starting up or not responding)."""
+        """Names of subscribed nodes that aren't connected, because they are starting or don't respond."""
         return () if self._is_forked else self._transport.missing
 
     @property
@@ -128,7 +128,7 @@ class Publisher:
 
     @property
     def refused(self) -> int:
-        """Number of payloads that could not be encoded; the reason is logged and an alert in the graph."""
+        """Number of payloads that could not be encoded. The log and a graph alert state the reason."""
         return self._rejected.count
 
     @property
@@ -201,7 +201,7 @@ class Publisher:
         """Send data that is already encoded. Thread-safe.
 
         Args:
-            data: The encoded payload.
+            data: Encoded payload.
             extension: Additional header fields of the message.
 
         Raises:
@@ -214,7 +214,7 @@ class Publisher:
             self._send(encoded((data, extension)))
 
     def refuse(self, payload: object, error: Exception) -> None:
-        """Count and report a payload that the caller could not encode, as `publish` does."""
+        """Count and report a payload that the caller failed to encode with `error`, as `publish` does."""
         self._rejected.add(payload, error)
 
     def _send(self, encoded_payload: Encoded) -> None:
@@ -276,15 +276,15 @@ class Publisher:
     sendMsgPack = send_msgpack  # noqa: N815
 
     def loan(self, shape: int | tuple[int, ...], dtype: str = "uint8") -> NDArray[Any]:
-        """Return an array to fill and publish without a copy.
+        """Return an array that can be filled and published without a copy.
 
-        With shared memory the array lies in memory of all subscribers on this computer; otherwise it is an
-        ordinary array. Publish it as an image (`nep.raw_image`) or, for type `bytes`, as an `Encoded`. Don't
-        write to it after it is published: get a new one for the next message. Needs numpy.
+        With shared memory the array lies in memory that all subscribers on this computer can read; otherwise
+        it is an ordinary array. Publish it as an image (`nep.raw_image`) or, for type `bytes`, as an
+        `Encoded`. Don't write to it after publishing; get a new array for the next message. Needs numpy.
 
         Args:
             shape: Shape of the array.
-            dtype: numpy type name.
+            dtype: Name of a numpy type.
 
         Raises:
             ClosedError: The publisher is closed.
@@ -314,7 +314,7 @@ class Publisher:
                     self._on_close(self)
 
     def node_closes(self) -> None:
-        """Mark the publisher as closed, together with its node."""
+        """Mark the publisher as closed because its node is being closed."""
         self.is_closed = True
 
     def forked(self) -> None:
@@ -332,12 +332,12 @@ class Publisher:
 
 
 class RejectedPayloads:
-    """Payloads of one publisher that can't be encoded: count, log and report them.
+    """Payloads of one publisher that can't be encoded. Counts, logs and reports them.
 
     Args:
         topic: Name of the topic.
-        encode: The codec's encoder.
-        report: Called with the problem for the graph, or "" when it is solved.
+        encode: Encoder of the codec.
+        report: Called with the problem for the graph, or "" when a payload could be encoded again.
         clock: Monotonic clock in seconds.
     """
 
@@ -361,7 +361,7 @@ class RejectedPayloads:
         self._located = ("", "")
 
     def is_valid(self, payload: object) -> bool:
-        """Encode an unsubscribed payload at most once per interval; return False if it can't be encoded."""
+        """Return True if an unsubscribed payload can be encoded; checked at most once per interval."""
         started = self._clock()
         if started < self._validate_at:
             return True
@@ -376,7 +376,7 @@ class RejectedPayloads:
         return not self.problem
 
     def add(self, payload: object, error: Exception) -> None:
-        """Count a payload that can't be encoded because of `error`."""
+        """Count, log and report a payload that can't be encoded because of `error`."""
         self.count += 1
         reason = _error_text(error)
         now = self._clock()
@@ -394,7 +394,7 @@ class RejectedPayloads:
             self._report(sentence)
 
     def error(self, payload: object, error: Exception, codec: str) -> EncodeError:
-        """Return the exception to raise for a payload, with the path of the offending value."""
+        """Return the exception to raise for a payload, with the path of the value that can't be encoded."""
         if not isinstance(error, EncodeError):
             error = EncodeError(codec, type(payload).__name__, _error_text(error))
         place = error.place or _escaped_path_of(payload, self._encode)
@@ -403,7 +403,7 @@ class RejectedPayloads:
         return EncodeError(error.codec, error.kind, f"{error.reason}; it is at '{place}'", place)
 
     def resolve(self) -> None:
-        """Report that a payload could be encoded."""
+        """Clear the reported problem, because a payload could be encoded."""
         if self.problem:
             self.problem = ""
             self._report("")
@@ -439,7 +439,7 @@ def _escaped_path_of(payload: object, encode: Callable[[object], Encoded]) -> st
 def path_of(payload: object, encode: Callable[[object], Encoded]) -> str:
     """Return the path of the first value that can't be encoded, such as "pose.x" or "joints[3]".
 
-    Empty for the payload itself, or when none is found among ten thousand values.
+    Returns "" for the payload itself, or if no such value is among the first ten thousand.
     """
     path, value, nodes_left = "", payload, _MAX_NODES_CHECKED
     for _level in range(_MAX_DEPTH):

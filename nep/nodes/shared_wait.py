@@ -1,4 +1,4 @@
-"""Wait of one thread for subscribers of any nodes and back ends."""
+"""SharedWait: one thread waits for subscribers of any nodes and back ends."""
 
 from __future__ import annotations
 
@@ -15,11 +15,11 @@ from nep.system.wakeup import Waker
 __all__ = ["SharedWait"]
 
 _POLL_INTERVAL_S = 0.01
-"""Polling interval for subscribers that can't notify."""
+"""Polling interval in seconds for subscribers that can't notify."""
 
 
 class _ReadyCallback:
-    """Callback object that a subscriber wakes (a `Wakes`)."""
+    """Callback that a subscriber wakes. Implements `Wakes`."""
 
     def __init__(self, waits: SharedWait, subscriber: SubscriberTransport) -> None:
         self._waits = waits
@@ -31,10 +31,10 @@ class _ReadyCallback:
 
 
 class SharedWait:
-    """Set of armed subscribers and the wait for them: by descriptor where there is one, else by notification.
+    """Wait for armed subscribers, by their descriptors or, without one, by notification.
 
-    Only the waiting thread may arm, disarm and close; `wake` is thread-safe. A wake before the wait is kept.
-    Raises `TooManyFilesError`.
+    Only the waiting thread may arm, disarm and close; `wake` is thread-safe. A `wake` before the wait ends
+    the next wait. Raises `TooManyFilesError`.
     """
 
     def __init__(self) -> None:
@@ -52,7 +52,7 @@ class SharedWait:
         self._ready: deque[SubscriberTransport] = deque()
 
     def arm(self, subscriber: SubscriberTransport) -> bool:
-        """Arm a subscriber. Return False if it may already have a message or is closed. Idempotent."""
+        """Include a subscriber; return False if it may have a message or is closed. Idempotent."""
         if subscriber in self._armed or subscriber in self._polled:
             return True
         if getattr(subscriber, "enter_wait", None) is None:  # an older plug-in
@@ -71,25 +71,25 @@ class SharedWait:
         return True
 
     def disarm(self, subscriber: SubscriberTransport) -> None:
-        """Disarm a subscriber."""
+        """Exclude a subscriber from the wait."""
         self._polled.discard(subscriber)
         callback = self._armed.pop(subscriber, None)
         if callback is not None:
             if subscriber.fd >= 0:
                 with suppress(
                     OSError, ValueError, KeyError
-                ):  # closed; its number may belong to another file now
+                ):  # closed; its descriptor may now belong to another file
                     self._selector.unregister(subscriber.fd)
             subscriber.leave_wait(callback)
 
     def disarm_all(self) -> None:
-        """Disarm all subscribers."""
+        """Exclude all subscribers from the wait."""
         for subscriber in list(self._armed):
             self.disarm(subscriber)
         self._polled.clear()
 
     def wait(self, timeout_s: float) -> list[SubscriberTransport]:
-        """Wait for a subscriber or `wake`, at most `timeout_s`. Return and disarm ready subscribers."""
+        """Wait up to `timeout_s` seconds for a subscriber or `wake`; disarm and return ready subscribers."""
         ready = self._selector.select(min(timeout_s, _POLL_INTERVAL_S) if self._polled else timeout_s)
         self._waker.clear()
         self._ready.extend(key.data for key, _events in ready if key.data is not None)

@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 __all__ = ["SLICE_S", "Subscriber"]
 
 SLICE_S = 0.1
-"""Maximum duration of a single wait: on Windows Ctrl+C does not interrupt a wait."""
+"""Maximum duration of a single wait in seconds, because on Windows Ctrl+C doesn't interrupt a wait."""
 
 _NO_PAYLOADS: deque[Any] = deque()
 _logger = logging.getLogger("nep")
@@ -31,7 +31,7 @@ _logger = logging.getLogger("nep")
 class Subscriber:
     """Subscriber to one topic or pattern. Created by `Node.new_sub`.
 
-    It returns the messages of each publisher in the order of their publication.
+    Messages of one publisher are returned in the order of their publication.
 
     Iterating (`for` or `async for`) yields `Message` objects until the subscriber is closed. Usable as a
     context manager.
@@ -40,7 +40,7 @@ class Subscriber:
     """
 
     is_typed = False
-    """True if payloads are instances of a declared type (`nep.nodes.typed`)."""
+    """True if payloads are instances of a declared type. See `nep.nodes.typed`."""
 
     def __init__(
         self,
@@ -55,7 +55,7 @@ class Subscriber:
         self._ready = transport.ready
         self._payload_source = transport if isinstance(transport, GivesPayloads) else None
         self.payloads = _NO_PAYLOADS if self._payload_source is None else self._payload_source.payloads
-        """Decoded payloads that are read next, for callers that don't need the messages."""
+        """Decoded payloads to be read next, for callers that don't need the messages."""
         self._empty = codec_for(spec.msg_type).empty
         self._async_reader = AsyncReader(transport, self._poll_first)
         self._problem = ""
@@ -68,7 +68,7 @@ class Subscriber:
 
     @property
     def msg_type(self) -> str:
-        """Registered message type; each message has its own."""
+        """Registered message type. A received message has its publisher's type."""
         return self._spec.msg_type
 
     @property
@@ -83,12 +83,12 @@ class Subscriber:
 
     @property
     def lost(self) -> int | None:
-        """Number of messages lost in transit or dropped unread; None if the back end can't know it."""
+        """Number of messages lost in transit or dropped unread; None if the back end can't detect it."""
         return self._transport.lost
 
     @property
     def refused(self) -> int:
-        """Number of received frames that were not valid messages; the reason is an alert in the graph."""
+        """Number of received frames that were not valid messages. An alert in the graph states the reason."""
         return self._transport.refused
 
     @property
@@ -97,13 +97,13 @@ class Subscriber:
         return self._transport.is_closed
 
     def listen(self, block_mode: bool = False, *, timeout_s: float | None = None) -> tuple[bool, object]:
-        """Return (True, payload) of the next message, or (False, empty payload) without one.
+        """Return (True, payload) for the next message, or (False, empty payload) if there is none.
 
         Messages that can't be decoded are skipped, logged, and reported as an alert in the graph.
 
         Args:
-            block_mode: Wait without limit.
-            timeout_s: Time limit in seconds. Without both arguments the call does not wait.
+            block_mode: True to wait without limit.
+            timeout_s: Time limit in seconds. Without either argument the call doesn't wait.
 
         Raises:
             ClosedError: The subscriber is closed.
@@ -152,23 +152,23 @@ class Subscriber:
     # ---- names of the original module
 
     def listen_json(self, block_mode: bool = False) -> tuple[bool, object]:
-        """Call `listen`, for a topic of type `json`."""
+        """Return the next payload as `listen` does, for a topic of type `json`."""
         return self.listen(block_mode)
 
     def listen_string(self, block_mode: bool = False) -> tuple[bool, object]:
-        """Call `listen`, for a topic of type `string`."""
+        """Return the next payload as `listen` does, for a topic of type `string`."""
         return self.listen(block_mode)
 
     def listen_image(self, block_mode: bool = False) -> tuple[bool, object]:
-        """Call `listen`, for a topic of images."""
+        """Return the next payload as `listen` does, for a topic of type `image`."""
         return self.listen(block_mode)
 
     def listen_bytes(self, block_mode: bool = False) -> tuple[bool, object]:
-        """Call `listen`, for a topic of type `bytes`."""
+        """Return the next payload as `listen` does, for a topic of type `bytes`."""
         return self.listen(block_mode)
 
     def listen_msgpack(self, block_mode: bool = False) -> tuple[bool, object]:
-        """Call `listen`, for a topic of type `msgpack`."""
+        """Return the next payload as `listen` does, for a topic of type `msgpack`."""
         return self.listen(block_mode)
 
     listenJson = listenDictionary = listen_json  # noqa: N815 - names of the original module from 0.5.4.7 on
@@ -178,7 +178,7 @@ class Subscriber:
     listenMsgPack = listen_msgpack  # noqa: N815
 
     def receive(self, timeout_s: float | None = None) -> Message | None:
-        """Return the next message, not yet decoded, or None after the time limit.
+        """Wait for the next message and return it, not yet decoded, or None after the time limit.
 
         Args:
             timeout_s: Time limit in seconds; None waits without limit.
@@ -201,12 +201,12 @@ class Subscriber:
         return self._receive(timeout_s)
 
     def want_payloads(self) -> None:
-        """Read only payloads from now on, unless a problem is reported or the payloads are typed."""
+        """Read only payloads from now on, except while a problem is reported or if the payloads are typed."""
         if self._payload_source is not None:
             self._payload_source.wants_payloads = not (self._problem or self.is_typed)
 
     def want_messages(self) -> None:
-        """Read whole messages from now on, also from data that was already read."""
+        """Read whole messages from now on, including data that was already read."""
         if self._payload_source is not None:
             self._payload_source.wants_payloads = False
             if self.payloads:
@@ -237,14 +237,14 @@ class Subscriber:
                 return message
 
     async def receive_async(self, timeout_s: float | None = None) -> Message | None:
-        """Return the next message as `receive` does, in an asyncio event loop.
+        """Wait for the next message as `receive` does, in an asyncio event loop.
 
-        Cancelling it loses no message.
+        Cancelling loses no message.
         """
         return await self._async_reader.receive(seconds("timeout_s", timeout_s))
 
     async def listen_async(self, timeout_s: float | None = None) -> tuple[bool, object]:
-        """Return the next payload as `listen` does, in an asyncio event loop.
+        """Wait for the next payload as `listen` does, in an asyncio event loop.
 
         Waits without limit by default.
         """
@@ -275,11 +275,11 @@ class Subscriber:
         return ClosedError(f"subscriber '{self.topic}'", is_forked=self._is_forked)
 
     def typed(self, message: Message) -> Message:
-        """Return a message of the transport as this subscriber presents it."""
+        """Return a message of the transport in the form that this subscriber returns."""
         return message
 
     def decoded(self, message: Message) -> object:
-        """Return the payload of a message. Errors are logged (rarely) and reported in the graph.
+        """Return the decoded payload of a message. Errors are logged (rarely) and reported in the graph.
 
         Raises:
             DecodeError: The payload can't be decoded.
@@ -295,7 +295,7 @@ class Subscriber:
         return payload
 
     def decoded_unshared(self, message: Message) -> object:
-        """Return the payload of a message that is not shared, without caching it."""
+        """Return the decoded payload of a message that no other reader shares, without caching it."""
         if self._problem or message.decoded is not UNDECODED:
             return self.decoded(message)
         try:

@@ -51,20 +51,21 @@ class Timer:
 
     @property
     def due(self) -> float:
-        """Next due time, by the timer's clock."""
+        """Time of the next call, by the timer's clock."""
         return self._due
 
     def run_if_due(self) -> bool:
-        """Call the function if it is due; return True if it was. Exceptions propagate."""
+        """Call the function if the timer is due; return True if it was. Exceptions propagate."""
         is_due = self.take_turn()
         if is_due:
             self._callback()
         return is_due
 
     def take_turn(self) -> bool:
-        """Return True if the function is due; of several threads only one gets True and must call it.
+        """Return True if the timer is due; the caller must then call the function.
 
-        The next due time is set before the call, so it is also right if the function raises or spins itself.
+        Of several threads only one gets True. The next due time is set before the call, so that it is correct
+        even if the function raises or spins itself.
         """
         now = self._clock()
         if self._is_cancelled or now < self._due:
@@ -76,13 +77,13 @@ class Timer:
         return True
 
     def cancel(self) -> None:
-        """Stop calling. A running call is not interrupted. Thread-safe; idempotent."""
+        """Cancel the timer. A running call is not interrupted. Thread-safe; idempotent."""
         self._is_cancelled = True
         if self._on_cancel is not None:
             self._on_cancel(self)
 
     def node_closes(self) -> None:
-        """Stop calling because the node is closed or the process was forked. Takes no lock."""
+        """Cancel the timer because its node is closed or the process was forked. Acquires no lock."""
         self._is_cancelled = True
 
     def __repr__(self) -> str:

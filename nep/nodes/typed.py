@@ -1,4 +1,4 @@
-"""Typed messages: `msg_type` may be a dataclass or a TypedDict wherever it may be a name.
+"""Typed messages: `msg_type` may be a dataclass or TypedDict wherever it may be a name.
 
 `nep.messages.typed`, which analyses the declarations, is imported when the first type is used.
 """
@@ -33,7 +33,7 @@ def name_of(msg_type: object) -> str:
 
 
 def codec_of(backend: Backend, msg_type: MsgType) -> Codec:
-    """Return the codec of a publisher."""
+    """Return the codec of a publisher's message type."""
     if not isinstance(msg_type, type):
         return backend.codec_for(msg_type)
     declared = typed.message_type(msg_type)
@@ -41,7 +41,7 @@ def codec_of(backend: Backend, msg_type: MsgType) -> Codec:
 
 
 def sink_of(msg_type: MsgType, sink: Sink | None) -> Sink | None:
-    """Return a sink that gets messages with typed payloads. Raises `ValueError`."""
+    """Return a sink that passes messages with typed payloads to `sink`. Raises `ValueError`."""
     if sink is None or not isinstance(msg_type, type):
         return None if sink is None else function("sink", sink)
     give, reader = function("sink", sink), typed.TypedReader(typed.message_type(msg_type))
@@ -49,7 +49,7 @@ def sink_of(msg_type: MsgType, sink: Sink | None) -> Sink | None:
 
 
 class TypedSubscriber(Subscriber):
-    """Subscriber whose payloads are instances of a type; `listen` returns (False, None) without a message."""
+    """Subscriber whose payloads are instances of a declared type."""
 
     is_typed = True
 
@@ -65,15 +65,15 @@ class TypedSubscriber(Subscriber):
         self._empty = _empty_payload
 
     def typed(self, message: Message) -> Message:
-        """Return the message with a typed payload."""
+        """Return a message with a typed payload."""
         return self._reader.typed(message)
 
     def decoded_unshared(self, message: Message) -> object:
-        """Return the typed payload of a message that is not shared."""
+        """Return the typed payload of a message that no other reader shares."""
         return self.decoded(self._reader.typed(message))
 
     def listen(self, block_mode: bool = False, *, timeout_s: float | None = None) -> tuple[bool, object]:
-        """Return (True, payload) of the next message, or (False, None) without one."""
+        """Return (True, payload) for the next message, or (False, None) if there is none."""
         seconds("timeout_s", timeout_s)
         return self._wait_and_listen(block_mode, timeout_s)
 
@@ -100,7 +100,7 @@ def new_subscriber(
     on_close: Callable[[Subscriber], object],
     msg_type: MsgType,
 ) -> Subscriber:
-    """Return a subscriber for the message type."""
+    """Create a subscriber for the message type."""
     if isinstance(msg_type, type):
         return TypedSubscriber(transport, spec, on_close, msg_type)
     return Subscriber(transport, spec, on_close)

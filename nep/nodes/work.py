@@ -22,7 +22,7 @@ NO_MESSAGE = object()
 
 
 class Callback(NamedTuple):
-    """Callback with its subscriber; `with_message`: it gets whole messages instead of payloads."""
+    """Callback and its subscriber. With `with_message` it is called with messages, not payloads."""
 
     subscriber: Subscriber
     transport: SubscriberTransport
@@ -107,7 +107,7 @@ class Work:
         self.wake()
 
     def reset_stop(self) -> None:
-        """Reset the stop request: the spin has ended."""
+        """Clear a stop request at the end of a spin."""
         self._is_stopped.clear()
 
     def wake(self) -> None:
@@ -117,17 +117,17 @@ class Work:
             each.wake()
 
     def watch(self, watcher: Wakes) -> None:
-        """Add an object that `wake` also wakes."""
+        """Register an object that `wake` also wakes."""
         with self._lock:
             self._watchers = (*self._watchers, watcher)
 
     def unwatch(self, watcher: Wakes) -> None:
-        """Remove an object added by `watch`."""
+        """Unregister an object that `watch` registered."""
         with self._lock:
             self._watchers = tuple(each for each in self._watchers if each is not watcher)
 
     def close(self) -> None:
-        """Remove all callbacks and timers: the node is closed."""
+        """Remove all callbacks and timers because the node is closed."""
         with self._lock:
             self.is_closed = True
             self.callbacks = ()
@@ -214,7 +214,7 @@ class Work:
         return True
 
     def run_servers(self) -> bool:
-        """Run one call per server; return True if there was any."""
+        """Run one call per server; return True if any server had a call."""
         return self.services.run(self._is_stopped)
 
     def _run_timers(self) -> bool:
@@ -252,7 +252,7 @@ class Work:
         return has_more
 
     def next_item(self, callback: Callback) -> object:
-        """Return the next message or payload for a callback, or `NO_MESSAGE` without one."""
+        """Return the next message or payload for a callback, or `NO_MESSAGE` if there is none."""
         subscriber, transport = callback.subscriber, callback.transport
         if subscriber.payloads:
             subscriber.want_messages()
@@ -275,7 +275,7 @@ class Work:
 
     @property
     def waiting(self) -> list[SubscriberTransport]:
-        """Transports of the open subscribers with a callback."""
+        """Transports of the open subscribers that have a callback."""
         return [each[1] for each in self.callbacks if not each[1].is_closed]
 
     @property
@@ -291,7 +291,7 @@ class Work:
             self.transport.wait(waiting, timeout_s)
 
     def spin(self, timeout_s: float | None) -> None:
-        """Run the work in this thread until stopped or closed, or for `timeout_s` seconds.
+        """Run the work in this thread until the node is stopped or closed, or for `timeout_s` seconds.
 
         See `Node.spin`.
         """
