@@ -2,7 +2,7 @@
 
 After topic and header follow the number of messages (u32), their sizes (u32 each), their time stamps (u64
 each) and their payloads. The header has the flag `BATCH`, the sequence number of the first message (the
-others count on from it), and the size of everything after the header.
+others follow consecutively), and the size of everything after the header.
 """
 
 from __future__ import annotations
@@ -31,14 +31,21 @@ __all__ = [
 ]
 
 BATCH_FORM = BATCH << 16
-"""Flag `BATCH` at its position in `form_of`."""
+"""Flag `BATCH`, shifted to its position in the result of `form_of`."""
 BATCH_MAX = 256
 """Maximum number of messages in a batch; larger batches are rejected."""
 _COUNT = struct.Struct("<I")
 
 
 class BatchEntry(NamedTuple):
-    """Message of a batch: its index, time stamp, and the range of its payload."""
+    """Position of a message in a batch.
+
+    Attributes:
+        number: Index of the message.
+        stamp_ns: Time stamp of the message.
+        begin: Offset of its payload in the body.
+        end: Offset of the end of its payload.
+    """
 
     number: int
     stamp_ns: int
@@ -48,7 +55,7 @@ class BatchEntry(NamedTuple):
 
 @cache
 def table_of(count: int) -> struct.Struct:
-    """Return the table of a batch: number of messages, all sizes, all time stamps."""
+    """Return the format of a batch's table: number of messages, all sizes, all time stamps."""
     return struct.Struct(f"<I{count}I{count}Q")
 
 
@@ -60,11 +67,11 @@ def batch_part(
     stamps_ns: Sequence[int],
     payloads: Sequence[bytes],
 ) -> bytes:
-    """Return a batch as one part.
+    """Encode a batch as one part.
 
     Args:
         topic: Topic part.
-        form: `form_of` each message.
+        form: Result of `form_of` for each message.
         seq: Sequence number of the first message.
         publisher: Id of the publisher.
         stamps_ns: Time stamps of the messages.
@@ -78,7 +85,7 @@ def batch_part(
 
 
 def entries(body: bytes) -> list[BatchEntry]:
-    """Return the entries of a batch's body. Raises `WireError`."""
+    """Parse the table of a batch's body. Raises `WireError`."""
     count = _COUNT.unpack_from(body)[0] if len(body) >= _COUNT.size else 0
     if not 1 <= count <= BATCH_MAX:
         raise WireError(
@@ -104,7 +111,7 @@ def entries(body: bytes) -> list[BatchEntry]:
 
 
 def check_batch(header: Header, body: bytes) -> None:
-    """Raise `WireError` unless flags and size of a batch's header match its body."""
+    """Raise `WireError` unless the flags and size in a batch's header match its body."""
     if header.flags != BATCH:
         raise WireError(_("a batch must be one part without other flags"), len(body), code="batch-form")
     if header.size != len(body):
@@ -118,10 +125,10 @@ def check_batch(header: Header, body: bytes) -> None:
 
 
 def read_parts(parts: Sequence[bytes | memoryview]) -> list[Parts]:
-    """Return the message in `parts`, or the messages if they are a batch.
+    """Parse a message or batch; return its messages.
 
     Raises:
-        WireError: The parts violate the specification; checked in the order of docs/wire.md.
+        WireError: The parts violate the specification. The rules are checked in the order of docs/wire.md.
     """
     one = split(parts)
     found = [one] if not one.header.flags & BATCH else _messages_of(one)

@@ -12,14 +12,20 @@ from nep.messages.clocks import UNCERTAINTY_MAX_NS, drift_ns, is_clock
 __all__ = ["ClockSamples", "Moment"]
 
 _MAX_SAMPLES = 8
-"""Number of renewals kept; the one with the shortest round trip is used."""
+"""Number of renewals that are kept; the one with the shortest round trip is used."""
 _STEP_NS = 50_000
 _SLEW_DIVISOR = 2_000
-"""Reciprocal of the fastest slew of a clock; a larger change (plus `_STEP_NS`) is a step."""
+"""Reciprocal of the fastest clock slew. A larger change (plus `_STEP_NS`) counts as a step."""
 
 
 class Moment(NamedTuple):
-    """Simultaneous readings of both clocks: `steady_ns` is the middle of two readings, ± `slack_ns`."""
+    """Simultaneous readings of both clocks of this computer.
+
+    Attributes:
+        wall_ns: Clock of message time stamps, in nanoseconds since 1970.
+        steady_ns: Monotonic clock in nanoseconds: the middle of two readings.
+        slack_ns: Uncertainty (±) of `steady_ns`.
+    """
 
     wall_ns: int
     steady_ns: int
@@ -36,11 +42,11 @@ class _Sample(NamedTuple):
 
 
 class ClockSamples:
-    """Estimator of the clock offset to the master, from the four time stamps of NTP.
+    """Estimator of the clock offset to the master, from four time stamps as in NTP.
 
-    A renewal is sent (this clock), received and answered (the master's clock), and its reply arrives (this
-    clock). The network delay may be entirely on one way, so half of it is the uncertainty. When one of the
-    clocks is set, all samples are discarded.
+    The time stamps are those of sending a renewal (this clock), its receipt and its reply (the master's
+    clock), and the arrival of the reply (this clock). The delay may lie entirely in one direction, so half of
+    it is the uncertainty. When one of the clocks is set, all samples are discarded.
 
     Args:
         wall: Clock of message time stamps, in ns since 1970.
@@ -65,9 +71,9 @@ class ClockSamples:
         """Number of detected clock steps."""
 
     def now(self) -> Moment:
-        """Return the current moment.
+        """Return the current readings of both clocks.
 
-        Discards all samples if this computer's clock was set in the meantime.
+        Discards all samples if this computer's clock was set since the last reading.
         """
         before = self._steady()
         wall_ns = self._wall()
@@ -79,13 +85,13 @@ class ClockSamples:
         return moment
 
     def add(self, sent: Moment, received_ns: int, answered_ns: int, now: Moment | None = None) -> bool:
-        """Add a renewal; return True if it is usable.
+        """Add the time stamps of a renewal; return True if they are usable.
 
         Args:
-            sent: Moment of sending.
+            sent: Readings at sending.
             received_ns: Time of receipt by the master's clock.
             answered_ns: Time of the reply by the master's clock.
-            now: Moment of the reply's arrival; default: now.
+            now: Readings at the arrival of the reply; None for the current ones.
         """
         now = now or self.now()
         taken_ns = now.steady_ns - sent.steady_ns
@@ -107,7 +113,7 @@ class ClockSamples:
         return True
 
     def offset(self, now: Moment | None = None) -> tuple[int, int] | None:
-        """Return the offset to add to this computer's time and its uncertainty in ns, or None if unknown."""
+        """Return the offset to add to this computer's time, and its uncertainty, in ns; None if unknown."""
         now = now or self.now()
         best = self._best(now.steady_ns)
         if best is None or best.uncertainty_at(now.steady_ns) > UNCERTAINTY_MAX_NS:
@@ -115,14 +121,14 @@ class ClockSamples:
         return best.offset_ns, best.uncertainty_at(now.steady_ns)
 
     def forget(self) -> None:
-        """Discard all samples: another master may have another clock."""
+        """Discard all samples, because another master may have another clock."""
         self._samples.clear()
 
     def _best(self, steady_ns: int) -> _Sample | None:
         return min(self._samples, key=lambda each: each.uncertainty_at(steady_ns), default=None)
 
     def _is_consistent(self, then: Moment, now: Moment) -> bool:
-        # True if both clocks advanced equally.
+        # True if both clocks have advanced equally.
         by_steady = now.steady_ns - then.steady_ns
         allowed = _STEP_NS + then.slack_ns + now.slack_ns + 2 * self._resolution_ns
         return abs(now.wall_ns - then.wall_ns - by_steady) <= allowed + max(0, by_steady) // _SLEW_DIVISOR

@@ -1,8 +1,8 @@
 """Wire encoding of requests, replies and pushes. Pure functions; specification: `docs/wire.md`.
 
-A body is one msgpack map. Requests have `do` (the operation) and `call` (a number repeated as `re` in the
-reply); replies and pushes have `is`; `what` holds the fields. `write` converts values to maps, `read` parses
-and validates them once, at the edge. Graphs have an encoder of their own that caches unchanged parts.
+A body is one msgpack map. Requests have `do` (the operation) and `call` (a number that the reply repeats as
+`re`); replies and pushes have `is`; `what` holds the fields. `write` converts values to maps; `read` parses
+and validates received maps. Graphs have a separate encoder that caches unchanged parts.
 """
 
 from __future__ import annotations
@@ -98,25 +98,25 @@ _NOT_A_MAP = lazy("'{field}' is a '{given}', not a map")
 _LARGE_BYTES = 50_000
 _SMALL_BYTES = 4096
 _MAX_LISTS, _MAX_LIST_LENGTH = 50_000, 20_000
-"""Limits of lists and maps in a request: a joining node has at most 5,000 records."""
+"""Maximum number and length of lists and maps in a request. A joining node has at most 5,000 records."""
 _VIEW_PREFIX = b"\x83\xa2is\xa4seen\xa2re"
-"""First bytes of a graph reply from `AnswerEncoder`."""
+"""First bytes of a graph reply that `AnswerEncoder` has encoded."""
 
 
 class ReceivedRequest(NamedTuple):
-    """Decoded request with its call number, or the error of a malformed one."""
+    """Decoded request with its call number, or the error of a malformed request."""
 
     call: int
     request: Request | WireError
 
 
 def encode_request(request: Request, call: int) -> bytes:
-    """Return the body of a request."""
+    """Encode a request."""
     return pack_saturated({"do": _REQUEST_NAMES[type(request)], "call": call, "what": write(request)})
 
 
 def decode_request(body: bytes) -> ReceivedRequest:
-    """Decode a request. Never raises, so that every sender gets a reply."""
+    """Decode a request. Never raises: errors are returned, so that every sender gets a reply."""
     call = 0
     try:
         if len(body) < _SMALL_BYTES:
@@ -136,14 +136,14 @@ def decode_request(body: bytes) -> ReceivedRequest:
 
 
 class AnswerEncoder:
-    """Encoder of replies and pushes. Caches the encoding of a graph's unchanged nodes and topics."""
+    """Encoder of replies and pushes. Caches the encoded nodes and topics of a graph until they change."""
 
     def __init__(self) -> None:
         self._pack = msgpack.Packer(use_bin_type=True, unicode_errors="replace", default=_packable_value).pack
         self._parts: dict[str, tuple[NodeInfo | TopicInfo, bytes]] = {}
 
     def encode(self, answer: Reply | Push, call: int = 0) -> bytes:
-        """Return the body of a reply to `call`, or of a push."""
+        """Encode a reply to `call`, or a push."""
         if isinstance(answer, Seen):
             return self._encode_view(answer, call)
         return pack_saturated({"is": _ANSWER_NAMES[type(answer)], "re": call, "what": write(answer)})
@@ -201,7 +201,7 @@ def _packable_value(value: object) -> object:
 
 
 def encode_answer(answer: Reply | Push, call: int = 0) -> bytes:
-    """Return the body of a reply to `call`, or of a push."""
+    """Encode a reply to `call`, or a push."""
     return AnswerEncoder().encode(answer, call)
 
 
@@ -220,7 +220,7 @@ def call_of_view(body: bytes) -> int | None:
 
 
 def decode_answer(body: bytes) -> tuple[int, Reply | Push]:
-    """Decode a reply or push. Return (call, answer); call is 0 for a push. Raises `WireError`."""
+    """Decode a reply or push; return (call, answer). The call number of a push is 0. Raises `WireError`."""
     if len(body) < _LARGE_BYTES:
         return _decode_answer(body)
     with collecting_later():
@@ -249,9 +249,9 @@ def _envelope(body: bytes, unpack_it: Callable[[bytes], object]) -> Mapping[str,
 
 @contextmanager
 def collecting_later() -> Iterator[None]:
-    """Disable garbage collection, which halves the time to build a large graph.
+    """Disable garbage collection within the context, which halves the time to build a large graph.
 
-    It affects the whole process: use it for milliseconds only.
+    Affects the whole process, so use it for milliseconds only.
     """
     was_on = gc.isenabled()
     gc.disable()
@@ -266,7 +266,7 @@ def collecting_later() -> Iterator[None]:
 
 
 def write(value: object) -> object:
-    """Convert a value to maps, lists and scalars, without fields that have their default value."""
+    """Convert a value to maps, lists and scalars. Fields that have their default value are left out."""
     if type(value) in _PLAIN:
         return value
     if is_dataclass(value) and not isinstance(value, type):
@@ -292,9 +292,10 @@ def _fields_of(kind: type) -> tuple[tuple[str, object], ...]:
 
 
 def read(kind: type[T], value: object) -> T:
-    """Parse a `kind` from the result of `write`. Unknown fields are ignored: newer peers may send more.
+    """Parse a value of type `kind` from the result of `write`.
 
-    Raises `WireError` with the name of a missing or invalid field.
+    Unknown fields are ignored, because newer peers may send more fields. Raises `WireError` with the name of
+    a missing or invalid field.
     """
     hint: Any = kind
     try:
@@ -306,9 +307,9 @@ def read(kind: type[T], value: object) -> T:
 
 
 class _MismatchError(Exception):
-    """Validation error; its path is collected while the exception propagates, because errors are rare.
+    """Validation error. Its path is collected while the exception propagates, because errors are rare.
 
-    ``words`` is the message with the placeholder ``field`` and those in ``values``.
+    ``words`` is the message, with the placeholder ``field`` and those in ``values``.
     """
 
     def __init__(self, words: str, **values: str) -> None:
@@ -318,9 +319,9 @@ class _MismatchError(Exception):
 
 
 def make_frozen(kind: type[T], every_field: dict[str, object]) -> T:
-    """Return a frozen dataclass from all its fields, in a fifth of the constructor's time.
+    """Create a frozen dataclass from a dict of all its fields, in a fifth of the constructor's time.
 
-    It takes ownership of `every_field`, which must not be changed afterwards.
+    The dataclass takes ownership of `every_field`, which must not be changed afterwards.
     """
     value = object.__new__(kind)
     object.__setattr__(value, "__dict__", every_field)
@@ -415,7 +416,7 @@ def _fast_reader(kind: type, hints: Mapping[str, Any]) -> Callable[[dict[str, ob
     others = [(name, _reader(hints[name])) for name, types in plain.items() if not types]
     of_plain = itemgetter(*names) if len(names) > 1 else lambda value: tuple(value[name] for name in names)
     known: set[tuple[type, ...]] = set()
-    """Combinations of types found valid; two for each optional field."""
+    """Combinations of types that were found valid; there are two per optional field."""
 
     def read_fast(value: dict[str, object]) -> object | None:
         if len(value) != len(plain):

@@ -1,4 +1,4 @@
-"""Snapshot of the graph as frozen values: nodes, topics, publishers, subscribers, services, alerts."""
+"""Snapshot of the graph as immutable values: nodes, topics, publishers, subscribers, services, alerts."""
 
 from __future__ import annotations
 
@@ -20,17 +20,17 @@ __all__ = [
 ]
 
 BRIDGES_TOPIC = "/nep/bridges"
-"""Topic of the bridges' state (connected networks, message counts); its publishers are bridges."""
+"""Topic of the bridges' state (connected networks, message counts). Every publisher of it is a bridge."""
 
 
 @dataclass(frozen=True)
 class Alert:
-    """Current problem of the network, for people.
+    """Current problem of the network, described for people.
 
     Attributes:
         id: Kind and subject, such as "type:/camera".
         sentence: Description of the problem.
-        hint: What to do about it.
+        hint: Advice for fixing it.
     """
 
     id: str
@@ -246,7 +246,7 @@ class GraphView:
     patterns: Mapping[str, PatternInfo] = field(default_factory=dict)
 
     def to_plain(self) -> dict[str, object]:
-        """Return the graph as maps and lists, for the wire and for `--json`."""
+        """Convert the graph to maps and lists, for the wire and for `--json`."""
         return {
             "epoch": self.epoch,
             "revision": self.revision,

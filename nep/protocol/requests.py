@@ -1,7 +1,7 @@
-"""Requests, replies and pushes of nodes and the master. Wire encoding: `nep.protocol.encoding`.
+"""Requests of nodes, and replies and pushes of the master. Wire encoding: `nep.protocol.encoding`.
 
-Every reply and push has the master's `epoch`, which changes when the master is restarted, and the `revision`
-of the graph.
+Every reply and push contains the master's `epoch`, which changes when the master is restarted, and the
+`revision` of the graph.
 
 A node has a secret *key*, shared only with its masters, from which its id is derived. No other program can
 register that id, whether the node is registered, unlisted or returns to a restarted master. Ids of publishers
@@ -17,10 +17,10 @@ from hashlib import sha256
 from nep.protocol.graph_view import Alert, GraphView
 
 COUNT_MAX = 2**63 - 1
-"""Maximum of counters, which every language and encoding can represent."""
+"""Maximum value of counters; every language and encoding can represent it."""
 
 RENEW_S = 1.0
-"""Default interval of renewals; the master may ask for another."""
+"""Default interval of renewals in seconds. The master may request another interval."""
 
 
 def as_count(value: int) -> int:
@@ -30,16 +30,16 @@ def as_count(value: int) -> int:
 
 @dataclass(frozen=True)
 class NodeRecord:
-    """Node as it registers itself.
+    """Registration record of a node.
 
     Attributes:
-        id: Derived from the key.
+        id: Id derived from the key.
         name: Name of the node.
         host: Name of its computer.
         pid: Process id, or None if unknown.
         language: Programming language.
         generation: See `NodeInfo`.
-        since_ns: Start time by its own clock.
+        since_ns: Start time by its own clock, in nanoseconds since 1970.
         key: Secret that proves the id (`is_proven`).
         computer: Id of the computer; nodes with the same value share a clock. "" if unknown.
     """
@@ -57,16 +57,16 @@ class NodeRecord:
 
 @dataclass(frozen=True)
 class PublisherRecord:
-    """Publisher as its node registers it.
+    """Registration record of a publisher.
 
     Attributes:
-        id: Derived from the node's key and `number` (`is_proven`).
+        id: Id derived from the node's key and `number` (`is_proven`).
         topic: Name of the topic.
         msg_type: Message type.
         codec: Name of the codec.
         endpoints: Addresses; empty if subscribers can't connect directly.
         latched: True if it keeps messages for later subscribers.
-        local: True if it is also bound to the local (ipc) name of its loopback endpoint.
+        local: True if it is also bound to the Unix socket that belongs to its loopback endpoint.
         number: Proves the id.
         history: Number of messages kept for later subscribers, if more than one.
     """
@@ -84,9 +84,14 @@ class PublisherRecord:
 
 @dataclass(frozen=True)
 class SubscriberRecord:
-    """Subscriber as its node registers it. `number` proves its id (`is_proven`).
+    """Registration record of a subscriber.
 
-    With `pattern` its topic is a pattern: see `nep.protocol.topic_pattern`.
+    Attributes:
+        id: Id derived from the node's key and `number` (`is_proven`).
+        topic: Name of the topic, or a pattern.
+        msg_type: Message type.
+        number: Proves the id.
+        pattern: True if `topic` is a pattern. See `nep.protocol.topic_pattern`.
     """
 
     id: int
@@ -102,13 +107,13 @@ def node_id_from(key: str) -> str:
 
 
 def id_from(key: str, number: int) -> int:
-    """Return the publisher or subscriber id derived from a node's key and a number (from 1)."""
+    """Return the id of a publisher or subscriber, derived from its node's key and a number (from 1)."""
     digest = sha256(f"{key}/{number}".encode("utf-8", "replace")).digest()
     return int.from_bytes(digest[:8], "little") >> 1 or 1
 
 
 def is_proven(node: NodeRecord, record: PublisherRecord | SubscriberRecord | None = None) -> bool:
-    """Return True if the node's id is derived from its key and, with a record, the record's id, too."""
+    """Return True if a node's id is derived from its key; with a record, the record's id must be, too."""
     if not node.key or node_id_from(node.key) != node.id:
         return False
     return record is None or (record.number > 0 and id_from(node.key, record.number) == record.id)
@@ -118,8 +123,8 @@ def is_proven(node: NodeRecord, record: PublisherRecord | SubscriberRecord | Non
 class PublisherCount:
     """Statistics of a publisher: totals and the newest message.
 
-    `problem` describes payloads that can't be encoded, or is "". A server counts its calls, the bytes of its
-    replies, and calls with `errors`.
+    `problem` is the reason why payloads can't be encoded, or "". For a server, the statistics are its calls,
+    the bytes of its replies, and the calls that ended with `errors`.
     """
 
     id: int
@@ -133,7 +138,7 @@ class PublisherCount:
 
 @dataclass(frozen=True)
 class SubscriberCount:
-    """Statistics of a subscriber. `problem` describes messages that it can't decode, or is ""."""
+    """Statistics of a subscriber. `problem` is the reason why messages can't be decoded, or ""."""
 
     id: int
     received: int | None
@@ -143,7 +148,7 @@ class SubscriberCount:
 
 @dataclass(frozen=True)
 class RemotePublisher:
-    """Publisher with its node: everything a subscriber needs to connect. `computer` as in `NodeRecord`."""
+    """Publisher and its node: everything a subscriber needs to connect. `computer` as in `NodeRecord`."""
 
     publisher: PublisherRecord
     node_id: str
@@ -153,7 +158,7 @@ class RemotePublisher:
 
 @dataclass(frozen=True)
 class Expected:
-    """Subscriber that a new publisher waits for."""
+    """Registered subscriber that a new publisher waits for."""
 
     id: int
     node_id: str
@@ -165,10 +170,15 @@ class Expected:
 
 @dataclass(frozen=True)
 class Join:
-    """Register a node with everything it has, replacing its previous registration.
+    """Request to register a node and all its records, replacing its previous registration.
 
-    `epoch` is that of its previous master, or 0. A `managed` node (a program of the original NEP) has neither
-    connection nor lease: its manager reports its end.
+    Attributes:
+        node: Record of the node.
+        epoch: Epoch of its previous master, or 0.
+        publishers: Records of its publishers.
+        subscribers: Records of its subscribers.
+        managed: True for programs of the original NEP. They have neither a connection nor a lease; their
+            manager reports their end.
     """
 
     node: NodeRecord
@@ -180,7 +190,7 @@ class Join:
 
 @dataclass(frozen=True)
 class AddPublisher:
-    """Register a publisher, and its node if unknown. Reply: `Added`."""
+    """Request to register a publisher, and its node if unknown. Reply: `Added`."""
 
     node: NodeRecord
     publisher: PublisherRecord
@@ -188,7 +198,7 @@ class AddPublisher:
 
 @dataclass(frozen=True)
 class AddSubscriber:
-    """Register a subscriber, and its node if unknown. Reply: `Found`."""
+    """Request to register a subscriber, and its node if unknown. Reply: `Found`."""
 
     node: NodeRecord
     subscriber: SubscriberRecord
@@ -196,7 +206,7 @@ class AddSubscriber:
 
 @dataclass(frozen=True)
 class RemovePublisher:
-    """Unregister a publisher; `last_seq` is its last message."""
+    """Request to unregister a publisher, whose last message is `last_seq`."""
 
     node_id: str
     id: int
@@ -205,7 +215,7 @@ class RemovePublisher:
 
 @dataclass(frozen=True)
 class RemoveSubscriber:
-    """Unregister a subscriber."""
+    """Request to unregister a subscriber."""
 
     node_id: str
     id: int
@@ -213,14 +223,14 @@ class RemoveSubscriber:
 
 @dataclass(frozen=True)
 class Leave:
-    """Unregister a node with everything it has."""
+    """Request to unregister a node with all its records."""
 
     node_id: str
 
 
 @dataclass(frozen=True)
 class Renew:
-    """Renew a lease and report statistics.
+    """Request to renew a lease, with statistics. Reply: `Renewed`.
 
     Attributes:
         node_id: Id of the node.
@@ -228,8 +238,8 @@ class Renew:
         revision: Revision of the last reply.
         publishers: Statistics of its publishers.
         subscribers: Statistics of its subscribers.
-        cpu_ratio: CPU usage of its process since the last renewal, or None if unknown.
-        clock: Offset to add to its clock for the master's, and the uncertainty, in ns; empty if unknown yet;
+        cpu_ratio: CPU usage of its process since the last renewal (1.0 is one core), or None if unknown.
+        clock: Offset to add to its clock for the master's, and the uncertainty, in ns. Empty if unknown yet;
             None from nodes that don't compare clocks.
     """
 
@@ -244,7 +254,7 @@ class Renew:
 
 @dataclass(frozen=True)
 class ReportMissing:
-    """Report subscribers that did not answer a new publisher in time."""
+    """Report of subscribers that did not connect to a new publisher in time."""
 
     node_id: str
     publisher_id: int
@@ -253,7 +263,7 @@ class ReportMissing:
 
 @dataclass(frozen=True)
 class ReportAlerts:
-    """Report all current alerts of an attachment (`source`), replacing its previous ones.
+    """Report of all current alerts of an attachment (`source`), replacing its previous alerts.
 
     Only for `Master.submit`; has no wire encoding.
     """
@@ -264,7 +274,7 @@ class ReportAlerts:
 
 @dataclass(frozen=True)
 class Listen:
-    """Serve other computers at these addresses of the master's computer; none: only its own.
+    """Request to serve other computers at these addresses of the master's computer; none serves only its own.
 
     Reply: `Done`. Rejected from other computers.
     """
@@ -274,12 +284,12 @@ class Listen:
 
 @dataclass(frozen=True)
 class Look:
-    """Request the whole graph. Reply: `Seen`."""
+    """Request for the whole graph. Reply: `Seen`."""
 
 
 @dataclass(frozen=True)
 class Ping:
-    """Check that a master is running. Reply: `Done`."""
+    """Request to check that a master is running. Reply: `Done`."""
 
 
 Request = (
@@ -303,7 +313,12 @@ Request = (
 
 @dataclass(frozen=True)
 class _FromMaster:
-    """Base of replies and pushes: `epoch` changes when the master is restarted; `revision` of the graph."""
+    """Base class of replies and pushes.
+
+    Attributes:
+        epoch: Changes when the master is restarted.
+        revision: Revision of the graph.
+    """
 
     epoch: int
     revision: int
@@ -311,15 +326,18 @@ class _FromMaster:
 
 @dataclass(frozen=True)
 class Done(_FromMaster):
-    """Success; also the reply to a ping."""
+    """Request executed; also the reply to a ping."""
 
 
 @dataclass(frozen=True)
 class Added(_FromMaster):
-    """Publisher registered. It waits for `expected`; `hung` are known not to respond at present.
+    """Publisher registered.
 
-    `hosts` (here and below) are the addresses at which the master serves other computers; publishers on the
-    master's computer serve there, too.
+    Attributes:
+        expected: Subscribers that the publisher waits for.
+        hung: Subscribers of nodes that are known not to respond at present.
+        hosts: Addresses at which the master serves other computers. Publishers on the master's computer bind
+            to them, too.
     """
 
     expected: tuple[Expected, ...] = ()
@@ -329,9 +347,12 @@ class Added(_FromMaster):
 
 @dataclass(frozen=True)
 class Found(_FromMaster):
-    """Subscriber registered, or node joined: the publishers to connect to.
+    """Subscriber registered, or node joined.
 
-    `pattern`: the master supports patterns; older ones don't.
+    Attributes:
+        publishers: Publishers to connect to.
+        hosts: Addresses at which the master serves other computers.
+        pattern: True if the master supports patterns; older masters don't.
     """
 
     publishers: tuple[RemotePublisher, ...] = ()
@@ -352,15 +373,16 @@ class Renewed(_FromMaster):
     """Lease renewed.
 
     Attributes:
-        again: True if the master does not know the node as it is: it must join again.
+        again: True if the node must join again, because its registration at the master is missing or
+            different.
         topics: Publishers of topics that changed since the node's revision.
         last_seqs: Newest messages of the publishers that the node subscribes to, by publisher id.
         hosts: Addresses at which the master serves other computers.
         next_s: Time until the next renewal in seconds; longer in large graphs.
         times: Receipt and reply of the renewal by the master's clock (ns since 1970); empty for nodes with
             the same clock.
-        clocks: By node id of publishers on other computers: offset to add to their times for the node's
-            clock, and its uncertainty (ns).
+        clocks: Offset to add to times of a node on another computer for the receiver's clock, and its
+            uncertainty (ns), by node id. Only for nodes whose publishers it receives.
     """
 
     again: bool = False
@@ -374,16 +396,16 @@ class Renewed(_FromMaster):
 
 @dataclass(frozen=True)
 class Seen(_FromMaster):
-    """The whole graph."""
+    """Reply with the whole graph."""
 
     view: GraphView
 
 
 @dataclass(frozen=True)
 class Refused(_FromMaster):
-    """Rejection of a request; `reason` is a sentence in the master's language.
+    """Request rejected. `reason` is a sentence in the master's language.
 
-    `code` is language-independent: see the table of codes in docs/wire.md. Empty from older masters.
+    `code` is independent of the language; docs/wire.md lists the codes. Older masters send none ("").
     """
 
     reason: str
@@ -398,9 +420,10 @@ Reply = Done | Added | Found | Renewed | Seen | Refused
 
 @dataclass(frozen=True)
 class PublisherCame(_FromMaster):
-    """New publisher of a subscribed topic, or one with new endpoints.
+    """Notification of a new publisher on a subscribed topic, or of a publisher's new endpoints.
 
-    `is_new`: it was just created and has not sent anything; it did not rejoin or move.
+    `is_new` is True if the publisher was just created and has not sent anything, False if it rejoined or
+    moved.
     """
 
     publisher: RemotePublisher
@@ -409,10 +432,10 @@ class PublisherCame(_FromMaster):
 
 @dataclass(frozen=True)
 class PublisherGone(_FromMaster):
-    """Publisher of a subscribed topic no longer registered.
+    """Notification that a publisher of a subscribed topic is no longer registered.
 
-    `is_closed`: it unregistered, and `last_seq` was its last message. Otherwise its node does not respond,
-    and the connection stays, because the publisher may only be suspended.
+    `is_closed` is True if the publisher unregistered; `last_seq` was then its last message. Otherwise its
+    node doesn't respond, and the connection stays, because the publisher may only be suspended.
     """
 
     id: int
@@ -423,14 +446,14 @@ class PublisherGone(_FromMaster):
 
 @dataclass(frozen=True)
 class Probe(_FromMaster):
-    """Probe of a silent node's connection. Ignored by the receiver."""
+    """Test of the connection to a node that missed a renewal. Ignored by the receiver."""
 
 
 Push = PublisherCame | PublisherGone | Probe
 
 
 def node_of(request: Request) -> str | None:
-    """Return the id of the node that a request speaks for, or None."""
+    """Return the id of the node in whose name a request is sent, or None."""
     if isinstance(request, Join | AddPublisher | AddSubscriber):
         return request.node.id
     if isinstance(request, ReportAlerts | Listen | Look | Ping):

@@ -46,13 +46,13 @@ __all__ = [
 
 PREFIX = "nep.service:"
 SURVEY = "survey:"
-"""Prefix of a survey's service name; its respondents are listed as servers of that service."""
+"""Prefix of a survey's service name. The master lists its respondents as servers of that service."""
 SERVICE_TYPE = "service"
 """Message type and codec under which the master lists servers and clients."""
 ORIGINAL_CODEC = "original"
-"""Codec of servers with `ORIGINAL` framing: programs of the original NEP, listed by the gateway."""
+"""Codec of servers with `ORIGINAL` framing: programs of the original NEP that the gateway registers."""
 PAYLOAD_MAX_BYTES = 64 * 2**20
-"""Maximum size of a call or reply; a peer that sends more is disconnected."""
+"""Maximum size of a call or reply in bytes; a peer that sends more is disconnected."""
 
 _VERSION = 1
 _HEADER = struct.Struct("<BBHIQ")  # version, kind, codec, timeout_ms, number
@@ -64,7 +64,7 @@ _FAILURE = b'{"nep_error":'
 
 
 class CallKind(IntEnum):
-    """Kind of a frame. REFUSED: the server did not execute the call."""
+    """Kind of a frame. `REFUSED` is the reply to a call that the server did not execute."""
 
     CALL = 1
     ANSWER = 2
@@ -73,7 +73,7 @@ class CallKind(IntEnum):
 
 
 class Reply(NamedTuple):
-    """Reply of a server: the payload of an answer, or a `failure`."""
+    """Reply of a server: an encoded payload, or an error created by `failure`."""
 
     kind: CallKind
     data: bytes | memoryview
@@ -81,7 +81,7 @@ class Reply(NamedTuple):
 
 
 class CallHeader(NamedTuple):
-    """Call as a server parses it; `timeout_s` None means no limit."""
+    """Parsed call, as a server receives it. `timeout_s` is None if the client waits without limit."""
 
     number: int
     codec: int
@@ -90,14 +90,14 @@ class CallHeader(NamedTuple):
 
 
 class ReadAnswer(NamedTuple):
-    """Reply as a client parses it; `number` None means that it answers the oldest call."""
+    """Parsed reply, as a client receives it. `number` is None if it replies to the oldest call."""
 
     number: int | None
     reply: Reply
 
 
 class Framing(Protocol):
-    """Conversion of calls and replies to parts."""
+    """Wire format of calls and replies."""
 
     @property
     def in_order(self) -> bool:
@@ -106,13 +106,13 @@ class Framing(Protocol):
     def call(
         self, number: int, codec: int, timeout_s: float | None, data: bytes | memoryview
     ) -> list[bytes | memoryview]:
-        """Return the parts of a call."""
+        """Encode a call."""
 
     def read_call(self, parts: Sequence[bytes | memoryview]) -> CallHeader:
         """Parse a call. Raises `WireError`."""
 
     def answer(self, number: int, reply: Reply) -> list[bytes | memoryview]:
-        """Return the parts of a reply."""
+        """Encode a reply."""
 
     def read_answer(self, parts: Sequence[bytes | memoryview]) -> ReadAnswer:
         """Parse a reply. Raises `WireError`."""
@@ -193,13 +193,19 @@ def _single_part(parts: Sequence[bytes | memoryview]) -> bytes | memoryview:
 
 
 NATIVE: Framing = _Native()
-"""Header and payload."""
+"""Framing with a header and a payload."""
 ORIGINAL: Framing = _Original()
-"""JSON over REQ/REP, as the original NEP's `client` and `server`."""
+"""Framing of the original NEP's `client` and `server`: JSON over REQ and REP."""
 
 
 def failure(kind: CallKind, name: str, reason: str) -> Reply:
-    """Return an error reply: class name of the exception ("" for REFUSED) and message."""
+    """Return an error reply.
+
+    Args:
+        kind: `ERROR` or `REFUSED`.
+        name: Class name of the exception; "" for `REFUSED`.
+        reason: Message of the exception.
+    """
     # lone surrogates become "?"
     content = {"nep_error": _bounded(name, _MAX_CLASS_LENGTH), "reason": _bounded(reason, _MAX_REASON_LENGTH)}
     return Reply(kind, orjson.dumps(content))
@@ -210,7 +216,7 @@ def _bounded(text: str, most: int) -> str:
 
 
 def read_failure(data: bytes | memoryview) -> tuple[str, str]:
-    """Return class name and message of an error reply; accepts any untrusted data."""
+    """Return the class name and message of an error reply. Accepts any untrusted data."""
     try:
         content = orjson.loads(data)
     except ValueError:
@@ -235,7 +241,7 @@ def check_service(name: str) -> str:
 
 
 def check_survey(name: str) -> str:
-    """Validate a survey's name and return the name of its service. Raises `BadTopicError`."""
+    """Validate the name of a survey and return the name of its service. Raises `BadTopicError`."""
     check_service(name)
     check_topic(topic_of(f"{SURVEY}{name}"))
     return f"{SURVEY}{name}"
@@ -247,5 +253,5 @@ def topic_of(service: str) -> str:
 
 
 def service_of(topic: str) -> str | None:
-    """Return the service listed under a topic, or None for any other topic."""
+    """Return the service that is listed under a topic, or None for any other topic."""
     return topic.removeprefix(PREFIX) if topic.startswith(PREFIX) and len(topic) > len(PREFIX) else None

@@ -1,8 +1,8 @@
-"""Glob patterns of topics for people, such as `/*/odom` or `/cam?`. Pure functions.
+"""Glob patterns of topics, as people type them, such as `/*/odom` or `/cam?`. Pure functions.
 
-`*` matches any characters within a level, `?` one character, `**` any number of levels. Subscribers know
-wildcards for whole levels only (`nep.protocol.topic_pattern`): `widened` returns a pattern for them that
-matches at least as much.
+`*` matches any characters within a level, `?` matches one character, `**` any number of levels. Subscribers
+support only wildcards for whole levels (`nep.protocol.topic_pattern`); `widened` converts a glob pattern to
+one of these, which may match more topics.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ def is_glob(word: str) -> bool:
 
 
 def widened(pattern: str) -> str:
-    """Return a subscriber's pattern that matches at least all topics of a glob pattern.
+    """Return a subscriber's pattern that matches all topics of a glob pattern, and possibly others.
 
     Exception: topics with an empty level in the middle, which are not used.
     """

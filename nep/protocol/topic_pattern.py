@@ -24,7 +24,7 @@ def matches(pattern: str, topic: str) -> bool:
 
 
 def levels_match(parts: Sequence[str], levels: Sequence[str]) -> bool:
-    """Return True if levels match the levels of a pattern; see `matches`."""
+    """Return True if the levels of a topic match the levels of a pattern. See `matches`."""
     if _ANY not in parts and len(parts) != len(levels):
         return False
     at = _skip_empty_matches(parts, {0})

@@ -62,7 +62,10 @@ HEADER_BYTES = 32
 TOPIC_MAX_BYTES = 200
 NODE_NAME_MAX_BYTES = 200
 SUBSCRIPTION_MAX_BYTES = 4096
-"""Maximum size of a subscription; a peer that sends more is disconnected. libzmq stores 40 bytes per byte."""
+"""Maximum size of a subscription in bytes; a peer that sends more is disconnected.
+
+libzmq needs 40 bytes of memory for each of them.
+"""
 
 LATCHED = 1
 """Flag: the publisher keeps this message for later subscribers."""
@@ -73,39 +76,39 @@ BYE = 4
 BATCH = 8
 """Flag: one part with several messages. Sent only to subscribers with hello level 3."""
 SHARED = 16
-"""Flag: the payload is in shared memory; its part is the number (u64)."""
+"""Flag: the payload is in shared memory; the message has its number (u64) instead."""
 OFFER = 32
-"""Flag of a notice: offer of shared memory, whose generation is the header's size."""
+"""Flag of a notice: an offer of shared memory. The size field of the header is the memory's generation."""
 
 HELLO = b"\xffhello/"
-"""Prefix of a hello filter. 0xff sorts after all UTF-8, so it is installed after the topic filter."""
+"""Prefix of a hello filter. 0xff sorts after all UTF-8, so the hello filter is set after the topic filter."""
 HELLO_ONE = b"\xffhello1/"
-"""Prefix of a hello filter, level 1: also reads messages of one part."""
+"""Prefix of a hello filter, level 1: the subscriber also reads messages of one part."""
 HELLO_TELLS = b"\xffhello2/"
-"""Prefix of a hello filter, level 2: also acknowledges echoes with the last message read."""
+"""Prefix of a hello filter, level 2: the subscriber also acknowledges echoes with the last message read."""
 HELLO_BATCHES = b"\xffhello3/"
-"""Prefix of a hello filter, level 3: also reads batches (`nep.protocol.batch`)."""
+"""Prefix of a hello filter, level 3: the subscriber also reads batches (`nep.protocol.batch`)."""
 _HELLOS = (HELLO_BATCHES, HELLO_TELLS, HELLO_ONE, HELLO)
 READ = b"\xffread/"
-"""Prefix of the filter that acknowledges an echo. It is removed at once."""
+"""Prefix of the filter that acknowledges an echo. It is removed immediately after it was set."""
 SHARES = b"\xffshares/"
-"""Prefix of the filter that accepts an offer of shared memory. It is removed at once."""
+"""Prefix of the filter that accepts an offer of shared memory. It is removed immediately after it was set."""
 
 _HEX = re.compile(rb"[0-9a-fA-F]{16}")
-"""Stricter than `int`, which accepts signs and underscores."""
+"""Pattern of an id; stricter than `int`, which accepts signs and underscores."""
 _HEADER = struct.Struct("<BBHIQQQ")  # version, codec, flags, size, seq, stamp_ns, publisher
 _FAST_HEADER = struct.Struct("<IIQQQ")  # the first three fields in one
 SIZE_MAX = 2**32 - 1
 
 
 class Header(NamedTuple):
-    """Message header, the second part.
+    """Message header, the second part of a message.
 
     Attributes:
         codec: Number of the codec.
         flags: Flags.
         seq: Sequence number, counted from 1.
-        stamp_ns: Time of publication by the publisher's clock.
+        stamp_ns: Time of publication by the publisher's clock, in nanoseconds since 1970.
         publisher: Id of the publisher.
         size: Size of the payload in bytes; 0 if not stated.
     """
@@ -118,26 +121,26 @@ class Header(NamedTuple):
     size: int = 0
 
     def pack(self) -> bytes:
-        """Return the 32 bytes, little-endian."""
+        """Encode the header as 32 bytes, little-endian."""
         return _HEADER.pack(
             VERSION, self.codec, self.flags, self.size, self.seq, self.stamp_ns, self.publisher
         )
 
 
 def form_of(codec: int, flags: int) -> int:
-    """Return the first four bytes of a header as a number, which many messages share."""
+    """Return the first four bytes of a header as a number; most messages of a publisher have the same."""
     return VERSION | codec << 8 | flags << 16
 
 
 pack_quickly: Callable[[int, int, int, int, int], bytes] = _FAST_HEADER.pack
-"""Fast encoder of a header: (form, size, seq, stamp_ns, publisher). Sizes beyond `SIZE_MAX` are sent as 0."""
+"""Fast encoder for a header: (form, size, seq, stamp_ns, publisher). Sizes above `SIZE_MAX` are sent as 0."""
 unpack_quickly: Callable[[bytes], tuple[int, int, int, int, int]] = _FAST_HEADER.unpack
-"""Fast decoder of a header without validation: (form, size, seq, stamp_ns, publisher).
+"""Fast decoder for a header, without validation: (form, size, seq, stamp_ns, publisher).
 
 Raises `struct.error`.
 """
 unpack_at: Callable[[bytes, int], tuple[int, int, int, int, int]] = _FAST_HEADER.unpack_from
-"""Fast decoder of a header at an offset."""
+"""Fast decoder for a header at an offset, like `unpack_quickly`."""
 
 
 def check_topic(topic: str) -> str:
@@ -184,14 +187,19 @@ def check_node_name(name: str) -> str:
 
 
 def topic_part(topic: str) -> bytes:
-    """Return a topic's first part, which is also the filter of its subscribers: name and zero byte."""
+    """Return the first part of a topic's messages and the filter of its subscribers: name and zero byte."""
     return topic.encode("utf-8") + b"\0"
 
 
 class Hello(NamedTuple):
     """Parsed hello filter of a subscriber.
 
-    `one_part`, `tells` and `batches` are its abilities: messages of one part, acknowledged echoes, batches.
+    Attributes:
+        subscriber: Id of the subscriber.
+        topic: Name of the topic.
+        one_part: True if it reads messages of one part.
+        tells: True if it acknowledges echoes.
+        batches: True if it reads batches.
     """
 
     subscriber: int
@@ -202,7 +210,7 @@ class Hello(NamedTuple):
 
 
 class Read(NamedTuple):
-    """Acknowledgement of a subscriber: everything up to `seq` is read; it accepts `bound_bytes` in flight."""
+    """Parsed acknowledgement of all messages up to `seq`; the subscriber accepts `bound_bytes` in flight."""
 
     subscriber: int
     publisher: int
@@ -211,7 +219,7 @@ class Read(NamedTuple):
 
 
 class Shares(NamedTuple):
-    """Acceptance of a publisher's shared memory of one generation."""
+    """Parsed acceptance of shared memory of a publisher."""
 
     subscriber: int
     publisher: int
@@ -221,9 +229,9 @@ class Shares(NamedTuple):
 def hello_part(
     subscriber: int, topic: str, *, one_part: bool = False, tells: bool = False, batches: bool = False
 ) -> bytes:
-    """Return the hello filter of a subscriber, which is also the first part of messages for it alone.
+    """Return the hello filter of a subscriber, which is also the first part of messages addressed to it.
 
-    Each ability includes the ones before: `one_part`, `tells`, `batches`.
+    Each ability includes the previous ones: `one_part`, `tells`, `batches`.
     """
     begin = HELLO_BATCHES if batches else HELLO_TELLS if tells else HELLO_ONE if one_part else HELLO
     return begin + f"{subscriber:016x}/{topic}".encode()
@@ -245,7 +253,7 @@ def parse_hello(part: bytes) -> Hello | None:
 
 
 def read_part(read: Read) -> bytes:
-    """Return the filter that acknowledges an echo."""
+    """Return the filter that acknowledges all messages up to one."""
     return READ + b"/".join(b"%016x" % number for number in read)
 
 
@@ -296,7 +304,7 @@ def read_header(part: bytes) -> Header:
 
 
 def extension_part(extension: Mapping[str, object]) -> bytes:
-    """Return the extension part. Raises `WireError` if a value can't be encoded in msgpack."""
+    """Encode an extension part. Raises `WireError` if msgpack can't represent a value."""
     try:
         return pack(dict(extension))
     except ValueError as error:
@@ -324,7 +332,7 @@ def join(
     payload: bytes | memoryview,
     extension: Mapping[str, object] | None = None,
 ) -> tuple[bytes | memoryview, ...]:
-    """Return all parts of a message; sets the flag EXTENSION if needed."""
+    """Return all parts of a message. The flag EXTENSION is set if there is an extension."""
     if not extension:
         return topic_part(topic), header.pack(), payload
     flagged = header._replace(flags=header.flags | EXTENSION)
@@ -342,7 +350,7 @@ def apart(part: bytes) -> tuple[bytes, bytes, bytes]:
 
 
 class Parts(NamedTuple):
-    """Parsed message."""
+    """Parsed message: its topic, header, payload and extension."""
 
     topic: str
     header: Header
@@ -351,10 +359,10 @@ class Parts(NamedTuple):
 
 
 def split(parts: Sequence[bytes | memoryview]) -> Parts:
-    """Return the message in `parts`. The body of a batch is its payload: see `nep.protocol.batch.read_parts`.
+    """Parse a message. For a batch the payload is its body: see `nep.protocol.batch.read_parts`.
 
     Raises:
-        WireError: The parts violate the specification; checked in the order of docs/wire.md.
+        WireError: The parts violate the specification. The rules are checked in the order of docs/wire.md.
     """
     if not parts:
         raise WireError(_("a message must have 3 or 4 parts, but this one has none"), code="part-count")
@@ -367,9 +375,9 @@ def split(parts: Sequence[bytes | memoryview]) -> Parts:
 def split_rest(
     rest: Sequence[bytes | memoryview], *, is_one_part: bool = False
 ) -> tuple[Header, bytes | memoryview, Mapping[str, object]]:
-    """Return header, payload and extension from the parts after the first. Raises `WireError`.
+    """Parse the parts after the first: header, payload and extension. Raises `WireError`.
 
-    ``is_one_part`` is True if they were split from one part; only then a batch is allowed.
+    ``is_one_part`` is True if they were split from one part; a batch is only allowed then.
     """
     if not rest:
         raise WireError(_("a message must have 3 or 4 parts, but this one has 1"), code="part-count")
