@@ -1,4 +1,4 @@
-"""Widgets and the web view; the only package that imports PySide6.
+"""Graphical user interface; the only package that imports PySide6.
 
 `application` starts it. Layers import downward: shell, panels, code shared by panels, widgets, theme.
 """

@@ -46,7 +46,7 @@ from nep.i18n import ENGLISH, _, language, listed
 
 LOG_INTERVAL_MS = 500
 RESTART = -1
-"""Result of `run` when a restart was requested."""
+"""Result of `run` when the user requested a restart."""
 FIRST_START_KEY = "begun"  # key of the setting that marks the first start as done
 WEB_VIEW = "app.ui.blockly.view"
 SOON = (
@@ -54,7 +54,7 @@ SOON = (
     "app.ui.shell.dialogs.settings",
     "app.ui.shell.dialogs.shortcuts",
 )
-"""Modules imported in advance after the first paint, like the block editor."""
+"""Modules imported in advance after the first paint."""
 
 _log = logging.getLogger(__name__)
 
@@ -75,7 +75,7 @@ class Options:
 
     @property
     def alone(self) -> bool:
-        """True if the window shares neither later starts nor tabs with other windows."""
+        """True if the window neither receives start requests of other processes nor saves its tabs."""
         return self.new_window or self.self_drive is not None or self.drive is not None
 
 
@@ -113,7 +113,10 @@ def translate_qt(application: QCoreApplication) -> QTranslator | None:
 
 
 def steps_after(window: MainWindow, *, web: bool = True) -> list[Callable[[], object]]:
-    """Return deferred startup steps: create panels and import modules and the block editor."""
+    """Return the startup steps for the time after the first paint.
+
+    They create panels, import modules and load the block editor.
+    """
     panels = window.panels.steps() if isinstance(window.panels, PanelRegistry) else ()
     modules = (partial(importlib.import_module, name) for name in SOON)
     view = (partial(import_web_view, window.session.alerts),) if web else ()
@@ -121,7 +124,7 @@ def steps_after(window: MainWindow, *, web: bool = True) -> list[Callable[[], ob
 
 
 def import_web_view(alerts: Alerts) -> None:
-    """Import the block editor, or report the system libraries that it lacks."""
+    """Import the block editor, or raise an alert that names the missing system libraries."""
     try:
         importlib.import_module(WEB_VIEW)
     except ImportError as error:
@@ -133,7 +136,7 @@ def import_web_view(alerts: Alerts) -> None:
 
 
 def make_window(session: Session, options: Options) -> MainWindow:
-    """Create the window in its last state; nothing runs yet."""
+    """Create the window and restore its last state; the event loop is not running yet."""
     theme = Theme("light")
     # must come first: before the event loop runs, Qt doesn't notify widgets of a changed font
     WindowState(session.settings, _log.warning).apply_theme(theme)
@@ -151,7 +154,7 @@ def make_window(session: Session, options: Options) -> MainWindow:
 
 
 def tell_of_what_was_found(session: Session) -> None:
-    """Show alerts for stored files that can't be used: settings, and unsaved work of a newer version."""
+    """Raise alerts for stored files that can't be used: settings, and unsaved work of a newer version."""
     if session.settings.notice:
         session.alerts.put("settings:notice", "warn", session.settings.notice)
     names = of_newer()
@@ -167,7 +170,7 @@ def tell_of_what_was_found(session: Session) -> None:
 
 
 def tell_of_crashes(session: Session, this_run: StudioRun) -> None:
-    """Record runs that crashed and offer a report once for those since the last start."""
+    """Log earlier runs that crashed. Offer a problem report once for those since the last start."""
     reports = CrashReports()
     for crash in this_run.left():
         reports.add(crash)
@@ -175,7 +178,7 @@ def tell_of_crashes(session: Session, this_run: StudioRun) -> None:
 
 
 def keep_version(window: MainWindow, now_s: float) -> None:
-    """Record the version in the settings if it has changed, for problem reports."""
+    """Save a changed version in the settings, where problem reports read it."""
     settings = window.session.settings
     kept = studio_versions.with_this_version(settings.all(), now_s, is_first=settings.are_new)
     if kept is not None:
@@ -202,7 +205,7 @@ def close_when_asked(window: MainWindow, this_run: StudioRun) -> None:
 
 
 def open_asked(window: MainWindow, asked: StartRequest) -> None:
-    """Execute a start request of this or a later process."""
+    """Execute a start request of this process or of one that was started later."""
     if asked.files:
         window.commands.files.open_all(asked.files)
     elif asked.demo:
@@ -214,16 +217,17 @@ def open_asked(window: MainWindow, asked: StartRequest) -> None:
 
 
 def layout_left(window: MainWindow) -> str:
-    """Return the last layout if it has content, or "" for the start page."""
+    """Return the name of the last layout, or "" for the start page if that layout has no content."""
     last = window.state.layout
     there = {"developer": True, "behaviour": any(not each.blank for each in window.session.documents)}
     return last if there.get(last, False) else ""
 
 
 def offer_first_steps(window: MainWindow, *, asked: bool) -> None:
-    """Offer the first steps at the very first start.
+    """Offer the first steps on the very first start.
 
-    Skipped if files were ``asked`` for or unsaved work is offered. The first start is recorded immediately,
+    Skipped if ``asked`` names files to open, or unsaved work is offered. The first start is recorded
+    immediately,
     so that it counts even after a crash.
     """
     if not window.session.settings.are_new:
@@ -235,7 +239,7 @@ def offer_first_steps(window: MainWindow, *, asked: bool) -> None:
 
 
 def first_steps(window: MainWindow, options: Options) -> list[Callable[[], object]]:
-    """Show the first page; return the steps that complete it after the first paint."""
+    """Show the first page and return the steps that complete it after the first paint."""
     left = "" if options.alone else layout_left(window)
     asked = bool(options.files or options.demo)
     if options.self_drive is not None:
@@ -260,7 +264,7 @@ def first_steps(window: MainWindow, options: Options) -> list[Callable[[], objec
 
 
 def why_not(environ: Mapping[str, str], platform: str, user: int) -> str:
-    """Return why no window can be opened and what to do, or "".
+    """Return the reason why no window can be opened, with the remedy; "" if one can.
 
     Args:
         environ: Environment variables.
@@ -283,7 +287,11 @@ def why_not(environ: Mapping[str, str], platform: str, user: int) -> str:
 
 
 def run(options: Options) -> int:
-    """Show the window until it is closed; return 0, 2 if no window can be opened, or `RESTART`."""
+    """Show the window until it is closed.
+
+    Returns:
+        Exit code 0, 2 if no window can be opened, or `RESTART`.
+    """
     bring_here()
     meeting_place = single_instance.place(home())
     turn = FileLock(home() / "starting")

@@ -17,10 +17,11 @@ _FREEZERS = "_PYI_"
 
 @contextmanager
 def outside(environ: MutableMapping[str, str], *, is_frozen: bool) -> Iterator[None]:
-    """Restore the original environment of a frozen Studio within the context.
+    """Temporarily restore the environment that was in place before the frozen Studio changed it.
 
-    The loader sets the library path to Studio's bundled libraries. Another program that inherits it would
-    load those instead of its own and may fail to start.
+    The loader of a frozen Studio sets the library path to its bundled libraries. Another program that
+    inherits
+    this path would load those instead of its own and may fail to start.
     """
     kept = {
         name: value
@@ -40,6 +41,6 @@ def outside(environ: MutableMapping[str, str], *, is_frozen: bool) -> Iterator[N
 
 
 def open_outside(url: QUrl) -> bool:
-    """Open a folder or page in the system's default program; return whether that succeeded."""
+    """Open a folder or web page in the system's default program; return False on failure."""
     with outside(os.environ, is_frozen=bool(getattr(sys, "frozen", False))):
         return QDesktopServices.openUrl(url)

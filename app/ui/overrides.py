@@ -1,4 +1,4 @@
-"""Guards that keep exceptions of overridden Qt methods from propagating into Qt.
+"""Guards that prevent exceptions in overridden Qt methods from propagating into Qt.
 
 With PySide 6.11 and Python before 3.12 an exception from an override ends the process (ADR 0018). Therefore
 the overrides of every QObject subclass are wrapped: exceptions are passed to `sys.excepthook`, and Qt gets a
@@ -66,7 +66,10 @@ ANSWERS: dict[str, Callable[[], object]] = {
     "canFetchMore": bool,
     "fetchMore": NOTHING,
 }
-"""Return value of a failed override, by name; event handlers (``...Event``) return None."""
+"""Factories of the neutral return value of a failed override, by method name.
+
+Event handlers (``...Event``) return None.
+"""
 
 
 def guard(cls: type) -> type:
@@ -83,7 +86,7 @@ def _is_of_qt(cls: type, name: str) -> bool:
 
 
 def guarded(made: Callable[..., object], answer: Callable[[], object]) -> Callable[..., object]:
-    """Wrap a function so that exceptions are reported and ``answer()`` is returned instead."""
+    """Return a wrapper that reports exceptions of a function and then returns ``answer()``."""
 
     @functools.wraps(made)
     def override(*given: object, **named: object) -> object:
@@ -98,7 +101,7 @@ def guarded(made: Callable[..., object], answer: Callable[[], object]) -> Callab
 
 
 def guard_all() -> None:
-    """Guard all QObject subclasses defined from now on, including those of plug-ins."""
+    """Guard all QObject subclasses defined after this call, including those of plug-ins."""
 
     def begin(cls: type, /, **more: object) -> None:
         super(QObject, cls).__init_subclass__(**more)  # type: ignore[misc]  # cls is below QObject

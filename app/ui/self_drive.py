@@ -1,6 +1,6 @@
-"""Drives the real window unattended through its main use; each step waits for its expected result.
+"""Unattended operation of the real window: runs a list of steps, each of which waits for its expected result.
 
-Saves a screenshot for each step. A step that isn't completed in time ends the run with an explanation.
+A screenshot is saved for each step. A step that isn't completed in time ends the run with an explanation.
 """
 
 from __future__ import annotations
@@ -24,12 +24,16 @@ SETTLE_S = 0.6
 
 @dataclass(frozen=True)
 class Step:
-    """An action, its expected result, a timeout, and the name of its screenshot ("" for none).
+    """Action on the window, with the condition to wait for.
 
     Attributes:
         what: Description of the expected result.
+        do: Action.
         seen: Returns True once the result is visible.
-        wrong: Returns why the result can't occur any more, which ends the wait, or "".
+        within_s: Timeout.
+        picture: Name of the screenshot, or "" for none.
+        settle_s: Pause before the screenshot.
+        wrong: Returns the reason why the result can't occur any more, which ends the wait, or "".
         said: Returns details for the report.
         name: Name of the step in the report.
     """
@@ -46,20 +50,23 @@ class Step:
 
 
 class Listener(Protocol):
-    """Receives the progress of the steps."""
+    """Receiver of the progress of the steps."""
 
     def begun(self, step: Step) -> None:
-        """A step has started."""
+        """Called when a step has started."""
 
     def seen(self, step: Step) -> None:
-        """The result of a step is visible and its screenshot is saved."""
+        """Called when the result of a step is visible and its screenshot is saved."""
 
     def ended(self, well: bool, words: str) -> None:
-        """All steps have succeeded, or ``words`` describe the failure; the window closes now."""
+        """Called at the end, before the window closes.
+
+        ``well`` is True if all steps succeeded; otherwise ``words`` describe the failure.
+        """
 
 
 class SaysEnd:
-    """Listener that prints the outcome."""
+    """Listener that prints the result of the run."""
 
     def begun(self, step: Step) -> None:
         """Print nothing for single steps."""
@@ -68,12 +75,12 @@ class SaysEnd:
         """Print nothing for single steps."""
 
     def ended(self, well: bool, words: str) -> None:
-        """Print the outcome to stdout, or a failure to stderr."""
+        """Print the result to stdout, or a failure to stderr."""
         (sys.stdout if well else sys.stderr).write(words + "\n")
 
 
 class SelfDrive(QObject):
-    """Runs the steps in order, then closes the window; ``well`` is True if all of them succeeded."""
+    """Runs the steps in order, then closes the window. ``well`` is True if all steps succeeded."""
 
     def __init__(
         self,
@@ -83,8 +90,9 @@ class SelfDrive(QObject):
         listener: Listener | None = None,
         failed_picture: str = "failed",
     ) -> None:
-        # Starts at once. steps replace the default ones; failed_picture names the screenshot of a failed
-        # step.
+        # Starts immediately. `steps` replace the default ones; `failed_picture` is the name of the screenshot
+        # of a
+        # failed step.
         super().__init__(window)
         self._window, self._commands, self._folder = window, window.commands, folder
         self._listener = listener if listener is not None else SaysEnd()
@@ -214,7 +222,7 @@ class SelfDrive(QObject):
         self._step = None
         try:
             self._listener.ended(well, words)
-        finally:  # close the window even if the listener fails
+        finally:  # the window must close even if the listener fails
             for widget in QApplication.topLevelWidgets():
                 if widget is self._window:
                     widget.close()

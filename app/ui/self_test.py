@@ -1,7 +1,7 @@
-"""Self-test in the real window: robot, greeting, run, Stop, screenshot, close.
+"""Self-test of the real window: start a robot, greet, run, Stop, take a screenshot, close.
 
-Each step checks what a person relies on: the painted window, the drawn blocks, and the robot's own reports
-that it moves and has stopped. Without the web view the Developer layout is used.
+Each step checks the visible result: the painted window, the drawn blocks, and the robot's own reports that it
+moves and has stopped. Without the web view the Developer layout is used.
 """
 
 from __future__ import annotations
@@ -30,26 +30,26 @@ STATE = f"/{ROBOT}/state"
 JOINT_PREFIXES = ("theta_deg", "head_", "arm_", "elbow_")
 """Prefixes of joint names in the robot's state."""
 SETTLE_S = 1.0
-"""Pause before the screenshot, so that recent changes are painted."""
+"""Pause in s before the screenshot, so that recent changes are painted."""
 REPORTED_LEVELS, MAX_REPORTED_RECORDS = ("warn", "error"), 40
-"""Levels and number of Console lines in the report."""
+"""Levels of the log records in the report, and their maximum number."""
 MIN_COLOURS = 24
-"""A painted window has more colours than an empty or incomplete one."""
+"""Minimum number of colours of a completely painted window; an empty or incomplete one has fewer."""
 
 
 @runtime_checkable
 class SupportsPictures(Protocol):
-    """A panel with a block editor that can render its blocks."""
+    """Panel with a block editor that can render its blocks."""
 
     def picture(self, kind: str, white: bool, done: Callable[[bytes], None]) -> None:
-        """Render all blocks; ``done`` gets b"" without a page or blocks."""
+        """Render all blocks; ``done`` gets b"" if there is no page or no blocks."""
 
 
 class FirstPaint(QObject):
-    """Calls a function once, after the first paint of a window."""
+    """Event filter that calls a function once, after the first paint of a window."""
 
     def __init__(self, window: MainWindow, done: Callable[[], object]) -> None:
-        # done is called in the event loop turn after the paint event.
+        # `done` is called in the event loop iteration after the paint event.
         super().__init__(window)
         self._window, self._done = window, done
         window.installEventFilter(self)
@@ -62,10 +62,10 @@ class FirstPaint(QObject):
 
 
 class WindowSteps:
-    """Steps of a self-test and their checks."""
+    """Definition of the steps of the self-test and their checks."""
 
     def __init__(self, window: MainWindow, test: SelfTest, *, web: bool) -> None:
-        # web: the block editor's page is loaded.
+        # `web`: the page of the block editor is loaded.
         self._window, self._session, self._test, self._web = window, window.session, test, web
         self._painted = False
         self._drawn = b""
@@ -170,7 +170,7 @@ class WindowSteps:
     def _has_robot(self) -> bool:
         if not self._watched and self._link() is not None:
             self._watched = True
-            self._session.watch(STATE)  # until the session ends
+            self._session.watch(STATE)  # watched until the session ends
         return bool(self._state())
 
     def _robot_wrong(self) -> str:
@@ -230,7 +230,7 @@ class WindowSteps:
         return topic.newest if topic is not None else None
 
     def _state(self) -> Mapping[str, object]:
-        # Last state published by the robot.
+        # The last state published by the robot.
         topic = self._session.topics.get(STATE)
         payload = topic.newest.payload if topic is not None and topic.newest is not None else None
         return payload if isinstance(payload, Mapping) else {}
@@ -241,17 +241,17 @@ class WindowSteps:
 
 
 class Told:
-    """Reports the steps in the window to the self-test."""
+    """Listener that reports the steps to the self-test."""
 
     def __init__(self, test: SelfTest, session: Session) -> None:
         self._test, self._session = test, session
 
     def begun(self, step: Step) -> None:
-        """Start the step's time limit."""
+        """Start the time limit of the step."""
         self._test.begin(step.name, step.what)
 
     def seen(self, step: Step) -> None:
-        """Report the step; an empty screenshot fails the test."""
+        """Report the step as passed, or as failed if its screenshot is empty."""
         if not step.picture:
             self._test.record_success(step.said())
             return
@@ -262,7 +262,7 @@ class Told:
             self._test.record_success(_("{count} colours").format(count=shown))
 
     def ended(self, well: bool, words: str) -> None:
-        """Report the failure, if any; then the closing of the window is timed as the last step."""
+        """Report the failure, if any. Closing the window is then measured as the last step."""
         complaints = [each for each in self._session.console.records if each.level in REPORTED_LEVELS]
         self._test.report.add_computer(
             console=[
@@ -282,9 +282,10 @@ def colours(picture: QImage) -> int:
 
 
 def show_steps(test: SelfTest, *, web: bool) -> int:
-    """Show the window and run the steps in it; return the exit code of the window.
+    """Show the window and run the steps in it; ``web`` loads the page of the block editor.
 
-    ``web``: load the block editor's page.
+    Returns:
+        The exit code of the window.
     """
     refused = why_not(os.environ, sys.platform, os.geteuid() if hasattr(os, "geteuid") else 1)
     if refused:

@@ -1,4 +1,4 @@
-"""Painting of annotations on images: points, lines, areas, circles and texts; the colour bar."""
+"""Painters of image annotations (points, lines, areas, circles, texts) and of the colour bar."""
 
 from __future__ import annotations
 
@@ -24,9 +24,11 @@ MIN_BAR = 40
 def paint_drawn(
     painter: QPainter, theme: Theme, shares: QTransform, scale: float, drawn: Iterable[Drawn]
 ) -> None:
-    """Paint annotations.
+    """Paint annotations over an image.
 
-    ``shares`` maps image fractions to the view, ``scale`` is the width of an image pixel.
+    Args:
+        shares: Transform from image fractions to the view.
+        scale: Width of an image pixel in the view.
     """
     painter.save()
     painter.setRenderHint(QPainter.RenderHint.Antialiasing)
@@ -64,7 +66,7 @@ def _paint_one(
 
 
 def _paint_words(painter: QPainter, theme: Theme, at: QPointF, high: float, drawn: Drawn) -> None:
-    # The lower left corner is `at`; upright whatever the image's rotation.
+    # The lower left corner of the text is at `at`; the text is upright for any rotation of the image.
     font, words = theme.font("small"), drawn.words
     font.setPixelSize(round(min(max(high, MIN_LETTERS), MAX_LETTERS)))
     metrics = QFontMetricsF(font)
@@ -92,12 +94,12 @@ def _colour(colour: Colour) -> QColor:
 
 
 def end_words(value: float) -> str:
-    """Format the number at an end of a colour bar."""
+    """Format the value at an end of a colour bar."""
     return number(value, ".4g")
 
 
 def paint_colour_bar(painter: QPainter, theme: Theme, view: QRectF, scale: ColourScale) -> None:
-    """Paint the colour scale at the upper right of the view; nothing if the view is too low."""
+    """Paint the colour scale at the upper right of the view, unless the view is too low."""
     font = theme.font("small")
     line = paint.height_of(font)
     high = min(BAR.height(), view.height() - 2 * BAR_EDGE - 2 * line - 40)
@@ -116,6 +118,6 @@ def paint_colour_bar(painter: QPainter, theme: Theme, view: QRectF, scale: Colou
 
 
 def bar_image(scale: ColourScale) -> QImage:
-    """Return the 256 colours as an image, the last one on top."""
+    """Return the 256 colours of the scale as an image, with the last one at the top."""
     colours = scale.colours[::-1].copy()
     return QImage(colours.data, 1, 256, 3, QImage.Format.Format_RGB888).copy()

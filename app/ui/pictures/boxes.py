@@ -1,4 +1,4 @@
-"""Detections on images: their boxes, and the images that they belong to."""
+"""Bounding boxes of detections, and the assignment of detections to images."""
 
 from __future__ import annotations
 
@@ -19,14 +19,14 @@ if TYPE_CHECKING:
     from app.core.session import Session
     from app.robots.description.description import Sensor
 
-# Boxes are painted on images, independent of the theme: bright colours with dark text.
+# Boxes are painted on images and don't depend on the theme: bright colours with dark text.
 BOX_COLOURS = ("#FFC53D", "#5FD4F4", "#7BE0A0", "#F79AC0")
 BOX_INK = "#1C1B19"
 
 
 @dataclass(frozen=True, slots=True)
 class DetectionBox:
-    """Detection: label, confidence (0 to 1 or None), rectangle in image fractions."""
+    """Bounding box of a detection: label, confidence (0 to 1 or None), rectangle in image fractions."""
 
     words: str
     confidence: float | None
@@ -35,7 +35,7 @@ class DetectionBox:
 
 
 def boxes_of(detections: object, kind: int = 0) -> tuple[DetectionBox, ...]:
-    """Return the boxes in a detections value; malformed items are skipped."""
+    """Return the bounding boxes in a value of detections; malformed items are skipped."""
     if not isinstance(detections, Mapping):
         return ()
     width, height = _number(detections.get("width")), _number(detections.get("height"))
@@ -55,7 +55,7 @@ def boxes_of(detections: object, kind: int = 0) -> tuple[DetectionBox, ...]:
 
 
 def boxes_on(link: RobotLink, topic: str) -> tuple[DetectionBox, ...]:
-    """Return the boxes of all detections in this camera's images; one colour per sensor."""
+    """Return the bounding boxes of all detections in this camera's images, with one colour per sensor."""
     cameras = {sensor.name for sensor in link.robot.sensors if sensor.topic == topic}
     found: list[DetectionBox] = []
     detecting = [sensor for sensor in link.robot.sensors if sensor.kind == "detections"]
@@ -66,12 +66,12 @@ def boxes_on(link: RobotLink, topic: str) -> tuple[DetectionBox, ...]:
 
 
 def camera_of(link: RobotLink) -> Sensor | None:
-    """Return the robot's first camera, or None."""
+    """Return the first camera of a robot, or None."""
     return next((sensor for sensor in link.robot.sensors if sensor.is_image and sensor.topic), None)
 
 
 def owner_of(session: Session, topic: str) -> RobotLink | None:
-    """Return the robot that a topic's camera belongs to, or None."""
+    """Return the robot whose camera publishes the topic, or None."""
     for link in session.fleet.links:
         if any(sensor.is_image and sensor.topic == topic for sensor in link.robot.sensors):
             return link
@@ -79,7 +79,7 @@ def owner_of(session: Session, topic: str) -> RobotLink | None:
 
 
 def paint_box(painter: QPainter, theme: Theme, place: QRectF, box: DetectionBox) -> None:
-    """Paint a box around ``place`` (view pixels), with its label upright above it."""
+    """Paint a bounding box around ``place`` (in view pixels), with its label upright above it."""
     colour = QColor(BOX_COLOURS[box.kind % len(BOX_COLOURS)])
     painter.setRenderHint(QPainter.RenderHint.Antialiasing)
     painter.setBrush(Qt.BrushStyle.NoBrush)

@@ -1,4 +1,4 @@
-"""Image whose pixels can be clicked; drags and double clicks are not clicks."""
+"""Image view whose pixels can be clicked. Drags and double clicks don't count as clicks."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from nep.i18n import _, lazy
 
 MARK_MS = 1200
 RING_PX, REACH_PX = 7.0, 12.0
-FAR = 10  # pixels with Shift
+FAR = 10  # cursor step with Shift, in image pixels
 KEYS_WORDS = lazy("Use the arrow keys to point at a pixel and Enter to publish it.")
 BESIDE = (16, 16, -16, -16)
 BUTTONS: dict[Qt.MouseButton, Button] = {
@@ -25,11 +25,11 @@ BUTTONS: dict[Qt.MouseButton, Button] = {
 
 
 class ClickablePicture(ZoomablePicture):
-    """Image that emits `clicked` with a `PicturePoint`, once a double click is excluded.
+    """Image view that emits `clicked` with a `PicturePoint`.
 
-    The point is that of the press, and is emitted after the double-click interval; a click
-    elsewhere emits the previous one immediately. On the keyboard the arrow keys move a cursor by a pixel,
-    with Shift by ten, and Enter clicks.
+    The point is that of the press. It is emitted after the double-click interval, or immediately when another
+    place is clicked. On the keyboard, the arrow keys move a cursor by a pixel, with Shift by ten, and Enter
+    clicks.
     """
 
     clicked = Signal(object)
@@ -43,16 +43,16 @@ class ClickablePicture(ZoomablePicture):
         self._double_click_timer.setSingleShot(True)
         self._double_click_timer.timeout.connect(self._emit_click)
         self.pointed: tuple[int, int] | None = None
-        """Pixel of the keyboard cursor."""
+        """Pixel under the keyboard cursor, or None."""
         self.marked: PicturePoint | None = None
-        """Point of the mark."""
+        """Point with a mark, or None."""
         self._fading = QTimer(self)
         self._fading.setSingleShot(True)
         self._fading.timeout.connect(self._unmark)
 
     @property
     def takes_clicks(self) -> bool:
-        """True if clicks are emitted; pending ones are discarded when it changes."""
+        """True if clicks are emitted. Pending clicks are discarded when it changes."""
         return self._takes_clicks
 
     @takes_clicks.setter
@@ -65,7 +65,7 @@ class ClickablePicture(ZoomablePicture):
                 announce(self, _(KEYS_WORDS))
 
     def mark(self, point: PicturePoint) -> None:
-        """Show a mark at a point for a moment."""
+        """Show a mark at a point for a short time."""
         self.marked = point
         self._fading.start(MARK_MS)
         self.update()
@@ -100,7 +100,7 @@ class ClickablePicture(ZoomablePicture):
     # -- mouse --------------------------------------------------------------------------------------------
 
     def mousePressEvent(self, event: QMouseEvent) -> None:
-        self._emit_click()  # this press is not the second of a double click
+        self._emit_click()  # this press is not the second one of a double click
         super().mousePressEvent(event)
         point = self._point_at(event)
         alone = event.buttons() == event.button()
@@ -154,7 +154,7 @@ class ClickablePicture(ZoomablePicture):
             super().keyPressEvent(event)
 
     def _move_cursor(self, across: int, down: int, count: int) -> None:
-        # In displayed directions; starts at the centre of the visible part.
+        # Directions are those on the screen. The cursor starts at the centre of the visible part.
         if self.pointed is None:
             wanted = QRectF(self.rect()).center()
         else:
@@ -173,7 +173,7 @@ class ClickablePicture(ZoomablePicture):
         self.update()
 
     def _scroll_to_cursor(self) -> None:
-        # Scrolls a zoomed image so that the pixel is visible.
+        # Scrolls a zoomed image so that the cursor is visible.
         if self.pointed is None or self.place.zoom is None:
             return
         at, seen = self._view_of(self.pointed), QRectF(self.rect()).adjusted(*BESIDE)
@@ -183,7 +183,7 @@ class ClickablePicture(ZoomablePicture):
             self.move_by(dx, dy)
 
     def _view_of(self, pixel: tuple[int, int]) -> QPointF:
-        # Centre of a pixel in the view.
+        # Centre of a pixel in view coordinates.
         picture = self.picture
         if picture is None:
             return QPointF()
@@ -199,7 +199,7 @@ class ClickablePicture(ZoomablePicture):
     # -- painting -----------------------------------------------------------------------------------------
 
     def paintEvent(self, event: QPaintEvent) -> None:
-        if self.pointed is not None:  # its value is shown wherever zoom, rotation and size have moved it
+        if self.pointed is not None:  # zoom, rotation or size may have moved the cursor's pixel
             self.mouse = self._view_of(self.pointed)
         super().paintEvent(event)
         if self.picture is None:
@@ -210,7 +210,7 @@ class ClickablePicture(ZoomablePicture):
             self._paint_cross(self._view_of(self.pointed), ring=False)
 
     def _paint_cross(self, at: QPointF, *, ring: bool = True) -> None:
-        # Dark below and light above, so that it is visible on every image.
+        # Dark below and light above, so that the mark is visible on every image.
         painter = QPainter(self)
         painter.setRenderHint(QPainter.RenderHint.Antialiasing)
         for ink, width in ((Qt.GlobalColor.black, 4.0), (Qt.GlobalColor.white, 1.6)):
@@ -224,5 +224,5 @@ class ClickablePicture(ZoomablePicture):
 
 
 def _clamped(pixel: tuple[int, int], picture: Picture) -> tuple[int, int]:
-    # A later image can be smaller.
+    # A later image can be smaller than the one that the cursor was placed on.
     return min(pixel[0], picture.width - 1), min(pixel[1], picture.height - 1)

@@ -1,7 +1,7 @@
-"""Placement of an image in its view: zoom, position, rotation and mirroring. No widgets, no pixels.
+"""Placement of an image in its view: zoom, position, rotation and mirroring. Independent of widgets.
 
-Places in the image are fractions of its received width and height, 0 to 1 from its upper left corner; places
-in the view are logical pixels.
+Positions in the image are fractions of its received width and height, 0 to 1 from the upper left corner;
+positions in the view are in logical pixels.
 """
 
 from __future__ import annotations
@@ -18,10 +18,12 @@ FILL_LIMIT = 1.34
 
 @dataclass(slots=True)
 class PicturePlace:
-    """Placement of an image.
+    """Placement of an image in a view.
 
-    ``zoom`` is logical pixels per image pixel, None for fitting; ``centre`` is what is in the centre of the
-    view, as fractions of the rotated image.
+    Attributes:
+        zoom: Logical pixels per image pixel, or None to fit the view.
+        centre: Point at the centre of the view, as fractions of the rotated image.
+        turned: Clockwise rotation in degrees.
     """
 
     zoom: float | None = None
@@ -37,7 +39,10 @@ class PicturePlace:
         return picture.transposed() if self.turned % 180 else picture
 
     def fitting(self, view: QSizeF, picture: QSizeF, *, fill: bool = False) -> float:
-        """Return the zoom that fits; ``fill`` allows cutting a tenth at the edges."""
+        """Return the zoom that fits the image into the view.
+
+        With ``fill``, up to a tenth of the image may be cut off at the edges.
+        """
         seen = self.seen_size(picture)
         across, down = view.width() / max(1.0, seen.width()), view.height() / max(1.0, seen.height())
         scale = min(across, down)
@@ -46,9 +51,9 @@ class PicturePlace:
         return scale
 
     def area(self, view: QSizeF, picture: QSizeF, *, fill: bool = False) -> QRectF:
-        """Return the rectangle of the rotated image.
+        """Return the rectangle of the rotated image in the view.
 
-        It may exceed the view, but leaves no unnecessary gap.
+        The rectangle may exceed the view, but leaves no gap that a different position would avoid.
         """
         scale = self.zoom if self.zoom is not None else self.fitting(view, picture, fill=fill)
         seen = self.seen_size(picture) * scale
@@ -58,7 +63,7 @@ class PicturePlace:
         return QRectF(left, top, seen.width(), seen.height())
 
     def orientation(self) -> QTransform:
-        """Return the transform from the image to the rotated and mirrored one, both as fractions."""
+        """Return the transform from the image to the rotated and mirrored image, both in fractions."""
         transform = QTransform()
         transform.translate(0.5, 0.5)
         transform.scale(-1 if self.flipped_across else 1, -1 if self.flipped_down else 1)
@@ -67,16 +72,16 @@ class PicturePlace:
         return transform
 
     def to_view(self, area: QRectF) -> QTransform:
-        """Return the transform from the image (fractions) to the view."""
+        """Return the transform from the image (in fractions) to the view."""
         transform = QTransform()
         transform.translate(area.x(), area.y())
         transform.scale(area.width(), area.height())
         return self.orientation() * transform
 
     def to_picture(self, at: QPointF, area: QRectF) -> QPointF:
-        """Return the place in the image (fractions) of a point in the view.
+        """Return the position in the image (in fractions) of a point in the view.
 
-        Outside 0 to 1 it is beside the image.
+        Values below 0 or above 1 are beside the image.
         """
         back, _good = self.to_view(area).inverted()
         return back.map(at)
@@ -84,7 +89,7 @@ class PicturePlace:
     # -- commands of the user -----------------------------------------------------------------------------
 
     def zoom_at(self, factor: float, at: QPointF, view: QSizeF, picture: QSizeF) -> None:
-        """Zoom around a point of the view."""
+        """Zoom by a factor around a point of the view."""
         area = self.area(view, picture)
         before = area.width() / max(1.0, self.seen_size(picture).width())
         smallest = min(SMALLEST, self.fitting(view, picture))
@@ -100,7 +105,7 @@ class PicturePlace:
         self._normalize_centre(view, picture)
 
     def move(self, dx: float, dy: float, view: QSizeF, picture: QSizeF) -> None:
-        """Move the image by some pixels; one that fits stays."""
+        """Move the image by a distance in px. An image that fits into the view stays in place."""
         area = self.area(view, picture)
         if self.zoom is None:
             return
@@ -111,13 +116,13 @@ class PicturePlace:
         self._normalize_centre(view, picture)
 
     def set_zoom(self, zoom: float | None) -> None:
-        """Set the zoom in logical pixels per image pixel, or fit."""
+        """Set the zoom in logical pixels per image pixel, or None to fit the view."""
         self.zoom = zoom if zoom is None else min(MAX_SIZE, max(SMALLEST, zoom))
         if zoom is None:
             self.centre = (0.5, 0.5)
 
     def turn(self, degrees: int) -> None:
-        """Rotate the display clockwise by a multiple of 90 degrees."""
+        """Rotate the image clockwise by a multiple of 90 degrees."""
         quarter = -degrees if self.flipped_across != self.flipped_down else degrees
         self.turned = (self.turned + quarter) % 360
         if degrees % 180:
@@ -127,7 +132,7 @@ class PicturePlace:
             self.centre = (1 - self.centre[0], 1 - self.centre[1])
 
     def flip(self, *, across: bool) -> None:
-        """Mirror the display horizontally or vertically."""
+        """Mirror the image horizontally if `across`, else vertically."""
         x, y = self.centre
         if across:
             self.flipped_across, self.centre = not self.flipped_across, (1 - x, y)
@@ -135,7 +140,7 @@ class PicturePlace:
             self.flipped_down, self.centre = not self.flipped_down, (x, 1 - y)
 
     def _normalize_centre(self, view: QSizeF, picture: QSizeF) -> None:
-        # Normalizes the centre, so that the next step begins where the image is displayed.
+        # Normalizes the centre, so that the next movement starts where the image is displayed.
         area = self.area(view, picture)
         self.centre = (
             (view.width() / 2 - area.x()) / max(1e-9, area.width()),
@@ -145,7 +150,7 @@ class PicturePlace:
     # -- saved with the layout ----------------------------------------------------------------------------
 
     def saved(self) -> dict[str, object]:
-        """Return the placement for a layout."""
+        """Return the placement as JSON values for a layout."""
         return {
             "zoom": self.zoom,
             "centre": list(self.centre),
@@ -155,7 +160,7 @@ class PicturePlace:
         }
 
     def restore(self, saved: object) -> None:
-        """Restore the result of `saved`; invalid parts are ignored."""
+        """Restore a placement returned by `saved`; invalid values are ignored."""
         if not isinstance(saved, Mapping):
             return
         zoom, centre, turned = saved.get("zoom"), saved.get("centre"), saved.get("turned")
@@ -173,7 +178,7 @@ class PicturePlace:
 
 
 def _placed(room: float, length: float, centre: float) -> float:
-    # Offset of `length` so that `centre` of it is in the middle, without a gap.
+    # Offset of `length` that puts `centre` into the middle without leaving a gap.
     if length <= room:
         return (room - length) / 2
     return min(0.0, max(room - length, room / 2 - centre * length))

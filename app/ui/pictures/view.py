@@ -1,4 +1,4 @@
-"""Image view of a stream: fitting or zoomed, rotated, with boxes, and the value under the mouse."""
+"""Image view of a stream: fitted or zoomed, rotated, with boxes and the value of the pixel under the mouse."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ if TYPE_CHECKING:
 SILENT_AFTER_S = 2.0
 LABEL_EDGE = 8
 SHARP_FROM = 2.0  # screen pixels per image pixel from which pixels are drawn with sharp edges
-FIGURES_STAY_S = 1.0  # a rate or age that changes with every image is unreadable
+FIGURES_STAY_S = 1.0  # a rate or age that changes with every image would be unreadable
 OLDEST_S = 3600.0
 COARSE = QSize(16, 12)
 DIMMED, SILENT = QColor(0, 0, 0, 110), QColor(0, 0, 0, 140)
@@ -36,7 +36,7 @@ ICON = 28.0
 
 
 def rate_sentence(shown_hz: float | None, arriving_hz: float | None) -> str:
-    """Format rates: ``shown 30 of 60/s``; "" while both are unknown."""
+    """Format frame rates, such as ``shown 30 of 60/s``; "" if both are unknown."""
     if arriving_hz is None:
         return ""
     shown = min(shown_hz, arriving_hz) if shown_hz is not None else 0.0
@@ -44,9 +44,9 @@ def rate_sentence(shown_hz: float | None, arriving_hz: float | None) -> str:
 
 
 class RateWords:
-    """Formatted rates of a stream, changing at most once a second.
+    """Text with the frame rates of a stream, updated at most once a second.
 
-    Values that alternate with every image are unreadable, and different lengths move adjacent text.
+    Rates that change with every image would be unreadable, and texts of different lengths move adjacent text.
     """
 
     def __init__(self, clock: Callable[[], float] = time.monotonic) -> None:
@@ -54,19 +54,19 @@ class RateWords:
         self._words, self._since = "", 0.0
 
     def of(self, stream: ImageStream) -> str:
-        """Return the current text."""
+        """Return the current text for a stream."""
         words, now = rate_sentence(stream.shown_hz, stream.arriving_hz), self._clock()
         if words != self._words and (not self._words or not words or now - self._since >= FIGURES_STAY_S):
             self._words, self._since = words, now
         return self._words
 
     def clear(self) -> None:
-        """Clear the text for another stream."""
+        """Clear the text before another stream is shown."""
         self._words = ""
 
 
 def pixel_words(x: int, y: int, pixel: Pixel | None) -> str:
-    """Format a pixel: ``(16, 8)  196 198 190  #C4C6BE``; with one channel its number."""
+    """Format a pixel, such as ``(16, 8)  196 198 190  #C4C6BE``, or with a single number for one channel."""
     if pixel is None:
         return f"({x}, {y})"
     if isinstance(pixel, int | float):
@@ -76,7 +76,10 @@ def pixel_words(x: int, y: int, pixel: Pixel | None) -> str:
 
 
 class PictureView(QWidget):
-    """Shows the newest image of a stream; `take` is called at each refresh and repaints only changes."""
+    """Widget that shows the newest image of a stream.
+
+    Call `show_image` on every refresh; it repaints only changes.
+    """
 
     def __init__(
         self,
@@ -86,8 +89,8 @@ class PictureView(QWidget):
         labelled: bool = True,
         clock: Callable[[], float] = time.monotonic,
     ) -> None:
-        # `fill`: the image fills the view if at most a tenth is cut off; no black borders. Without `labelled`
-        # a missing stream is announced in the centre.
+        # `fill`: the image fills the view, without borders, if at most a tenth is cut off. If not `labelled`,
+        # a missing stream is reported in the centre.
         super().__init__()
         self._clock = clock
         self._theme = theme
@@ -95,14 +98,14 @@ class PictureView(QWidget):
         self.place = PicturePlace()
         self._picture: Picture | None = None
         self._image: QImage | None = None
-        self._grey: QImage | None = None  # grey version of the last image, when the stream is silent
+        self._grey: QImage | None = None  # grey version of the last image, shown while the stream is silent
         self._boxes: tuple[DetectionBox, ...] = ()
         self._drawn: tuple[Drawn, ...] = ()
         self._rate = self._state = self._age = ""
         self._rates = RateWords(clock)
-        self._silent = False  # the last image is shown, and no new one arrives
-        self.mouse: QPointF | None = None  # mouse position while it is relevant
-        self._age_updated_s = -FIGURES_STAY_S  # when the age was updated
+        self._silent = False  # the last image is shown because no new one arrives
+        self.mouse: QPointF | None = None  # position of the mouse if it is over the image
+        self._age_updated_s = -FIGURES_STAY_S  # time of the last update of the age
         self.setAttribute(Qt.WidgetAttribute.WA_OpaquePaintEvent)
         self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Expanding)
         self.setMinimumSize(80, 60)
@@ -111,7 +114,7 @@ class PictureView(QWidget):
 
     @property
     def words(self) -> str:
-        """Label at the lower left."""
+        """Text of the label at the lower left."""
         picture = self._picture
         if picture is None:
             return ""
@@ -123,21 +126,21 @@ class PictureView(QWidget):
 
     @property
     def boxes(self) -> tuple[DetectionBox, ...]:
-        """Current detection boxes."""
+        """Detection boxes on the current image."""
         return self._boxes
 
     @property
     def drawn(self) -> tuple[Drawn, ...]:
-        """Current annotations."""
+        """Annotations on the current image."""
         return self._drawn
 
     @property
     def picture(self) -> Picture | None:
-        """Current image."""
+        """Image that is shown, or None."""
         return self._picture
 
     def clear(self) -> None:
-        """Clear the view."""
+        """Remove the image from the view."""
         self._picture = self._image = self._grey = None
         self._boxes, self._drawn = (), ()
         self._rate = self._state = self._age = ""
@@ -151,7 +154,7 @@ class PictureView(QWidget):
         boxes: tuple[DetectionBox, ...] = (),
         drawn: Callable[[int, int], tuple[Drawn, ...]] | None = None,
     ) -> None:
-        """Show the stream's current image; ``drawn`` returns the annotations for an image of a given size."""
+        """Show the stream's newest image; ``drawn`` returns the annotations for an image of a given size."""
         words, before = self.words, (self._boxes, self._drawn, self._silent, self._state)
         picture, shown, silent_s = stream.picture, self._picture, stream.silent_s
         self._rate = self._rates.of(stream)
@@ -178,7 +181,7 @@ class PictureView(QWidget):
             if not stream.held:
                 stream.count_painted()
         if not stream.held or picture is not shown:
-            self._boxes = boxes  # boxes on a frozen image are frozen too
+            self._boxes = boxes  # boxes on a frozen image don't change
             shown = self._picture
             self._drawn = drawn(shown.width, shown.height) if drawn is not None and shown is not None else ()
         stream.want(self._wanted_size())
@@ -195,7 +198,7 @@ class PictureView(QWidget):
                 self.update(0, top, self.width(), self.height() - top)
 
     def _wanted_size(self) -> tuple[int, int] | None:
-        # Size of the image in screen pixels; None when each image pixel is needed.
+        # Size of the image in screen pixels; None if all image pixels are needed.
         if self.mouse is not None:
             return None
         ratio = self.devicePixelRatioF()
@@ -208,18 +211,18 @@ class PictureView(QWidget):
         return QSize(320, 240)
 
     def picture_size(self) -> QSizeF:
-        """Return the image size in its own pixels."""
+        """Return the size of the image in image pixels."""
         picture = self._picture
         return QSizeF(picture.width, picture.height) if picture is not None else QSizeF(self.size())
 
     def area(self) -> QRectF:
-        """Return the rectangle of the rotated image; it may exceed the view."""
+        """Return the rectangle of the rotated image, which may exceed the view."""
         if self._picture is None:
             return QRectF(self.rect())
         return self.place.area(QSizeF(self.size()), self.picture_size(), fill=self._fill)
 
     def scale(self) -> float:
-        """Return screen pixels per image pixel."""
+        """Return the number of screen pixels per image pixel."""
         seen = self.place.seen_size(self.picture_size()).width()
         return self.area().width() / max(1.0, seen) * self.devicePixelRatioF()
 
@@ -280,7 +283,7 @@ class PictureView(QWidget):
         painter.setRenderHint(QPainter.RenderHint.SmoothPixmapTransform, smooth)
         place = self.place
         if not place.turned and not place.flipped_across and not place.flipped_down:
-            painter.drawImage(area, image)  # Qt's fast path
+            painter.drawImage(area, image)  # fast path of Qt
             return
         painter.save()
         painter.setTransform(place.to_view(area), True)
@@ -306,7 +309,7 @@ class PictureView(QWidget):
 
 
 def paint_around(painter: QPainter, view: QRectF, image: QImage) -> None:
-    """Fill the view with the image's colours, blurred and darkened, instead of black borders."""
+    """Fill the view around an image with a blurred and darkened copy of it instead of black borders."""
     ignore, smooth = Qt.AspectRatioMode.IgnoreAspectRatio, Qt.TransformationMode.SmoothTransformation
     painter.save()
     painter.setRenderHint(QPainter.RenderHint.SmoothPixmapTransform)
@@ -316,12 +319,12 @@ def paint_around(painter: QPainter, view: QRectF, image: QImage) -> None:
 
 
 def grey(image: QImage) -> QImage:
-    """Return the image without colours."""
+    """Return a greyscale copy of the image."""
     return image.convertToFormat(QImage.Format.Format_Grayscale8)
 
 
 def paint_silent(painter: QPainter, theme: Theme, view: QRectF, words: str) -> None:
-    """Paint a camera icon and the image's age over a grey image."""
+    """Paint a camera icon and the image's age in the middle of the view."""
     painter.fillRect(view, SILENT)
     font = theme.font("bodyLarge")
     font.setWeight(font.Weight.DemiBold)
@@ -338,5 +341,5 @@ def paint_silent(painter: QPainter, theme: Theme, view: QRectF, words: str) -> N
 
 
 def _age_words(age_s: float | None) -> str:
-    # "" without a time stamp, or with a wrong clock.
+    # Age of the image; "" if it has no time stamp or the clock is wrong.
     return age_words(age_s) if age_s is not None and 0 <= age_s < OLDEST_S else ""

@@ -1,4 +1,4 @@
-"""Image with zoom, movement and pixel values, by mouse, touch pad and keyboard."""
+"""Image view that can be zoomed and moved by mouse, touch pad and keyboard."""
 
 from __future__ import annotations
 
@@ -16,10 +16,11 @@ WAYS = {"Left": (1, 0), "Right": (-1, 0), "Up": (0, 1), "Down": (0, -1)}
 
 
 class ZoomablePicture(PictureView):
-    """Wheel, pinch and double click zoom at the mouse; dragging and the arrow keys move the image.
+    """Image view in which wheel, pinch and double click zoom, and dragging and arrow keys move the image.
 
-    Emits `place_changed` after user input, and `key_pressed` with the name of a key in ``keys`` ("Ctrl+C"),
-    which take precedence over the window's shortcuts while the image has the focus.
+    Emits `place_changed` after user input, and `key_pressed` with the name of a key in ``keys`` such as
+    "Ctrl+C".
+    These keys take precedence over the window's shortcuts while the image has the focus.
     """
 
     place_changed = Signal()
@@ -33,7 +34,7 @@ class ZoomablePicture(PictureView):
         self.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
 
     def zoom_by(self, factor: float, at: QPointF | None = None) -> None:
-        """Zoom around ``at`` (default: the centre)."""
+        """Zoom by a factor around ``at``, by default the centre."""
         middle = QPointF(self.width() / 2, self.height() / 2)
         self.place.zoom_at(factor, at or middle, QSizeF(self.size()), self.picture_size())
         self.told()
@@ -44,11 +45,11 @@ class ZoomablePicture(PictureView):
         self.told()
 
     def show_exact(self, at: QPointF | None = None) -> None:
-        """Show one screen pixel per image pixel."""
+        """Show one screen pixel per image pixel, around ``at``."""
         self.zoom_by(1 / max(1e-9, self.scale()), at)
 
     def move_by(self, dx: float, dy: float) -> None:
-        """Move the image."""
+        """Move the image by a distance in px."""
         self.place.move(dx, dy, QSizeF(self.size()), self.picture_size())
         self.told()
 
@@ -123,10 +124,10 @@ def _is_key(event: QEvent) -> TypeGuard[QKeyEvent]:
 
 
 def key_name(event: QKeyEvent) -> str:
-    """Return a key with modifiers as a shortcut: Ctrl+C, R, +."""
+    """Return the name of a key with its modifiers, such as "Ctrl+C", "R" or "+"."""
     held = event.modifiers()
     text = event.text()
-    if text and text in "+-":  # on some keyboards they need Shift, or are on the number pad
+    if text and text in "+-":  # on some keyboards these keys need Shift, or are on the number pad
         name = text
     else:
         name = event.keyCombination().key().name.removeprefix("Key_")

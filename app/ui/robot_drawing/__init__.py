@@ -1,4 +1,4 @@
-"""Drawing of a virtual robot in its room from its state.
+"""Drawing of virtual robots in their room.
 
-`scene` composes the room, its objects and the robot: `pepper` or `turtle`.
+`scene` composes the room, its objects and the robots; `pepper` and `turtle` paint the figures.
 """

@@ -1,4 +1,4 @@
-"""Speech bubble of a robot: the whole text, wrapped; long text scrolls with the speech."""
+"""Speech bubble of a robot with the wrapped text; a long text scrolls as it is spoken."""
 
 from __future__ import annotations
 
@@ -16,12 +16,12 @@ SHORT_LINES, MAX_LINES, MAX_NARROW = 4, 6, 8
 LARGE, SMALL = 14, 12
 INSIDE, EDGE = 14.0, 8.0
 READ_AHEAD = 2
-"""Number of lines before the spoken one that stay visible."""
+"""Number of visible lines above the spoken one."""
 
 
 @dataclass(frozen=True, slots=True)
 class BubbleText:
-    """Wrapped text; ``first`` is the top line, ``shown`` the number of visible lines."""
+    """Wrapped text; ``first`` is the index of the top line, ``shown`` the number of visible lines."""
 
     lines: Sequence[str]
     first: int
@@ -29,12 +29,12 @@ class BubbleText:
 
     @property
     def visible(self) -> Sequence[str]:
-        """Visible lines."""
+        """Lines that are visible."""
         return self.lines[self.first : self.first + self.shown]
 
 
 def wrapped(words: str, metrics: QFontMetricsF, width: float) -> list[str]:
-    """Wrap a text to a width; a longer word continues in the next line."""
+    """Wrap a text to a width in px; a longer word continues in the next line."""
     lines = [""]
     for word in words.split():
         tried = f"{lines[-1]} {word}".strip()
@@ -59,7 +59,7 @@ def _pieces(word: str, metrics: QFontMetricsF, width: float) -> list[str]:
 
 
 def scrolled(lines: Sequence[str], most: int, spoken: float) -> BubbleText:
-    """Return as many lines as fit, scrolled so that the spoken word is visible (``spoken`` from 0 to 1)."""
+    """Return as many lines as fit, scrolled to the spoken word (``spoken`` from 0 to 1)."""
     shown = max(1, min(most, len(lines)))
     letters = sum(len(line) for line in lines)
     position, line = spoken * letters, 0
@@ -78,9 +78,13 @@ def paint_bubble(
     font: QFont,
     taken: Sequence[QRectF] = (),
 ) -> QRectF:
-    """Paint a robot's speech beside its ``head`` within ``bounds``; ``p`` is in stage units.
+    """Paint the speech bubble of a robot beside its head, and return the bubble's rectangle.
 
-    ``taken`` are other bubbles, which are covered only without another place. Return the bubble's rectangle.
+    Args:
+        p: Painter in stage units.
+        bounds: Area for the bubble.
+        head: Rectangle of the head.
+        taken: Rectangles of other bubbles, which are covered only if there is no other place.
     """
     near, words = 31.0 * head.scale, state.caption
     room_right, room_left = bounds.right() - EDGE - head.u - near, head.u - near - bounds.left() - EDGE
@@ -91,7 +95,7 @@ def paint_bubble(
     lines = wrapped(words, QFontMetricsF(face), width - 2 * INSIDE)
     if len(lines) > SHORT_LINES:
         face.setPixelSize(SMALL)
-        beside = max(room_right, room_left)  # narrower and higher, rather than over the face
+        beside = max(room_right, room_left)  # narrower and higher, so that the bubble doesn't cover the face
         width = min(max(MIN_WIDTH, beside), LONG_WIDTH, bounds.width() - 2 * EDGE)
         lines = wrapped(words, QFontMetricsF(face), width - 2 * INSIDE)
     metrics = QFontMetricsF(face)
@@ -123,7 +127,7 @@ def paint_bubble(
 def _free_place(
     places: Sequence[tuple[float, QRectF]], taken: Sequence[QRectF], bounds: QRectF
 ) -> tuple[float, QRectF]:
-    # The first place without overlap, else below other bubbles; else the one with the smallest overlap.
+    # Tries places without overlap first, then below other bubbles, then the one with the smallest overlap.
     def covered(place: tuple[float, QRectF]) -> float:
         common = [place[1].intersected(other) for other in taken]
         return sum(each.width() * each.height() for each in common)
@@ -135,7 +139,7 @@ def _free_place(
 
 
 def paint_heard(p: QPainter, area: QRectF, words: str, font: QFont) -> None:
-    """Paint speech that is audible after its bubble closed, in a line at the bottom of ``area`` (pixels)."""
+    """Paint a caption, in one line at the bottom of ``area`` (px), of speech that outlasts its bubble."""
     metrics = QFontMetricsF(font)
     most = max(0.0, area.width() - 4 * EDGE - 2 * INSIDE)
     line = metrics.elidedText(words, Qt.TextElideMode.ElideRight, most)
@@ -163,7 +167,7 @@ def _paint_box(p: QPainter, box: QRectF, foot: float, side: float) -> None:
 
 
 def _paint_thumb(p: QPainter, box: QRectF, text: BubbleText) -> None:
-    # Scroll position.
+    # Paints the scroll position.
     track = QRectF(box.right() - 7, box.top() + 10, 3, box.height() - 20)
     count = len(text.lines)
     thumb = QRectF(

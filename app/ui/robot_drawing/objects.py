@@ -1,4 +1,4 @@
-"""Objects in the virtual robot's room: ball, table, shelf, cards, and positions of people.
+"""Objects in the virtual robot's room: ball, table, shelf, cards, and marks for positions of people.
 
 All lengths are in stage units (`app.ui.robot_drawing.room`).
 """
@@ -19,7 +19,7 @@ TABLE = Spot(315.0, 239.0, (239.0 - HORIZON) / START)
 
 
 def _table(p: QPainter, spot: Spot) -> None:
-    # Painted at the position of the design and translated from there.
+    # Painted at its position in the design and translated from there.
     p.save()
     p.translate(spot.u, spot.v)
     p.scale(spot.scale / TABLE.scale, spot.scale / TABLE.scale)
@@ -45,7 +45,7 @@ def _table(p: QPainter, spot: Spot) -> None:
 
 
 def _shelf(p: QPainter, area: QRectF) -> None:
-    # Lower than a real one, so that the window stays visible.
+    # Lower than a real table, so that the window stays visible.
     p.fillRect(area, QColor("#8B6644"))
     edge = area.width() * 0.07
     inside = area.adjusted(edge, edge, -edge, -edge * 0.6)
@@ -62,7 +62,7 @@ def _shelf(p: QPainter, area: QRectF) -> None:
 
 
 def thing_area(thing: Thing, spot: Spot) -> QRectF:
-    """Return the rectangle of a thing, in stage units."""
+    """Return the rectangle of a thing in stage units."""
     if thing.kind == "place":
         return QRectF(spot.u - 30 * spot.scale, spot.v - 8 * spot.scale, 60 * spot.scale, 16 * spot.scale)
     if thing.kind == "shelf":
@@ -79,7 +79,7 @@ def thing_area(thing: Thing, spot: Spot) -> QRectF:
 
 
 def paint_thing(p: QPainter, thing: Thing, spot: Spot, font: QFont) -> None:
-    """Paint a ball, a table, a named position, or a card on a stand (a face, a marker, a shelf)."""
+    """Paint a ball, a table, a named position, or a card on a stand (face, marker or shelf)."""
     area = thing_area(thing, spot)
     p.setPen(Qt.PenStyle.NoPen)
     if thing.kind == "table":
@@ -122,7 +122,7 @@ def _ball(p: QPainter, area: QRectF, colour: QColor) -> None:
 
 
 def _place(p: QPainter, area: QRectF, name: str, font: QFont) -> None:
-    # A person between the robot and the viewer: only a mark on the floor.
+    # A person between the robot and the viewer is only a mark on the floor.
     p.setPen(QPen(QColor(63, 124, 179, 210), 1.4))
     p.setBrush(QColor(63, 124, 179, 70))
     p.drawEllipse(area)

@@ -1,8 +1,9 @@
-"""Figure of the virtual Pepper at any heading, painted by `QPainter`.
+"""Painter of the virtual Pepper at any heading.
 
-Each part is on the body at an azimuth: its horizontal position is ``sin(azimuth + heading)`` of the radius,
-its width is scaled by the cosine, and parts behind are hidden. So it turns smoothly without separate views.
-Units are stage units; (0, 0) is the centre of its foot, y is down, its height is 187.
+Each part is on the body at an azimuth: its horizontal position is ``sin(azimuth + heading)`` times the
+radius, its width is scaled by the cosine, and parts at the back are hidden. The figure therefore turns
+smoothly without separate views. Lengths are in stage units; (0, 0) is the centre of the foot, y points down,
+and the figure is 187 high.
 """
 
 from __future__ import annotations
@@ -29,7 +30,7 @@ DARK = "#15181F"
 
 @dataclass(frozen=True, slots=True)
 class Limb:
-    """Arm as displayed: shoulder, hand, and how far the shoulder is in front (-1 to 1)."""
+    """Arm on the screen: shoulder, hand, and the depth of the shoulder from -1 (back) to 1 (front)."""
 
     side: str
     shoulder: QPointF
@@ -88,7 +89,7 @@ def _limb(side: str, sign: int, raised_deg: float, heading: float) -> Limb:
 
 
 def paint_figure(p: QPainter, state: RobotState) -> None:
-    """Paint the robot; the painter's origin is the centre of its foot."""
+    """Paint the robot; the painter's origin is the centre of the foot."""
     heading = math.radians(state.theta_deg)
     arms = limbs(state)
     p.setPen(Qt.PenStyle.NoPen)
@@ -195,7 +196,7 @@ def _arm(p: QPainter, arm: Limb, state: RobotState) -> None:
     if arm.front > -0.5:
         p.setBrush(QColor(JOINT))
         p.drawEllipse(arm.shoulder, 8.4, 8.4)
-        # From the front the light is where the shoulder faces the viewer, so that it is never hidden.
+        # Seen from the front, the light is where the shoulder faces the viewer, so that it is never hidden.
         p.setBrush(QColor(state.shoulders))
         p.drawEllipse(arm.shoulder, 4.0, 4.0)
     if f"{arm.side}_hand" in state.touched:
@@ -242,7 +243,12 @@ def _ear(p: QPainter, azimuth: float) -> None:
 
 
 def paint_face(p: QPainter, state: RobotState, heading: float, nod: float) -> None:
-    """Paint the face around the centre of the head; ``heading`` in rad, ``nod`` shifts it vertically."""
+    """Paint the face around the centre of the head.
+
+    Args:
+        heading: Direction of the head in rad.
+        nod: Vertical shift of the face.
+    """
     look = _EXPRESSIONS.get(state.emotion, _EXPRESSIONS["neutral"])
     dot = QPointF(HEAD_RX * 0.5 * math.sin(heading), -20.8 + nod)
     if math.cos(heading) > 0.0:
@@ -280,7 +286,7 @@ def _eye(p: QPainter, colour: QColor, look: Expression, sign: int) -> None:
         p.fillPath(lid.intersected(eye), QColor("#DCE2EC"))
     if look.brow:
         p.setPen(QPen(QColor("#4E5566"), 2.0, Qt.PenStyle.SolidLine, Qt.PenCapStyle.RoundCap))
-        # The inner end (towards the nose) is up for a positive brow.
+        # For a positive brow the inner end (towards the nose) is up.
         tilt = 3.0 * look.brow * sign
         p.drawLine(QLineF(-7, -13.4 - tilt, 7, -13.4 + tilt))
         p.setPen(Qt.PenStyle.NoPen)

@@ -1,7 +1,7 @@
-"""Room of the virtual robot: the projection from metres to pixels, wall, floor and objects.
+"""Room of the virtual robots: projection from metres to pixels, and painting of wall, window and floor.
 
-The colours belong to the illustration, not to the theme; a dark theme dims it. All lengths are in units of a
-stage of 382 x 286, the panel of the design at 1440 x 900.
+The colours belong to the illustration, not to the theme; a dark theme dims them. All lengths are in units of
+a stage of 382 x 286, the size of the panel in the design at 1440 x 900.
 """
 
 from __future__ import annotations
@@ -15,8 +15,8 @@ from app.ui.robot_drawing.state import RoomBounds
 
 WIDTH, HEIGHT = 382.0, 286.0
 HORIZON, WALL_FOOT, FLOOR_TOP = 91.0, 157.0, 162.8
-BACK, FRONT = 178.0, 280.0  # position of things at the far wall and nearest to the viewer
-START = 250.6 - HORIZON  # position of the robot in the design: scale 1
+BACK, FRONT = 178.0, 280.0  # vertical positions of things at the far wall, and nearest to the viewer
+START = 250.6 - HORIZON  # vertical position of the robot in the design, where the scale is 1
 
 
 @dataclass(frozen=True, slots=True)
@@ -30,7 +30,7 @@ class Spot:
 
 @dataclass(frozen=True, slots=True)
 class Stage:
-    """Fits a room into a rectangle: uniform scale, centred; wall and floor extend to the edges."""
+    """Projection of the room into a rectangle: uniform scale, centred; wall and floor extend to the edges."""
 
     area: QRectF
     room: RoomBounds
@@ -48,19 +48,19 @@ class Stage:
         )
 
     def bounds(self) -> QRectF:
-        """Return the whole area in stage units; it may start above and left of 0."""
+        """Return the whole rectangle in stage units. Its left and top may be negative."""
         s, o = self.scale, self.origin
         a = self.area
         return QRectF((a.x() - o.x()) / s, (a.y() - o.y()) / s, a.width() / s, a.height() / s)
 
     def unit(self, point: QPointF) -> QPointF:
-        """Convert a pixel to stage units."""
+        """Convert a point in pixels to stage units."""
         return (point - self.origin) / self.scale
 
     def spot(self, x: float, y: float) -> Spot:
-        """Return the position of a floor point (m), limited to the room.
+        """Return the position of a floor point (in m), limited to the room.
 
-        Not a real perspective: distant things are drawn closer, so that the robot stays large.
+        This is no true perspective: distant things are drawn closer, so that the robot stays large.
         """
         room = self.room
         depth = _clamp((x - room.x_min) / (room.x_max - room.x_min), 0.0, 1.0)
@@ -70,7 +70,7 @@ class Stage:
         return Spot(WIDTH / 2 + side * _reach(scale), v, scale)
 
     def floor(self, point: QPointF) -> tuple[float, float]:
-        """Return the floor point (m) at a pixel, limited to the room."""
+        """Return the floor point (in m) at a pixel, limited to the room."""
         unit = self.unit(point)
         room = self.room
         share = _clamp((unit.y() - BACK) / (FRONT - BACK), 0.0, 1.0)
@@ -83,7 +83,7 @@ class Stage:
 
 
 def _reach(scale: float) -> float:
-    # Distance of the side walls from the centre, at this scale.
+    # Distance of the side walls from the centre, at a scale.
     return 70.0 + 96.0 * scale
 
 
@@ -92,7 +92,12 @@ def _clamp(value: float, low: float, high: float) -> float:
 
 
 def paint_room(p: QPainter, bounds: QRectF) -> None:
-    """Paint wall, window and floor; ``p`` is in stage units, ``bounds`` is the area to fill."""
+    """Paint wall, window and floor.
+
+    Args:
+        p: Painter in stage units.
+        bounds: Area to fill.
+    """
     wall = QLinearGradient(0, bounds.top(), 0, WALL_FOOT)
     wall.setColorAt(0, QColor("#E8E4DA"))
     wall.setColorAt(1, QColor("#DCD4C8"))

@@ -1,4 +1,4 @@
-"""Drawing of virtual robots in their room, and hit testing of their parts."""
+"""Painter of virtual robots in their room, and hit testing of their parts."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from app.ui.robot_drawing.turtle import TOP, paint_turtle, side_at
 TURTLE = "turtle"
 Others: TypeAlias = Sequence[tuple[str, RobotState]]
 
-# Preview before any robot has reported its state.
+# Shown before any robot has published its state.
 PREVIEW = RobotState(
     x=0.05,
     arm_left_deg=124.0,
@@ -29,7 +29,7 @@ PREVIEW = RobotState(
 
 @dataclass(frozen=True, slots=True)
 class Marks:
-    """Parts under the mouse and selected by the keyboard, as returned by `RobotDrawing.part_at`."""
+    """Part under the mouse and part selected by keyboard, as returned by `RobotDrawing.part_at`."""
 
     hovered: str | None = None
     chosen: str | None = None
@@ -40,13 +40,13 @@ NO_MARKS = Marks()
 
 
 class RobotDrawing:
-    """Paints `RobotState`s; caches the room's pixmap of the last size, so that frames are cheap.
+    """Painter of `RobotState`s. The pixmap of the room is cached for the last size, so that frames are cheap.
 
-    The first robot is the main one; ``others`` are in the same room, each with its name.
+    The first robot is the main one; ``others`` are robots in the same room, each with its name.
     """
 
     def __init__(self, font: QFont | None = None) -> None:
-        # `font` is that of the speech bubble.
+        # `font` is the font of speech bubbles.
         self._font = QFont(font) if font is not None else QFont()
         self._room: QPixmap | None = None
         self._room_key: tuple[float, float, float, bool] | None = None
@@ -91,11 +91,11 @@ class RobotDrawing:
             painter.fillRect(area, QColor(0, 0, 12, 34))
 
     def part_at(self, point: QPointF, area: QRectF, state: RobotState, others: Others = ()) -> str | None:
-        """Return the part at a pixel.
+        """Return the part at a point in px, or None.
 
-        ``head``, ``left_hand``, ``body``, an object's name, ``Turtle/body``, or None.
-
-        Touchable parts precede things, and things precede others behind them.
+        Examples are ``head``, ``left_hand``, ``body``, ``Turtle/body`` and the name of an object. Parts that
+        can be
+        touched precede things, and things precede others behind them.
         """
         stage = Stage(area, state.room)
         unit = stage.unit(point)
@@ -112,9 +112,9 @@ class RobotDrawing:
     def side_at(
         self, point: QPointF, area: QRectF, part: str, state: RobotState, others: Others = ()
     ) -> str | None:
-        """Return the bumper side pressed at a pixel, of the robot whose body is ``part``.
+        """Return the side of the bumper that is pressed by a click on ``part``, the body of a robot.
 
-        None for a robot without a bumper.
+        Return None if the robot has no bumper.
         """
         stage = Stage(area, state.room)
         for figure in _figures(stage, state, others):
@@ -123,17 +123,17 @@ class RobotDrawing:
         return None
 
     def floor_at(self, point: QPointF, area: QRectF, state: RobotState) -> tuple[float, float]:
-        """Return the floor point (m) at a pixel."""
+        """Return the floor point (in m) at a point in px."""
         return Stage(area, state.room).floor(point)
 
     def pixel_of(self, x: float, y: float, area: QRectF, state: RobotState) -> QPointF:
-        """Return the pixel of a floor point (m)."""
+        """Return the point in px of a floor point (in m)."""
         stage = Stage(area, state.room)
         spot = stage.spot(x, y)
         return stage.origin + QPointF(spot.u, spot.v) * stage.scale
 
     def place_of(self, part: str, area: QRectF, state: RobotState, others: Others = ()) -> QPointF | None:
-        """Return the pixel at the centre of a part (see `part_at`), or None."""
+        """Return the point in px at the centre of a part (see `part_at`), or None."""
         stage = Stage(area, state.room)
         for figure in _figures(stage, state, others):
             small = figure.state.figure == TURTLE
@@ -149,7 +149,7 @@ class RobotDrawing:
         return None
 
     def _mark(self, p: QPainter, stage: Stage, state: RobotState, others: Others, marks: Marks) -> None:
-        # A line around the hovered part, a stronger one around the selected part.
+        # Outlines the part under the mouse, and more strongly the selected part.
         areas = {figure.named("body"): figure.area for figure in _figures(stage, state, others)}
         for spot, thing in _placed_things(stage, state):
             areas[thing.name or thing.kind] = thing_area(thing, spot)
@@ -169,7 +169,7 @@ class RobotDrawing:
             size = QSize(max(1, round(area.width() * ratio)), max(1, round(area.height() * ratio)))
             self._room = QPixmap(size)
             self._room.setDevicePixelRatio(ratio)
-            self._room.fill(QColor("#C4AA87"))  # the colour below antialiased edges
+            self._room.fill(QColor("#C4AA87"))  # shows through at antialiased edges
             room = QPainter(self._room)
             room.setRenderHint(QPainter.RenderHint.Antialiasing)
             room.translate(stage.origin - area.topLeft())
@@ -181,32 +181,33 @@ class RobotDrawing:
 
 
 def _placed_things(stage: Stage, state: RobotState) -> list[tuple[Spot, Thing]]:
-    # Farthest first; people in front of the robot as marks on the floor.
+    # Sorted from back to front; people in front of the robot are marks on the floor.
     placed = []
     for thing in state.objects:
         before = thing.kind in {"person", "face"} and thing.x > state.x
         shown = replace(thing, kind="place") if before else thing
         spot = stage.spot(thing.x, thing.y)
         half = thing_area(shown, spot).width() / 2
-        inside = min(max(spot.u, half + 4), WIDTH - half - 4)  # things at a side wall are entirely visible
+        # keeps things at a side wall completely visible
+        inside = min(max(spot.u, half + 4), WIDTH - half - 4)
         placed.append((replace(spot, u=inside), shown))
     return sorted(placed, key=lambda pair: pair[0].v)
 
 
 @dataclass(frozen=True, slots=True)
 class Figure:
-    """Robot with its position; ``name`` is empty for the main one."""
+    """Robot with its position; ``name`` is "" for the main robot."""
 
     name: str
     state: RobotState
     spot: Spot
 
     def named(self, part: str) -> str:
-        """Return the name of a part as in `RobotDrawing.part_at`."""
+        """Return the name of a part in the format of `RobotDrawing.part_at`."""
         return f"{self.name}/{part}" if self.name else part
 
     def own(self, unit: QPointF) -> QPointF:
-        """Convert a stage point to the figure's own units."""
+        """Convert a point from stage units to the figure's own units."""
         return (unit - QPointF(self.spot.u, self.spot.v)) / self.spot.scale
 
     @property
@@ -250,7 +251,7 @@ def _paint_reach(painter: QPainter, robot: Spot, state: RobotState) -> None:
 
 
 def _part_at(own: QPointF, state: RobotState) -> str | None:
-    # Only the large figure has touchable parts.
+    # Only Pepper has parts that can be touched.
     if state.figure == TURTLE:
         return None
     for limb in limbs(state):

@@ -1,4 +1,4 @@
-"""State of a virtual robot, parsed from its ``state`` topic for the drawing."""
+"""State of a virtual robot for the drawing, parsed from its ``state`` topic."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from nep.text import bounded_str
 
 EYES = "#35B0FA"
 SHOULDERS = "#3AB5FF"
-MAX_HEARD_CHARS = 200  # letters
+MAX_HEARD_CHARS = 200  # characters
 
 
 @dataclass(frozen=True, slots=True)
@@ -28,7 +28,7 @@ class Thing:
 
 @dataclass(frozen=True, slots=True)
 class RoomBounds:
-    """Floor in m; the viewer looks from ``x_max`` to ``x_min``, with ``y_max`` at the right."""
+    """Extent of the floor in m. The viewer looks from ``x_max`` to ``x_min``; ``y_max`` is at the right."""
 
     x_min: float = -3.0
     x_max: float = 3.0
@@ -38,13 +38,21 @@ class RoomBounds:
 
 @dataclass(frozen=True, slots=True)
 class RobotState:
-    """State of a robot for drawing.
+    """State of a robot for the drawing.
 
-    ``x``, ``y`` in m; ``theta_deg`` 0 faces along x, towards the viewer, and grows to the robot's left. Head
-    yaw grows to the robot's left, pitch grows downwards. Arms are 0 hanging, 90 horizontal, 180 straight up.
-    ``figure`` is ``pepper`` or ``turtle``; ``bumped`` is the touching side, ``spoken`` the spoken fraction of
-    its text (0 to 1), ``sound`` what it plays ("bell", "440 Hz"), ``heard`` what the user recently said to
-    it. ``held`` is whether the user holds it up, ``shared`` whether its room is shared by all robots.
+    Attributes:
+        x, y: Position in m.
+        theta_deg: Heading; 0 faces along x, towards the viewer, and positive angles turn to the robot's left.
+        head_yaw_deg: Positive to the robot's left.
+        head_pitch_deg: Positive downwards.
+        arm_left_deg, arm_right_deg: 0 is hanging, 90 horizontal, 180 straight up.
+        figure: ``pepper`` or ``turtle``.
+        bumped: Side of the pressed bumper.
+        spoken: Spoken fraction of the text (0 to 1).
+        sound: Sound being played, such as "bell" or "440 Hz".
+        heard: Words that the user recently said to the robot.
+        held: True while the user lifts the robot.
+        shared: True if all robots share the room.
     """
 
     x: float = 0.0
@@ -72,13 +80,13 @@ class RobotState:
 
     @property
     def caption(self) -> str:
-        """Text of its bubble, for speech and sounds: "♪ bell"."""
+        """Text of the speech bubble, or of a sound such as "♪ bell"."""
         played = f"♪\N{NO-BREAK SPACE}{_(self.sound)}" if self.sound else ""
         return " ".join(each for each in (self.speech or "", played) if each)
 
     @classmethod
     def parse(cls, data: Mapping[str, object]) -> RobotState:
-        """Parse a message; missing and malformed values keep their defaults."""
+        """Parse a message. Missing and malformed values keep their defaults."""
         speech = data.get("speech")
         return cls(
             x=_number(data.get("x")),

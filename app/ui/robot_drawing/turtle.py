@@ -1,7 +1,7 @@
-"""Figure of the small wheeled robot at any heading, seen slightly from above.
+"""Painter of the virtual Turtle, a small wheeled robot, at any heading, seen slightly from above.
 
-Each part is on its round body at an azimuth, as on the large figure (`app.ui.robot_drawing.pepper`): 0 faces
-the viewer, its left is +90°. Units are stage units; (0, 0) is its centre on the floor.
+Each part is on the round body at an azimuth, as in `app.ui.robot_drawing.pepper`: 0 faces the viewer, the
+robot's left is +90°. Lengths are in stage units; (0, 0) is the centre of the robot on the floor.
 """
 
 from __future__ import annotations
@@ -13,12 +13,12 @@ from PySide6.QtGui import QBrush, QColor, QLinearGradient, QPainter, QPainterPat
 
 from app.ui.robot_drawing.state import RobotState
 
-RADIUS, FLAT = 37.0, 0.36  # of the body, and the flattening of a circle on the floor
-LOW, HIGH = -9.0, -31.0  # its lower and upper deck
-MAST = -52.0  # top of the camera's mast
+RADIUS, FLAT = 37.0, 0.36  # radius of the body, and ratio of height to width of a circle on the floor
+LOW, HIGH = -9.0, -31.0  # heights of the lower and upper deck
+MAST = -52.0  # height of the top of the camera's mast
 WHEEL = 14.0
 TOP = QPointF(0.0, -36.0)
-ABOVE = 0.6  # fraction of its radius that is touched from above
+ABOVE = 0.6  # fraction of the radius that counts as a touch from above
 FRONT_DEG, BACK_DEG = 40.0, 130.0
 
 SHELL, SHELL_DARK, DECK, RUBBER, METAL = "#4E8C7A", "#376B5C", "#6FB3A0", "#2B2D33", "#C8CCD8"
@@ -44,16 +44,19 @@ def paint_turtle(p: QPainter, state: RobotState) -> None:
 
 
 def on_body(azimuth: float, share: float = 1.0, height: float = 0.0) -> QPointF:
-    """Return the point at an azimuth (rad, 0 faces the viewer), a fraction of the radius, and a height."""
+    """Return the point at an azimuth (rad, 0 faces the viewer), a fraction of the radius and a height."""
     return QPointF(RADIUS * share * math.sin(azimuth), RADIUS * share * FLAT * math.cos(azimuth) + height)
 
 
 def side_at(own: QPointF, theta_deg: float) -> str:
-    """Return the bumper side pressed at a point in the figure's units; a touch from above is the front."""
+    """Return the side of the bumper that a click at a point presses.
+
+    `own` is in the figure's units; a touch from above presses the front.
+    """
     across, along = own.x() / RADIUS, (own.y() - HIGH) / (RADIUS * FLAT)
     if math.hypot(across, along) < ABOVE or along < -1.0:
         return "front"
-    if along > 0:  # the deck's near edge and the drum below it: all of it is the side towards the viewer
+    if along > 0:  # near edge of the deck and drum below it: counts as the side that faces the viewer
         along = math.sqrt(max(0.0, 1.0 - across * across))
     aside = math.degrees(math.atan2(across, along)) - theta_deg
     aside = (aside + 180.0) % 360.0 - 180.0
@@ -63,7 +66,7 @@ def side_at(own: QPointF, theta_deg: float) -> str:
 
 
 def _wheel(p: QPainter, azimuth: float) -> None:
-    # At the side, facing along its azimuth.
+    # Painted on the body's side, facing in the direction of the azimuth.
     wide = max(2.6, WHEEL * abs(math.cos(azimuth)))
     middle = on_body(azimuth, 0.98, -WHEEL + 1.5)
     p.setPen(Qt.PenStyle.NoPen)
@@ -98,7 +101,7 @@ def _body(p: QPainter, state: RobotState) -> None:
 
 
 def _bumper(p: QPainter, heading: float, bumped: str) -> None:
-    # A bow around the visible front; the touching side is amber.
+    # An arc around the visible front; the touching side is amber.
     sides = {"left": (18.0, 70.0), "front": (-18.0, 18.0), "right": (-70.0, -18.0)}
     for side, (first, last) in sides.items():
         shape = QPainterPath()
@@ -147,7 +150,7 @@ def _deck(p: QPainter, heading: float, light: str) -> None:
 
 
 def _mast(p: QPainter, heading: float) -> None:
-    # The lens is visible when it faces the viewer.
+    # The lens is visible if it faces the viewer.
     foot, top = QPointF(0, HIGH - 1), QPointF(0, MAST + 6)
     p.setPen(QPen(QColor(METAL), 5.0, Qt.PenStyle.SolidLine, Qt.PenCapStyle.RoundCap))
     p.drawLine(foot, top)

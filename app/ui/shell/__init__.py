@@ -1,4 +1,4 @@
-"""The window around the panels; `main_window` combines bars, layouts, dialogs and commands.
+"""Window around the panels; `main_window` combines bars, layouts, dialogs and commands.
 
-Its parts don't import it: commands use it as a `Shell`, panels as a `PanelContext`.
+The parts don't import the window: commands use it as a `Shell`, panels as a `PanelContext`.
 """

@@ -130,7 +130,10 @@ class TopicList(QWidget):
 def shortest_choice(
     topics: Sequence[RecordedTopic], names: Collection[str]
 ) -> tuple[tuple[str, ...], tuple[str, ...]]:
-    """Return (included, excluded) topic names, whichever list is shorter; empty for all topics."""
+    """Return the names of the included or of the excluded topics, whichever are fewer.
+
+    Both are empty if all topics are included.
+    """
     wanted = tuple(topic.name for topic in topics if topic.name in names)
     unwanted = tuple(topic.name for topic in topics if topic.name not in names)
     return ((), unwanted) if len(unwanted) < len(wanted) else (wanted, ())

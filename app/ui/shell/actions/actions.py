@@ -23,15 +23,16 @@ ROLES = {
     "file.quit": QAction.MenuRole.QuitRole,
     "help.about": QAction.MenuRole.AboutRole,
 }
-"""Commands that macOS places in the application menu."""
+"""Menu roles of commands that macOS places in the application menu."""
 
 T = TypeVar("T")
 
 
 class Actions:
-    """One QAction per command.
+    """Creates and owns one QAction per command.
 
-    ``do`` is passed to each command's ``run`` and ``why_not``.
+    Args:
+        do: Passed to `run` and `why_not` of each command.
     """
 
     def __init__(self, window: QWidget, theme: Theme, commands: Sequence[Command[T]], do: T) -> None:
@@ -71,17 +72,17 @@ class Actions:
         return name in self._actions
 
     def bind(self, button: QAbstractButton, name: str) -> None:
-        """Make a button trigger a command; its tooltip shows the command's keys (see `Shortcuts`)."""
+        """Make a button trigger a command and show the command's keys in its tooltip (see `Shortcuts`)."""
         name_command(button, name)
         button.clicked.connect(self[name].trigger)
 
     def set_keys(self, keys_of: Callable[[str], Sequence[str]]) -> None:
-        """Set the shortcuts of all commands; the first key of each is shown in menus."""
+        """Set the shortcuts of all commands. The first one of each command is shown in menus."""
         for name, action in self._actions.items():
             action.setShortcuts([QKeySequence(key) for key in keys_of(name)])
 
     def why_not(self, name: str) -> str:
-        """Return why a command is unavailable, or "" if it is available.
+        """Return the reason why a command is unavailable, or "" if it is available.
 
         The reason is a short phrase without a full stop.
         """
@@ -89,14 +90,14 @@ class Actions:
         return self._why_not[name]()
 
     def disable(self) -> None:
-        """Disable the actions of unavailable commands; Stop stays enabled."""
+        """Disable the actions of commands that are unavailable. Stop is always enabled."""
         for name, action in self._actions.items():
             action.setEnabled(name == STOP or not self.why_not(name))
 
     def enable_all(self) -> None:
-        """Enable all actions, so that shortcuts work again.
+        """Enable all actions, because shortcuts of disabled actions don't work.
 
-        Each command checks for itself whether it can run.
+        Each command checks for itself whether it is available.
         """
         for action in self._actions.values():
             action.setEnabled(True)
@@ -114,13 +115,13 @@ class Actions:
         return True
 
     def choose(self, name: str) -> None:
-        """Check one choice of an exclusive group without running it."""
+        """Check the action of a choice in an exclusive group without running its command."""
         self[name].setChecked(True)
 
     def fill(self, bar: QMenuBar, menus: Sequence[str]) -> dict[str, Menu]:
-        """Add menus to a menu bar and return them by name, with titles in the current language.
+        """Add menus to a menu bar, with titles in the current language. Return the menus by name.
 
-        Alt with a letter of its name opens each. Submenus are returned as "View/Look".
+        A mnemonic (Alt with a letter of its title) opens each menu. Names of submenus are like "View/Look".
         """
         titles = marked([_(name) for name in menus])
         made = {name: Menu(self._theme, bar, title) for name, title in zip(menus, titles, strict=True)}

@@ -1,4 +1,4 @@
-"""Command: a row of the command table."""
+"""Command of the window, as a row in the command table."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ T = TypeVar("T")
 
 
 class UnknownCommandError(LookupError):
-    """Request for a command that isn't in the table: a programming error."""
+    """Raised for a command that isn't in the table, which is a programming error."""
 
     def __init__(self, name: str) -> None:
         super().__init__(f"no command '{name}'; the commands are in app.ui.shell.commands.table")
@@ -26,25 +26,25 @@ def _always(_do: object) -> str:
 
 @dataclass(frozen=True)
 class Command(Generic[T]):
-    """An action of the window with a text, keys and a place in a menu.
-
-    Attributes:
-        id: Unique name, such as ``file.open``.
-        text, menu, tip, under: Marked with `lazy` and translated when shown; `words` is the translated text.
-        run: Executes the command.
-        why_not: Returns a short phrase if the command is unavailable, else "".
-        tip: Tooltip of its buttons.
-        under: Submenu of ``menu`` that contains it.
-        group: Name of the exclusive group that it belongs to.
-        above: Insert a separator above it in the menu.
-        everywhere: The key works in all windows.
-        check: The action is checkable.
-        mac: Keys on macOS in place of ``keys``. As in Qt, Ctrl stands for Cmd and Meta for Ctrl.
-        number: Fills the placeholder ``number`` of ``text``.
-        shows: Key shown in the menu but handled by the focused widget, as Ctrl+C is by text fields.
+    """Action of the window with a text, keys and a place in a menu.
 
     A command without a menu appears only in the palette (``in_palette``) and in the list of shortcuts
     (``in_shortcuts``).
+
+    Attributes:
+        id: Unique name, such as ``file.open``.
+        text, menu, tip, under: Wrapped in `lazy` and translated when shown; `words` is the translated text.
+        run: Executes the command.
+        why_not: Returns a short phrase if the command is unavailable, else "".
+        tip: Tooltip of buttons for the command.
+        under: Submenu of ``menu`` that contains the command.
+        group: Name of the exclusive group that the command belongs to.
+        above: True to insert a separator above the command in the menu.
+        everywhere: True if the key works in all windows.
+        check: True if the action is checkable.
+        mac: Keys on macOS in place of ``keys``. As in Qt, Ctrl stands for Cmd and Meta for Ctrl.
+        number: Value for the placeholder ``number`` of ``text``.
+        shows: Key shown in the menu but handled by the focused widget, as Ctrl+C is by text fields.
     """
 
     id: str
@@ -72,16 +72,16 @@ class Command(Generic[T]):
         return _(self.text).format(number=self.number)
 
     def keys_at_first(self, platform: str = sys.platform) -> tuple[str, ...]:
-        """Return the default keys for a platform, the one shown in menus first."""
+        """Return the default keys on a platform. The first one is shown in menus."""
         return self.mac if platform == "darwin" and self.mac else self.keys
 
 
 @dataclass(frozen=True)
 class ArgumentCommand(Generic[T]):
-    """A command with an argument, written ``id:argument``, such as ``inspect:/faces``.
+    """Command with an argument, written ``id:argument``, such as ``inspect:/faces``.
 
-    ``run`` gets the text after the colon and returns whether such a thing exists. It raises ValueError for an
-    argument that is invalid.
+    ``run`` gets the text after the colon. It returns False if the argument refers to nothing, and raises
+    ValueError if the argument is invalid.
     """
 
     id: str

@@ -1,4 +1,4 @@
-"""Keyboard shortcuts: the table's defaults, a person's changes, and fixed keys.
+"""Keyboard shortcuts: defaults of the command table, changes by the user, and fixed keys.
 
 The settings store only the differences from the table, under "shortcuts". F12 is always Stop. Stop also has a
 second key, Ctrl+. by default (Cmd+. on macOS, where F12 changes the volume).
@@ -34,7 +34,7 @@ MODIFIERS = (
 
 @dataclass(frozen=True, slots=True)
 class Fixed:
-    """A key that can't be changed: where it works and what it does (both `lazy`), and the keys."""
+    """Keys that can't be changed, with the place where they work and their function (both `lazy`)."""
 
     place: str
     words: str
@@ -109,17 +109,17 @@ FIXED: tuple[Fixed, ...] = (
 
 
 def normal(key: str) -> str:
-    """Return a key in Qt's portable spelling, used for comparing and storing; "" if it is invalid."""
+    """Convert a key to Qt's portable spelling for comparison and storage; "" if it is invalid."""
     return QKeySequence(key).toString(QKeySequence.SequenceFormat.PortableText)
 
 
 def key_of(pressed: QKeyCombination) -> str:
-    """Return the key of a key press in the portable spelling."""
+    """Return the key of a key press in Qt's portable spelling."""
     return QKeySequence(pressed).toString(QKeySequence.SequenceFormat.PortableText)
 
 
 class Shortcuts(QObject):
-    """Keys of all commands; emits `changed` when any of them changes."""
+    """Current keys of all commands; emits `changed` when any of them changes."""
 
     changed = Signal()
 
@@ -131,7 +131,8 @@ class Shortcuts(QObject):
         *,
         platform: str = sys.platform,
     ) -> None:
-        # complain gets a sentence when the shortcuts can't be saved; platform is a value of sys.platform.
+        # `complain` is called with a sentence if the shortcuts can't be saved; `platform` is a
+        # `sys.platform`.
         super().__init__()
         self._settings, self._complain, self._platform = settings, complain, platform
         self.commands: Mapping[str, Command[Any]] = {command.id: command for command in commands}
@@ -158,7 +159,7 @@ class Shortcuts(QObject):
         return tuple(normal(key) for key in command.keys_at_first(self._platform))
 
     def of(self, name: str) -> tuple[str, ...]:
-        """Return the current keys of a command, the one shown in menus and tooltips first."""
+        """Return the current keys of a command. The first one is shown in menus and tooltips."""
         keys = self._own.get(name, self.default(name))
         if name == STOP:
             given = {key for other, own in self._own.items() if other != STOP for key in own}
@@ -170,15 +171,15 @@ class Shortcuts(QObject):
         return next(iter(self.of(name)), "")
 
     def own(self, name: str) -> bool:
-        """Return whether the keys of a command differ from the defaults."""
+        """Return True if the keys of a command differ from the defaults."""
         return self.of(name) != self.default(name)
 
     def holder(self, key: str) -> str:
-        """Return the command that has a key, or ""."""
+        """Return the name of the command that has a key, or ""."""
         return next((name for name in self.commands if normal(key) in self.of(name)), "")
 
     def refusal(self, name: str, pressed: QKeyCombination) -> str:
-        """Return why a command can't have a key as a sentence, or "" if it can."""
+        """Return the reason why a command can't have a key, as a sentence, or "" if it can."""
         key = key_of(pressed)
         if key == STOP_KEY:
             return "" if name == STOP else _("F12 always stops and can't be changed.")
@@ -194,7 +195,10 @@ class Shortcuts(QObject):
         return ""
 
     def give(self, name: str, key: str) -> None:
-        """Make a key the only one of a command (for Stop next to F12), removing it from another command."""
+        """Replace the keys of a command by one key, and remove that key from other commands.
+
+        Stop gets the key in addition to F12.
+        """
         key, holder = normal(key), self.holder(key)
         if holder and holder != name:
             self._own[holder] = tuple(each for each in self.of(holder) if each != key)
@@ -202,7 +206,7 @@ class Shortcuts(QObject):
         self._keep()
 
     def swap(self, name: str, key: str) -> None:
-        """Assign a key to a command and give its previous holder the command's first key."""
+        """Assign a key to a command, and the command's first key to the previous holder."""
         holder, before = self.holder(key), self.first(name)
         self._own[name] = (normal(key),)
         if holder and holder != name:
@@ -212,8 +216,9 @@ class Shortcuts(QObject):
     def reset(self, name: str) -> None:
         """Restore the default keys of a command and remove them from commands that have taken them.
 
-        Such a command gets its own default back unless that is taken, so that a swap leaves no command
-        without a key.
+        Each such command gets its own default key back unless that is taken, so that no command is left
+        without a
+        key after a swap.
         """
         self._own.pop(name, None)
         for key in self.default(name):
@@ -243,6 +248,7 @@ class Shortcuts(QObject):
             command = widget.property("command")
             if isinstance(command, str):
                 said = _(self.commands[command].tip)
-                if not said or isinstance(widget, IconButton):  # the tooltip is an icon button's only text
+                # the tooltip is the only text of an icon button
+                if not said or isinstance(widget, IconButton):
                     said = widget.accessibleName()
                 widget.setToolTip(plain.tip(tip_with_key(said, ", ".join(self.of(command)))))

@@ -35,16 +35,16 @@ CHIP_WORDS = {
     "paused": lazy("{robot} is paused"),
     "running": lazy("{robot} running"),
 }
-"""Text of the robot chip when there is one robot, by state."""
+"""Text of the robot chip for a single robot, by state."""
 
 
 class AppBar(QWidget):
-    """Menus at the left, the layout switch in the middle, the robots at the right."""
+    """Bar with the menus at the left, the layout switch in the middle and the robots at the right."""
 
     layout_chosen = Signal(str)
 
     def __init__(self, theme: Theme, layouts: Sequence[Layout], platform: str = sys.platform) -> None:
-        # platform is a value of sys.platform.
+        # `platform` is a value of `sys.platform`.
         super().__init__()
         self._theme = theme
         self.setMinimumHeight(theme.size("appBar"))
@@ -106,7 +106,7 @@ class AppBar(QWidget):
         self._fit()
 
     def _fit(self) -> None:
-        # Shrinks in this order when the menus lack room: texts of the switch, the chip, the key of the field.
+        # Shrinks in this order if the menus lack room: texts of the switch, the chip, the key of the field.
         for bare in range(4):
             self.switch.set_bare(bare > 0)
             self.chip.set_bare(bare > 1)
@@ -137,9 +137,9 @@ class AppBar(QWidget):
         actions.bind(self.stop, "run.stop")
 
     def show_layout(self, name: str | None, *, back: bool = False) -> None:
-        """Mark the current layout; None means the start page, which shows Stop in place of the switch.
+        """Show the name of the current layout as selected; None means the start page.
 
-        With ``back`` the start page shows a button that returns to the open work.
+        On the start page, Stop replaces the switch, and with ``back`` a button returns to the open work.
         """
         self.home.setVisible(name is not None)
         self.back.setVisible(name is None and back)
@@ -150,7 +150,7 @@ class AppBar(QWidget):
         self._fit()
 
     def show_robots(self, text: str, status: str) -> None:
-        """Set the robot chip to a text and status."""
+        """Set text and status of the robot chip."""
         if text != self.chip.text:
             self.chip.set(text, status)
             self._fit()
@@ -168,7 +168,7 @@ class AppBar(QWidget):
 class PaletteField(PaintedButton):
     """Button that opens the command palette, painted as a search field with its key at the right.
 
-    Narrow windows shorten the text, then show only icon and key.
+    In narrow windows the text is shortened, then hidden so that only icon and key are shown.
     """
 
     def __init__(self, theme: Theme, parent: QWidget | None = None) -> None:
@@ -178,7 +178,7 @@ class PaletteField(PaintedButton):
         self.setSizePolicy(QSizePolicy.Policy.Preferred, QSizePolicy.Policy.Fixed)
 
     def set_bare(self, bare: bool) -> None:
-        """Show only the icon (and key), or the text again where it fits."""
+        """Show only the icon (and key), or the text too where it fits."""
         if bare != self._bare:
             self._bare = bare
             self.updateGeometry()

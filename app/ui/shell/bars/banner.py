@@ -1,6 +1,7 @@
-"""Alert banner: lies over the free area of the current bar and offers the alert's next step.
+"""Banner that shows an alert over the free area of the current bar, with a button for the next step.
 
-It shows one alert at a time. A banner that takes space of its own would move the panels under the mouse.
+One alert is shown at a time. The banner takes no space of its own, because that would move the panels under
+the mouse.
 """
 
 from __future__ import annotations
@@ -34,11 +35,11 @@ STEP_ICONS = {
 }
 NEXT_ICON = "arrow-right"
 FRESH_S = 0.5
-"""Seconds during which a banner that appears under the mouse passes clicks on to what was there."""
+"""Time in s for which a banner that appears under the mouse passes clicks on to the widget below."""
 
 
 class AlertLike(Protocol):
-    """Interface of `app.core.alerts.ActiveAlert` that the banner uses."""
+    """Interface of `app.core.alerts.ActiveAlert` as used by the banner."""
 
     @property
     def id(self) -> str:
@@ -50,7 +51,7 @@ class AlertLike(Protocol):
 
     @property
     def title(self) -> str:
-        """The problem as one sentence."""
+        """Description of the problem as one sentence."""
 
     @property
     def detail(self) -> str:
@@ -62,11 +63,11 @@ class AlertLike(Protocol):
 
     @property
     def action(self) -> str | None:
-        """Name of the next step in the table of actions."""
+        """Name of the action for the next step."""
 
 
 class BannerWords(QWidget):
-    """A bold and a plain sentence, wrapped to the available lines; the tooltip has the full text."""
+    """Title in bold and detail, wrapped to the available lines; the tooltip has the full text."""
 
     def __init__(self, theme: Theme) -> None:
         super().__init__()
@@ -90,7 +91,7 @@ class BannerWords(QWidget):
 
     def paintEvent(self, _event: QPaintEvent) -> None:
         painter = QPainter(self)
-        # the largest font in which the full text fits, else the smallest
+        # the largest font in which the full text fits, else the smallest one
         kind = next((each for each in FONTS if self.lines(each)[1]), FONTS[-1])
         lines, high = self.lines(kind)[0], paint.height_of(self._theme.font(kind))
         top = (self.height() - high * len(lines)) / 2
@@ -104,9 +105,9 @@ class BannerWords(QWidget):
         painter.end()
 
     def lines(self, kind: str) -> tuple[list[list[tuple[str, QFont, str]]], bool]:
-        """Return the lines as pieces of text with font and colour, and whether the full text fits.
+        """Return the lines, each as pieces of text with font and colour.
 
-        The last line is elided when painted.
+        The last line is elided when painted. The bool is True if the full text fits.
         """
         plain_font, bold = self._theme.font(kind), self._theme.font(kind)
         bold.setWeight(QFont.Weight.DemiBold)
@@ -144,7 +145,7 @@ def _fitting(font: QFont, words: Sequence[str], width: float) -> int:
 
 
 class Banner(AlertBox):
-    """Icon, title, detail, a button for the next step, an optional second button, and close."""
+    """Icon, title, detail, a button for the next step, an optional second button, and a close button."""
 
     icon_side, icon_left, left, high, gap = 18, 12, 40, 0, 6
 
@@ -186,14 +187,14 @@ class Banner(AlertBox):
         second: str | None = None,
         icon: str | None = None,
     ) -> None:
-        """Set the content; ``others`` is the number of further alerts."""
+        """Set the contents; ``others`` is the number of further alerts."""
         self._icon = self.button.icon_name = icon
         self.set_status(status)
         self.words.show_words(title, detail)
         spoken = f"{title} {detail}".strip()
         self.setAccessibleName(spoken)
         news = FIGURES.sub("", spoken)
-        if news != self._announced:  # changed numbers alone aren't announced again
+        if news != self._announced:  # changes of numbers alone aren't announced again
             self._announced = news
             paint.announce(self, spoken)
         self._step, self._others = button or "", others
@@ -231,7 +232,7 @@ class Banner(AlertBox):
 
 
 class AlertBanner(QWidget):
-    """Banner over the current bar: shows the worst alert that isn't dismissed, until it is solved."""
+    """Banner over the current bar. Shows the most severe alert that isn't dismissed, until it is resolved."""
 
     def __init__(
         self,
@@ -241,7 +242,7 @@ class AlertBanner(QWidget):
         mouse_at: Callable[[], QPoint] = QCursor.pos,
         clock: Callable[[], float] = time.monotonic,
     ) -> None:
-        # mouse_at returns the mouse position on the screen; clock returns monotonic seconds.
+        # `mouse_at` returns the mouse position on the screen; `clock` returns monotonic seconds.
         super().__init__()
         self.banner = banner if banner is not None else Banner(theme)
         self.mouse_at, self.clock = mouse_at, clock
@@ -266,7 +267,7 @@ class AlertBanner(QWidget):
 
     @property
     def identity(self) -> str:
-        """Identity of the content, independent of its texts: an alert's id, "offer", or "" for nothing."""
+        """Identity of the contents, independent of the texts: id of an alert, "offer", or "" if empty."""
         if self._offer is not None:
             return "offer"
         return self._alert.id if self._alert is not None else ""
@@ -278,7 +279,7 @@ class AlertBanner(QWidget):
 
     @property
     def offers(self) -> bool:
-        """True while an offer waits for an answer."""
+        """True while an offer waits for a choice."""
         return self._offer is not None
 
     def offer(
@@ -288,13 +289,13 @@ class AlertBanner(QWidget):
         yes: tuple[str, Callable[[], object]],
         no: tuple[str, Callable[[], object]],
     ) -> None:
-        """Show an offer with two answers; alerts wait until one is chosen."""
+        """Show an offer with two buttons. Alerts are shown after one of them was chosen."""
         self._offer = (yes[1], no[1])
         self.banner.show_words("info", title, detail, yes[0], second=no[0])
         self.show()
 
     def show_alerts(self, alerts: Sequence[AlertLike]) -> None:
-        """Set the active alerts that aren't dismissed, worst first."""
+        """Set the alerts that are active and not dismissed, most severe first."""
         self._alerts = alerts
         if self._offer is not None:
             return
@@ -309,7 +310,7 @@ class AlertBanner(QWidget):
         self.show()
 
     def _first(self, alerts: Sequence[AlertLike]) -> AlertLike | None:
-        # Keeps the shown alert while the mouse is over the banner, so that the button under it doesn't
+        # Keeps the current alert while the mouse is over the banner, so that the button under it doesn't
         # change.
         shown = self._alert
         if shown is not None and self.banner.underMouse():
@@ -344,7 +345,7 @@ class AlertBanner(QWidget):
         self.on_more()
 
     def follow(self, area: QRect) -> None:
-        """Move to an area of the parent; called with every tick, as the bars change their layout.
+        """Move to an area of the parent. Called on every tick, because the bars change their layout.
 
         A banner that appears under the mouse ignores clicks for `FRESH_S`.
         """

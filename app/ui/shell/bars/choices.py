@@ -1,4 +1,4 @@
-"""Answers to a question as large buttons, operated by mouse, arrow keys and number keys."""
+"""Choices for a question as large buttons, operated by mouse, arrow keys and number keys."""
 
 from __future__ import annotations
 
@@ -24,10 +24,10 @@ _WRAPPED = int(Qt.TextFlag.TextWordWrap | Qt.AlignmentFlag.AlignLeft | Qt.Alignm
 
 
 class ChoiceButton(PaintedButton):
-    """One answer: its number key and its text, wrapped."""
+    """Button for one choice, with its number key and wrapped text."""
 
     def __init__(self, theme: Theme, words: str, key: str) -> None:
-        # key is "" for answers beyond the number keys.
+        # `key` is "" for choices beyond the number keys.
         super().__init__(theme, words, radius="large")
         self.key = key
         self._shown = plain.breakable(words)
@@ -44,7 +44,7 @@ class ChoiceButton(PaintedButton):
         return math.ceil(self._before_words() + paint.width_of(self._font(), self.text()) + PADDING) + 1
 
     def height_for(self, width: int) -> int:
-        """Return the height in px for a width."""
+        """Return the height in px that is needed for a width."""
         room = QRectF(0, 0, max(1.0, width - self._before_words() - PADDING), 1e6)
         needed = QFontMetricsF(self._font()).boundingRect(room, _WRAPPED, self._shown).height()
         return max(round(self._theme.scaled(MIN_HEIGHT)), math.ceil(needed) + 2 * PADDING)
@@ -54,7 +54,10 @@ class ChoiceButton(PaintedButton):
         return QSize(wide, self.height_for(wide))
 
     def keyPressEvent(self, event: QKeyEvent) -> None:
-        """Handle Enter and Space; leave other keys to `Choices`, including those that Qt's buttons handle."""
+        """Handle Enter and Space.
+
+        Other keys, including those that Qt's buttons handle, are left to `Choices`.
+        """
         if is_pressed_key(event.key()):
             super().keyPressEvent(event)
         else:
@@ -78,11 +81,11 @@ class ChoiceButton(PaintedButton):
 
 
 class Choices(QWidget):
-    """Answers of one question, in as many columns as fit with each answer on one line."""
+    """Buttons for the choices of one question, in as many columns as fit with each text on one line."""
 
     chosen = Signal(str)
     reached = Signal(QWidget)
-    """An arrow key moved the focus to this button, which may have to be scrolled into view."""
+    """Emitted when an arrow key moved the focus to a button, which may have to be scrolled into view."""
 
     def __init__(self, theme: Theme) -> None:
         super().__init__()
@@ -93,7 +96,7 @@ class Choices(QWidget):
         self.setSizePolicy(policy)
 
     def show_choices(self, choices: Sequence[str]) -> None:
-        """Replace the answers."""
+        """Replace the choices."""
         for button in self.buttons:
             button.hide()
             button.deleteLater()
@@ -108,12 +111,12 @@ class Choices(QWidget):
         self.updateGeometry()
 
     def take_keyboard(self) -> None:
-        """Focus the first answer."""
+        """Focus the first choice."""
         if self.buttons:
             self.buttons[0].setFocus(Qt.FocusReason.PopupFocusReason)
 
     def hold(self, *, held: bool) -> None:
-        """Disable or enable all answers."""
+        """Disable or enable all choices."""
         for button in self.buttons:
             button.setEnabled(not held)
 
@@ -124,7 +127,7 @@ class Choices(QWidget):
         return max(1, min(MAX_COLUMNS, len(self.buttons), fitting))
 
     def places(self, width: int) -> list[QRect]:
-        """Return the rectangles of the buttons for a width; the buttons of a row have equal heights."""
+        """Return the rectangles of the buttons for a width. The buttons of a row have equal heights."""
         columns = self.columns(width)
         wide = (width - GAP) // columns - GAP
         found: list[QRect] = []
@@ -159,7 +162,7 @@ class Choices(QWidget):
             button.setGeometry(place)
 
     def press(self, event: QKeyEvent) -> bool:
-        """Move the focus by an arrow key or choose by a number key; return whether the key was handled."""
+        """Move the focus by an arrow key, or choose by a number key. Return True if the key was handled."""
         key = event.key()
         number = key - Qt.Key.Key_1
         if not is_plain(event) or not self.buttons or not self.buttons[0].isEnabled():

@@ -1,4 +1,4 @@
-"""Left end of the tool bar: record, save the flight recorder, freeze, source, layouts and panels."""
+"""Tools at the left of the tool bar: record, save the flight recorder, freeze, source, layouts, panels."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ RECORDING_ROOM_PX = 1240  # the same with the button back to the live network
 
 
 class RecordButton(Button):
-    """Button that starts a recording and shows the length and size of the current one."""
+    """Button that starts a recording, and shows the length and size of the current one."""
 
     def __init__(self, theme: Theme) -> None:
         super().__init__(theme, _("Record"), "circle-dot", size="small")
@@ -41,7 +41,7 @@ class RecordButton(Button):
         self._is_on = self._is_bare = False
 
     def set_bare(self, bare: bool) -> None:
-        """Show only the dot, or the text again."""
+        """Show only the dot if `bare`, else the text too."""
         if bare != self._is_bare:
             self._is_bare = bare
             self.updateGeometry()
@@ -51,7 +51,7 @@ class RecordButton(Button):
         return "" if self._is_bare else self.text()
 
     def show_recording(self, recordings: SessionRecordings) -> None:
-        """Show the state of the recording."""
+        """Show the state of the current recording."""
         self._is_on = recordings.is_recording
         if not self._is_on:
             self.set_word(_("Record"))
@@ -79,7 +79,7 @@ LIVE_ICON, RECORDING_ICON = "radio-tower", "history"
 
 
 class SourceSwitch(MenuButton):
-    """Menu button that shows and chooses the source; ``back`` is visible while a recording is shown."""
+    """Menu button to choose the source. ``back`` is visible while a recording is shown."""
 
     def __init__(self, theme: Theme, session: Session, actions: Actions) -> None:
         super().__init__(theme, _("Live network"), LIVE_ICON, size="small")
@@ -93,7 +93,7 @@ class SourceSwitch(MenuButton):
 
     @property
     def is_recording(self) -> bool:
-        """True while a recording is shown."""
+        """True while a recording is the source."""
         return self._is_recording
 
     def refresh(self) -> None:
@@ -120,7 +120,7 @@ class SourceSwitch(MenuButton):
 
 
 class DeveloperTools(QObject):
-    """Adds the tools to the tool bar and keeps them up to date by `follow`."""
+    """Adds the tools to the tool bar and updates them in `follow`."""
 
     def __init__(self, shell: Shell, bar: ToolBar, commands: Commands, session: Session) -> None:
         super().__init__(bar)
@@ -154,7 +154,7 @@ class DeveloperTools(QObject):
         theme.changed.connect(self._fit)
 
     def refresh(self) -> None:
-        """Update all tools from the session."""
+        """Update all tools to the state of the session."""
         was_recording = self.source.is_recording
         self.source.refresh()
         if self.source.is_recording != was_recording:
@@ -176,8 +176,9 @@ class DeveloperTools(QObject):
         return False
 
     def _fit(self) -> None:
-        # Hides tools in this order when room is short; all are in menus: Keep, source, layouts, Freeze,
-        # Record.
+        # Hides tools in this order if there is little room: Keep, source, layouts, Freeze, Record. All of
+        # them
+        # are also in menus.
         width, scaled, recording = self._bar.width(), self._shell.theme.scaled, self.source.is_recording
         paint.show_when(self.source, recording or width >= scaled(SOURCE_ROOM_PX))
         paint.show_when(self.source.back, recording)
@@ -189,7 +190,7 @@ class DeveloperTools(QObject):
         paint.show_when(self.record, width >= scaled(RECORD_ROOM_PX))
 
     def follow(self) -> None:
-        """Refresh every few half ticks while the bar is visible."""
+        """Refresh the tools every few half ticks while the bar is visible."""
         self._ticks += 1
         if self._ticks % REFRESH_HALF_TICKS == 0 and self._bar.isVisible():
             self.refresh()

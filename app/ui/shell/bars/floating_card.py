@@ -1,4 +1,4 @@
-"""Card that floats over a window without darkening it and keeps its place when either is resized."""
+"""Card that floats over a window without dimming it, and keeps its place when either is resized."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from PySide6.QtWidgets import QWidget
 
 
 class FloatingCard(QWidget):
-    """Card, hidden at first; subclasses position it in `place`."""
+    """Card that is initially hidden; subclasses position it in `place`."""
 
     def __init__(self, window: QWidget) -> None:
         super().__init__(window)
@@ -15,7 +15,7 @@ class FloatingCard(QWidget):
         self.hide()
 
     def place(self) -> None:
-        """Set position and size for the current content."""
+        """Set position and size for the current contents."""
         raise NotImplementedError
 
     def event(self, event: QEvent) -> bool:

@@ -1,4 +1,4 @@
-"""The logo: an N between two amber joints on the accent colour, painted at any size."""
+"""Logo, an N between two amber joints on the accent colour, painted at any size."""
 
 from __future__ import annotations
 

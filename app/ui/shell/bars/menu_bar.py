@@ -14,8 +14,8 @@ from app.ui.widgets.letters import plain_words
 class _Alt(QObject):
     """Event filter that reports whether Alt is held.
 
-    A separate object: while Alt is held, Qt makes a menu bar filter the events of the whole application, and
-    those of the web view's internal objects must not reach Python.
+    A separate object is needed: while Alt is held, Qt makes a menu bar filter the events of the whole
+    application, and events of the web view's internal objects must not reach Python.
     """
 
     held = Signal(bool)
@@ -29,7 +29,7 @@ class _Alt(QObject):
 
 
 class MenuBar(QMenuBar):
-    """Menu bar with mnemonics that are underlined only while Alt is held."""
+    """Menu bar whose mnemonics are underlined only while Alt is held."""
 
     def __init__(self, theme: Theme) -> None:
         super().__init__()
@@ -46,7 +46,8 @@ class MenuBar(QMenuBar):
     def showEvent(self, event: QShowEvent) -> None:
         super().showEvent(event)
         window = self.window().windowHandle()
-        if window is not None:  # sees Alt before the focused widget; installing a filter again is harmless
+        # receives Alt before the focused widget; installing a filter again is harmless
+        if window is not None:
             window.removeEventFilter(self._alt)
             window.installEventFilter(self._alt)
 

@@ -1,4 +1,4 @@
-"""Card for questions of a running behaviour; it takes the focus and never covers Stop."""
+"""Card for questions of a running behaviour. It takes the focus and never covers Stop."""
 
 from __future__ import annotations
 
@@ -33,13 +33,13 @@ MAX_ANSWER_LENGTH = 10_000
 
 
 class QuestionCard(FloatingCard):
-    """Question with a text field or choices. Enter answers; Esc gives no answer.
+    """Card with a question and a text field or choices. Enter answers; Esc closes it without an answer.
 
     The card is disabled while the behaviour is paused.
     """
 
     def __init__(self, theme: Theme, window: QWidget, answer: Callable[[AskedQuestion, str], object]) -> None:
-        # answer gets the question and the text or choice.
+        # `answer` gets the question and the text or choice.
         super().__init__(window)
         self._theme, self._answer = theme, answer
         self._question: AskedQuestion | None = None
@@ -57,7 +57,7 @@ class QuestionCard(FloatingCard):
         self._offered = Scrolled(self.choices)
         self.choices.reached.connect(lambda button: self._offered.ensureWidgetVisible(button, 0, GAP))
         self._hint = label(_("Press Resume first"), "small", role="textSecondary")
-        self.setFocusPolicy(Qt.FocusPolicy.ClickFocus)  # receives the keys while the card is held
+        self.setFocusPolicy(Qt.FocusPolicy.ClickFocus)  # receives the keys while the card is disabled
         row = QHBoxLayout()
         row.setSpacing(10)
         row.addWidget(self.field, 1)
@@ -76,9 +76,9 @@ class QuestionCard(FloatingCard):
         self.setGraphicsEffect(shadow)
 
     def show_question(self, question: AskedQuestion | None, *, held: bool) -> None:
-        """Show a question, or hide the card for None; called with every tick.
+        """Show a question, or hide the card for None. Called on every tick.
 
-        ``held`` disables the card while the behaviour is paused.
+        ``held`` disables the card, while the behaviour is paused.
         """
         if question != self._question:
             self._question = question
@@ -112,7 +112,7 @@ class QuestionCard(FloatingCard):
         paint.announce(self, ", ".join((words, *question.choices)))
 
     def take_keyboard(self) -> None:
-        """Take the focus if there is a question that isn't held."""
+        """Take the focus if there is a question and the card is enabled."""
         if self._question is None or self._held:
             return
         if self.choices.buttons:
@@ -135,7 +135,7 @@ class QuestionCard(FloatingCard):
         had = self._has_keyboard()
         self._held = held
         if had and held and self.choices.buttons:
-            # Otherwise Qt moves the focus from the disabled widget to the next one in the window.
+            # Otherwise Qt would move the focus from the disabled widget to the next one in the window.
             self.setFocus(Qt.FocusReason.OtherFocusReason)
         self.choices.hold(held=held)
         self._hint.setVisible(held and bool(self.choices.buttons))
@@ -162,7 +162,7 @@ class QuestionCard(FloatingCard):
         self.setGeometry(left, bottom - high, wide, high)
 
     def _free(self, window: QWidget, left: int, wide: int) -> tuple[int, int]:
-        # Vertical range between the Stop buttons above and below.
+        # Vertical range between the Stop buttons above and below the card.
         middle, top, bottom = window.height() // 2, MARGIN, window.height() - MARGIN
         for each in stops_in(window):
             stop = QRect(each.mapTo(window, QPoint()), each.size())

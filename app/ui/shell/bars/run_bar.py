@@ -1,4 +1,4 @@
-"""Run bar of the Behaviour layout and tool bar of the Developer layout: Run, Pause, Step, Stop."""
+"""Run bar of the Behaviour layout and tool bar of the Developer layout, with Run, Pause, Step and Stop."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ MARKS = {
 
 
 class Mark(QWidget):
-    """Run state as a mark: ring (idle), amber dot (running), pause, crossed circle (action needed)."""
+    """Mark of the run state: ring (idle), amber dot (running), pause, crossed circle (action needed)."""
 
     def __init__(self, theme: Theme) -> None:
         super().__init__()
@@ -52,11 +52,11 @@ class Mark(QWidget):
 
     @property
     def state(self) -> str:
-        """Current state: one of the six states of Run and Stop."""
+        """Name of one of the six states of Run and Stop."""
         return self._state
 
     def show_state(self, state: str) -> None:
-        """Show one of the six states of Run and Stop."""
+        """Show the mark of one of the six states of Run and Stop."""
         if state != self._state:
             self._state = state
             self.update()
@@ -88,7 +88,7 @@ class Mark(QWidget):
 
 
 class Sentence(QWidget):
-    """Current state as a title and a detail."""
+    """Text of the current state, with a title and a detail."""
 
     def __init__(self, theme: Theme) -> None:
         super().__init__()
@@ -99,18 +99,18 @@ class Sentence(QWidget):
         theme.changed.connect(self.updateGeometry)
 
     def keep_to(self, width: float | None) -> None:
-        """Limit the text to a width because an alert covers the rest; None removes the limit."""
+        """Limit the text to a width, because an alert covers the rest. None removes the limit."""
         if width != self._shared_px:
             self._shared_px = width
             self.update()
 
     @property
     def colour_role(self) -> str:
-        """Colour of the title: the error colour if a person must act."""
+        """Colour role of the title: the error colour if the user has to act."""
         return self._theme.status("error").colour if self._is_alarm else "text"
 
     def show_words(self, title: str, detail: str, *, is_alarm: bool = False) -> None:
-        """Set the texts; with ``is_alarm`` the title is red because a person must act."""
+        """Set title and detail. With ``is_alarm`` the title is red because the user has to act."""
         if (title, detail, is_alarm) != (self._title, self._detail, self._is_alarm):
             self._title, self._detail, self._is_alarm = title, detail, is_alarm
             said = [each for each in (title, detail) if each]
@@ -138,7 +138,7 @@ class Sentence(QWidget):
     def paintEvent(self, _event: QPaintEvent) -> None:
         width = self.width() if self._shared_px is None else min(self.width(), self._shared_px)
         if width < self._theme.scaled(MIN_SENTENCE_PX):
-            return  # too narrow to read; the tooltip and screen readers have the full text
+            return  # too narrow to be readable; the tooltip and screen readers have the full text
         painter = QPainter(self)
         lines = self.lines(width)
         top = (self.height() - sum(paint.height_of(font) for _text, font, _role in lines)) / 2
@@ -149,9 +149,10 @@ class Sentence(QWidget):
         painter.end()
 
     def lines(self, width: float) -> list[tuple[str, QFont, str]]:
-        """Return the painted lines with font and colour; the last one is elided if it is too long.
+        """Return the lines to paint, with font and colour; the last one is elided if it is too long.
 
-        A detail too long for one line is split into two lines in a small font if the bar is high enough.
+        A detail that is too long for one line is split into two lines in a small font if the bar is high
+        enough.
         """
         bold, plain, small = self._title_font(), self._theme.font("body"), self._theme.font("small")
         title, quiet = [(self._title, bold, self.colour_role)], "textSecondary"
@@ -164,7 +165,7 @@ class Sentence(QWidget):
 
 
 class Result(QWidget):
-    """Result of a stop (confirmed, pending, unanswered), or while running a reminder of the last one."""
+    """Result of the last Stop: confirmed, pending or unanswered; during a run, a reminder of it."""
 
     def __init__(self, theme: Theme, *, compact: bool = False) -> None:
         super().__init__()
@@ -177,7 +178,7 @@ class Result(QWidget):
 
     @property
     def text(self) -> str:
-        """Current text."""
+        """Text that is shown."""
         return self._text
 
     @property
@@ -187,11 +188,11 @@ class Result(QWidget):
 
     @property
     def status(self) -> StopStatus:
-        """Status that gives icon and colour."""
+        """Status that determines icon and colour."""
         return self._status
 
     def show_view(self, view: RunView) -> None:
-        """Show the result of a stop."""
+        """Show the result of the last Stop."""
         look, text = "", ""
         if view.state == "unanswered":
             look, text = "error", (view.compact if self._compact else view.result or "")
@@ -273,7 +274,7 @@ class Result(QWidget):
 
 
 class Bar(QWidget):
-    """Surface below the app bar with a line at its bottom."""
+    """Surface below the app bar with a separator line at its bottom."""
 
     def __init__(self, theme: Theme, height: int) -> None:
         super().__init__()
@@ -290,13 +291,13 @@ class Bar(QWidget):
 
 
 def free_area(bar: Bar, left: int, beside: Iterable[QWidget]) -> QRect:
-    """Return the area of the bar from ``left`` to the first of the widgets, above the bar's line."""
+    """Return the free area of a bar from ``left`` to the first of the widgets, above the separator."""
     right = min((each.x() for each in beside), default=bar.width()) - GAP
     return QRect(left, BANNER_EDGE, max(0, right - left), bar.height() - 1 - 2 * BANNER_EDGE)
 
 
 class RunBar(Bar):
-    """Run bar, 60 px high: three large buttons, the current state, the result of the last stop, and Stop."""
+    """Run bar, 60 px high: three large buttons, the current state, the result of the last Stop, and Stop."""
 
     def __init__(self, theme: Theme) -> None:
         super().__init__(theme, theme.size("runBar"))
@@ -346,9 +347,9 @@ class RunBar(Bar):
         self._paces.addActions([actions[name] for name in PACES])
 
     def banner_area(self) -> QRect:
-        """Return the area for an alert: next to the state, which stays readable while a person must act.
+        """Return the area for an alert, next to the state, which stays readable while the user has to act.
 
-        It may cover the reminder of the last stop, but not buttons or the result of a stop.
+        The area may include the reminder of the last Stop, but no buttons and no result of Stop.
         """
         left = self.sentence.x() + self._sentence_px() + GAP
         beside: list[QWidget] = [
@@ -359,7 +360,7 @@ class RunBar(Bar):
         return free_area(self, round(left), beside)
 
     def share(self, *, has_banner: bool) -> None:
-        """Leave room for an alert next to the state, or give the room back."""
+        """Leave room for an alert next to the state if there is a banner."""
         self.sentence.keep_to(self._sentence_px() if has_banner else None)
 
     def _sentence_px(self) -> float:
@@ -393,7 +394,7 @@ class RunBar(Bar):
         self.result.setMaximumWidth(round(left) if self.result.look in {"ok", "off"} else QWIDGETSIZE_MAX)
 
     def show_view(self, view: RunView) -> None:
-        """Show one of the six states. Restart takes the place of Run, which is Resume while paused."""
+        """Show one of the six states. During a run, Restart replaces Run; while paused, Run is Resume."""
         restarts = view.can_restart and not view.can_run
         self.run.set_word(_(view.run_word), "rotate-ccw" if view.run_word == RESTART else "play")
         self.run.set_filled(view.can_run or (restarts and view.edited))
@@ -408,13 +409,13 @@ class RunBar(Bar):
         self.confirm.set_word(view.confirm or "")
         paint.show_when(self.confirm, view.confirm is not None)
         self.stop.show_state(_(view.stop_word), ring=view.state == "stopping")
-        if view != self._fitted:  # this method is called with every tick
+        if view != self._fitted:  # because this method is called on every tick
             self._fitted = view
             self._fit()
 
 
 class ToolBar(Bar):
-    """Tool bar, 40 px high: shows the same states at its right end."""
+    """Tool bar, 40 px high, which shows the run state at its right end."""
 
     def __init__(self, theme: Theme) -> None:
         super().__init__(theme, theme.size("toolBar"))
@@ -469,11 +470,11 @@ class ToolBar(Bar):
         bind(self, actions)
 
     def add_tool(self, tool: QWidget, place: int = -1) -> None:
-        """Insert a button at the left end, by default after the existing ones."""
+        """Insert a button at the left end, after the existing ones unless `place` is given."""
         self.tools.insertWidget(place, tool)
 
     def show_view(self, view: RunView) -> None:
-        """Show one of the six states in the small form."""
+        """Show one of the six states in short form."""
         self.result.show_view(view)
         spoken = bool(self.result.text) and view.state in {"proven", "unanswered"}
         self.mark.show_state(view.state)
@@ -491,7 +492,7 @@ class ToolBar(Bar):
 
 
 def bind(bar: RunBar | ToolBar, actions: Actions) -> None:
-    """Connect the run buttons of either bar to the same commands."""
+    """Connect the run buttons of a bar to their commands."""
     actions.bind(bar.run, "run.run")
     actions.bind(bar.restart, "run.restart")
     actions.bind(bar.pause, "run.pause")

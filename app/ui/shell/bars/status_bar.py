@@ -1,4 +1,4 @@
-"""Status bar: facts with their figures; unknown facts are omitted."""
+"""Status bar with short texts about the session. Unknown facts are left out."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ def _worst(found: Iterable[str]) -> tuple[str, str]:
 
 
 class StatusFacts:
-    """Formats the session's state as short texts with icons."""
+    """Formats the session's state as short texts with icons. Methods return an empty fact to show nothing."""
 
     def __init__(self, session: Session, clock: Callable[[float], time.struct_time] = time.localtime) -> None:
         self._session = session
@@ -42,7 +42,7 @@ class StatusFacts:
         self._web_host = self._web_network = ""
 
     def alerts(self, *, for_developers: bool = False) -> Fact:
-        """Return the number of alerts; nothing without alerts."""
+        """Return the number of alerts."""
         alerts = self._session.alerts.to_tell(for_developers=for_developers)
         if not alerts:
             return NOTHING
@@ -53,7 +53,7 @@ class StatusFacts:
     def health(self) -> Fact:
         """Return the number of alerts or problems in Health, or that the robots are well.
 
-        A robot that hasn't reported its state yet is only "connected".
+        A robot that hasn't reported its state yet is only described as "connected".
         """
         alerts = self.alerts()
         if alerts != NOTHING:
@@ -88,7 +88,7 @@ class StatusFacts:
         return "circle-dashed", words.format(robot=name, count=count), "off"
 
     def saved(self) -> Fact:
-        """Return when the behaviour was saved, or that it has unsaved changes and if they are backed up."""
+        """Return when the behaviour was saved, or that it has unsaved changes and whether they are backed up."""
         document = self._session.document
         if document.dirty and document.journal_error is not None:
             return "circle-x", _("Not saved · no backup"), "error"
@@ -106,7 +106,7 @@ class StatusFacts:
         return "", ngettext("{count} active topic", "{count} active topics", live).format(count=live), None
 
     def remote_access(self) -> Fact:
-        """Return which computers can reach this master."""
+        """Return which computers can connect to this master."""
         return access_words(self._session.remote_access)
 
     def remote_access_quietly(self) -> Fact:
@@ -115,7 +115,7 @@ class StatusFacts:
         return ("" if status is None else icon), words, status
 
     def web_pages(self) -> Fact:
-        """Return the web server's network and the number of connected pages; nothing while it is off."""
+        """Return the network of the web server and the number of connected pages; empty while it is off."""
         web = self._session.web_pages
         if web.host != self._web_host:  # resolving the computer's addresses is slow
             self._web_host, self._web_network = web.host, host_words(web)
@@ -147,7 +147,7 @@ class StatusFacts:
         return "", ", ".join(facts), None
 
     def lost(self) -> Fact:
-        """Return the number of messages lost in 30 s; nothing for 0."""
+        """Return the number of messages lost in 30 s; empty for 0."""
         lost = self._session.traffic.lost_30s
         if not lost:
             return NOTHING
@@ -155,7 +155,7 @@ class StatusFacts:
         return "triangle-alert", words.format(count=grouped(lost)), "warn"
 
     def recording(self) -> Fact:
-        """Return length, size and losses of the current recording; nothing without one."""
+        """Return length, size and losses of the current recording; empty without one."""
         recordings = self._session.recordings
         state = recordings.client.state
         if not recordings.is_recording:
@@ -172,7 +172,7 @@ class StatusFacts:
         return ("triangle-alert", words, "warn") if state.unkept else ("circle-dot", words, "recording")
 
     def armed(self) -> Fact:
-        """Return the remaining arming time and the topics being sent; nothing while disarmed."""
+        """Return the remaining arming time and the topics being sent; empty while disarmed."""
         acting = self._session.acting
         if not acting.arming.is_on:
             return NOTHING
@@ -195,14 +195,14 @@ class StatusFacts:
         return "triangle-alert", words, "warn"
 
     def ring(self) -> Fact:
-        """Return the seconds available in the flight recorder; nothing while it is off."""
+        """Return the number of seconds in the flight recorder; empty while it is off."""
         seconds = self._session.recordings.client.state.ring_s
         if seconds is None:
             return NOTHING
         return "history", _("last {count} s available").format(count=round(seconds)), None
 
     def replayed(self) -> tuple[Fact, ...]:
-        """Return name, time range, content and losses of the recording that is shown."""
+        """Return name, time range, contents and losses of the recording that is shown."""
         replay = self._session.replay
         if replay is None or replay.opened is None:
             return ()
@@ -229,7 +229,7 @@ class StatusFacts:
         return "radio-tower", _("The live network keeps running"), None
 
     def shown(self) -> Fact:
-        """Return the number of shown messages of watched topics; nothing if all were shown."""
+        """Return the number of displayed messages of watched topics; empty if all were displayed."""
         traffic = self._session.traffic
         if traffic.shown_30s >= traffic.sent_30s:
             return NOTHING
@@ -243,7 +243,7 @@ class StatusFacts:
 
 
 class StatusBar(QWidget):
-    """Status bar, 26 px high: facts at the left and right; clicking some runs a command."""
+    """Status bar, 26 px high, with facts at the left and right. Clicking some of them runs a command."""
 
     pressed = Signal(str)
 
@@ -258,7 +258,7 @@ class StatusBar(QWidget):
         self._row.setContentsMargins(16, 0, 16, 0)
         self._row.setSpacing(0)
         self.commands: Mapping[str, str] = {}
-        """Commands of facts, by their text."""
+        """Command that is run on a click, by the text of the fact."""
         self._left: list[tuple[StatusItem, Separator]] = []
         self._right: list[tuple[StatusItem, Separator]] = []
         self._row.addStretch(1)

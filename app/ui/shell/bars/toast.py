@@ -1,4 +1,4 @@
-"""Toast: confirms a person's action for six seconds at the bottom right; never used for errors."""
+"""Toast that confirms an action of the user for six seconds at the bottom right. Never used for errors."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ CHECK_AGAIN_MS = 1000
 
 
 class Toast(FloatingCard):
-    """One sentence with an optional button; stays while hovered or focused."""
+    """Card with one sentence and an optional button; stays open while hovered or focused."""
 
     def __init__(self, theme: Theme, window: QWidget) -> None:
         super().__init__(window)
@@ -47,7 +47,7 @@ class Toast(FloatingCard):
 
     @property
     def text(self) -> str:
-        """Sentence shown last."""
+        """Sentence that was shown last."""
         return self._words.text()
 
     def show_toast(
@@ -58,7 +58,14 @@ class Toast(FloatingCard):
         *,
         until: Callable[[], bool] | None = None,
     ) -> None:
-        """Show a sentence until ``until`` returns True; ``button`` undoes or follows up the action."""
+        """Show a sentence until ``until`` returns True or the time is over.
+
+        Args:
+            words: Sentence.
+            button: Text of the button, which undoes or follows up the action.
+            run: Action of the button.
+            until: Returns True when the sentence is outdated.
+        """
         self._until = until
         self._words.setText(words)
         self.setAccessibleName(words)
@@ -72,13 +79,13 @@ class Toast(FloatingCard):
         self._timer.start(self._theme.duration("toastShown"))
 
     def refresh(self) -> None:
-        """Hide once the sentence has become false; called with every tick."""
+        """Hide the toast once `until` returns True; called on every tick."""
         if self._until is not None and self._until():
             self._until = None
             self.hide()
 
     def place(self) -> None:
-        """Move to the bottom right of the window, or left of a sheet there if it fits."""
+        """Move to the bottom right of the window, or left of a sheet that is docked there if it fits."""
         window = self.parentWidget()
         if window is not None:
             self._fit(window.width() - 2 * MARGIN)

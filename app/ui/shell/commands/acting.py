@@ -11,27 +11,27 @@ from nep.i18n import _
 
 @runtime_checkable
 class SupportsActing(Protocol):
-    """A panel that sends messages or calls."""
+    """Panel that sends messages or calls services."""
 
     def begin(self, name: str) -> None:
         """Select a topic or service; "" selects none."""
 
 
 class ActingCommands:
-    """Open the panels for manual sending. Nothing is sent until a person arms them."""
+    """Opens the panels for manual sending. Nothing is sent before the user arms them."""
 
     def __init__(self, shell: Shell) -> None:
         self._shell = shell
 
     def publish(self, key: str = "") -> bool:
-        """Open a new message for a topic, or without one for ""."""
+        """Open a new message for the topic `key`, or without a topic for ""."""
         if split_key(key)[0]:
             self._shell.show_toast(_("Only topics of Studio's own network can be published to"))
             return False
         return self._begin("publish", key)
 
     def call(self, service: str) -> bool:
-        """Show a service to be called, or all services for ""."""
+        """Show the request form of a service, or all services for ""."""
         return self._begin("services", service)
 
     def _begin(self, panel: str, name: str) -> bool:

@@ -1,4 +1,4 @@
-"""Commands for open behaviours: tabs, blocks, run and step, and restoring tabs at start."""
+"""Commands for open behaviours: tabs, blocks, run and step, and restoring of tabs at startup."""
 
 from __future__ import annotations
 
@@ -34,14 +34,14 @@ Answer = tuple[str, Callable[[], object]]
 
 
 class OfferChoice(Protocol):
-    """Shows an offer with two answers, each a text and a callback."""
+    """Function that shows an offer with two buttons, each with a text and a callback."""
 
     def __call__(self, title: str, detail: str, yes: Answer, no: Answer) -> None: ...
 
 
 @runtime_checkable
 class SupportsUndo(Protocol):
-    """A panel with an undo stack."""
+    """Panel with an undo stack."""
 
     def undo(self) -> None:
         """Undo the last edit."""
@@ -52,15 +52,15 @@ class SupportsUndo(Protocol):
 
 @runtime_checkable
 class SupportsBlockEdits(Protocol):
-    """A panel whose blocks can be copied and pasted."""
+    """Panel with blocks that can be copied and pasted."""
 
     def edit_blocks(self, what: str) -> None:
-        """Perform "copy", "cut", "paste" or "duplicate", unless the page handles the keys itself."""
+        """Run "copy", "cut", "paste" or "duplicate", unless the page handles the keys itself."""
 
 
 @runtime_checkable
 class SupportsShowBlock(Protocol):
-    """A panel that can scroll to a block."""
+    """Panel that can scroll to a block."""
 
     def show_block(self, block: str) -> None:
         """Scroll to a block by its id."""
@@ -68,15 +68,15 @@ class SupportsShowBlock(Protocol):
 
 @runtime_checkable
 class SupportsFindBlocks(Protocol):
-    """A panel that can search for blocks."""
+    """Panel that can search for blocks."""
 
     def find_blocks(self, *, to_add: bool) -> None:
-        """Open the search in the behaviour's blocks, or in the toolbox with ``to_add``."""
+        """Open the search in the behaviour's blocks, or in the toolbox if ``to_add``."""
 
 
 @runtime_checkable
 class SupportsPointAt(Protocol):
-    """A panel that can highlight a block in the toolbox."""
+    """Panel that can highlight a block in the toolbox."""
 
     def point_at(self, block: str) -> None:
         """Highlight the block of this type in the toolbox; "" removes the highlight."""
@@ -84,7 +84,7 @@ class SupportsPointAt(Protocol):
 
 @dataclass(frozen=True, slots=True)
 class TabPlace:
-    """A new position, from 0, for the tab with a document's key."""
+    """New position, counted from 0, for the tab of a document."""
 
     key: str
     place: int
@@ -101,17 +101,17 @@ class TabPlace:
 
 
 def read_stack(text: str) -> Stack:
-    """Parse the stack that the editor's page sends as JSON.
+    """Parse the script that the editor's page sends as JSON.
 
     Raises:
-        ValueError: The text isn't a valid stack.
+        ValueError: The text isn't a valid script.
     """
     return Stack.from_json(deep_json.loads(text))
 
 
 @dataclass(frozen=True, slots=True)
 class TabName:
-    """A new name for the tab with a document's key."""
+    """New name for the tab of a document."""
 
     key: str
     name: str
@@ -125,20 +125,20 @@ class TabName:
 
 @runtime_checkable
 class SupportsRename(Protocol):
-    """A panel in which the name of a behaviour can be edited."""
+    """Panel in which the name of a behaviour can be edited."""
 
     def rename_tab(self, key: str) -> None:
-        """Start editing the name of the tab with this key."""
+        """Start to edit the name of the tab with this key."""
 
 
 def bring_into_view(shell: Shell) -> None:
-    """Show the Behaviour layout with the blocks in front of other tabs."""
+    """Show the Behaviour layout with the blocks panel in front."""
     shell.show_layout("behaviour")
     shell.open_panel("behaviour")
 
 
 class BehaviourCommands:
-    """Commands for behaviours and their tabs."""
+    """Implements the commands for behaviours and their tabs."""
 
     def __init__(self, shell: Shell, session: Session, files: DocumentController, asks: FileDialogs) -> None:
         self._shell, self._session, self._files = shell, session, files
@@ -147,7 +147,7 @@ class BehaviourCommands:
         self.printing = Printing(shell, session, asks)
 
     def run_or_go_on(self) -> None:
-        """Resume a paused program; otherwise run or restart with the editor's newest edit."""
+        """Resume a paused program, or run (again) the behaviour with the editor's newest edit."""
         runs = self._session.runs
         if runs.view().state == "paused":
             runs.go_on()
@@ -155,7 +155,7 @@ class BehaviourCommands:
             self._files.with_newest(partial(self._instead_of_what_runs, runs.run))
 
     def _instead_of_what_runs(self, begin: Callable[[], object]) -> None:
-        # Shows a toast with the name of the behaviour that was stopped.
+        # Shows a toast with the name of the behaviour that was stopped by this run.
         session = self._session
         runs, shown, running = session.runs, session.document, session.runs.document
         was_active = runs.active
@@ -168,9 +168,9 @@ class BehaviourCommands:
             )
 
     def run_named(self, name: str) -> str:
-        """Run the behaviour of this name, open or recent; return why it can't be run, or "".
+        """Run the open or recent behaviour of this name. Return the reason why it can't be run, or "".
 
-        A running program isn't interrupted.
+        A program that is already running is not interrupted.
         """
         session = self._session
         if session.runs.active:
@@ -192,7 +192,7 @@ class BehaviourCommands:
         return ""
 
     def try_stack(self, stack: Stack) -> None:
-        """Run a single stack with the editor's newest edit."""
+        """Run a single script with the editor's newest edit."""
         try_it = partial(self._session.runs.try_stack, stack)
         self._files.with_newest(partial(self._instead_of_what_runs, try_it))
 
@@ -205,14 +205,14 @@ class BehaviourCommands:
         self._files.with_newest(self._session.runs.step)
 
     def demo(self) -> None:
-        """Start the virtual Pepper and open the first example."""
+        """Start the virtual Pepper and open the first example, as a demonstration."""
         self._session.launcher.start_virtual_robot()
         self._shell.show_layout("behaviour")
         if self._shell.examples:
             self._files.example(self._shell.examples[0].path)
 
     def next_tab(self, step: int) -> None:
-        """Show the tab that is ``step`` positions further, wrapping around."""
+        """Show the tab that is ``step`` positions to the right, wrapping around."""
         self._files.show(self._session.documents.neighbour(step))
         bring_into_view(self._shell)
 
@@ -221,22 +221,22 @@ class BehaviourCommands:
         self._files.close(self._session.document)
 
     def show_tab(self, key: str) -> bool:
-        """Show the tab with a key. Like the methods below, return False if it doesn't exist."""
+        """Show the tab with this key. Return False if there is none; so do the following methods."""
         return self._with(key, self._files.show)
 
     def close_tab(self, key: str) -> bool:
-        """Close the tab."""
+        """Close a tab."""
         return self._with(key, self._files.close)
 
     def close_other_tabs(self, key: str) -> bool:
-        """Close all other tabs."""
+        """Close all tabs except the one with this key."""
         documents = self._session.documents
         return self._with(
             key, lambda document: self._files.close(*(other for other in documents if other is not document))
         )
 
     def save_tab_as(self, key: str) -> bool:
-        """Show the tab and ask where to save it."""
+        """Show the tab and ask for the file to save its behaviour to."""
 
         def save_as(document: Document) -> None:
             self._files.show(document)
@@ -245,22 +245,22 @@ class BehaviourCommands:
         return self._with(key, save_as)
 
     def rename_current(self) -> None:
-        """Start editing the name of the current tab."""
+        """Start to edit the name of the current tab."""
         bring_into_view(self._shell)
         editor = self._shell.editor()
         if isinstance(editor, SupportsRename):
             editor.rename_tab(self._session.document.key)
 
     def rename_tab(self, to: TabName) -> bool:
-        """Rename the behaviour."""
+        """Rename a behaviour."""
         return self._with(to.key, lambda document: self._files.rename(document, to.name))
 
     def duplicate_tab(self, key: str) -> bool:
-        """Open a copy as a new behaviour."""
+        """Open a copy of a behaviour as a new one."""
         return self._with(key, self._files.duplicate)
 
     def save_tab(self, key: str) -> bool:
-        """Show the tab and save it."""
+        """Show the tab and save its behaviour."""
 
         def save(document: Document) -> None:
             self._files.show(document)
@@ -269,7 +269,7 @@ class BehaviourCommands:
         return self._with(key, save)
 
     def show_folder(self, key: str) -> bool:
-        """Open the folder of its file in the file manager."""
+        """Open the folder of a behaviour's file in the file manager."""
 
         def show(document: Document) -> None:
             if document.path is None:
@@ -281,7 +281,7 @@ class BehaviourCommands:
         return self._with(key, show)
 
     def move_tab(self, to: TabPlace) -> bool:
-        """Move the tab to another position."""
+        """Move a tab to another position."""
         return self._with(to.key, lambda document: self._files.move(document, to.place))
 
     def _with(self, key: str, act: Callable[[Document], object]) -> bool:
@@ -303,13 +303,13 @@ class BehaviourCommands:
             editor.redo()
 
     def edit_blocks(self, what: str) -> None:
-        """Perform "copy", "cut", "paste" or "duplicate" on blocks, wherever the focus is in the layout."""
+        """Run "copy", "cut", "paste" or "duplicate" on the blocks, wherever the focus is in the layout."""
         editor = self._shell.editor()
         if self._shell.showing == "behaviour" and isinstance(editor, SupportsBlockEdits):
             editor.edit_blocks(what)
 
     def show_block(self, block: str) -> None:
-        """Show the Behaviour layout and scroll to a block by its id."""
+        """Show the Behaviour layout and scroll to the block with this id."""
         self._shell.show_layout("behaviour")
         editor = self._shell.editor()
         if isinstance(editor, SupportsShowBlock):
@@ -326,14 +326,14 @@ class BehaviourCommands:
         return isinstance(editor, SupportsPointAt)
 
     def find_blocks(self, *, to_add: bool) -> None:
-        """Open the search in the behaviour's blocks, or in the toolbox with ``to_add``."""
+        """Open the search in the behaviour's blocks, or in the toolbox if ``to_add``."""
         self._shell.show_layout("behaviour")
         editor = self._shell.editor()
         if isinstance(editor, SupportsFindBlocks):
             editor.find_blocks(to_add=to_add)
 
     def earlier_versions(self) -> None:
-        """Show earlier versions of the file, after the newest edit was written to it."""
+        """Show earlier versions of the file, after the newest edit was saved to it."""
         self._files.with_newest(self._show_versions)
 
     def _show_versions(self) -> None:
@@ -346,7 +346,7 @@ class BehaviourCommands:
         self._versions.show_for(document.name, document.path, document.workspace, title=title)
 
     def forget_recent(self) -> None:
-        """Clear the list of recent files, with undo."""
+        """Clear the list of recent files; the toast offers to undo it."""
         before: list[RecentFile] = self._session.settings.recent_known
         words = _("Recent files cleared")
         if not self._set_recent([]):
@@ -364,7 +364,7 @@ class BehaviourCommands:
         return kept
 
     def come_back(self, left: Sequence[Unsaved], offer: OfferChoice) -> None:
-        """Restore the tabs of the last session and offer to recover changes left by a crash."""
+        """Restore the tabs of the last session, and offer to recover changes that were left by a crash."""
         rest = self._session.tabs.come_back(left)
         if not rest:
             return
@@ -382,7 +382,7 @@ class BehaviourCommands:
 
 
 def unsaved_words(left: Sequence[Unsaved]) -> str:
-    """Return a sentence that names the unsaved behaviours."""
+    """Return a sentence with the names of the unsaved behaviours."""
     if len(left) == 1:
         return _("“{name}” wasn't saved before Studio closed.").format(name=left[0].name)
     if len(left) == 2:

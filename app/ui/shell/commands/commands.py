@@ -1,4 +1,4 @@
-"""Commands of one window: the handlers of the table, and running a command by its id."""
+"""Commands of one window: creates the handlers of the table, and runs a command by its id."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ _ABOUT = {command.id: command for command in ARGUMENT_COMMANDS}
 
 
 class Commands:
-    """Creates menus and keys of a window and runs commands by id."""
+    """Creates the menus and shortcuts of a window, and runs commands by id."""
 
     def __init__(self, shell: Shell, session: Session, asks: FileDialogs) -> None:
         keys = Shortcuts(session.settings, shell.complain, COMMANDS)

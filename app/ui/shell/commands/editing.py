@@ -1,4 +1,4 @@
-"""Cut, copy, paste and select all of the Edit menu, applied to the focused field or to blocks."""
+"""Cut, copy, paste and select all of the Edit menu, for the focused field or the blocks."""
 
 from __future__ import annotations
 
@@ -18,16 +18,16 @@ CHANGES = frozenset({"cut", "paste"})
 
 @runtime_checkable
 class SupportsEditMenu(Protocol):
-    """A panel with blocks and with fields that aren't Qt widgets."""
+    """Panel with blocks, and with text fields that aren't Qt widgets."""
 
     def edit_from_menu(self, what: Edit) -> None:
-        """Apply the edit to the focused field of the page, or to the selected blocks."""
+        """Apply an edit command to the focused field of the page, or to the selected blocks."""
 
 
 class EditCommands:
-    """Perform in the menu what the keys do.
+    """Implements the entries of the Edit menu.
 
-    The keys themselves, such as Ctrl+C, are handled by the focused field, page or panel.
+    Their keys, such as Ctrl+C, are handled by the focused field, page or panel instead.
     """
 
     def __init__(self, shell: Shell) -> None:
@@ -38,12 +38,12 @@ class EditCommands:
             application.focusChanged.connect(self._changed)
 
     def _changed(self, _old: QWidget | None, now: QWidget | None) -> None:
-        # The menu bar takes the focus when opened by Alt: remember the previous widget.
+        # The menu bar takes the focus when it is opened by Alt: remember the widget that had it before.
         if now is not None and not isinstance(now, (QMenu, QMenuBar)):
             self._had = now
 
     def do(self, what: Edit) -> None:
-        """Perform cut, copy, paste or select all."""
+        """Run cut, copy, paste or select all."""
         field = self._field()
         if field is not None:
             getattr(field, what)()
@@ -53,7 +53,7 @@ class EditCommands:
             editor.edit_from_menu(what)
 
     def why_not(self, what: Edit) -> str:
-        """Return why the edit is unavailable, or ""."""
+        """Return the reason why an edit command is unavailable, or ""."""
         field = self._field()
         if field is not None:
             return _("This text can't be changed") if what in CHANGES and field.isReadOnly() else ""

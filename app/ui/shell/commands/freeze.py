@@ -1,4 +1,4 @@
-"""Freeze all open panels that have a freeze button."""
+"""Command that freezes all open panels that have a freeze button."""
 
 from __future__ import annotations
 
@@ -11,20 +11,20 @@ from app.ui.shell.docking.workbench import Workbench
 
 @runtime_checkable
 class SupportsFreeze(Protocol):
-    """A panel whose button ``freeze`` holds its content; the button is hidden without live content."""
+    """Panel whose button ``freeze`` stops its updates; the button is hidden without live contents."""
 
     freeze: QAbstractButton
 
 
 def freezable(bench: Workbench | None) -> list[QAbstractButton]:
-    """Return the freeze buttons of open panels that show live content."""
+    """Return the freeze buttons of open panels with live contents."""
     panels = [bench.docks[name].panel for name in bench.open_names()] if bench is not None else []
     buttons = [panel.freeze for panel in panels if isinstance(panel, SupportsFreeze)]
     return [button for button in buttons if not button.isHidden()]
 
 
 def all_frozen(bench: Workbench | None) -> bool:
-    """Return True if there is live content and all of it is frozen."""
+    """Return True if there are panels with live contents and all of them are frozen."""
     found = freezable(bench)
     return bool(found) and all(button.isChecked() for button in found)
 

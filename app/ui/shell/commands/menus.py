@@ -1,4 +1,4 @@
-"""Dynamic menus: recent files, panels, layouts; and disabling of unavailable entries."""
+"""Menus that depend on the state: recent files, panels, layouts; disabling of unavailable entries."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ ARRANGING = ("layout.keep", "layout.rename", "layout.delete", "layout.export", "
 
 
 class MenuLists:
-    """Rebuilds the lists when their menus open."""
+    """Updates the dynamic menus when they open."""
 
     def __init__(
         self,
@@ -51,14 +51,14 @@ class MenuLists:
         self._arranging.aboutToHide.connect(actions.enable_all)
 
     def drop_layouts(self, anchor: QWidget) -> None:
-        """Open a menu of layouts and layout commands below a button."""
+        """Show a menu with layouts and layout commands below a button."""
         self.actions.disable()
         self._list_layouts(self._arranging)
         self._arranging.addAction(self.actions["layout.reset"])
         drop_below(self._arranging, anchor)
 
     def drop_panels(self, anchor: QWidget) -> None:
-        """Open a menu of panels below a button."""
+        """Show a menu with panels below a button."""
         self._list_panels()
         drop_below(self._panels, anchor)
 

@@ -21,7 +21,7 @@ TOPIC_ICONS = {"json": "braces", "string": "type", "bytes": "binary", "image": "
 
 
 class PaletteEntries:
-    """Builds the palette entries of a window; those of topics are cached until the topics change."""
+    """Creates the palette entries of a window. Those of topics are cached until the topics change."""
 
     def __init__(
         self,
@@ -31,7 +31,7 @@ class PaletteEntries:
         why_not: Callable[[str], str],
         shortcuts: Shortcuts,
     ) -> None:
-        # why_not returns why a command is unavailable, or "".
+        # `why_not` returns the reason why a command is unavailable, or "".
         self._shell, self._session, self._shortcuts = shell, session, shortcuts
         self._shown = [command for command in commands if command.in_palette]
         self._why_not = why_not
@@ -39,7 +39,7 @@ class PaletteEntries:
         self._topics_seen = (-1, -1)
 
     def all(self) -> list[Entry]:
-        """Return all entries; the order breaks ties between equally good matches."""
+        """Return all entries. Their order decides between equally good matches."""
         return [
             *self._commands(),
             *self._panels(),

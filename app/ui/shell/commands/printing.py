@@ -1,4 +1,4 @@
-"""Printing of blocks, on a printer or to PDF."""
+"""Printing of blocks, to a printer or a PDF file."""
 
 from __future__ import annotations
 
@@ -22,12 +22,12 @@ if TYPE_CHECKING:
     from PySide6.QtPrintSupport import QPrinter
 
 MAX_DPI = 300
-"""Limit of the resolution: more isn't visible in blocks, and a page at 1200 dpi takes 500 MB."""
+"""Maximum resolution: more isn't visible in blocks, and a page at 1200 dpi takes 500 MB."""
 
 
 @runtime_checkable
 class SupportsPrinting(Protocol):
-    """A panel with printable content."""
+    """Panel whose contents can be printed."""
 
     def pdf(self, title: str, date: str, layout: QPageLayout, done: Callable[[bytes], None]) -> None:
         """Render a PDF with this page layout; ``done`` gets b"" if there is nothing to print."""
@@ -43,12 +43,12 @@ class Printing:
         asks: FileDialogs,
         printers: Callable[[], list[str]] | None = None,
     ) -> None:
-        # printers returns the names of the computer's printers.
+        # `printers` returns the names of the computer's printers.
         self._shell, self._session, self._asks = shell, session, asks
         self._printers = printers if printers is not None else known_printers
 
     def ask(self) -> None:
-        """Open the print dialog, or without printers the dialog to save a PDF."""
+        """Show the print dialog or, if there are no printers, the dialog to save a PDF."""
         if not self._printers():
             self._shell.show_toast(_("No printer is set up on this computer. Save the pages as PDF instead."))
             self.ask_pdf()
@@ -60,14 +60,14 @@ class Printing:
         printer.setPageLayout(usual_paper())
         dialog = QPrintDialog(printer, self._shell.surface.window())
         dialog.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
-        dialog.setWindowModality(Qt.WindowModality.NonModal)  # so that Stop remains accessible
+        dialog.setWindowModality(Qt.WindowModality.NonModal)  # keeps Stop accessible
         dialog.finished.connect(
             lambda result: self.print(printer) if result == QDialog.DialogCode.Accepted else None
         )
         dialog.show()
 
     def print(self, printer: QPrinter) -> None:
-        """Print with the settings of the printer object."""
+        """Print on a printer, with the settings of the printer object."""
 
         def paint(data: bytes) -> None:
             if not data:
@@ -91,7 +91,7 @@ class Printing:
         )
 
     def save(self, path: Path) -> None:
-        """Save a PDF, adding the ending ".pdf" if it is missing."""
+        """Save as PDF, adding the file extension ".pdf" if it is missing."""
         whole = path if path.suffix.lower() == ".pdf" else path.with_name(f"{path.name}.pdf")
 
         def write(data: bytes) -> None:
@@ -137,7 +137,7 @@ def usual_paper() -> QPageLayout:
 
 
 def paint_pdf(data: bytes, printer: QPrinter) -> bool:
-    """Paint the requested page range; return whether the printer accepted it."""
+    """Paint the requested page range. Return False if the printer rejected it."""
     from PySide6.QtPdf import QPdfDocument  # noqa: PLC0415 - needed for printing only
 
     buffer = QBuffer()

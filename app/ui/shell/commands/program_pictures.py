@@ -1,4 +1,4 @@
-"""Images of blocks: save as PNG or SVG, or copy to the clipboard."""
+"""Images of the blocks, saved as PNG or SVG, or copied to the clipboard."""
 
 from __future__ import annotations
 
@@ -29,9 +29,9 @@ KINDS = (
 
 
 def beside(document: Document) -> Path:
-    """Return a suggested path for a file made from a behaviour, without its ending.
+    """Return the suggested path, without extension, for a file made from a behaviour.
 
-    The folder is that of the behaviour's file, or the home folder for files that Studio manages.
+    Its folder is that of the behaviour's file, or the home folder for files that Studio manages.
     """
     own = document.path
     folder = own.parent if own is not None and own.parent != kept_folder() else Path.home()
@@ -40,20 +40,20 @@ def beside(document: Document) -> Path:
 
 @runtime_checkable
 class SupportsPicture(Protocol):
-    """A panel that can render an image of its content."""
+    """Panel that can render an image of its contents."""
 
     def picture(self, kind: str, white: bool, done: Callable[[bytes], None]) -> None:
         """Render a "png" or "svg", on white or transparent; ``done`` gets b"" if there are no blocks."""
 
 
 class ProgramPictures:
-    """Creates images of the blocks of the open behaviour."""
+    """Saves and copies images of the blocks of the open behaviour."""
 
     def __init__(self, shell: Shell, session: Session, asks: FileDialogs) -> None:
         self._shell, self._session, self._asks = shell, session, asks
 
     def ask(self) -> None:
-        """Ask for a file and format, then save."""
+        """Ask for a file and format, then save the image."""
         suggestion = beside(self._session.document)
 
         def take(path: Path, kind: FileKind) -> None:
@@ -62,7 +62,7 @@ class ProgramPictures:
         self._asks.save_as(_("Save blocks as image"), suggestion, KINDS, take)
 
     def save(self, path: Path, kind: str, white: bool) -> None:
-        """Save a "png" or "svg", adding the ending if it is missing."""
+        """Save a "png" or "svg", adding the file extension if it is missing."""
         whole = path if path.suffix.lower() == f".{kind}" else path.with_name(f"{path.name}.{kind}")
 
         def write(data: bytes) -> None:
@@ -81,7 +81,7 @@ class ProgramPictures:
         self._make(kind, white, write)
 
     def copy(self) -> None:
-        """Copy an image to the clipboard."""
+        """Copy an image of the blocks to the clipboard."""
 
         def put(data: bytes) -> None:
             image = QImage.fromData(data)

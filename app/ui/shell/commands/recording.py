@@ -23,14 +23,14 @@ else:
 
 @runtime_checkable
 class SupportsRecordings(Protocol):
-    """The recordings panel."""
+    """Panel of recordings."""
 
     def choose_file(self, path: Path) -> None:
         """Select this recording as soon as it is listed."""
 
 
 class RecordCommands:
-    """Commands for recording, used by keys, menus, the tool bar and the sheet."""
+    """Implements the commands for recording, for keys, menus, the tool bar and the sheet."""
 
     def __init__(self, shell: Shell, session: Session, asks: FileDialogs) -> None:
         self._shell, self._session, self._asks = shell, session, asks
@@ -62,7 +62,7 @@ class RecordCommands:
         return not why_not
 
     def record_topic(self, key: str) -> bool:
-        """Record only this topic, without changing the saved settings."""
+        """Record only this topic; the saved settings are not changed."""
         network, topic = split_key(key)
         if network:
             self._shell.show_toast(_("Only topics of Studio's own network can be recorded"))
@@ -75,7 +75,7 @@ class RecordCommands:
         return True
 
     def open_sheet(self) -> None:
-        """Open the sheet for the recording's topics and settings."""
+        """Open the sheet with topics and settings of the recording."""
         if self._sheet is None:
             shell = self._shell
             self._sheet = record_sheet.RecordSheet(
@@ -84,7 +84,7 @@ class RecordCommands:
         self._sheet.open()
 
     def keep(self) -> None:
-        """Save the flight recorder's last seconds as a recording."""
+        """Save the contents of the flight recorder as a recording."""
         recordings = self._recordings
         if not recordings.wish.is_on:
             self._shell.show_toast(
@@ -106,7 +106,7 @@ class RecordCommands:
     def show(self, path: Path | None = None) -> None:
         """Show the recordings panel and select a recording."""
         if self._sheet is not None:
-            self._sheet.shut()  # it may cover the panel
+            self._sheet.shut()  # the sheet may cover the panel
         if self._shell.bench is None:
             self._shell.show_layout("developer")
         dock = self._shell.open_panel("recordings")
@@ -115,7 +115,7 @@ class RecordCommands:
         self._shell.panel_focus.give(dock)
 
     def show_for_export(self, path: Path) -> None:
-        """Show the recordings panel, which exports a part: the timeline's loop, if the recording is open."""
+        """Show the recordings panel to export a part of a recording: the timeline's loop, if it is open."""
         if path.parent == self._recordings.folder:
             self.show(path)
         else:
@@ -123,7 +123,7 @@ class RecordCommands:
             self._shell.show_toast(words.format(file=path.name), _("Choose a folder"), self.choose_folder)
 
     def choose_folder(self) -> None:
-        """Ask for the folder of recordings."""
+        """Ask for the folder in which recordings are saved."""
         recordings = self._recordings
 
         def take(folder: Path) -> None:

@@ -25,7 +25,7 @@ TIMELINE = "timeline"
 
 
 class ReplayCommands:
-    """Shows recordings in place of the live network."""
+    """Implements the commands that show recordings in place of the live network."""
 
     def __init__(self, shell: Shell, session: Session, asks: FileDialogs) -> None:
         self._shell, self._session, self._asks = shell, session, asks
@@ -37,7 +37,7 @@ class ReplayCommands:
         self._asks.open_recording(str(place), self.open)
 
     def open(self, path: Path) -> None:
-        """Open a recording with its timeline; errors become alerts."""
+        """Open a recording with its timeline. Errors become alerts."""
         if not path.is_file():
             self._shell.show_toast(_("{file} no longer exists").format(file=path.name))
             return
@@ -61,7 +61,7 @@ class ReplayCommands:
         return self._session.replay
 
     def play(self) -> None:
-        """Play or pause."""
+        """Start or pause the replay."""
         if self._replay is not None:
             self._replay.toggle()
 

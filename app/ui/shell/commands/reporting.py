@@ -1,4 +1,4 @@
-"""Commands of the Help menu: problem report, log, and the page of releases."""
+"""Commands of the Help menu: problem report, log, and the web page of releases."""
 
 from __future__ import annotations
 
@@ -29,13 +29,13 @@ else:
     report_sheet = lazy_module("app.ui.shell.dialogs.report")
 
 DOCTOR_TIMEOUT_S = 15.0
-"""Time that a report waits for the connection doctor."""
+"""Maximum time in s that a report waits for the connection doctor."""
 DOCTOR_MAX_AGE_S = 60.0
-"""Age up to which the doctor's results are reused."""
+"""Maximum age in s of results of the connection doctor that are reused."""
 
 
 class ReportCommands:
-    """Opens problem reports and the page of releases."""
+    """Implements the commands for problem reports and the web page of releases."""
 
     def __init__(
         self,
@@ -45,13 +45,13 @@ class ReportCommands:
         asks: FileDialogs,
         clock: Callable[[], float] = time.time,
     ) -> None:
-        # clock returns epoch seconds.
+        # `clock` returns seconds since 1970.
         self._shell, self._session, self._files, self._asks = shell, session, files, asks
         self._clock = clock
         self._sheet: report_sheet.ReportSheet | None = None
 
     def report(self) -> None:
-        """Open a problem report that contains the newest edits of the open behaviours."""
+        """Open a problem report that includes the newest edits of the open behaviours."""
         self._session.alerts.resolve(ALERT)
         doctor = self._session.doctor
         if doctor.looked_s is None or self._clock() - doctor.looked_s > DOCTOR_MAX_AGE_S:
@@ -83,9 +83,9 @@ class ReportCommands:
         ]
 
     def look_for_new_version(self, page: str = RELEASES_PAGE) -> None:
-        """Open the page of releases in the browser and show the installed version.
+        """Open the web page of releases in the browser, and show the installed version.
 
-        Studio itself makes no request.
+        Studio itself sends no request.
         """
         opened = open_outside(QUrl(page))
         words = (
@@ -97,7 +97,7 @@ class ReportCommands:
 
 
 def qt_facts(window: QWidget) -> tuple[tuple[str, str], ...]:
-    """Return facts that only Qt has (version, screens, window), in English for developers."""
+    """Return facts that only Qt knows (version, screens, window), in English for developers."""
     screens = [
         (f"screen {place}", f"{size.width()} x {size.height()} at {each.devicePixelRatio():g}, {rate:.0f} Hz")
         for place, each in enumerate(QGuiApplication.screens(), start=1)

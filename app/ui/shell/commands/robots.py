@@ -1,4 +1,4 @@
-"""Commands for robots and other computers, and fixes for problems with missing robots."""
+"""Commands for robots and other computers, and fixes for missing robots."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from nep.i18n import _
 
 @dataclass(frozen=True, slots=True)
 class RobotSwap:
-    """A missing robot and the one that replaces it in the behaviour."""
+    """Missing robot, and the robot that replaces it in the behaviour."""
 
     missing: str
     other: str
@@ -33,19 +33,19 @@ class RobotSwap:
 
 @runtime_checkable
 class FillsScreen(Protocol):
-    """A panel that can be shown in full screen."""
+    """Panel that can be shown in full screen."""
 
     def fill_screen(self) -> None:
         """Toggle full screen."""
 
 
 class RobotCommands:
-    """Starts virtual robots, connects missing ones, and opens the sheets for network access."""
+    """Starts virtual robots, restarts missing ones, and opens the sheets for network access."""
 
     def __init__(
         self, shell: Shell, session: Session, files: DocumentController, undo: Callable[[], object]
     ) -> None:
-        # undo reverts the last edit of the blocks.
+        # `undo` reverts the last edit of the blocks.
         self._shell, self._session, self._files, self._undo = shell, session, files, undo
         self._network_access: NetworkAccessSheet | None = None
         self._other_networks: OtherNetworksSheet | None = None
@@ -66,7 +66,7 @@ class RobotCommands:
     def virtual_pepper(self) -> None:
         """Start the virtual Pepper and show the Behaviour layout."""
         self.start_pepper()
-        if self._shell.showing != "behaviour":  # otherwise keep the focus
+        if self._shell.showing != "behaviour":  # otherwise the focus stays where it is
             self._shell.show_layout("behaviour")
 
     def virtual_turtle(self) -> None:
@@ -80,7 +80,7 @@ class RobotCommands:
         return name in self._session.coming
 
     def end_virtual(self, name: str = "") -> bool:
-        """Stop one or all virtual robots started here; they aren't restored at the next start."""
+        """Stop one or all virtual robots that this Studio started. They aren't restored at the next start."""
         launcher = self._session.launcher
         names = [each for each in launcher.wanted if name in {"", each}]
         for each in names:
@@ -88,13 +88,13 @@ class RobotCommands:
         return bool(names)
 
     def room_in_full_screen(self) -> None:
-        """Show the room of virtual robots in full screen, or in its panel again."""
+        """Toggle full screen for the room of virtual robots."""
         dock = self._shell.open_panel("robot")
         if dock is not None and isinstance(dock.panel, FillsScreen):
             dock.panel.fill_screen()
 
     def connect(self, name: str) -> None:
-        """Restart a missing virtual robot, or show the list of robots for a real one."""
+        """Restart a missing virtual robot, or show the list of robots for a missing real one."""
         kind = self._described(name).get("rb:robot")
         model = _model(kind) if isinstance(kind, Mapping) and kind.get("virtual") is True else None
         if model is not None:
@@ -103,7 +103,7 @@ class RobotCommands:
             self._shell.open_panel("robots")
 
     def start_for(self, missing: str) -> bool:
-        """Start the virtual model of a missing robot, with undo; return False if it has none."""
+        """Start the virtual model of a missing robot, with undo. Return False if it has none."""
         model = _model(self._described(missing).get("rb:robot"))
         if model is None:
             return False
@@ -118,12 +118,15 @@ class RobotCommands:
         return True
 
     def _described(self, name: str) -> Mapping[str, object]:
-        # The last received description, or the one saved in the behaviour.
+        # The last description received, or the one saved in the behaviour.
         link = self._session.fleet.link(name)
         return link.robot.source if link is not None else self._session.document.robots.get(name, {})
 
     def use(self, swap: RobotSwap) -> bool:
-        """Replace a missing robot in the behaviour, with undo; return False if the other is away."""
+        """Replace a missing robot in the behaviour, with undo.
+
+        Return False if the other one is not connected.
+        """
         link = self._session.fleet.link(swap.other)
         if link is None:
             return False
@@ -139,7 +142,7 @@ class RobotCommands:
         return True
 
     def ask_before_moving(self) -> None:
-        """Revoke the permission for real robots to move, so that Studio asks again."""
+        """Revoke the permissions of real robots to move, so that Studio asks again."""
         words = _("Studio will ask again before a real robot moves")
         try:
             self._session.fleet.permission.forget()
@@ -181,6 +184,6 @@ class RobotCommands:
 
 
 def _model(kind: object) -> str | None:
-    # None without a virtual robot of the model.
+    # None if there is no virtual robot of the model.
     model = str(kind.get("model")) if isinstance(kind, Mapping) else ""
     return model if model in VIRTUAL_ROBOTS else None
