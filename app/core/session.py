@@ -1,6 +1,7 @@
-"""State of one window: the network with its topics and robots, the behaviours, their run.
+"""State of one window: the network with its topics and robots, the behaviours and their run.
 
-The window reads it 30 times a second. Nothing here blocks: threads post into the mailbox, and `Session.tick`
+The window reads the state 30 times a second. No method blocks: threads post to the mailbox, and
+`Session.tick`
 applies the posted events and messages.
 """
 
@@ -80,19 +81,20 @@ else:
 CHECK_INTERVAL_S = 1.0
 NO_WATCH = lazy("can't monitor the robots: {error}")
 LOGS = {LOG_TOPIC: LOG_TYPE, LAST_ERRORS_TOPIC: LAST_ERRORS_TYPE}
-"""Topics of the Console."""
+"""Topics shown in the Console, with their message types."""
 
 
 class Session:
-    """State that the panels show. Not thread-safe: use it from the window's thread; `close` ends its threads.
+    """State shown by the panels. Not thread-safe: use it from the window's thread; `close` stops all threads.
 
     ``topics``, ``nodes``, ``networks``, ``images``, ``series`` and ``graph`` belong to the source that is
-    shown: the live network (`live`), which stays connected, or a recording (``replay``).
+    shown: the live
+    network (`live`), which stays connected, or a recording (``replay``).
     """
 
     replay: replay_module.Replay | None = None
     sources_shown = 0
-    """Number of changes between sources."""
+    """Counter that increases when another source is shown."""
     _live: LiveNetwork | None = None  # while a recording is shown
     _closing_replays: list[replay_module.Replay]
 
@@ -192,7 +194,7 @@ class Session:
 
     @property
     def live(self) -> LiveNetwork:
-        """Live network, also while a recording is shown."""
+        """Live network, even while a recording is shown."""
         if self._live is not None:
             return self._live
         return LiveNetwork(self.topics, self.nodes, self.networks, self.images, self.series, self.graph)
@@ -208,7 +210,10 @@ class Session:
         return self.replay.console if self.replay is not None else self.console
 
     def open_recording(self, path: Path) -> replay_module.Replay:
-        """Show a recording instead of the live network, which stays connected; a child process reads it."""
+        """Show a recording instead of the live network, which stays connected.
+
+        The recording is read in a child process.
+        """
         live = self.live
         self._end_replay()
         self._live = live
@@ -247,7 +252,7 @@ class Session:
         return tuple(name for name in self.launcher.coming if name not in there)
 
     def start(self) -> None:
-        """Start the threads, and a master if none answers."""
+        """Start the threads, and a master if none replies."""
         self.source.start()
         self.networks.start()
         self.alarms.start()
@@ -264,21 +269,27 @@ class Session:
         return self._watches.open([topic])
 
     def watch_shown(self, topic: str) -> Watch:
-        """Subscribe to a topic of the source that is shown; call again after `sources_shown` changed."""
+        """Subscribe to a topic of the source that is shown.
+
+        Call this again when `sources_shown` has changed.
+        """
         return self.watch(topic) if self.replay is None else self.replay.watch(topic)
 
     def topic(self, key: str) -> Topic | None:
-        """Return the topic of that key, or None."""
+        """Return the topic with this key, or None."""
         return self.networks.topic(key) if split_key(key)[0] else self.topics.get(key)
 
     def mark_seen(self, key: str) -> None:
-        """Clear the mark of a topic as new."""
+        """Stop highlighting a topic as new."""
         name, topic = split_key(key)
         network = self.networks.get(name)
         (network.topics if network is not None else self.topics).mark_seen(topic)
 
     def gives_up(self, document: Document) -> bool:
-        """Return whether the user discards work that can't be saved; the first call asks by an alert."""
+        """Return True if the user discards work that can't be saved.
+
+        The first call raises an alert instead.
+        """
         return self._health.gives_up(document.name, document.journal_error or "")
 
     def tick(self) -> None:
@@ -328,9 +339,11 @@ class Session:
             self.sources_shown += 1  # its topics and start time are available from now on
 
     def guarded(self, what: str, **holes: object) -> AbstractContextManager[None]:
-        """Return a context that logs and alerts exceptions of one step of a tick instead of raising them.
+        """Return a context that suppresses exceptions of one step of a tick after logging and alerting them.
 
-        ``what`` completes the sentence "can't ..."; mark it with `lazy`. Its ``holes`` are filled later.
+        Args:
+            what: Completes the sentence "can't ..."; use `lazy` for it.
+            holes: Values for the placeholders in ``what``.
         """
         return self._faults.guarded(what, **holes)
 
@@ -368,7 +381,7 @@ class Session:
         self._closing_replays.clear()
 
     def close(self) -> None:
-        """Stop the running program and end every thread and child process; errors are logged, not raised."""
+        """Stop the running program and all threads and child processes; errors are logged, not raised."""
         live = self.live
         ends: list[tuple[str, Callable[[], object]]] = [
             ("stop the program", self.runs.close),

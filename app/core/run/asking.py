@@ -1,4 +1,4 @@
-"""Open question of a running program."""
+"""Open question of a running program to the user."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from app.core.run.runner import Runner, RunnerEvent
 
 @dataclass(frozen=True, slots=True)
 class AskedQuestion:
-    """Question of a run: its number, words and choices."""
+    """Question of a program: number of the run, number of the question, text, and choices."""
 
     run: int
     number: int
@@ -18,28 +18,28 @@ class AskedQuestion:
 
 
 class Asking:
-    """Holds the program's question, one at a time."""
+    """Stores the open question of the program; there is at most one."""
 
     def __init__(self) -> None:
         self.question: AskedQuestion | None = None
         self._runner: Runner | None = None
 
     def begin(self, runner: Runner) -> None:
-        """Begin with a new program."""
+        """Reset for a new program."""
         self.question, self._runner = None, runner
 
     def apply(self, event: RunnerEvent) -> None:
-        """Apply an event: a question or its withdrawal; others are ignored."""
+        """Apply an event that asks a question or withdraws one; other events are ignored."""
         if event.kind == "ask" and self._runner is not None:
             number = event.question
             self.question = AskedQuestion(event.run, number, event.text, event.choices) if number else None
 
     def answer(self, question: AskedQuestion, words: str) -> None:
-        """Send the user's answer; no effect when the question is no longer open."""
+        """Send the user's answer to the program. No effect if the question is no longer open."""
         if self._runner is not None and question == self.question:
             self.question = None
             self._runner.answer(question.number, words)
 
     def clear(self) -> None:
-        """Clear the question: the program ends."""
+        """Discard the question, because the program has ended."""
         self.question = self._runner = None

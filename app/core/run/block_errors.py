@@ -1,4 +1,4 @@
-"""Errors shown at blocks until the block is repaired or the next run."""
+"""Errors shown at blocks until the block is fixed or the next run starts."""
 
 from __future__ import annotations
 
@@ -13,10 +13,11 @@ _CONTENT = ("type", "fields", "inputs", "extraState", "enabled", "disabledReason
 
 
 class BlockErrors:
-    """Sentences by block id (``by_block``).
+    """Error messages by block id (``by_block``).
 
-    An error that prevented the start is removed when the blocks no longer have it. One that stopped a program
-    is removed when its block, or a block inside it, differs from the run.
+    An error that prevented the start is removed when the blocks no longer have it. An error that stopped a
+    program is
+    removed when its block, or a block inside it, differs from the run.
     """
 
     def __init__(self) -> None:
@@ -27,15 +28,15 @@ class BlockErrors:
         self._checked: Program | int | None = None  # the newest program, or count of edits, that was checked
 
     def begin(self, wanted: RequestedRun) -> None:
-        """Clear the errors of the last run."""
+        """Clear the errors of the previous run."""
         self.by_block, self._wanted, self._ran = {}, wanted, wanted.document.workspace
 
     def put(self, errors: Mapping[str, str], *, not_started: bool) -> None:
-        """Set errors that prevented the start or stopped the program."""
+        """Set the errors that prevented the start or stopped the program."""
         self.by_block, self._not_started, self._checked = errors, not_started, None
 
     def forget_repaired(self) -> bool:
-        """Remove the errors whose blocks are repaired; return whether any were removed."""
+        """Remove the errors of fixed blocks; return True if any were removed."""
         if not self.by_block or self._wanted is None:
             return False
         count = len(self.by_block)

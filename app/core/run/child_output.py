@@ -1,4 +1,4 @@
-"""Output of a program's process: protocol lines, limited in number and length."""
+"""Output of a program's process: lines of the protocol, limited in number and length."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from typing import IO
 MAX_LINE_LENGTH = 1_000_000
 CHUNK = 65_536
 MARK = b'{"is"'
-"""First bytes of each protocol line; everything else is counted, not parsed."""
+"""First bytes of each line of the protocol; all other output is counted but not parsed."""
 LINES_PER_S = 1_000
 BYTES_PER_S = 20_000_000
 PAUSE_S = 0.02
@@ -18,7 +18,7 @@ MAX_TEXT_LENGTH = 2_000
 
 
 class Output:
-    """Lines of a pipe, throttled so that the window stays responsive: the writer blocks meanwhile."""
+    """Lines of a pipe, read at a limited rate to keep the window responsive; the writer then blocks."""
 
     def __init__(
         self, stream: IO[bytes], stopped: threading.Event, clock: Callable[[], float] = time.monotonic
@@ -26,7 +26,7 @@ class Output:
         # `stopped` ends the pauses between floods.
         self._stream, self._stopped, self._clock = stream, stopped, clock
         self.strange_bytes = 0
-        """Number of bytes that are not protocol lines."""
+        """Number of bytes that don't belong to the protocol."""
         self._second, self._lines, self._bytes = clock(), 0, 0
 
     def __iter__(self) -> Iterator[bytes]:
@@ -81,7 +81,7 @@ class Output:
 
 
 class Gate:
-    """Rate limiter that counts what it rejects."""
+    """Rate limiter that counts rejected items."""
 
     def __init__(self, per_second: int, clock: Callable[[], float] = time.monotonic) -> None:
         self._per_second, self._clock = per_second, clock
@@ -89,7 +89,7 @@ class Gate:
         self.kept_back = 0
 
     def passes(self) -> bool:
-        """Return whether one more may pass now."""
+        """Return True if another item may pass now; count it as rejected otherwise."""
         now = self._clock()
         if now - self._second >= 1.0:
             self._second, self._passed = now, 0
@@ -100,7 +100,7 @@ class Gate:
         return True
 
     def take_kept_back(self) -> int:
-        """Return and clear the number of rejected items, once some can pass again."""
+        """Return and clear the number of rejected items; 0 until items can pass again."""
         if self._clock() - self._second < 1.0 and self._passed >= self._per_second:
             return 0
         count, self.kept_back = self.kept_back, 0
@@ -108,10 +108,10 @@ class Gate:
 
 
 def texts(said: object) -> tuple[str, ...]:
-    """Return the strings of a list; empty for any other type."""
+    """Return the items of a list as strings; empty for any other type."""
     return tuple(str(each) for each in said) if isinstance(said, (list, tuple)) else ()
 
 
 def text_of(said: Mapping[str, object], name: str) -> str:
-    """Return a string field, shortened for display."""
+    """Return a field as a string, truncated for display."""
     return str(said.get(name, ""))[:MAX_TEXT_LENGTH]

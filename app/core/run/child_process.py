@@ -1,4 +1,4 @@
-"""Process of a program with its children: limited in memory, and killed as a whole."""
+"""Process of a program with its child processes: limited in memory, and killed together."""
 
 from __future__ import annotations
 
@@ -23,9 +23,9 @@ else:
     psutil = lazy_module("psutil")
 
 MAX_BYTES = 1_000_000_000
-"""Maximum memory of a program and its children."""
+"""Maximum memory of a program and its child processes in bytes."""
 CHILD_CHECK_INTERVAL_S = 1.0
-"""Interval of checks for new child processes; the program's own memory is checked each time."""
+"""Interval of checks for new child processes; the memory of the program is checked more often."""
 
 
 class ChildProcess:
@@ -44,7 +44,7 @@ class ChildProcess:
         self._family: list[psutil.Process] = []
         self._next_family_s = clock() + CHILD_CHECK_INTERVAL_S
         self.too_large = False
-        """True if it was killed because of its memory use."""
+        """True if the process was killed because of its memory use."""
         try:
             self.popen = subprocess.Popen(
                 command,
@@ -67,7 +67,7 @@ class ChildProcess:
         return self.popen.poll() is not None
 
     def check(self) -> None:
-        """Find its children, and kill it when it uses too much memory."""
+        """Look for new child processes, and kill the process if it uses too much memory."""
         if self._process is None:
             return
         if self._clock() >= self._next_family_s:
@@ -78,7 +78,7 @@ class ChildProcess:
             self.kill()
 
     def wait(self, timeout_s: float) -> bool:
-        """Wait for its end; return whether it has ended."""
+        """Wait until the process has ended; return False after ``timeout_s`` seconds."""
         try:
             self.popen.wait(timeout_s)
         except subprocess.TimeoutExpired:
@@ -93,7 +93,7 @@ class ChildProcess:
         self.end_family()
 
     def end_family(self) -> None:
-        """Kill remaining children: its process group, and those that left the group."""
+        """Kill remaining child processes: the process group, and processes that left the group."""
         if os.name == "posix":
             with contextlib.suppress(ProcessLookupError, PermissionError):  # the group is empty
                 os.killpg(self.popen.pid, signal.SIGKILL)
@@ -105,14 +105,14 @@ class ChildProcess:
 
 
 def child_command() -> tuple[str, ...]:
-    """Return the command of a program's process: this Python, or the frozen Studio itself."""
+    """Return the command that runs a program: this Python, or the executable of a frozen Studio."""
     if getattr(sys, "frozen", False):
         return (sys.executable, "--child")
     return (sys.executable, "-m", "app.blocks.runtime.child")
 
 
 def home() -> Path | None:
-    """Return the folder of ``app`` if it isn't installed."""
+    """Return the folder that contains ``app``; None in a frozen build."""
     return None if getattr(sys, "frozen", False) else Path(__file__).resolve().parents[3]
 
 

@@ -1,4 +1,4 @@
-"""Run, Pause, Step and Stop: the program's process and the robots' replies."""
+"""Run, Pause, Step and Stop: controls the program's process and collects the robots' replies."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ from app.errors import AppError
 from nep.i18n import _
 
 DOUBLE_CLICK_S = 0.5
-"""Time within which two presses of Run count as a double click."""
+"""Maximum time between two clicks on Run that count as a double click."""
 CLOSE_WAIT_S = STOP_TIMEOUT_S + 1
 
 _log = logging.getLogger("studio")
@@ -56,7 +56,10 @@ class RunNetwork(Protocol):
 
 
 class Runs:
-    """Runs of behaviours. Not thread-safe: use it from the window's thread. Stops wait in other threads."""
+    """Runs of behaviours. Not thread-safe: use it from the window's thread.
+
+    Other threads wait for the result of a Stop.
+    """
 
     pace_s = 0.0
     """Delay before each block, in seconds."""
@@ -107,7 +110,7 @@ class Runs:
         self._errors = BlockErrors()
         self._warnings = RunWarnings(lambda words: self._console.add("warn", self._run.name, words))
         self.values: Mapping[str, VariableValue] = {}
-        """Values of the run's variables by id; kept after its end."""
+        """Values of the run's variables by id; still available after the run."""
         self._variables: Mapping[str, Variable] = {}
 
     # -- commands of the user ----------------------------------------------------------------------------
@@ -124,26 +127,26 @@ class Runs:
 
     @property
     def used(self) -> tuple[str, ...]:
-        """Names of robots that the running or paused program uses."""
+        """Names of the robots that the running or paused program uses."""
         return self._used if self.active else ()
 
     @property
     def tried_value(self) -> TriedValue | None:
-        """Last tried block with its value."""
+        """Last tried block and its value."""
         return self._trial.value
 
     @property
     def block_errors(self) -> Mapping[str, str]:
-        """Error messages by block id, until the block is repaired or the next run."""
+        """Error messages by block id, until the block is fixed or the next run starts."""
         return self._errors.by_block
 
     @property
     def block_warnings(self) -> Mapping[str, str]:
-        """Warnings by block id, kept after the run."""
+        """Warnings by block id; still available after the run."""
         return self._warnings.by_block
 
     def tick(self) -> None:
-        """Follow edits, robots and breakpoints, and invalidate `view`."""
+        """Check for edits, changed robots and breakpoints, and refresh `view`. Called at each tick."""
         self._view = None
         if self._run.nothing_in is not None and self._run.nothing_in is not self._documents.current.newest():
             self._run = replace(self._run, nothing_in=None)  # another tab, or an edit
@@ -178,7 +181,7 @@ class Runs:
         return self._view[2]
 
     def run(self) -> None:
-        """Run the current behaviour; resume it while paused, restart it while running.
+        """Run the current behaviour; resume it if it is paused, restart it if it is running.
 
         Problems are shown at their blocks.
         """
@@ -194,7 +197,7 @@ class Runs:
             self._request(replace(self._current_request, paused=False))
 
     def try_stack(self, stack: Stack) -> None:
-        """Run one stack of the current behaviour; a running program is stopped first."""
+        """Run one stack of the current behaviour, after stopping a running program."""
         variable = stack.variable_in(self._documents.current.workspace)
         if variable is not None:
             self._show_variable(stack, variable)
@@ -211,7 +214,7 @@ class Runs:
         self._trial.show(document, stack, value.text if value is not None else _("no value yet"))
 
     def concerns(self, document: Document) -> bool:
-        """Return whether this behaviour runs, or will once the running program has stopped."""
+        """Return True if this behaviour is running, or will run once another program has stopped."""
         return (self.active and self.document is document) or (
             self._pending_request is not None and self._pending_request.document is document
         )
@@ -237,13 +240,13 @@ class Runs:
             self._runner.step()
 
     def set_pace(self, seconds: float) -> None:
-        """Set the delay before each block in seconds, also of the running program."""
+        """Set the delay before each block in seconds, also for a running program."""
         self.pace_s, self._view = seconds, None
         if self._runner is not None:
             self._runner.set_pace(seconds)
 
     def put_variable(self, id: str, value: str | float | bool) -> bool:
-        """Set a variable of the running program; return False if it has no such variable."""
+        """Set a variable of the running program; return False if the program has no such variable."""
         variable = self._variables.get(id)
         if self._runner is None or not self.active or variable is None or not variable.python:
             return False
@@ -273,7 +276,10 @@ class Runs:
         self._fleet.permission.withdraw()
 
     def stop_robot(self, name: str) -> None:
-        """Stop one robot. Same as `stop` while a program runs, which would move the robot again."""
+        """Stop one robot.
+
+        While a program is running, stop everything, as the program would move the robot again.
+        """
         if self.active:
             self.stop()
             return
@@ -288,9 +294,10 @@ class Runs:
         threading.Thread(target=work, name="studio-stop-one", daemon=True).start()
 
     def stop_again(self, name: str) -> None:
-        """Stop a robot again that reports the end of an action which its Stop could not end.
+        """Stop a robot again after it reported the end of an action that its Stop could not end.
 
-        At most once per Stop of the user, so that a robot whose stops always time out is not stopped forever.
+        At most once for each Stop by the user, so that a robot whose stops always time out is not stopped
+        forever.
         """
         report, state = self._run.report, self._run.state
         if name in self._stopped_again:
@@ -303,12 +310,12 @@ class Runs:
             self._stop_one(name)
 
     def follow_robots(self) -> None:
-        """Report new and restarted robots to the running program, as far as they may move."""
+        """Report new and restarted robots that are allowed to move to the running program."""
         if self.active:
             self._robots.follow()
 
     def confirm_still(self) -> None:
-        """Apply the user's confirmation that the robots without a reply have stopped."""
+        """Apply the user's confirmation that the robots without a reply are not moving."""
         if self._run.state == "unanswered" and self._run.report is not None:
             silent = self._run.report.silent
             self._fleet.stands_still(silent)
@@ -324,7 +331,7 @@ class Runs:
             self._alerts.resolve("stop")
 
     def close(self) -> None:
-        """Stop the program, whose end stops its robots."""
+        """Stop the program, which stops its robots when it ends."""
         if self._runner is not None:
             self._runner.stop()
         if self._stop_thread is not None:
@@ -372,7 +379,7 @@ class Runs:
         return self._run
 
     def on_stop(self, event: StopDone | RobotAnswered | OneStopped | LateAnswer) -> None:
-        """Apply the replies of robots to the newest Stop."""
+        """Apply robots' replies to the newest Stop."""
         if isinstance(event, OneStopped):
             self._news.tell_fleet(event.report, event.mark)
             self._news.tell_person(event.report, "stop")

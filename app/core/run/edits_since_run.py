@@ -1,4 +1,4 @@
-"""Detection of changes to the running behaviour since Run was pressed."""
+"""Detection of edits of the running behaviour since Run was pressed."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from app.blocks.model.program import Program
 
 
 class RunDocument(Protocol):
-    """Part of the running behaviour that is used here."""
+    """Part of a document that is used here."""
 
     edits: int
 
@@ -17,9 +17,9 @@ class RunDocument(Protocol):
 
 
 class EditsSinceRun:
-    """Compares the running program with the current blocks; an undone edit counts as unchanged.
+    """Compares the running program with the current blocks. An edit that was undone counts as no change.
 
-    Moving a block on the canvas changes nothing. Robots that connect or disconnect change the program but not
+    Moving a block on the canvas is no change. Robots that connect or disconnect change the program, but not
     the blocks.
     """
 
@@ -31,13 +31,13 @@ class EditsSinceRun:
         self._differs = False
 
     def ran(self, document: RunDocument | None, program: Program) -> None:
-        """Set the running program of a behaviour; None ignores edits."""
+        """Set the running program and its behaviour; with None, edits are ignored."""
         self._document, self._ran = document, program.runnable
         self._edits = 0 if document is None else document.edits
         self._compared, self._differs = program, False
 
     def has_edits(self) -> bool:
-        """Return whether the blocks differ now; each program is compared once."""
+        """Return True if the blocks now differ from the running program."""
         if self._document is None:
             return False
         newest = self._document.newest()

@@ -1,4 +1,4 @@
-"""Robots known to a running program: new and restarted ones are reported to it."""
+"""Robots known to a running program; new and restarted ones are reported to it."""
 
 from __future__ import annotations
 
@@ -16,7 +16,10 @@ def owners_of(fleet: Fleet) -> dict[str, str]:
 
 
 class ProgramRobots:
-    """Reports robots to a program. A robot that may move is reported after the user's permission."""
+    """Reports robots to a program.
+
+    Robots that the program moves are reported once the user has allowed that.
+    """
 
     def __init__(self, fleet: Fleet) -> None:
         self._fleet = fleet
@@ -30,7 +33,13 @@ class ProgramRobots:
     def begin(
         self, runner: Runner, asked: Sequence[tuple[Robot, Sequence[str]]], owners: Mapping[str, str]
     ) -> None:
-        """Begin with a running program that knows these ``owners``; ``asked`` are its actions by robot."""
+        """Start with a running program.
+
+        Args:
+            runner: Runner of the program.
+            asked: Actions of each robot that the program invokes.
+            owners: Node ids of the robots that the program knows, by name.
+        """
         self._runner, self._known_owners, self._revision = runner, owners, self._fleet.revision
         moving, connected = self._fleet.moving, {link.name for link in self._fleet.connected}
         # the program was started with the connected robots; unreadable ones are reported at the next tick
@@ -39,11 +48,11 @@ class ProgramRobots:
         self._requested_actions = {robot.name: actions for robot, actions in asked}
 
     def end(self) -> None:
-        """Stop reporting: the program has ended."""
+        """Stop reporting, because the program has ended."""
         self._runner = None
 
     def follow(self) -> None:
-        """Report the present robots to the program, if they changed."""
+        """Report the connected robots to the program if they have changed."""
         if self._runner is None or not self._has_changed():
             return
         self._revision, owners = self._fleet.revision, owners_of(self._fleet)

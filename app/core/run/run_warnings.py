@@ -1,4 +1,4 @@
-"""Warnings of a program at its blocks, shown until the next run or edit."""
+"""Warnings of a program at its blocks, shown until the next edit or run."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from nep.i18n import ngettext
 
 
 class RunWarnings:
-    """Newest warning of each block. The Console shows its 1st, 10th, 100th, … occurrence."""
+    """Newest warning of each block. The Console shows the 1st, 10th, 100th, … occurrence."""
 
     def __init__(self, log: Callable[[str], object]) -> None:
         self._log = log
@@ -18,19 +18,26 @@ class RunWarnings:
         self._edits = 0
 
     def begin(self) -> None:
-        """Clear everything for a new run."""
+        """Clear all warnings for a new run."""
         self.by_block = {}
         self._counts, self._logged_counts = {}, {}
 
     def clear_if_edited(self, edits: int) -> bool:
-        """Remove the warnings if there were edits since the newest one; return whether any were removed."""
+        """Remove the warnings if there was an edit since the newest one; return True if any were removed."""
         if not self.by_block or edits == self._edits:
             return False
         self.by_block = {}
         return True
 
     def add(self, block: str, sentence: str, count: int, edits: int = 0) -> None:
-        """Add a warning with its number of occurrences in this run, at the behaviour's edit count."""
+        """Add a warning.
+
+        Args:
+            block: Id of the block.
+            sentence: Warning.
+            count: Number of occurrences in this run.
+            edits: Current number of edits of the behaviour.
+        """
         self._edits = edits
         key = (block, sentence)
         self._counts[key] = count
@@ -39,7 +46,7 @@ class RunWarnings:
             self._log_count(key)
 
     def end(self) -> None:
-        """Log the final counts."""
+        """Log the final number of occurrences of each warning."""
         for key, count in self._counts.items():
             if count != self._logged_counts[key]:
                 self._log_count(key)
@@ -50,7 +57,7 @@ class RunWarnings:
 
 
 def counted(sentence: str, count: int) -> str:
-    """Return the sentence with its count if it occurred more than once."""
+    """Append the number of occurrences to a sentence if it is greater than one."""
     if count == 1:
         return sentence
     return ngettext("{sentence} ({count} time)", "{sentence} ({count} times)", count).format(

@@ -1,4 +1,4 @@
-"""Runner of a program in a process of its own, which can be paused, stepped, and always stopped."""
+"""Runner of a program in a separate process, which can be paused, stepped, and always stopped."""
 
 from __future__ import annotations
 
@@ -32,20 +32,20 @@ Kind = Literal[
 State = Literal["ready", "running", "paused", "stopping", "ended"]
 
 STOP_GRACE_S = 0.04
-"""Time that a stopped program gets to end before it is killed; stopping takes well below 100 ms in all."""
+"""Time after which a stopped program is killed. Stopping takes well below 100 ms in total."""
 END_TIMEOUT_S = 2.0
-"""Time that a process gets to end after its program has ended."""
+"""Time after which a process is killed once its program has ended."""
 MEMORY_CHECK_INTERVAL_S = 0.1
 """Interval of the memory checks."""
 PIPE_TIMEOUT_S = 0.5
-"""Time that its pipes may stay open after its end: its child processes may hold them."""
+"""Time that pipes may stay open after the process has ended, because child processes may hold them."""
 EVENTS_PER_S = 300
 MAX_BLOCKS = 100
 MAX_CHOICES, MAX_CHOICE_LENGTH = 12, 200
 WORTH_TELLING = 10_000
 MAX_ERROR_LENGTH = 100_000
 ERRORS_KEPT = 200
-"""Number of lines, which include the stack of each thread at a crash in native code."""
+"""Number of stored lines of error output; a crash in native code writes the stack of each thread."""
 
 _runs = itertools.count(1)
 _log = logging.getLogger("studio.runner")
@@ -55,13 +55,22 @@ _log = logging.getLogger("studio.runner")
 class RunnerEvent:
     """Event of a program's process.
 
-    ``run`` is the number of the runner's program. ``blocks`` are running (kind running), held (paused; the
-    first is the next one), or failed (error). ``says`` describes what runs (paused: the next block). ``text``
-    is a printed line, a warning for the user (paused), an error's sentence, the reason of a failure at the
-    end, or a question (ask) with the number ``question``; 0 withdraws the question. ``choices`` are its
-    possible answers, if restricted. ``ok``: it ended without a failed block. ``silent``: robots that did not
-    reply to the program's own Stop at its end. ``values`` are the changed variables. ``count`` is the number
-    of occurrences of a warning.
+    Attributes:
+        kind: Kind of event.
+        run: Number of the run.
+        blocks: Blocks that are running (running), at which the program is held (paused; the next one first),
+            or that
+            failed (error).
+        says: Description of what is running, or of the next block (paused).
+        text: Printed line; warning for the user (paused); error message (error); reason of a failure (ended);
+            question
+            (ask).
+        ok: True if the program ended without a failed block.
+        silent: Robots that did not reply to the program's own Stop at its end.
+        values: Variables that changed.
+        count: Number of occurrences of a warning.
+        question: Number of a question; 0 withdraws the open question.
+        choices: Possible answers to a question; empty if any answer is allowed.
     """
 
     kind: Kind
@@ -79,9 +88,10 @@ class RunnerEvent:
 
 
 class Runner:
-    """Runs one program. `on_event` is called in threads of its own; "ended" comes exactly once, and last.
+    """Runs one program. ``on_event`` is called in background threads; "ended" is always the last event.
 
-    A program that floods Studio, uses too much memory or leaves processes behind is limited, and reported.
+    A program that floods Studio with output, uses too much memory or leaves processes behind is limited and
+    reported.
     """
 
     def __init__(
@@ -95,9 +105,11 @@ class Runner:
         # `command` starts the child; the default is this Python or this frozen Studio.
         self.run = next(_runs)
         self.program_key = uuid.uuid4().hex
-        """Key of the program: a Stop with it invalidates its commands. Not published before."""
+        """Key of the program. A Stop that contains the key invalidates the program's commands; until then it
+        is secret.
+        """
         self.program_id = program_of(self.program_key)
-        """Sender id of the program's commands."""
+        """Id of the program as a sender of commands."""
         self.state: State = "ready"
         self._on_event = on_event
         self._command = tuple(command) if command is not None else child_command()
@@ -112,7 +124,7 @@ class Runner:
 
     @property
     def pid(self) -> int | None:
-        """Process id of the child, None before `start`."""
+        """Process id of the child; None before `start`."""
         return None if self._child is None else self._child.popen.pid
 
     def start(
@@ -126,10 +138,18 @@ class Runner:
         pace_s: float = 0.0,
         owners: Mapping[str, str] | None = None,
     ) -> None:
-        """Start the program; `robots` are the descriptions of the connected robots.
+        """Start the program.
 
-        `owners` are their node ids by name: only messages of these nodes count. `pace_s` is slow motion
-        (`set_pace`). Raises RunnerError if the process can't be started.
+        Raises RunnerError if the process can't be started.
+
+        Args:
+            program: Compiled program.
+            robots: Descriptions of the connected robots.
+            master: Address of the master.
+            name: Name of the behaviour.
+            paused: True to hold before the first block.
+            pace_s: Delay before each block; see `set_pace`.
+            owners: Node ids of the robots by name. Messages of other nodes are ignored.
         """
         if self._child is not None:
             raise RunnerError(_("this runner has already run its program; create a new one"))
@@ -162,7 +182,7 @@ class Runner:
         return thread
 
     def set_pace(self, seconds: float) -> None:
-        """Set slow motion: seconds that each script waits at a block; 0 for none."""
+        """Set the delay before each block in seconds; 0 for full speed."""
         self._commands.put({"do": "pace", "pace_s": seconds})
 
     def set_robots(self, owners: Mapping[str, str], guarded: Mapping[str, Sequence[str]]) -> None:
@@ -171,7 +191,7 @@ class Runner:
         self._commands.put({"do": "robots", "owners": dict(owners), "guarded": topics})
 
     def put_variable(self, python: str, value: str | float | bool) -> None:
-        """Set a variable of the running program; ``python`` is its name there."""
+        """Set a variable of the running program; ``python`` is the name of the variable in the program."""
         self._commands.put({"do": "variable", "python": python, "value": value})
 
     def set_breakpoints(self, blocks: Sequence[str]) -> None:
@@ -179,7 +199,7 @@ class Runner:
         self._commands.put({"do": "breakpoints", "blocks": list(blocks)})
 
     def pause(self) -> None:
-        """Pause the program and its robots; the event "paused" reports when all are still."""
+        """Pause the program and its robots. The event "paused" is sent when all of them have paused."""
         self._commands.put({"do": "pause"})
 
     def go_on(self) -> None:
@@ -197,9 +217,9 @@ class Runner:
         self._commands.put({"do": "answer", "question": question, "text": words})
 
     def stop(self) -> None:
-        """Stop the program: ask it to end, and kill it if it doesn't at once. It has ended within 100 ms.
+        """Stop the program within 100 ms: ask it to end, and kill it if it doesn't.
 
-        Works in every state. Thread-safe. `app.core.robots.stop.stopper` stops its robots.
+        Works in every state. Thread-safe. The robots are stopped by `app.core.robots.stop.stopper`.
         """
         child = self._child
         if child is None:
@@ -213,7 +233,7 @@ class Runner:
             child.wait(END_TIMEOUT_S)
 
     def wait(self, timeout_s: float | None = None) -> bool:
-        """Wait until the program has ended and its last event was delivered; return whether it has."""
+        """Wait until the program has ended and its last event was delivered; return False on timeout."""
         return self._ended.wait(timeout_s)
 
     def close(self) -> None:

@@ -1,4 +1,4 @@
-"""Work of the threads that stop a program and its robots; results are posted to the mailbox."""
+"""Functions for the threads that stop a program and its robots; results are posted to the mailbox."""
 
 from __future__ import annotations
 
@@ -22,10 +22,15 @@ def stop_program(
     *,
     is_for_all: bool,
 ) -> None:
-    """Stop the program of ``runner`` and the robots ``names``; blocks until they replied or timed out.
+    """Stop a program and its robots; blocks until the robots have replied or timed out.
 
-    ``number`` identifies the Stop in the posted events. ``ends`` and ``is_for_all`` as in
-    `app.core.robots.stop.stopper.RobotStopper.stop_all`.
+    Args:
+        post_event: Receives the results.
+        number: Identifies the Stop in the posted events.
+        runner: Runner of the program.
+        names: Robots to stop.
+        ends: As in `app.core.robots.stop.stopper.RobotStopper.stop_all`.
+        is_for_all: As in `app.core.robots.stop.stopper.RobotStopper.stop_all`.
     """
 
     def answered(robot: RobotStop) -> None:
@@ -47,7 +52,10 @@ def stop_program(
 
 
 def stop_robot(post_event: PostEvent, stopper: RobotStopper | None, name: str, mark: int) -> None:
-    """Stop one robot; blocks until it replied or timed out. ``mark`` is of `MovedRobots`."""
+    """Stop one robot; blocks until it has replied or timed out.
+
+    ``mark`` is the value of `MovedRobots.mark` when the Stop started.
+    """
 
     def late(robot: RobotStop) -> None:
         post_event(LateAnswer(None, robot, mark))

@@ -1,4 +1,4 @@
-"""Reports of a Stop to the user (Console, alerts) and to the fleet."""
+"""Reporting of a Stop to the user (Console and alerts) and to the fleet."""
 
 from __future__ import annotations
 
@@ -13,20 +13,20 @@ from nep.i18n import _
 
 
 class StopNews:
-    """Reports Stops. Not thread-safe: use it from the window's thread."""
+    """Reports the results of stops. Not thread-safe: use it from the window's thread."""
 
     def __init__(self, fleet: Fleet, alerts: Alerts, console: Console) -> None:
         self._fleet, self._alerts, self._console = fleet, alerts, console
 
     def tell_fleet(self, report: StopReport, mark: int) -> None:
-        """Apply the result of a Stop that began at ``mark`` (`MovedRobots.mark`), then its sentences."""
+        """Apply the result of a Stop that started at ``mark`` (`MovedRobots.mark`) to the fleet."""
         self._fleet.moved.apply_report(report, mark)
         clock = clock_words(time.localtime())
         words = {name: (stop_words(each, clock), each.status) for name, each in report.by_name.items()}
         self._fleet.stopped(words, report)
 
     def doubts(self, report: StopReport) -> tuple[str, ...]:
-        """Return why robots without a confirmation may move, and which receive the Stop later."""
+        """Return why robots without a confirmation may be moving, and which get the Stop later."""
         pending = [name for name, robot in report.by_name.items() if robot.is_pending]
         motions = (self._fleet.moved.motion(name) for name in report.silent)
         return (
@@ -38,7 +38,7 @@ class StopNews:
         )
 
     def tell_person(self, report: StopReport, origin: str) -> None:
-        """Report in the Console, for ``origin``, and by an alert while a robot may still move."""
+        """Report a Stop in the Console as ``origin``, and with an alert while a robot may be moving."""
         for name, program in report.strangers:
             sentence = _("“{program}” replied to Stop on behalf of {robot}; the reply was ignored").format(
                 program=program, robot=name

@@ -1,4 +1,4 @@
-"""Trial of one stack of a behaviour: its label while it runs, and its value."""
+"""Trial of one stack of a behaviour: its label while it is running, and its value."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from nep.i18n import _
 
 @dataclass(frozen=True, slots=True)
 class TriedValue:
-    """Value of a tried block, formatted; ``number`` counts the trials."""
+    """Formatted value of a tried block; ``number`` is the running number of the trial."""
 
     document: Document
     block: str
@@ -25,7 +25,7 @@ class TriedValue:
 
 
 class Trial:
-    """State of the current or last trial; empty for a whole behaviour."""
+    """State of the current or last trial; empty if a whole behaviour runs."""
 
     def __init__(self) -> None:
         self.value: TriedValue | None = None
@@ -34,18 +34,18 @@ class Trial:
         self._unit = ""
 
     def begin(self, wanted: RequestedRun) -> None:
-        """Begin with a request; discards the value of the previous trial."""
+        """Start a request, discarding the value of the previous trial."""
         self._request, self._unit, self.value = wanted, "", None
 
     def start(self, program: Program, robots: Iterable[Robot]) -> str:
-        """Start with these robots; return the label of the tried block, "" for a behaviour."""
+        """Start with these robots; return the label of the tried block, or "" for a whole behaviour."""
         if self._request is None:
             return ""
         self._unit = self._request.unit(program, robots)
         return self._request.label(program)
 
     def parse_line(self, line: str) -> str | None:
-        """Return a printed line formatted as the tried value; None if the trial has no value."""
+        """Format a printed line as the tried value; None if the tried block has no value."""
         wanted = self._request
         if wanted is None or wanted.stack is None or not wanted.gives_value:
             return None
@@ -54,5 +54,5 @@ class Trial:
         return words
 
     def show(self, document: Document, stack: Stack, words: str) -> None:
-        """Set the value of the block."""
+        """Set the value of a block."""
         self.value = TriedValue(document, stack.id, words, next(self._tries))

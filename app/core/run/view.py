@@ -1,4 +1,4 @@
-"""Contents of the run bar: the six states of Run and Stop in words, made from the state of a run."""
+"""Contents of the run bar: texts and buttons for each state of a run."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from nep.i18n import _, lazy, listed, ngettext, number
 
 MAX_NAMED = 4
 WIDEST_NAMES = 24
-"""Maximum length of robot names on the button; longer ones are only in the sentence beside it."""
+"""Maximum length of robot names on the button; longer ones are shown only next to it."""
 APPLIES_LATER = lazy("Your changes apply at the next Run")
 NOTHING = lazy("Drag “when started” from Events and put blocks below it")
 RUN, GO_ON, RESTART = lazy("Run"), lazy("Resume"), lazy("Restart")
@@ -20,15 +20,24 @@ STOP, STOPPING, STOP_AGAIN = lazy("Stop"), lazy("Stopping"), lazy("Stop again")
 
 @dataclass(frozen=True, slots=True)
 class RunState:
-    """State of a run, immutable: each event creates a new one.
+    """State of a run. Immutable: each event creates a new one.
 
-    ``state`` is ready, running, paused, stopping, proven or unanswered; ready with a ``report`` after a Stop
-    without robots. ``doubts`` are reasons why robots that did not reply may move (`MovedRobots`). ``warning``
-    is shown before a paused program resumes. Times are monotonic seconds; the program's clock stops while it
-    is paused (``held_s``, ``pause_began_s``). ``again``: the previous Stop is not proven. ``restarts``: a
-    program starts as soon as this Stop is proven. ``edited``: the behaviour differs from the running program.
-    ``trying`` is the label of a tried block, ``value`` its value. ``begun``: its scripts run and receive
-    events; its process starts some tenths of a second before.
+    Times are monotonic seconds. The program's clock stops while the program is paused.
+
+    Attributes:
+        state: "ready", "running", "paused", "stopping", "proven" or "unanswered"; "ready" with a `report`
+            after a Stop
+            without robots.
+        doubts: Why robots that did not reply may be moving (`MovedRobots`).
+        warning: Shown before a paused program resumes.
+        begun: True if the scripts run and receive events; the process starts some tenths of a second earlier.
+        held_s: Total duration of all pauses.
+        pause_began_s: Start of the current pause.
+        again: True if the previous Stop is not proven.
+        restarts: True if a program starts as soon as this Stop is proven.
+        edited: True if the behaviour differs from the running program.
+        trying: Label of a tried block.
+        value: Value of a tried block.
     """
 
     state: str = "ready"
@@ -59,7 +68,7 @@ class RunState:
     doubts: tuple[str, ...] = ()
 
     def elapsed(self, now: float) -> float:
-        """Return the running time in seconds without pauses."""
+        """Return the running time in seconds, without pauses."""
         held = self.held_s
         if self.pause_began_s is not None:
             held += now - self.pause_began_s
@@ -68,12 +77,16 @@ class RunState:
 
 @dataclass(frozen=True, slots=True)
 class RunView:
-    """Contents of the run bar, large and compact.
+    """Contents of the run bar, in the large and the compact form.
 
-    ``result`` is shown beside Stop with its icon and colour (``result_status``); ``last_stop`` is a small
-    reminder while a program runs, with its own status (``last_stop_status``); ``confirm`` is the label of the
-    button by which the user confirms that a silent robot has stopped. ``edited``: the running program differs
-    from the blocks, so that Restart is the suggested next step.
+    Attributes:
+        edited: True if the running program differs from the blocks, so that Restart is the suggested next
+            step.
+        result: Result of a Stop, shown next to the Stop button.
+        result_status: Icon and colour of `result`.
+        last_stop: Reminder of the last Stop while a program is running.
+        last_stop_status: Icon and colour of `last_stop`.
+        confirm: Label of the button with which the user confirms that a silent robot has stopped.
     """
 
     state: str
@@ -99,7 +112,7 @@ class RunView:
 def place_of(says: str, blocks: Sequence[str], labels: Mapping[str, str]) -> str:
     """Return the label of the block at which a program is held.
 
-    Its words, or its name if they contain a quotation.
+    The label is the text of the block, or its name if the text contains a quotation.
     """
     if "“" not in says or not blocks:
         return says
@@ -115,10 +128,17 @@ def view_of(
     elsewhere: bool = False,
     slow: bool = False,
 ) -> RunView:
-    """Return the run bar for a state, the names of connected robots, and the time.
+    """Return the contents of the run bar.
 
-    ``coming`` are robots that are starting. ``elsewhere``: the run belongs to a behaviour in another tab, so
-    the title names it, and Run is for the current one. ``slow``: slow motion.
+    Args:
+        run: State of the run.
+        connected: Names of the connected robots.
+        now: Monotonic seconds.
+        coming: Names of the robots that are starting.
+        elsewhere: True if the run belongs to a behaviour in another tab; then the title names that behaviour,
+            and Run
+            applies to the current one.
+        slow: True if blocks run with a delay.
     """
     view = replace(_view(run, connected, coming, now), slow=slow)
     if run.trying:
@@ -294,7 +314,7 @@ _ENDED = {
     ("finished", True, True): lazy("{name} finished after {time}"),
     ("finished", True, False): lazy("{name} finished"),
 }
-"""By (how it ended, whether the behaviour is named, whether it ran)."""
+"""Titles by (result of the run, True if the behaviour is named, True if it ran)."""
 
 
 def _proven(run: RunState, _now: float) -> RunView:
@@ -346,7 +366,7 @@ def seconds(value: float) -> str:
 
 
 def connected_words(names: Sequence[str], coming: Sequence[str] = ()) -> str:
-    """Return the line below Ready: connected robots, else those that are starting."""
+    """Return the line below "Ready": the connected robots, or else those that are starting."""
     if not names and coming:
         words = ngettext("{robots} is starting", "{robots} are starting", len(coming))
         return words.format(robots=listed(coming))
@@ -357,7 +377,10 @@ def connected_words(names: Sequence[str], coming: Sequence[str] = ()) -> str:
 
 
 def result_words(report: StopReport) -> str:
-    """Format a Stop's result: ``all 2 robots stopped (41 ms)``; its icon is that of `StopReport.status`."""
+    """Format the result of a Stop: ``all 2 robots stopped (41 ms)``.
+
+    `StopReport.status` determines the icon.
+    """
     names, still = report.names, report.still
     unsure = [robot.who for robot in report.robots if not robot.can_confirm]
     if report.unproven:
@@ -382,10 +405,11 @@ def _some_stopped(stopped: int, count: int) -> str:
 
 
 def unanswered_words(report: StopReport, doubts: Sequence[str] = ()) -> tuple[str, str, str, str]:
-    """Return title, detail, compact sentence and button label when robots have not confirmed.
+    """Return title, detail, compact text and button label for robots that have not confirmed a Stop.
 
-    A robot's own report ("Arm may still move: the brake is stuck") comes first, unchanged. ``doubts`` are
-    what moved them (`RunState`).
+    A report of a robot itself ("Arm may still move: the brake is stuck") comes first, unchanged. ``doubts``
+    are the
+    reasons why robots may be moving (`RunState`).
     """
     still = report.still
     names = listed(report.silent)
@@ -429,7 +453,7 @@ def _wrong_words(report: StopReport) -> str:
 
 
 def stop_words(robot: RobotStop, clock: str) -> str:
-    """Format one robot's reply to a Stop for its health: ``answered in 41 ms, at 8:40``."""
+    """Format the reply of a robot to a Stop for its health panel."""
     if not robot.can_confirm:
         return _("sent at {time}; this robot can't confirm").format(time=clock)
     if robot.answered:

@@ -1,4 +1,4 @@
-"""Requests to run a behaviour, or one stack of it alone."""
+"""Requests to run a behaviour or a single stack of it."""
 
 from __future__ import annotations
 
@@ -16,11 +16,11 @@ from nep.i18n import _
 
 
 class OpenBehaviours(Protocol):
-    """Open behaviours as far as a run needs them."""
+    """Access to the open behaviours that a run needs."""
 
     @property
     def current(self) -> Document:
-        """Behaviour of the current tab, which Run runs."""
+        """Behaviour of the current tab, which Run applies to."""
 
     def title(self, document: Document) -> str:
         """Return the title of a behaviour."""
@@ -28,7 +28,7 @@ class OpenBehaviours(Protocol):
 
 @dataclass(frozen=True, slots=True)
 class RequestedRun:
-    """Request to run a behaviour, or one ``stack`` of it; ``paused``: hold before the first block."""
+    """Request to run a behaviour, or only one ``stack`` of it. ``paused``: hold before the first block."""
 
     document: Document
     paused: bool = False
@@ -40,7 +40,7 @@ class RequestedRun:
 
     @property
     def gives_value(self) -> bool:
-        """True if the stack is a value, which the program prints."""
+        """True if the stack is a value block, whose value the program prints."""
         return self.stack is not None and self.stack.is_value
 
     def unit(self, program: Program, robots: Iterable[Robot]) -> str:
@@ -59,7 +59,7 @@ class RequestedRun:
         return pretty_unit(sensor.unit) or ""
 
     def problems(self, program: Program) -> dict[str, str]:
-        """Return errors by block; a whole behaviour runs without missing robots."""
+        """Return the errors by block. Missing robots don't prevent a whole behaviour from running."""
         wrong = {each.block_id: each.sentence for each in program.problems if each.severity == "error"}
         found = {block: sentence for block, sentence in wrong.items() if block}
         if self.stack is None or found:

@@ -1,8 +1,9 @@
-"""Self-test for testing packages of Studio: time limits, report, watchdog.
+"""Self-test for checking packages of Studio: steps with time limits, a report, and a watchdog.
 
-`surroundings` gives it a folder, a home and a master of its own, `report` is its result, `test` runs the
-steps with time limits, a watchdog against hanging, and a check for remaining processes. The steps in the
-window are in `app.ui.self_test`.
+`surroundings` creates a separate folder, home folder and master. `report` writes the result. `test` runs the
+steps
+with time limits and a watchdog, and checks for processes that are left. The steps in the window are in
+`app.ui.self_test`.
 """
 
 from app.core.self_test.surroundings import UnwritableFolderError as UnwritableFolderError

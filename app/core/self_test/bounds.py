@@ -1,4 +1,4 @@
-"""Time limits of the self-test in seconds: generous, because slow computers must pass too."""
+"""Time limits of the self-test in seconds; generous, so that slow computers pass too."""
 
 from __future__ import annotations
 
@@ -16,11 +16,13 @@ STEP_S: dict[str, float] = {
     "close": 60.0,
     "processes": 20.0,
 }
-"""Limit of each step by its name in the report, in order."""
+"""Time limit of each step by its name in the report, in order."""
 ALL_S = 480.0
-"""Limit of all steps together."""
+"""Time limit of all steps together."""
 GRACE_S = 10.0
-"""Delay after a limit before the watchdog kills the process, in which a responsive window reports the failure
-itself."""
+"""Time between a time limit and the moment when the watchdog kills the process.
+
+A window that still responds reports the failure itself within this time.
+"""
 END_S = 30.0
-"""Time that the process gets to end after the report says that all is well."""
+"""Time that the process has to exit after the report was completed successfully."""

@@ -1,4 +1,4 @@
-"""Report of a self-test: a JSON file that is valid at any moment, also if the process is killed."""
+"""Report of a self-test: a JSON file that is valid at any time, even if the process is killed."""
 
 from __future__ import annotations
 
@@ -18,12 +18,12 @@ from nep.version import __version__
 
 FORMAT, FORMAT_VERSION = "nep-studio-selftest", 1
 OLDEST_S = 24 * 3600.0
-"""Maximum age of the process at the start of the self-test; an older one means that the clock was set."""
+"""Maximum age of the process when the self-test starts; a greater one means that the clock was changed."""
 
 
 @dataclass
 class StepReport:
-    """One step: expectation and result; times in ms since the start of the process."""
+    """One step: the expectation and the result. Times are milliseconds since the start of the process."""
 
     name: str
     words: str
@@ -34,7 +34,7 @@ class StepReport:
     said: str = ""
 
     def to_json(self) -> dict[str, object]:
-        """Return the form used in the report."""
+        """Return the step as a JSON object for the report."""
         return {
             "name": self.name,
             "ok": self.ok,
@@ -47,7 +47,7 @@ class StepReport:
 
 
 def seconds_since_start() -> float:
-    """Return the age of this process as reported by the system, or 0."""
+    """Return the age of this process in seconds as reported by the system; 0 if unknown."""
     try:
         age = time.time() - psutil.Process().create_time()
     except psutil.Error:
@@ -56,7 +56,7 @@ def seconds_since_start() -> float:
 
 
 class Report:
-    """Report of one self-test, written at each change. Thread-safe."""
+    """Report of one self-test, written to disk at each change. Thread-safe."""
 
     def __init__(self, path: Path, facts: dict[str, object]) -> None:
         self._path = path
@@ -83,7 +83,7 @@ class Report:
 
     @property
     def why(self) -> str:
-        """Sentence why it failed, or ""."""
+        """Reason why the test failed, or ""."""
         return self._why
 
     @property
@@ -99,18 +99,18 @@ class Report:
             self._facts.update(facts)
 
     def mark(self, name: str) -> None:
-        """Record this moment once, as ``NAME_ms``."""
+        """Record the current time as ``NAME_ms``. Only the first call for a name has an effect."""
         with self._lock:
             self._marks.setdefault(f"{name}_ms", self.now_ms())
 
     def begin(self, name: str, words: str, bound_s: float) -> None:
-        """Start a step, which ends the previous one."""
+        """Start a step."""
         with self._lock:
             self._steps.append(StepReport(name, words, bound_s, self.now_ms()))
             self._write()
 
     def record_success(self, said: str = "") -> None:
-        """Record that the step succeeded."""
+        """Record that the current step succeeded."""
         with self._lock:
             step = self.step
             if step is not None:
@@ -118,7 +118,7 @@ class Report:
                 self._write()
 
     def fail(self, why: str) -> None:
-        """Record that the test failed; the first sentence counts."""
+        """Record that the test failed; only the first reason is stored."""
         with self._lock:
             step = self.step
             if step is not None:
@@ -127,7 +127,7 @@ class Report:
             self._write()
 
     def end(self) -> bool:
-        """Record the end; return whether all was well."""
+        """Complete the report; return True if the test succeeded."""
         with self._lock:
             self._over = True
             self.mark("total")

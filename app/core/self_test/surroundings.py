@@ -1,4 +1,4 @@
-"""Environment of a self-test: folder, settings and master of its own, isolated from other instances."""
+"""Environment of a self-test: a folder, settings and a master that are isolated from other instances."""
 
 from __future__ import annotations
 
@@ -18,11 +18,11 @@ from nep.system.addresses import MASTER_VARIABLE
 
 REPORT, PICTURE, CRASH = "report.json", "window.png", "crash.txt"
 BEGUN = b"{}\n"
-"""Initial report, so that no reader takes the one of an earlier test for this one's."""
+"""Initial content of the report, so that no reader mistakes an old report for the new one."""
 
 
 class UnwritableFolderError(AppError):
-    """The self-test's folder can't be written."""
+    """Raised if the folder of the self-test can't be written."""
 
     def __init__(self, folder: Path, reason: str) -> None:
         self.folder, self.reason = folder, reason
@@ -35,7 +35,7 @@ class UnwritableFolderError(AppError):
 
 @dataclass(frozen=True)
 class Surroundings:
-    """Folder of the results, which contains the home (settings, journal, log) of this test."""
+    """Folder with the results, which also contains the home folder (settings, journal, log) of the test."""
 
     folder: Path
     home: Path
@@ -47,11 +47,11 @@ class Surroundings:
 
 
 def prepare(folder: Path, environ: MutableMapping[str, str], *, is_root: bool) -> Surroundings:
-    """Create the folder and a home in it; set them and a free master port in ``environ``.
+    """Create the folder with a home folder in it; set both and a free master port in ``environ``.
 
-    Result files of an earlier test are removed, and nothing else. The web engine runs as root only without
-    its sandbox: the test loads nothing but Studio's own page, and disables it for itself. Raises
-    UnwritableFolderError.
+    Result files of an earlier test are removed, nothing else. The web engine can't use its sandbox as root;
+    the test
+    loads only Studio's own page and then disables the sandbox. Raises UnwritableFolderError.
     """
     folder = Path(os.path.abspath(folder))  # noqa: PTH100 - links are not resolved, so that the name stays as given
     try:
@@ -74,7 +74,7 @@ def prepare(folder: Path, environ: MutableMapping[str, str], *, is_root: bool) -
 
 
 def remove_home(made: Surroundings) -> None:
-    """Remove the test's home as far as possible: ended processes may still hold files."""
+    """Remove the home folder of the test as far as possible; ending processes may still use files in it."""
     for path in sorted(made.home.rglob("*"), reverse=True):
         with suppress(OSError):
             path.rmdir() if path.is_dir() and not path.is_symlink() else path.unlink()

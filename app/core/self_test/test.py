@@ -1,4 +1,4 @@
-"""Self-test of this process: its steps in order, and a watchdog that ends it in any case."""
+"""Self-test of this process: its steps in order, and a watchdog that ends the process in any case."""
 
 from __future__ import annotations
 
@@ -46,25 +46,24 @@ class SelfTest:
     # -- steps --------------------------------------------------------------------------------------------
 
     def begin(self, name: str, words: str) -> None:
-        """Start the step with this name (of `bounds.STEP_S`); ``words`` describes the expectation."""
+        """Start the step with this name (in `bounds.STEP_S`); ``words`` describes the expectation."""
         bound_s = bounds.STEP_S[name]
         self.report.begin(name, words, bound_s)
         self._wait_until(time.monotonic() + bound_s + bounds.GRACE_S, words)
 
     def record_success(self, said: str = "") -> None:
-        """Record that the step succeeded; ``said`` gives details."""
+        """Record that the current step succeeded; ``said`` are details."""
         self.report.record_success(said)
 
     def fail(self, why: str) -> None:
-        """Record that the test failed; the first sentence counts."""
+        """Record that the test failed; only the first reason is stored."""
         self.report.fail(why)
 
     def run(self, show: Callable[[], int]) -> int:
-        """Run ``show``, which does the steps until the window is closed.
+        """Call ``show``, which runs the steps until the window is closed; clean up and return the exit code.
 
-        End the rest and return the exit code.
-
-        0 when all was well; 1 otherwise, also when ``show`` raises or returns another code.
+        The exit code is 0 on success, and 1 on failure, which includes an exception or another result of
+        ``show``.
         """
         try:
             code = show()
@@ -158,13 +157,13 @@ def command(process: psutil.Process) -> list[str]:
 
 
 def is_master(process: psutil.Process) -> bool:
-    """Return whether a process is a master with an owner, which ends by itself shortly after the owner."""
+    """Return True if a process is a master with an owner; such a master ends shortly after its owner."""
     words = command(process)
     return "master" in words and "--owner-pid" in words
 
 
 def is_web(process: psutil.Process) -> bool:
-    """Return whether a process belongs to the web view, whose processes end with their parent."""
+    """Return True if a process belongs to the web view, whose processes end with their parent."""
     try:
         return process.name().lower().startswith(WEB_PROCESS[:15])
     except (psutil.Error, OSError):  # raised on Windows, where psutil has no own exception
@@ -172,9 +171,9 @@ def is_web(process: psutil.Process) -> bool:
 
 
 def is_of_windows(process: psutil.Process, root: str = os.environ.get("SYSTEMROOT", "")) -> bool:
-    """Return whether a process is a program of Windows itself, in the folder ``root``.
+    """Return True if a process is a program of Windows, in the folder ``root``.
 
-    Windows starts some as children, such as console hosts, and ends them at any time.
+    Windows starts some of its programs as child processes, such as console hosts, and ends them at any time.
     """
     try:
         program = process.exe()

@@ -1,4 +1,4 @@
-"""Series: numbers and states selected from topics by field paths, stored, and reduced for drawing.
+"""Series: numbers and states read from topics by field paths, stored, and reduced for drawing.
 
-`feed` belongs to the session; everything else needs numpy and is loaded with the first plot.
+`feed` is part of the session. All other modules need numpy and are loaded with the first plot.
 """

@@ -1,4 +1,4 @@
-"""Calculated curves, extended incrementally as their inputs grow."""
+"""Calculated curves, which are extended as their inputs grow."""
 
 from __future__ import annotations
 
@@ -11,15 +11,15 @@ from app.core.series.formula import Calculation, Windowed
 from app.core.series.samples import Floats, Samples
 
 MAX_WAIT_S = 0.5
-"""Time (by the messages' time stamps) that the newest sample of one input waits for the others."""
+"""Maximum time (by time stamps) that the newest sample of one input waits for the other inputs."""
 HOLDS_S, HOLDS = 1.0, 8.0
-"""Validity of another input's sample: until its next one, at most this long, or eight usual intervals."""
+"""Maximum validity of a sample of another input: seconds, and number of usual intervals."""
 AT_ONCE = 200_000
-"""Maximum number of samples calculated per tick."""
+"""Maximum number of samples calculated in one tick."""
 
 
 class Calculated:
-    """Samples calculated from others; `advance` processes new input."""
+    """Samples calculated from other samples; `advance` processes new input."""
 
     def __init__(self, inputs: Sequence[Samples]) -> None:
         # Sampled at the times of the first input.
@@ -94,7 +94,10 @@ class WindowCurve(Calculated):
 
 
 class ExpressionCurve(Calculated):
-    """Expression of several curves, at the times of the first, with the newest sample of each other."""
+    """Expression of several curves.
+
+    Evaluated at the times of the first input, with the newest sample of each other input.
+    """
 
     def __init__(self, calculate: Calculation, inputs: Sequence[Samples]) -> None:
         super().__init__(inputs)
@@ -116,7 +119,10 @@ class ExpressionCurve(Calculated):
 
 
 def held_values(samples: Samples, times: Floats) -> Floats:
-    """Return the newest sample at each time; NaN before the first, in a gap, and long after the last."""
+    """Return the newest sample at each time.
+
+    NaN before the first sample, in a gap, and long after the last.
+    """
     if not len(samples):
         return np.full(len(times), np.nan)
     places = np.searchsorted(samples.times, times, side="right") - 1

@@ -1,4 +1,4 @@
-"""Curves as CSV: one row for each time with any value."""
+"""Curves as CSV: one row for each time at which any curve has a value."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ ROWS_AT_ONCE = 5000
 
 @dataclass(frozen=True, slots=True)
 class CsvColumn:
-    """Snapshot of one curve: name, numbers with their times (s), and starts of its states."""
+    """Snapshot of one curve: name, numbers with their times (s), and states with their start times."""
 
     name: str
     times: Floats
@@ -27,7 +27,7 @@ class CsvColumn:
 
 
 def columns_of(curves: Sequence[Curve], begin_s: float = -inf, end_s: float = inf) -> list[CsvColumn]:
-    """Return the values of curves in a range, for a thread that writes them."""
+    """Return a snapshot of the curves in a time range, which another thread can write."""
     columns = []
     for curve in curves:
         first, end = curve.samples.places(begin_s, end_s)
@@ -43,9 +43,9 @@ def columns_of(curves: Sequence[Curve], begin_s: float = -inf, end_s: float = in
 
 
 def csv_lines(columns: Sequence[CsvColumn], origin_ns: int) -> Iterator[str]:
-    """Yield the lines of a CSV file (RFC 4180) in chunks: the header, then rows by time.
+    """Yield a CSV file (RFC 4180) in chunks: the header, then rows by time.
 
-    Times are nanoseconds since 1970 and ISO 8601 in UTC; a state is in the row of its start.
+    Times are given in nanoseconds since 1970 and as ISO 8601 in UTC. A state is in the row of its start.
     """
     yield csv_text([["stamp_ns", "time_utc", *(harmless(column.name) for column in columns)]])
     states = [np.array([time_s for time_s, _word in column.states]) for column in columns]

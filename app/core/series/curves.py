@@ -30,13 +30,20 @@ from nep.i18n import _
 
 MAX_CURVES = 64
 MAX_SAMPLES_TOGETHER = 8 * MAX_SAMPLES
-"""Maximum number of samples of all curves of a plot (about 150 MB); more curves keep fewer samples each."""
+"""Maximum number of samples of all curves of a plot (about 150 MB), which the curves share."""
 MIN_SAMPLES = 8192
 
 
 @dataclass(eq=False, slots=True)
 class Curve:
-    """Curve of a plot: ``text`` as typed, its ``source``, samples, and the states of a field."""
+    """Curve of a plot.
+
+    Attributes:
+        text: Text as typed.
+        source: Source of the samples.
+        samples: Numbers over time.
+        of: Series of the field; None for a calculated curve.
+    """
 
     text: str
     source: Source
@@ -50,7 +57,7 @@ class Curve:
 
     @property
     def is_state(self) -> bool:
-        """True if it is shown as a lane of states."""
+        """True if the curve is shown as a lane of states."""
         return self.of is not None and (
             self.of.is_state or (not len(self.samples) and len(self.of.states) > 0)
         )
@@ -74,7 +81,7 @@ def topics_of(source: Source) -> set[str]:
 
 @dataclass(slots=True, eq=False)
 class _Shared:
-    """Samples that several curves may use, with their number of users."""
+    """Samples used by one or several curves, with the number of users."""
 
     samples: Samples
     users: int = 0
@@ -99,10 +106,10 @@ class Curves:
     def add(self, text: str, also: Iterable[str] = ()) -> list[Curve]:
         """Add the curves of a typed text; ``[*]`` adds one for each element of the newest message.
 
-        ``also`` are valid topics that don't exist now.
-
-        Raises `CurveError` with the correction; then nothing is added. Whether a field exists is known only
-        after a message of its topic.
+        ``also`` are topics that are valid although they don't exist at the moment. Raises `CurveError`, which
+        says how to
+        fix the text; then nothing is added. Whether a field exists is only known after a message of its
+        topic.
         """
         source = parse(text, [*self._known_topics(), *also])
         sources: Sequence[Source] = [source]
@@ -112,12 +119,12 @@ class Curves:
         return self.add_sources(sources, text)
 
     def add_field(self, topic: str, path: FieldPath) -> list[Curve]:
-        """Add the curves of a field, whether its topic exists or not."""
+        """Add the curves of a field, even if its topic doesn't exist."""
         paths = path.expanded(self.payload_of(topic)) if path.has_every else [path]
         return self.add_sources([FieldSource(topic, each) for each in paths], str(FieldSource(topic, path)))
 
     def add_sources(self, sources: Sequence[Source], text: str) -> list[Curve]:
-        """Add curves of these sources, except those that are plotted already."""
+        """Add curves of these sources, except those that are already plotted."""
         there = {each.text for each in self.all}
         new = [each for each in sources if str(each) not in there]
         if not sources:
@@ -133,7 +140,7 @@ class Curves:
         return curves
 
     def remove(self, curve: Curve) -> None:
-        """Remove a curve; its topic's watch ends when no other curve needs it."""
+        """Remove a curve; its topic is unwatched if no other curve needs it."""
         if curve in self.all:
             self.all.remove(curve)
             self._release(curve.text)
@@ -145,7 +152,7 @@ class Curves:
             self.remove(curve)
 
     def advance(self) -> None:
-        """Calculate new samples. Call it once per tick, after the messages were added."""
+        """Calculate new samples. Call this once per tick, after the messages were added."""
         for shared in self._shared.values():
             if shared.calculated is not None:
                 shared.calculated.advance()
@@ -154,12 +161,12 @@ class Curves:
     # ------------------------------------------------------------------------------------------------
 
     def payload_of(self, topic: str) -> object:
-        """Return the newest message of a plotted topic; `MISSING` otherwise."""
+        """Return the newest message of a plotted topic; `MISSING` if there is none."""
         known = self._topics.get(topic)
         return known.payload if known is not None else MISSING
 
     def fields(self, topic: str) -> list[FieldFound]:
-        """Return the fields of a plotted topic that can be plotted."""
+        """Return the fields of a plotted topic that can be shown in a plot."""
         payload = self.payload_of(topic)
         return [] if payload is MISSING else list(fields_of(payload))
 
@@ -175,19 +182,19 @@ class Curves:
 
     @property
     def undone(self) -> int:
-        """Number of samples and states removed because a clock was set back."""
+        """Number of samples and states that were removed because a clock was set back."""
         fields = [field for topic in self._topics.values() for field in topic.fields]
         return sum(field.numbers.undone + field.states.undone for field in fields)
 
     @property
     def forgotten(self) -> int:
-        """Number of old samples and states evicted."""
+        """Number of old samples and states that were evicted."""
         states = [each.states for each in self.all if each.states is not None]
         return sum(each.samples.begun for each in self.all) + sum(each.forgotten for each in states)
 
     @property
     def newest_s(self) -> float | None:
-        """Time of the newest sample or state of any curve."""
+        """Time of the newest sample or state of all curves; None if there is none."""
         found = [
             last
             for curve in self.all
@@ -197,7 +204,7 @@ class Curves:
         return max(found, default=None)
 
     def advice(self, curve: Curve) -> str:
-        """Return a sentence why a curve has no values, or "" where it has or may get some."""
+        """Return why a curve has no values; "" if it has some or may get some."""
         if curve.of is None or len(curve.samples) or len(curve.of.states):
             return ""
         payload = self.payload_of(curve.of.topic)

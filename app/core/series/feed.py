@@ -1,4 +1,4 @@
-"""Feed of the series: passes every message of plotted topics on, once per tick."""
+"""Feed of the series: passes all messages of plotted topics to the series, once per tick."""
 
 from __future__ import annotations
 
@@ -9,24 +9,24 @@ from app.core.network.mailbox import Batch
 from app.core.network.watches import Watching
 
 BETWEEN_TICKS = 8192
-"""Maximum number of messages of a plotted topic between ticks: 1 kHz for 8 s, if the window is that late."""
+"""Maximum number of messages of a plotted topic between ticks; enough for 8 s at 1 kHz."""
 
 
 class SeriesTaker(Protocol):
-    """Receiver of a topic's messages."""
+    """Receiver of the messages of a topic."""
 
     def process(self, batch: Batch, now_ns: int) -> None:
-        """Process a batch; ``now_ns`` is this computer's time, for messages without a time stamp."""
+        """Process a batch; ``now_ns`` is this computer's time, used for messages without a time stamp."""
 
     def rewind(self) -> None:
-        """Clear: the source moved to another time, which counts as no loss."""
+        """Remove all messages without counting losses, because the source jumped to another time."""
 
 
 class SeriesFeed:
     """Receivers of messages by topic. Not thread-safe: use it from the window's thread.
 
-    A topic is subscribed to while it has a receiver, also while no panel is visible, so that plots have no
-    gaps. ``origin_ns`` is the time from which all series count their seconds.
+    A topic is subscribed to while it has a receiver, even if no panel is visible, so that plots have no gaps.
+    ``origin_ns`` is time 0 of all series.
     """
 
     def __init__(
@@ -49,13 +49,14 @@ class SeriesFeed:
         return tuple(self._takers)
 
     def now_s(self) -> float:
-        """Return this computer's time in the seconds of all series."""
+        """Return this computer's current time in seconds since ``origin_ns``."""
         return (self._clock_ns() - self.origin_ns) / 1e9
 
     def join(self, topic: str, taker: SeriesTaker, *, deep: bool = True) -> None:
-        """Pass the messages of a topic to ``taker`` from now on.
+        """Pass the messages of a topic to ``taker``.
 
-        If not ``deep``, it accepts drops of a late window, and gets no history of a recording.
+        Without ``deep``, messages may be dropped while the window is busy, and a recording provides no
+        history.
         """
         self._takers.setdefault(topic, []).append(taker)
         if deep:
@@ -81,13 +82,13 @@ class SeriesFeed:
                 self._set_room(topic, None)
 
     def rewind(self, topics: Iterable[str] | None = None) -> None:
-        """Clear these topics (None: all): the source moved to another time."""
+        """Reset the receivers of these topics (None: all), because the source jumped to another time."""
         for topic in list(self._takers) if topics is None else topics:
             for taker in self._takers.get(topic, ()):
                 taker.rewind()
 
     def add(self, batches: Mapping[str, Batch]) -> None:
-        """Pass on the messages of a tick, by topic."""
+        """Pass the messages of a tick to the receivers."""
         if not self._takers:
             return
         now_ns = self._clock_ns()

@@ -1,8 +1,10 @@
 """Field paths to values in messages: ``pose.x[2]``, ``joints[*].position``.
 
 A path is parsed once. A key that is not a plain word is a JSON string in brackets, as in ``people["first
-name"]``; ``[*]`` means every element of an array. The value of a message that is neither object nor array is
-called ``value``.
+name"]``;
+``[*]`` stands for every element of an array. In a message that is neither object nor array, the value is
+called
+``value``.
 """
 
 from __future__ import annotations
@@ -19,7 +21,7 @@ from nep.errors import nearest
 from nep.i18n import _
 
 EVERY: Final = "*"
-"""Step for every element of an array; as a key it would be quoted in brackets."""
+"""Step that stands for every element of an array. As a key, it would be quoted in brackets."""
 MAX_STEPS, MAX_EVERY, MAX_FIELDS = 32, 65, 2000
 MAX_LENGTH = 400
 ALONE = "value"
@@ -28,14 +30,15 @@ _STEP = re.compile(
     r"""|\[(?P<every>\*)\]|\[(?P<key>"(?:[^"\\]|\\.)*")\]"""
 )
 _PLAIN = re.compile(r"""[^.\[\]"\s,()+*/%^-]+\Z""")
-"""Keys that can't be confused with a calculation: `head-yaw` would be a difference, so it is written
-`["head-yaw"]`."""
+"""Keys that can't be confused with a calculation; `head-yaw`, which looks like a difference, is written
+`["head-yaw"]`.
+"""
 
 FieldKind = Literal["number", "state", "list"]
 
 
 class Missing:
-    """Result of a path without a value."""
+    """Type of `MISSING`, the result of a path that has no value."""
 
     def __repr__(self) -> str:
         return "MISSING"
@@ -45,7 +48,7 @@ MISSING: Final = Missing()
 
 
 class Every:
-    """Step ``[*]``."""
+    """Type of `ALL`, the step ``[*]``."""
 
     def __repr__(self) -> str:
         return "[*]"
@@ -56,13 +59,13 @@ Step = str | int | Every
 
 
 def is_list(value: object) -> bool:
-    """Return whether a value is an array; strings and bytes are not."""
+    """Return True if a value is an array; strings and bytes are not arrays."""
     return isinstance(value, Sequence) and not isinstance(value, (str, bytes, bytearray, memoryview))
 
 
 @dataclass(frozen=True, slots=True)
 class FieldPath:
-    """Steps from a message to a value: keys, indexes, `ALL`."""
+    """Steps from a message to a value: keys, indices, or `ALL`."""
 
     steps: tuple[Step, ...]
 
@@ -84,7 +87,7 @@ class FieldPath:
 
     @property
     def has_every(self) -> bool:
-        """True if it stands for several values."""
+        """True if the path contains a wildcard and so may match several values."""
         return ALL in self.steps
 
     def __str__(self) -> str:
@@ -93,7 +96,7 @@ class FieldPath:
         return written.removeprefix(".")
 
     def value_in(self, payload: object) -> object:
-        """Return the value in a decoded message; `MISSING` if there is none."""
+        """Return the value at the path in a decoded message; `MISSING` if there is none."""
         here = payload
         for step in self.steps:
             # `isinstance` with an ABC takes ten times as long
@@ -109,9 +112,12 @@ class FieldPath:
         return here
 
     def expanded(self, payload: object) -> list[FieldPath]:
-        """Return the paths without `ALL` for a message, at most 65; itself if it has none.
+        """Return the paths that replace each `ALL` by the indices in a message.
 
-        That is one more than the curves of a plot, so that too many are reported and not silently cut.
+        The path itself if it has none.
+
+        At most 65, one more than the curves of a plot, so that too many are reported and not silently cut
+        off.
         """
         if not self.has_every:
             return [self]
@@ -160,7 +166,7 @@ class FieldFound:
 def fields_of(payload: object, most: int = MAX_FIELDS) -> Iterator[FieldFound]:
     """Yield the plottable values of a message, upper levels first.
 
-    Of an array the first elements and ``[*]``.
+    For an array, the first elements and ``[*]`` are included.
     """
     waiting: list[tuple[tuple[Step, ...], object]] = [((), payload)]
     if not isinstance(payload, Mapping) and not is_list(payload):
@@ -185,7 +191,7 @@ def fields_of(payload: object, most: int = MAX_FIELDS) -> Iterator[FieldFound]:
 def kind_of_value(value: object) -> FieldKind | None:
     """Return how a value can be plotted.
 
-    None for objects, bytes, null, and arrays of anything but numbers.
+    None for objects, bytes, null, and for arrays of anything but numbers.
     """
     if isinstance(value, (bool, str)):
         return "state"
@@ -199,7 +205,7 @@ def kind_of_value(value: object) -> FieldKind | None:
 
 
 def completed(text: str, known: Sequence[str]) -> str:
-    """Complete ``text`` to the next dot, bracket or end that all matching entries of ``known`` share."""
+    """Complete ``text`` up to the next dot, bracket or end that all matching entries of ``known`` share."""
     fitting = [each for each in known if each.startswith(text)]
     if not fitting:
         return text
@@ -212,5 +218,5 @@ def completed(text: str, known: Sequence[str]) -> str:
 
 
 def meant_field(path: FieldPath, payload: object) -> str | None:
-    """Return the path of the most similar field that a message has; None if none is similar."""
+    """Return the path of the most similar field in a message; None if none is similar."""
     return nearest(str(path), [str(each.path) for each in fields_of(payload)])

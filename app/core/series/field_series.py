@@ -1,4 +1,4 @@
-"""Series of one topic: each message gets its time once, then each field is read from it."""
+"""Series of one topic: the time of each message is determined once, then each field is read."""
 
 from __future__ import annotations
 
@@ -19,21 +19,22 @@ if TYPE_CHECKING:
     from nep.messages.message import Message
 
 LATEST_STAMP_NS = 1 << 63
-"""Latest valid time stamp (the year 2262); messages beyond are counted and skipped."""
+"""Latest valid time stamp (in the year 2262); later ones are counted and their messages skipped."""
 SILENCE_S, SILENCES = 1.0, 8.0
-"""Minimum silence that counts as a gap: one second, and eight usual intervals."""
+"""Minimum silence that counts as a gap: seconds, and number of usual intervals."""
 SILENCES_IN_A_ROW = 3
-"""Number of consecutive silences after which they are the usual interval; otherwise each message would be a
-gap."""
+"""Number of consecutive gaps after which their length becomes the usual interval."""
 MAX_PUBLISHERS = 64
 UNREAD = object()
-"""Placeholder for an unreadable message."""
+"""Placeholder for a message that can't be read."""
 
 
 class FieldSeries:
-    """History of one field: `numbers`, and `states` where it was text or boolean.
+    """History of one field: `numbers`, and `states` for text and boolean values.
 
-    ``last`` is its newest value as received; ``missing`` counts messages without the field.
+    Attributes:
+        last: Newest value as received.
+        missing: Number of messages without the field.
     """
 
     def __init__(self, topic: str, path: FieldPath) -> None:
@@ -44,11 +45,14 @@ class FieldSeries:
 
     @property
     def is_state(self) -> bool:
-        """True if its newest value is text or boolean."""
+        """True if the newest value is text or boolean."""
         return kind_of_value(self.last) == "state"
 
     def add_values(self, times_s: Sequence[float], payloads: Sequence[object], gaps: Sequence[bool]) -> None:
-        """Add the field's values in messages at these times; ``gaps`` marks missing messages before each."""
+        """Add the field's values from messages.
+
+        ``gaps`` is True where messages are missing before a message.
+        """
         find = self.path.value_in
         times: list[float] = []
         values: list[float] = []
@@ -84,7 +88,7 @@ class FieldSeries:
             self.numbers.break_line()
 
     def rewind(self) -> None:
-        """Clear everything."""
+        """Remove all values."""
         self.numbers.clear()
         self.states.clear()
         self.last = MISSING
@@ -92,7 +96,7 @@ class FieldSeries:
 
 
 def number_of(value: object) -> float:
-    """Convert a number to float; infinite when too large, which is not drawn."""
+    """Convert a number to float; too large numbers become infinite and are not drawn."""
     try:
         return float(value)  # type: ignore[arg-type]
     except OverflowError:
@@ -100,10 +104,13 @@ def number_of(value: object) -> float:
 
 
 class TopicSeries:
-    """All series of one topic; receives its messages (`app.core.series.feed`).
+    """All series of one topic, and receiver of its messages (`app.core.series.feed`).
 
-    ``lost`` counts messages that did not arrive, ``unread`` unreadable or too large ones, ``unplaced`` those
-    with an invalid time stamp. ``payload`` is the newest one.
+    Attributes:
+        lost: Number of messages that did not arrive.
+        unread: Number of messages that can't be decoded or are too large.
+        unplaced: Number of messages with an invalid time stamp.
+        payload: Newest message.
     """
 
     def __init__(self, topic: str, origin_ns: int) -> None:
@@ -119,7 +126,7 @@ class TopicSeries:
         self._silences = 0  # consecutive
 
     def join(self, field: FieldSeries) -> None:
-        """Add a field, read from now on and in the newest message."""
+        """Add a field, which is read from the newest message and from all later ones."""
         self.fields.append(field)
         if self.payload is not MISSING and self._last_s is not None:
             field.add_values([self._last_s], [self.payload], [False])
@@ -158,7 +165,7 @@ class TopicSeries:
             field.add_values(times, payloads, gaps)
 
     def rewind(self) -> None:
-        """Clear: the source moved to another time."""
+        """Remove all values, because the source jumped to another time."""
         self._seqs.clear()
         self._gap, self._last_s, self._usual_s, self._silences = False, None, None, 0
         self.received = self.lost = self.unread = self.unplaced = 0

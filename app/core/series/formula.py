@@ -39,7 +39,7 @@ FUNCTIONS: dict[str, tuple[int, Callable[..., Floats]]] = {
     "min": (2, np.minimum), "max": (2, np.maximum), "floor": (1, np.floor), "ceil": (1, np.ceil),
     "sign": (1, np.sign), "deg": (1, np.degrees), "rad": (1, np.radians),
 }  # fmt: skip
-"""Allowed functions, with their number of arguments."""
+"""Allowed functions, each with its number of arguments."""
 CONSTANTS = {"pi": np.pi, "e": np.e}
 OPERATORS: dict[type[ast.operator], Callable[[Floats, Floats], Floats]] = {
     ast.Add: np.add, ast.Sub: np.subtract, ast.Mult: np.multiply, ast.Div: np.divide, ast.Mod: np.mod,
@@ -65,7 +65,7 @@ class FieldSource:
 
 @dataclass(frozen=True, slots=True)
 class WindowSource:
-    """Change of a source over time, or its mean over the last ``window_s``."""
+    """Change of a source over time, or its mean over the last ``window_s`` seconds."""
 
     kind: Windowed
     of: Source
@@ -77,7 +77,13 @@ class WindowSource:
 
 @dataclass(frozen=True, slots=True)
 class ExpressionSource:
-    """Number calculated from ``inputs``, which ``calculate`` gets in this order; ``text`` is its name."""
+    """Number calculated from several sources.
+
+    Attributes:
+        text: Display name.
+        inputs: Sources.
+        calculate: Calculates the values; the arguments are in the order of `inputs`.
+    """
 
     text: str
     inputs: tuple[Source, ...]
@@ -91,9 +97,9 @@ Source = FieldSource | WindowSource | ExpressionSource
 
 
 def address(text: str, topics: Sequence[str]) -> FieldSource | None:
-    """Return the field if the text is exactly one; otherwise None.
+    """Return the field if the text is a single field; otherwise None.
 
-    Raises `CurveError` when it names a topic with an invalid path.
+    Raises `CurveError` if the text consists of a topic and an invalid path.
     """
     topic = _topic_at(text, topics)
     if topic is None:
@@ -105,9 +111,14 @@ def address(text: str, topics: Sequence[str]) -> FieldSource | None:
 
 
 def parse(text: str, topics: Sequence[str]) -> Source:
-    """Parse a typed curve; ``topics`` are the existing ones.
+    """Parse a curve expression: a field, or a formula with fields.
 
-    Raises `CurveError` with the correction.
+    Args:
+        text: Text that the user typed.
+        topics: Names of the existing topics.
+
+    Raises:
+        CurveError: The expression is invalid; the message says how to fix it.
     """
     text = text.strip()
     if not text or len(text) > MAX_LENGTH:
@@ -276,7 +287,7 @@ def _constant(value: object) -> Floats:
 
 
 def unknown_topic(name: str, topics: Sequence[str]) -> CurveError:
-    """Return the error for an unknown topic, with the most similar one."""
+    """Return the error for an unknown topic, which suggests the most similar one."""
     near = nearest(name, list(topics))
     if near is None:
         return CurveError(_("topic {topic} does not exist").format(topic=name))

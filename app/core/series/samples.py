@@ -1,8 +1,10 @@
-"""Samples of one series over time: bounded, with gaps and a multi-resolution pyramid.
+"""Samples of one series over time, bounded, with gaps and a multi-resolution pyramid.
 
-Values are finite; after a missing one the next is marked as following a gap. For drawing and statistics,
-minimum, maximum and sum are kept for every 16, 128 and 1024 samples, so that a million samples cost no more
-than some thousands. Samples are appended; late ones are inserted in order.
+All values are finite; if a value is missing, the next sample is marked as following a gap. Minimum, maximum
+and sum
+are stored for every 16, 128 and 1024 samples, so that drawing a million samples costs no more than some
+thousands.
+Samples are appended; late ones are inserted in order.
 """
 
 from __future__ import annotations
@@ -18,14 +20,14 @@ from numpy.typing import NDArray
 Floats = NDArray[np.float64]
 Indexes = NDArray[np.intp]
 MAX_SAMPLES = 1 << 20
-"""About a million samples: a quarter of an hour at 1 kHz, 20 MB."""
+"""Maximum number of samples: a quarter of an hour at 1 kHz, 20 MB."""
 MAX_LATENESS_S = 1.0
-"""Maximum lateness of a sample that is inserted; beyond it the clock was set back."""
+"""Maximum lateness of a sample that is inserted. A later one means that the clock was set back."""
 SHIFTS = (4, 7, 10)
 RAW_PER_COLUMN = 4
-"""Maximum number of samples per pixel up to which all of them are drawn."""
+"""Number of samples per pixel up to which each sample is drawn."""
 FEW_RANGES, FEW_NUMBERS = 8, 4096
-"""Numbers up to which a Python loop is faster than vectorized reduction."""
+"""Numbers of ranges and samples up to which a Python loop is faster than a vectorized reduction."""
 _FIRST_ROOM = 1024
 _GRAIN = 1 << SHIFTS[-1]
 _REWRITES_KEPT = 256
@@ -33,7 +35,7 @@ _REWRITES_KEPT = 256
 
 @dataclass(frozen=True, slots=True)
 class Figures:
-    """Statistics of a range: count, minimum, maximum and mean (None: no samples)."""
+    """Statistics of a range; minimum, maximum and mean are None without samples."""
 
     count: int = 0
     least: float | None = None
@@ -43,7 +45,10 @@ class Figures:
 
 @dataclass(frozen=True, slots=True)
 class Line:
-    """Polyline to draw: times (s) and values, NaN at gaps; ``is_whole`` if these are all samples."""
+    """Polyline to draw: times (s) and values, NaN at gaps.
+
+    ``is_whole`` is True if it includes all samples.
+    """
 
     times: Floats
     values: Floats
@@ -52,7 +57,7 @@ class Line:
 
 
 class _Level:
-    """Minimum, maximum and sum of every ``1 << shift`` samples, as far as complete."""
+    """Minimum, maximum and sum of each complete group of ``1 << shift`` samples."""
 
     def __init__(self, shift: int) -> None:
         self.shift, self.built = shift, 0
@@ -84,9 +89,11 @@ class _Level:
 
 @dataclass(slots=True)
 class _Pixels:
-    """Drawn pixels with numbers from ``first`` (inclusive) to ``end`` (exclusive): two points each.
+    """Drawn pixels from ``first`` (inclusive) to ``end`` (exclusive), with two points each.
 
-    ``keys`` are the numbers of non-empty pixels; ``broken`` is whether a gap precedes them.
+    Attributes:
+        keys: Numbers of the pixels that aren't empty.
+        broken: True for pixels after a gap.
     """
 
     first: float = 0.0
@@ -119,7 +126,7 @@ class _Pixels:
 class _Drawn:
     """Cache of the last drawn pixels that later samples can't change.
 
-    A moving plot draws almost the same pixels again.
+    A scrolling plot draws almost the same pixels again.
     """
 
     width_s: float = 0.0
@@ -131,8 +138,11 @@ class _Drawn:
 class Samples:
     """Times in s, ascending, and finite values. Not thread-safe: use it from the window's thread.
 
-    ``begun`` samples were evicted to stay within ``limit`` (the oldest, a quarter at a time), ``undone``
-    removed because a clock was set back. An absolute index includes evicted samples.
+    An absolute index includes evicted samples.
+
+    Attributes:
+        begun: Number of samples evicted to stay within ``limit``; the oldest quarter is evicted at a time.
+        undone: Number of samples removed because a clock was set back.
     """
 
     def __init__(self, limit: int = MAX_SAMPLES) -> None:
@@ -172,7 +182,7 @@ class Samples:
 
     @property
     def last_s(self) -> float | None:
-        """Time of the newest sample."""
+        """Time of the newest sample; None without samples."""
         return float(self._times[self._count - 1]) if self._count else None
 
     @property
@@ -189,7 +199,7 @@ class Samples:
         self._gap_pending = self._count > 0
 
     def extend(self, times: Floats, values: Floats, gaps: NDArray[np.bool_]) -> None:
-        """Append samples in order of arrival; non-finite ones become gaps."""
+        """Append samples in order of arrival; samples that aren't finite become gaps."""
         good = np.isfinite(times) & np.isfinite(values)
         if not good.all():
             gaps = _gaps_carried(gaps, good)
@@ -248,7 +258,7 @@ class Samples:
         self._rewrite(place, time_s)
 
     def truncate(self, time_s: float) -> None:
-        """Remove samples at or after a time: the clock was set back, or a recording continues from there."""
+        """Remove samples at or after a time: the clock was set back, or a recording continues there."""
         place = int(np.searchsorted(self.times, time_s, side="left"))
         if place < self._count:
             self.undone += self._count - place
@@ -268,7 +278,7 @@ class Samples:
         self._rewrites.append((self.rewritten, time_s))
 
     def rewritten_from(self, seen: int) -> float | None:
-        """Return the earliest time changed since ``rewritten`` was ``seen``; None when nothing changed."""
+        """Return the earliest time changed since ``rewritten`` was ``seen``; None if nothing has changed."""
         if seen == self.rewritten:
             return None
         if not self._rewrites or self._rewrites[0][0] > seen + 1:
@@ -312,12 +322,12 @@ class Samples:
     # ------------------------------------------------------------------------------------------------
 
     def places(self, begin_s: float, end_s: float) -> tuple[int, int]:
-        """Return the index range of samples in an inclusive time range: first, and one behind the last."""
+        """Return the index range of the samples in an inclusive time range, as (first, last + 1)."""
         first = np.searchsorted(self.times, begin_s, side="left")
         return int(first), int(np.searchsorted(self.times, end_s, side="right"))
 
     def at(self, time_s: float) -> tuple[float, float] | None:
-        """Return the newest sample up to a time, with its time; None before the first one, and in a gap."""
+        """Return time and value of the newest sample up to a time; None before the first one and in a gap."""
         place = int(np.searchsorted(self.times, time_s, side="right")) - 1
         if place < 0:
             return None
@@ -326,7 +336,7 @@ class Samples:
         return float(self._times[place]), float(self._values[place])
 
     def beside(self, time_s: float, steps: int) -> float | None:
-        """Return the time of the sample ``steps`` after (or before) a time; None when there is none."""
+        """Return the time of the sample ``steps`` samples after (or before) a time; None if there is none."""
         if steps > 0:
             place = int(np.searchsorted(self.times, time_s, side="right")) + steps - 1
         else:
@@ -343,11 +353,11 @@ class Samples:
         return Figures(end - first, float(low[0]), float(high[0]), mean if isfinite(mean) else None)
 
     def line(self, begin_s: float, end_s: float, columns: int) -> Line:
-        """Return what to draw of a range on ``columns`` pixels.
+        """Return the polyline for a range on ``columns`` pixels.
 
-        All samples, or minimum and maximum per pixel.
-
-        Includes one sample on each side of the range, so that the line reaches the edges.
+        Contains all samples, or the minimum and maximum in each pixel, and one sample on each side of the
+        range, so that the
+        line reaches the edges.
         """
         first, end = self.places(begin_s, end_s)
         points = end - first

@@ -1,4 +1,4 @@
-"""States over time: text and boolean values as runs of equal values; bounded, with gaps."""
+"""States over time: text and boolean values as runs of equal values, bounded, with gaps."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ MAX_STATE_LENGTH = 200
 
 @dataclass(frozen=True, slots=True)
 class StateRun:
-    """Value from ``begin_s`` to ``end_s``; ``word`` is None where unknown."""
+    """Value from ``begin_s`` to ``end_s``; ``word`` is None if the value is unknown."""
 
     begin_s: float
     end_s: float
@@ -23,7 +23,7 @@ class StateRun:
 
 
 class States:
-    """Runs of one field. Beyond `MAX_RUNS` changes the oldest are evicted and counted."""
+    """Runs of one field. Beyond `MAX_RUNS` runs, the oldest are evicted and counted."""
 
     def __init__(self, limit: int = MAX_RUNS) -> None:
         self._limit = limit
@@ -36,9 +36,9 @@ class States:
         return len(self._begins)
 
     def add(self, time_s: float, word: str | None, *, gap: bool = False) -> None:
-        """Add a value (None: no value) at a time; ``gap``: messages are missing before.
+        """Add a value (None for no value) at a time; ``gap`` is True if messages are missing before it.
 
-        Slightly late values are ignored; a very late one means that the clock was set back.
+        Slightly late values are ignored. A very late one means that the clock was set back.
         """
         if self.last_s is not None and time_s < self.last_s:
             if self.last_s - time_s <= MAX_LATENESS_S:
@@ -76,9 +76,13 @@ class States:
     def runs(
         self, begin_s: float, end_s: float, *, step_s: float = 0.0, without: Collection[str] | None = None
     ) -> Iterator[StateRun]:
-        """Yield the runs in a range, oldest first; the newest one ends with the last message.
+        """Yield the runs in a range, oldest first. The newest run ends with the last message.
 
-        With ``step_s`` one run per step is enough. ``without``: skip these words, and unknown parts.
+        Args:
+            begin_s: Start of the range.
+            end_s: End of the range.
+            step_s: Duration in which one run is sufficient.
+            without: Values to be skipped; if given, parts with unknown values are skipped too.
         """
         place, end = self._places(begin_s, end_s)
         while place < end:
@@ -91,7 +95,7 @@ class States:
             place = max(place + 1, bisect_right(self._begins, at_s + step_s) - 1)
 
     def words(self, begin_s: float, end_s: float) -> set[str]:
-        """Return the values in a range."""
+        """Return the distinct values in a range."""
         first, end = self._places(begin_s, end_s)
         return {word for word in set(self._words[first:end]) if word is not None}
 
@@ -106,7 +110,7 @@ class States:
         return self._begins[place] if self.last_s is None else self.last_s
 
     def at(self, time_s: float) -> str | None:
-        """Return the value at a time, or None."""
+        """Return the value at a time; None if it is unknown."""
         place = bisect_right(self._begins, time_s) - 1
         return self._words[place] if place >= 0 else None
 
@@ -117,7 +121,7 @@ class States:
         return sum(one != other for one, other in pairwise(words))
 
     def lasted_s(self, word: str, begin_s: float, end_s: float) -> float:
-        """Return how long a value lasted in a range, in seconds."""
+        """Return the total duration of a value in a range, in seconds."""
         return sum(
             max(0.0, min(self._end_of(place), end_s) - max(self._begins[place], begin_s))
             for place in range(*self._places(begin_s, end_s))

@@ -1,4 +1,4 @@
 """Storage: settings and files, written atomically.
 
-Used by behaviours, journals and versions, which it doesn't depend on.
+Used by behaviours, journals and versions; does not depend on them.
 """

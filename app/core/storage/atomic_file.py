@@ -1,6 +1,6 @@
 """Atomic writing and safe reading of Studio's files.
 
-Files that concern only their user (settings, unsaved work, versions) are private, whatever the umask.
+Files that concern only the user (settings, unsaved work, versions) are private, independent of the umask.
 """
 
 from __future__ import annotations
@@ -20,14 +20,16 @@ from nep.system.replace_file import replace_file
 
 LEFT_AFTER_S = 60.0
 MAX_BYTES = 10_000_000
-"""Maximum size of a file that is read into memory."""
+"""Maximum size of a file that is read into memory, in bytes."""
 _PRIVATE_FOLDER, _OTHERS = 0o700, 0o077
 
 
 def read_whole(path: Path, most_bytes: int = MAX_BYTES) -> bytes:
-    """Return the content of a regular file. Raises OSError otherwise, with the reason in ``strerror``.
+    """Return the content of a regular file.
 
-    Never blocks on a pipe, a device, a folder, or a link to one.
+    Raises OSError for anything else, with the reason in ``strerror``.
+
+    Never blocks on a pipe, a device, a folder, or a link to one of these.
     """
     # Without NONBLOCK, opening a pipe waits for its writer forever.
     handle = os.open(path, os.O_RDONLY | getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_BINARY", 0))
@@ -54,17 +56,19 @@ def read_whole(path: Path, most_bytes: int = MAX_BYTES) -> bytes:
 def write_atomically(
     path: Path, data: bytes | Iterable[bytes], *, durable: bool = True, private: bool = False
 ) -> None:
-    """Replace ``path`` by ``data``: readers see the old file or the new one, never a part.
+    """Replace the content of a file. Readers see the old or the new content, never a part of it.
 
-    On OSError the old file is unchanged.
+    If OSError is raised, the old file is unchanged.
 
     Args:
         path: File; its folder is created if necessary.
-        data: Bytes, or parts of them, so that a large file need not fit into memory; exceptions of the
-            iterable cancel the write.
-        durable: Flush to disk before the old file is replaced, so that one of both survives a power cut.
-            Otherwise only a crash of this process is covered.
-        private: Make the file, and a folder that is created, accessible for its owner only.
+        data: Bytes, or an iterable of parts, so that a large file need not fit into memory. An exception of
+            the
+            iterable cancels the write.
+        durable: True to flush the data to disk before the old file is replaced, so that one of both survives
+            a power
+            failure. Otherwise the file survives only a crash of this process.
+        private: True to make the file, and a folder that is created, accessible only to their owner.
     """
     if isinstance(data, bytes) and not data:
         raise ValueError("an empty file is never written over a full one")
@@ -101,14 +105,15 @@ def _remove_stale_parts(path: Path) -> None:
 def private_folder(folder: Path) -> None:
     """Create the folder if necessary, and make it private. Raises OSError if it can't be created.
 
-    Folders of other users are unchanged, as on Windows, where user folders are private already.
+    Folders of other users are left unchanged. On Windows nothing is changed, because user folders are already
+    private.
     """
     folder.mkdir(mode=_PRIVATE_FOLDER, parents=True, exist_ok=True)
     _close_to_others(folder)
 
 
 def make_private(folder: Path, files: str) -> None:
-    """Make a folder and matching files in it private, which earlier versions did not."""
+    """Make a folder and the matching files in it private, because earlier versions did not."""
     if os.name != "posix" or not folder.is_dir():
         return
     _close_to_others(folder)

@@ -1,4 +1,4 @@
-"""CSV (RFC 4180) that is safe for spreadsheets: values of robots are not interpreted as formulas."""
+"""CSV (RFC 4180) that is safe for spreadsheets: values received from robots can't become formulas."""
 
 from __future__ import annotations
 
@@ -10,12 +10,12 @@ _START = ("=", "+", "-", "@", "\t", "\r")
 
 
 def harmless(text: str) -> str:
-    """Prefix a text that a spreadsheet would interpret as a formula with an apostrophe."""
+    """Prefix a text with an apostrophe if a spreadsheet would interpret it as a formula."""
     return f"'{text}" if text.startswith(_START) else text
 
 
 def csv_text(rows: Iterable[Sequence[str]]) -> str:
-    """Return the rows as CSV, each with a line end."""
+    """Return the rows as CSV; each row ends with a line break."""
     out = io.StringIO(newline="")
     csv.writer(out).writerows(rows)
     return out.getvalue()

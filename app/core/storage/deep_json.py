@@ -1,8 +1,10 @@
-"""JSON nested as deep as a long stack of blocks: Blockly nests each block in the one above it.
+"""JSON with deep nesting, as for a long stack of blocks, where Blockly nests each block in the previous one.
 
-Python's json supports about 1000 levels, a stack of 480 blocks. Deeper values are processed in a thread with
-a larger stack, up to `LEVELS` (fewer in early releases of Python 3.12); beyond that RecursionError is raised
-as usual.
+Python's json supports about 1000 levels, which is a stack of 480 blocks. Values with deeper nesting are
+processed in
+a thread with a larger stack, up to `LEVELS` (less in early releases of Python 3.12). Beyond that,
+RecursionError is
+raised as usual.
 """
 
 from __future__ import annotations
@@ -15,9 +17,9 @@ from typing import TypeVar
 
 LEVELS = 9_000
 SHALLOW = 8_000
-"""Number of brackets that can't be nested too deep."""
+"""Number of brackets up to which a text can't be nested too deeply."""
 STACK_BYTES = 255 * 1024 * 1024
-"""Stack size; Python for Windows rejects 256 MiB."""
+"""Size of the stack in bytes; Python for Windows rejects 256 MiB."""
 
 T = TypeVar("T")
 _one_at_a_time = threading.Lock()
@@ -32,9 +34,9 @@ def loads(text: str | bytes) -> object:
 
 
 def dumps(value: object, indent: int | None = None, *, ascii: bool = False) -> str:
-    """Return a value as JSON, escaped with ``ascii``. Raises RecursionError beyond 9000 levels.
+    """Format a value as JSON, with escaped characters if ``ascii``. Raises RecursionError beyond 9000 levels.
 
-    A deep value is not indented: its text would be mostly spaces.
+    A value with deep nesting is not indented, because its text would consist mostly of spaces.
     """
     try:
         return json.dumps(value, indent=indent, ensure_ascii=ascii)
@@ -43,7 +45,7 @@ def dumps(value: object, indent: int | None = None, *, ascii: bool = False) -> s
 
 
 def same(one: object, other: object) -> bool:
-    """Return whether two values are equal, however deep."""
+    """Return True if two values are equal, independent of their depth."""
     return deeply(lambda: one == other)
 
 

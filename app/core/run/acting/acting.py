@@ -147,9 +147,9 @@ class SessionActing:
     def allow(
         self, target: Target, then: Callable[[], object] | None = None, *, is_sure: bool = False
     ) -> str:
-        """Allow sending to a target, then call ``then``; return a sentence why it can't be, or "".
+        """Allow sending to a target and call ``then``; return the reason why that isn't possible, or "".
 
-        For a topic that moves robots `question` is opened first, unless the user ``is_sure``.
+        For a topic that moves robots, `question` is opened first, unless ``is_sure`` is True.
         """
         if not is_sure and self.asks(target):
             names = tuple(name for name in self._moved(target) if name != target.name)
@@ -185,26 +185,29 @@ class SessionActing:
         self.revision += 1
 
     def asks(self, target: Target) -> bool:
-        """Return whether the user must be asked before sending there, because it moves a robot."""
+        """Return True if the user must be asked before sending to a target, because that moves a robot."""
         if target.kind != "topic" or self.arming.is_confirmed(target.name):
             return False
         return target.name in self.recorded_commands or bool(self._moved(target))
 
     @property
     def is_asking(self) -> bool:
-        """True if a question is open, here or before a real robot moves for the first time."""
+        """True if a question is open: `question`, or the one before a real robot moves for the first time."""
         return self.question is not None or self._session.fleet.permission.question is not None
 
     def _moved(self, target: Target) -> tuple[str, ...]:
         return self.gate.moved_by(target.name) if target.kind == "topic" else ()
 
     def may_go_on(self, target: Target) -> bool:
-        """Return whether repeated sending may continue: a robot that it moves may have connected."""
+        """Return True if repeated sending may continue.
+
+        False if the topic now moves a robot, because one has connected.
+        """
         is_permitted = target.kind != "topic" or self.gate.is_permitted(target.name)
         return is_permitted and not self.asks(target)
 
     def tell_moved(self, target: Target, asker: Asker) -> None:
-        """Report the robots that a message moves to `on_moved`. Call it before sending."""
+        """Report the robots that a message moves to `on_moved`. Call this before sending."""
         moved = self._moved(target)
         if moved:
             self.on_moved(moved, _MOVED_BY.get(asker, asker))
@@ -212,13 +215,13 @@ class SessionActing:
     # ---- messages
 
     def new_message(self, topic: str, msg_type: str, text: str) -> KeptMessage | None:
-        """Add a message to the shelf; return None when it is full."""
+        """Add a message to the shelf; return None if the shelf is full."""
         name = self.shelf.free_name(topic.rpartition("/")[2] or _("Message"))
         message = KeptMessage(new_message_id(), name, topic, msg_type or "json", text)
         return message if self.shelf.put(message) else None
 
     def problem_of(self, message: KeptMessage) -> str:
-        """Return a sentence why a message can't be sent, or "" when it can be once armed."""
+        """Return why a message can't be sent, or "" if it can be sent once armed."""
         if not is_written(message.msg_type):
             template = _("Messages of type {type} can't be edited by hand.")
             return template.format(type=message.msg_type)
@@ -234,9 +237,10 @@ class SessionActing:
         return _("Fill in “{name}” first.").format(name=missing[0]) if missing else ""
 
     def send(self, message: KeptMessage, *, rate_hz: float = 0.0) -> str:
-        """Send a message once or at a rate; return a sentence why it can't be, or "".
+        """Send a message once or at a rate; return the reason why that isn't possible, or "".
 
-        While switched off, it is first armed for this topic alone; a robot's topic is asked for again.
+        If sending is switched off, it is switched on for this topic alone; for a robot's topic the user is
+        asked.
         """
         problem = self.problem_of(message)
         if problem:
@@ -247,7 +251,7 @@ class SessionActing:
         return self.send_order(order, rate_hz=rate_hz)
 
     def send_order(self, order: SendOrder, *, rate_hz: float = 0.0) -> str:
-        """Send an order as `send` does; return a sentence why it can't be sent, or ""."""
+        """Send an order in the same way as `send`; return the reason why that isn't possible, or ""."""
         not_now = self._replay_obstacle()
         if not_now:
             return not_now
@@ -266,9 +270,9 @@ class SessionActing:
         return _("A recording is open. Return to live to send.") if self._session.is_replaying else ""
 
     def ready(self, target: Target, go_on: Callable[[], object]) -> str | None:
-        """Return None when messages may be sent there now; else the reason.
+        """Return None if messages may be sent to a target now; otherwise the reason.
 
-        "" when a question is open or ``go_on`` was called already.
+        The reason is "" if a question is open or ``go_on`` was already called.
         """
         if not self.arming.is_on:
             why_not = self.arm()
@@ -287,7 +291,7 @@ class SessionActing:
         return None if self.gate.permits(target.name, still) else ""
 
     def repeat(self, number: int) -> str:
-        """Repeat an entry of `sent` while its target is armed; return why it can't be, or ""."""
+        """Repeat an entry of `sent` while its target is armed; return why that isn't possible, or ""."""
         record = self.sent.get(number)
         if record is None or record.again is None:
             return _("This can't be sent again.")
@@ -296,14 +300,17 @@ class SessionActing:
         return record.again()
 
     def end(self, message_id: str) -> None:
-        """End sending a message."""
+        """Stop sending a message."""
         self.outbox.end(message_id)
         self.revision += 1
 
     # ---- services
 
     def call(self, service: str, text: str, timeout_s: float) -> str:
-        """Call a service with a JSON request, armed first if necessary; return why it can't be, or ""."""
+        """Call a service with a JSON request; return the reason why that isn't possible, or "".
+
+        Sending is switched on for this service if necessary.
+        """
         try:
             request = read_json(text).filled({})
         except NepError as error:
@@ -325,7 +332,7 @@ class SessionActing:
     # ---- interface of the session
 
     def tick(self) -> None:
-        """Process results; switch off when the time is over or another source is shown."""
+        """Process results. Switch off when the time has elapsed or another source is shown."""
         if self._session.sources_shown != self._source_seen:
             self._source_seen = self._session.sources_shown
             self.disarm()
@@ -375,7 +382,7 @@ class SessionActing:
         )  # fmt: skip
 
     def log(self, level: str, target: Target, words: str, sent: int = 0) -> None:
-        """Log what a recording sends; ``sent`` messages have been sent."""
+        """Log a result of sending a recording; ``sent`` is the number of messages that were sent."""
         self.revision += 1
         self._log_to_console(level, f"{target.name}: {words}")
         self._add_record("replay", target.name, words, sent=sent, is_bad=level == "warn")
@@ -390,7 +397,7 @@ class SessionActing:
         self._session.console.add(level, "studio", words)
 
     def check(self) -> None:
-        """Save changes. Called once a second."""
+        """Save the shelf if it changed. Called once a second."""
         self._write()
         try:
             if self._worker.pop_result(FILE):
@@ -402,7 +409,7 @@ class SessionActing:
             self._session.alerts.put("messages:kept", "warn", title, detail, count=0)
 
     def close(self) -> None:
-        """End all sending and save changes."""
+        """Stop all sending and save the shelf."""
         self.disarm()
         self.outbox.close()
         self.calls.close()
@@ -443,7 +450,7 @@ def _ignore() -> None: ...
 
 
 def result_words(result: SendResult) -> str:
-    """Format a result: "heard by 2", "412 sent, 3 left out, being late"."""
+    """Format a result: "received by 2", "412 sent, 3 left out, being late"."""
     if result.kind == "sent":
         return heard_words(result.heard)
     if result.kind == "began":
@@ -457,7 +464,7 @@ def result_words(result: SendResult) -> str:
 
 
 def heard_words(count: int) -> str:
-    """Format the number of subscribers: "heard by 2", "nobody hears it"."""
+    """Format the number of subscribers: "received by 2", "no subscribers"."""
     return (
         ngettext("received by {count}", "received by {count}", count).format(count=count)
         if count
@@ -466,7 +473,7 @@ def heard_words(count: int) -> str:
 
 
 def call_words(record: CallRecord) -> str:
-    """Format the result of a call: "answered in 412 ms", "no answer in 2 s"."""
+    """Format the result of a call, such as the time until the reply."""
     if record.state == "answered":
         return _("replied in {time}").format(time=time_words(record.took_s))
     return record.sentence

@@ -1,4 +1,4 @@
-"""Switch that permits sending: on for some minutes, for named topics and services."""
+"""Switch that allows sending, for some minutes and to selected topics and services."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ MAX_NAMES = 20
 
 
 class Target(NamedTuple):
-    """Topic or service that something is sent to."""
+    """Topic or service to which something is sent."""
 
     kind: Literal["topic", "service"]
     name: str
@@ -30,17 +30,18 @@ class Arming:
         self._targets: tuple[Target, ...] = ()
         self._confirmed: frozenset[str] = frozenset()
         self.turn = 0
-        """Number that changes with each switching; requests of one turn end with it."""
+        """Number that increases with each switching; requests made during one turn are invalid in the next.
+        """
         self.revision = 0
 
     @property
     def is_on(self) -> bool:
-        """True if sending is permitted now."""
+        """True if sending is allowed now."""
         return self._is_on and self._clock() < self._until_s
 
     @property
     def is_over(self) -> bool:
-        """True if the time is over and it was not switched off since."""
+        """True if the time has elapsed and `disarm` was not called since."""
         return self._is_on and self._clock() >= self._until_s
 
     @property
@@ -50,15 +51,15 @@ class Arming:
 
     @property
     def targets(self) -> tuple[Target, ...]:
-        """Permitted targets in the order in which they were added."""
+        """Allowed targets in the order in which they were added."""
         return self._targets
 
     def allows(self, target: Target) -> bool:
-        """Return whether sending to a target is permitted now."""
+        """Return True if sending to a target is allowed now."""
         return self.is_on and target in self._targets
 
     def arm(self, seconds: float = ARMED_S) -> None:
-        """Switch on, or extend to ``seconds`` from now (`MIN_S` to `MAX_S`)."""
+        """Switch on, or extend the time, for ``seconds`` from now (limited to `MIN_S` ... `MAX_S`)."""
         with self._lock:
             if not self.is_on:
                 self._targets, self._confirmed = (), frozenset()
@@ -68,9 +69,9 @@ class Arming:
             self.revision += 1
 
     def allow(self, target: Target, *, is_confirmed: bool = False) -> bool:
-        """Permit a target; return False while off and for more than `MAX_NAMES` targets.
+        """Allow a target; return False while switched off or if there are `MAX_NAMES` targets already.
 
-        ``is_confirmed``: the user knows that this moves a robot.
+        ``is_confirmed`` is True if the user has confirmed that this moves a robot.
         """
         with self._lock:
             if not self.is_on or (target not in self._targets and len(self._targets) >= MAX_NAMES):
@@ -83,18 +84,18 @@ class Arming:
             return True
 
     def is_confirmed(self, topic: str) -> bool:
-        """Return whether the user has confirmed that this topic moves a robot."""
+        """Return True if the user has confirmed that this topic moves a robot."""
         return topic in self._confirmed
 
     def forbid(self, target: Target) -> None:
-        """Remove a target."""
+        """Disallow a target."""
         with self._lock:
             self._targets = tuple(each for each in self._targets if each != target)
             self._confirmed -= {target.name}
             self.revision += 1
 
     def disarm(self) -> bool:
-        """Switch off; return whether it was on. Nothing is sent after this returns."""
+        """Switch off; return True if it was on. Nothing is sent after this returns."""
         with self._lock:
             was_on, self._is_on = self._is_on, False
             self._targets, self._confirmed = (), frozenset()
@@ -104,9 +105,9 @@ class Arming:
             return was_on
 
     def if_armed(self, turn: int, target: Target, do: Callable[[], object]) -> bool:
-        """Call ``do`` if the ``turn`` is unchanged and the target permitted; return whether it was called.
+        """Call ``do`` if the target is allowed and the turn is still ``turn``; return True if it was called.
 
-        Runs with the lock held, so ``do`` must not block.
+        The lock is held meanwhile, so ``do`` must not block.
         """
         with self._lock:
             if turn != self.turn or not self.allows(target):

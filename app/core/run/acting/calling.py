@@ -1,4 +1,4 @@
-"""Manual service calls, one at a time, each with its reply and duration, or the reason of a failure."""
+"""Manual service calls, one at a time, each with its reply or the reason of its failure."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ TIMEOUT_S = 2.0
 MIN_S, MAX_S = 0.1, 120.0
 HISTORY_KEPT = 200
 ANSWERS_KEPT = 20
-"""Number of newest calls whose replies are kept; of older ones only the fact and time."""
+"""Number of newest calls whose replies are stored."""
 ANSWER_LETTERS = 1_000_000
 MAX_CLIENTS = 20
 
@@ -33,10 +33,15 @@ State = Literal["waiting", "answered", "failed", "canceled"]
 
 @dataclass(frozen=True, slots=True)
 class CallRecord:
-    """One call. ``at_s`` is its start (epoch seconds), ``took_s`` its duration.
+    """One call of a service.
 
-    ``sentence`` is the reason of a failure. ``answer`` is the value and ``text`` the same as JSON, shortened
-    if ``is_cut``; both are discarded when newer calls have theirs (then ``is_kept`` is False).
+    Attributes:
+        at_s: Start in seconds since 1970.
+        took_s: Duration.
+        sentence: Reason of a failure.
+        answer: Value of the reply.
+        text: Reply as JSON; truncated if `is_cut` is True.
+        is_kept: False once `answer` and `text` were discarded in favour of newer calls.
     """
 
     number: int
@@ -57,7 +62,7 @@ class CallRecord:
 
 @dataclass(slots=True, eq=False)
 class _CallInFlight:
-    """Call in flight; its end may be set by any thread and counts once."""
+    """Call in flight. Any thread may set the result; only the first one counts."""
 
     number: int
     turn: int
@@ -78,7 +83,10 @@ class _Ended:
 
 
 class ServiceCalls:
-    """Calls while the switch is on, one at a time. Not thread-safe: use it from the window's thread."""
+    """Service calls while sending is switched on, one at a time.
+
+    Not thread-safe: use it from the window's thread.
+    """
 
     def __init__(
         self,
@@ -111,13 +119,13 @@ class ServiceCalls:
 
     @property
     def waited_s(self) -> float:
-        """Time since the call in flight began, in seconds."""
+        """Seconds since the start of the call in flight; 0 if there is none."""
         return self._clock() - self._in_flight.asked_s if self._in_flight is not None else 0.0
 
     def call(self, service: str, request: object, words: str, timeout_s: float) -> CallRecord:
-        """Call a service; ``words`` is the request for display.
+        """Call a service; ``words`` is the request as shown to the user.
 
-        Raises `NepError` while a call is in flight.
+        Raises `NepError` while another call is in flight.
         """
         if self.waiting is not None:
             raise NepError(_("Wait for the reply of {service} first.").format(service=self.waiting.service))
@@ -130,11 +138,11 @@ class ServiceCalls:
         return record
 
     def give_up(self) -> None:
-        """Cancel waiting for the reply; the server may still execute the call."""
+        """Stop waiting for the reply; the server may still execute the call."""
         self._cancel("canceled", _("canceled; the server may still carry it out"))
 
     def tick(self) -> list[CallRecord]:
-        """Apply finished calls; return those that ended since the last call, including cancelled ones."""
+        """Apply finished calls; return those that ended since the last tick, including cancelled ones."""
         while self._ended:
             ended = self._ended.popleft()
             place = next((i for i, each in enumerate(self._records) if each.number == ended.number), None)
@@ -150,7 +158,7 @@ class ServiceCalls:
         return done
 
     def clear(self) -> None:
-        """Discard past calls except one in flight."""
+        """Remove all past calls."""
         waiting = self.waiting
         self._records.clear()
         if waiting is not None:
@@ -247,7 +255,7 @@ class ServiceCalls:
 
 
 def reason_of(error: Exception, timeout_s: float) -> str:
-    """Return the reason of a missing reply: "no answer in 2 s", "refused: no face in sight"."""
+    """Return why there is no reply, such as a timeout or the reason given by the server."""
     if isinstance(error, NoServerError):
         return _("no server")
     if isinstance(error, WaitTimeoutError):

@@ -1,6 +1,7 @@
-"""Editable message text: JSON with placeholders, checked while typing.
+"""Message text that the user edits: JSON with placeholders, checked while typing.
 
 A placeholder is a name in braces in place of a value, outside of strings: ``{"yaw": {yaw}}``. Two are filled
+in
 automatically for each message: ``{new id}`` is a unique string, ``{now}`` the time in seconds since 1970.
 """
 
@@ -19,7 +20,7 @@ from nep.i18n import _
 from nep.messages.json_fault import JsonFault, find_json_fault
 
 MAX_LETTERS = 256 * 1024
-"""Maximum length of an editable text; longer ones are not parsed while typing."""
+"""Maximum length of an editable text; a longer text is not parsed while typing."""
 NEW_ID, NOW = "new id", "now"
 AUTOMATIC: Mapping[str, Callable[[], object]] = {
     NEW_ID: lambda: uuid.uuid4().hex,
@@ -30,7 +31,12 @@ _PLACE = re.compile(r'"(?:[^"\\\n]|\\.)*"?|\{ ?(?P<name>[^\W\d][\w ]{0,38}\w|[^\
 
 
 class JsonText:
-    """Parsed text: its ``fault`` (None for valid JSON), and the names of its ``places`` in order."""
+    """Parsed text of a message.
+
+    Attributes:
+        fault: Syntax error; None for valid JSON.
+        places: Names of the placeholders in order.
+    """
 
     def __init__(self, text: str) -> None:
         self.text = text
@@ -54,16 +60,16 @@ class JsonText:
 
     @property
     def to_fill(self) -> tuple[str, ...]:
-        """Placeholders that the user fills in."""
+        """Placeholders that the user must fill in."""
         return tuple(name for name in self.places if name not in AUTOMATIC)
 
     @property
     def fills_itself(self) -> bool:
-        """True if it has automatic placeholders, so that each message differs."""
+        """True if the text contains automatic placeholders, so that each message differs."""
         return any(name in AUTOMATIC for name in self.places)
 
     def filled(self, values: Mapping[str, object]) -> object:
-        """Return the value with its placeholders filled. Raises `NepError` with a sentence if it can't be."""
+        """Return the value with its placeholders filled in. Raises `NepError` if that isn't possible."""
         if self.fault is not None:
             raise NepError(self.fault.sentence)
         missing = [name for name in self.to_fill if name not in values]
@@ -84,12 +90,12 @@ class JsonText:
 
 @lru_cache(maxsize=64)
 def read_json(text: str) -> JsonText:
-    """Return a parsed text, cached: lists ask for it repeatedly."""
+    """Parse JSON text with placeholders. Cached, because lists request the same text on every refresh."""
     return JsonText(text)
 
 
 def value_typed(text: str) -> object:
-    """Parse a typed value: JSON or a number with a decimal comma, else the text itself."""
+    """Parse a typed value: JSON, a number with a decimal comma, or otherwise the text itself."""
     stripped = text.strip()
     if stripped and find_json_fault(stripped) is None:
         return json.loads(stripped)
@@ -100,7 +106,7 @@ def value_typed(text: str) -> object:
 
 
 def pretty(value: object) -> str:
-    """Format a value as editable JSON; values that JSON lacks become strings."""
+    """Format a value as editable JSON. Values that JSON lacks become strings."""
     return json.dumps(value, indent=2, ensure_ascii=False, default=_to_json_value)
 
 

@@ -1,4 +1,4 @@
-"""Clicked pixel of an image, as a message."""
+"""Pixel of an image that the user clicked, as a message."""
 
 from __future__ import annotations
 
@@ -8,12 +8,12 @@ from typing import Literal
 from nep.geometry import Header, Point, Time
 
 TYPES = ("json", Point.MSG_TYPE, "geometry_msgs/PointStamped")
-"""Message types of a point; "json" has all fields."""
+"""Message types for a point; "json" contains all fields."""
 Button = Literal["left", "middle"]
 
 
 def topic_of(pictures: str) -> str:
-    """Return the default topic for points in the images of a topic."""
+    """Return the default topic for points in the images of topic ``pictures``."""
     return f"{pictures.rstrip('/')}/point"
 
 
@@ -21,8 +21,10 @@ def topic_of(pictures: str) -> str:
 class PicturePoint:
     """Pixel of an image of ``width`` x ``height``, independent of zoom, rotation and mirroring.
 
-    ``x`` counts from the left and ``y`` from the top edge of the received image, from 0; ``stamp_ns`` is the
-    image's own time, or None if its publisher sends none.
+    Attributes:
+        x: Column from the left edge of the received image, from 0.
+        y: Row from the top edge, from 0.
+        stamp_ns: Time stamp of the image; None if its publisher sends none.
     """
 
     x: int
@@ -38,7 +40,7 @@ class PicturePoint:
         return (self.x + 0.5) / max(1, self.width), (self.y + 0.5) / max(1, self.height)
 
     def payload(self, pictures: str, msg_type: str) -> dict[str, object]:
-        """Return the message of one of `TYPES`; ``pictures`` is the image's topic."""
+        """Return the message of one of `TYPES`; ``pictures`` is the topic of the image."""
         stamp = Time.from_ns(self.stamp_ns) if self.stamp_ns is not None else None
         place = asdict(Point(float(self.x), float(self.y), 0.0))
         if msg_type == Point.MSG_TYPE:

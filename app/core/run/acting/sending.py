@@ -1,4 +1,4 @@
-"""Sending messages once or at a rate, evenly spaced, without bursts.
+"""Sending of messages, once or at a rate, with even spacing and without bursts.
 
 Publishers are created in the network thread; one thread sends all repeated messages.
 """
@@ -34,10 +34,13 @@ RESULTS_KEPT = 200
 
 @dataclass(frozen=True, slots=True)
 class SendOrder:
-    """Message to send: ``make`` returns a new payload each time, or raises `NepError`.
+    """Message to send.
 
-    ``source`` is the text that the user wrote, ``asker`` the origin of the request; ``told`` is called with
-    the result by the code that takes results.
+    Attributes:
+        make: Returns a new payload each time, or raises `NepError`.
+        source: Text that the user wrote.
+        asker: Origin of the request.
+        told: Called with the result by the code that collects results.
     """
 
     id: str
@@ -57,10 +60,14 @@ class SendOrder:
 
 @dataclass(frozen=True, slots=True)
 class SendResult:
-    """Result: ``kind`` is "sent", "began", "ended" or "failed"; ``heard`` is the number of subscribers.
+    """Result of sending.
 
-    ``count`` messages were sent at a rate; ``skipped`` were omitted because they were late. ``text`` is the
-    message that was sent once, or "" if it is too large to keep.
+    Attributes:
+        kind: "sent", "began", "ended" or "failed".
+        heard: Number of subscribers.
+        count: Number of messages sent at a rate.
+        skipped: Number of messages that were dropped because they were late.
+        text: Message that was sent once; "" if it is too large to be stored.
     """
 
     order: SendOrder
@@ -74,7 +81,7 @@ class SendResult:
 
 @dataclass(slots=True, eq=False)
 class Repeated:
-    """Repeated message; only its thread changes it."""
+    """Message that is sent repeatedly. Only the sending thread changes it."""
 
     order: SendOrder
     rate_hz: float
@@ -96,9 +103,9 @@ class Repeated:
 
 
 class Outbox:
-    """Sends while the switch is on.
+    """Sends messages while sending is switched on. `pop_results` returns the results.
 
-    Not thread-safe: use it from the window's thread. `take` returns results.
+    Not thread-safe: use it from the window's thread.
     """
 
     def __init__(
@@ -128,7 +135,7 @@ class Outbox:
         return taken
 
     def repeated(self, order_id: str) -> Repeated | None:
-        """Return the state of a repeated message."""
+        """Return the state of a repeated message; None if it isn't being sent."""
         with self._changed:
             return self._repeated.get(order_id)
 
@@ -139,7 +146,7 @@ class Outbox:
             return tuple(self._repeated.values())
 
     def is_going(self, order_id: str) -> bool:
-        """Return whether a message is sent repeatedly, or is about to be."""
+        """Return True if a message is being sent repeatedly or is about to be."""
         with self._changed:
             return order_id in self._repeated or order_id in self._starting
 
@@ -163,7 +170,7 @@ class Outbox:
         self._submit("", self._guarded(order, asked_s, send_it))
 
     def begin(self, order: SendOrder, rate_hz: float) -> bool:
-        """Send a message repeatedly; return False when `MAX_CONCURRENT` is reached."""
+        """Send a message repeatedly; return False if `MAX_CONCURRENT` is reached."""
         rate_hz = min(MAX_HZ, max(MIN_HZ, rate_hz))
         turn, asked_s, token = self._arming.turn, self._clock(), object()
         with self._changed:
@@ -198,7 +205,7 @@ class Outbox:
         return True
 
     def end(self, order_id: str) -> None:
-        """End a repeated message."""
+        """Stop sending a repeated message."""
         with self._changed:
             self._starting.pop(order_id, None)
             ended = self._repeated.pop(order_id, None)
@@ -207,7 +214,7 @@ class Outbox:
             self._report_end(ended)
 
     def end_all(self) -> None:
-        """End all sending and close the publishers."""
+        """Stop all sending and close the publishers."""
         with self._changed:
             self._starting.clear()
             ids = list(self._repeated)
@@ -217,7 +224,7 @@ class Outbox:
             self._submit("", lambda _node: self._close_unused())
 
     def close(self) -> None:
-        """End everything and wait for the thread, which waits for no other."""
+        """Stop all sending and wait for the thread."""
         self.end_all()
         with self._changed:
             self._is_closed = True

@@ -11,18 +11,25 @@ from app.core.run.acting.arming import Target
 
 MAX_ENTRIES = 200
 KEPT_BYTES = 16 * 1024
-"""Size limit of stored messages; larger ones are listed but can't be copied or repeated."""
+"""Maximum size of stored messages. Larger ones are listed but can't be copied or repeated."""
 
 Asker = Literal["publish", "service", "replay", "image", "switch"]
 
 
 @dataclass(frozen=True, slots=True)
 class SentRecord:
-    """Log entry. ``at_s`` is the time of its last occurrence (epoch seconds), ``count`` the number in a row.
+    """Log entry.
 
-    ``name`` is the topic or service, "" for the switch; ``words`` is the result, an error if ``is_bad``.
-    ``text`` is the message or request, "" if too large or none; ``source`` the same as the user wrote it.
-    ``again`` repeats it and returns why it can't, None where that makes no sense.
+    Attributes:
+        at_s: Time of the last occurrence in seconds since 1970.
+        name: Topic or service; "" for the switch.
+        words: Result.
+        is_bad: True if the result is an error.
+        text: Message or request; "" if too large or if there is none.
+        source: Message or request as the user wrote it.
+        again: Repeats the operation and returns why it can't be repeated; None where repeating makes no
+            sense.
+        count: Number of consecutive occurrences.
     """
 
     at_s: float
@@ -42,13 +49,16 @@ class SentRecord:
         return Target("service" if self.asker == "service" else "topic", self.name)
 
     def is_like(self, other: SentRecord) -> bool:
-        """Return whether both describe the same operation and result."""
+        """Return True if both entries describe the same operation and result."""
         facts = (self.asker, self.name, self.words, self.is_bad, self.source)
         return facts == (other.asker, other.name, other.words, other.is_bad, other.source)
 
 
 class SentLog:
-    """Newest `MAX_ENTRIES` entries, oldest first, and the total. Not thread-safe: window's thread only."""
+    """Newest `MAX_ENTRIES` entries, oldest first, and the total number.
+
+    Not thread-safe: use it from the window's thread.
+    """
 
     def __init__(self) -> None:
         self._records: deque[SentRecord] = deque(maxlen=MAX_ENTRIES)
@@ -56,7 +66,7 @@ class SentLog:
         self.total = 0
         """Number of messages and calls sent."""
         self.since_s: float | None = None
-        """Time of the first of them (epoch seconds)."""
+        """Time of the first message or call (seconds since 1970); None before it."""
         self.revision = 0
 
     @property
@@ -69,10 +79,11 @@ class SentLog:
         return next((each for each in self._records if each.number == number), None)
 
     def put(self, record: SentRecord, sent: int) -> None:
-        """Add an entry and number it; ``sent`` is the number of messages or calls sent.
+        """Add and number an entry; ``sent`` is the number of messages or calls that were sent.
 
-        A repetition of the newest entry only increases its count. Large texts and the means to repeat them
-        are not stored.
+        If the entry repeats the newest one, only its count increases. Large texts and the means to repeat
+        them are not
+        stored.
         """
         self.revision += 1
         if sent > 0:
@@ -88,11 +99,11 @@ class SentLog:
             self._records.append(replace(record, number=self._last))
 
     def clear(self) -> None:
-        """Remove the entries; the total stays."""
+        """Remove all entries, but not the total number."""
         self._records.clear()
         self.revision += 1
 
 
 def is_large(text: str) -> bool:
-    """Return whether a text exceeds `KEPT_BYTES`."""
+    """Return True if a text exceeds `KEPT_BYTES`."""
     return len(text) > KEPT_BYTES or len(text.encode("utf-8", "replace")) > KEPT_BYTES

@@ -1,4 +1,4 @@
-"""Shelf: messages saved for sending again, stored in one file beside the settings."""
+"""Shelf: messages saved for repeated use, stored in one file next to the settings."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ MAX_BYTES = 64 * 2**20
 
 
 class NewerShelfError(NepError):
-    """The file was written by a newer version of Studio."""
+    """Raised if the file was written by a newer version of Studio."""
 
 
 def new_message_id() -> str:
@@ -35,7 +35,7 @@ def new_message_id() -> str:
 
 @dataclass(frozen=True, slots=True)
 class KeptMessage:
-    """Saved message. ``values`` are the user's values of its placeholders, by name."""
+    """Saved message. ``values`` are the names of its placeholders with the values that the user entered."""
 
     id: str
     name: str
@@ -46,7 +46,7 @@ class KeptMessage:
     rate_hz: float = 1.0
 
     def payload(self) -> object:
-        """Return a new payload with automatic ids and times. Raises `NepError` with a sentence."""
+        """Return a new payload with automatic ids and times. Raises `NepError` if that isn't possible."""
         if is_plain(self.msg_type):
             return self.text
         typed = {name: value_typed(value) for name, value in self.values if value.strip()}
@@ -54,17 +54,17 @@ class KeptMessage:
 
     @property
     def source(self) -> str:
-        """Text that the user wrote, with the values of its placeholders."""
+        """Text that the user wrote, followed by the values of the placeholders."""
         return "\n".join((self.text, *(f"{name}: {value}" for name, value in self.values)))
 
     def with_value(self, name: str, value: str) -> KeptMessage:
-        """Return a copy with another value of a placeholder."""
+        """Return a copy in which a placeholder has another value."""
         others = {**dict(self.values), name: value[:VALUE_LETTERS]}
         return replace(self, values=tuple(others.items())[-MAX_VALUES:])
 
 
 class Shelf:
-    """Saved messages in order, and the last request of each service. Limited in number."""
+    """Saved messages in order, and the last request of each service; both limited in number."""
 
     def __init__(
         self, messages: Iterable[KeptMessage] = (), requests: Mapping[str, str] | None = None
@@ -85,11 +85,11 @@ class Shelf:
         return self._requests
 
     def get(self, id: str) -> KeptMessage | None:
-        """Return the message with this id."""
+        """Return the message with this id, or None."""
         return next((each for each in self._messages if each.id == id), None)
 
     def put(self, message: KeptMessage) -> bool:
-        """Add a message or replace the one with this id; return False when the shelf is full."""
+        """Add a message or replace the one with the same id; return False if the shelf is full."""
         place = self._index(message.id)
         if place is None:
             if len(self._messages) >= MAX_MESSAGES:
@@ -103,7 +103,7 @@ class Shelf:
         return True
 
     def copy(self, id: str) -> KeptMessage | None:
-        """Insert a copy below a message; return None if it doesn't exist or the shelf is full."""
+        """Insert a copy after a message; return None if that doesn't exist or the shelf is full."""
         place = self._index(id)
         if place is None or len(self._messages) >= MAX_MESSAGES:
             return None
@@ -114,7 +114,7 @@ class Shelf:
         return copied
 
     def free_name(self, wanted: str) -> str:
-        """Return the name, numbered if another message has it: "Stand still 2"."""
+        """Return the name, with a number appended if another message has it: "Stand still 2"."""
         taken = {each.name for each in self._messages}
         number, name = 2, wanted[:NAME_LETTERS]
         while name in taken:
@@ -181,7 +181,7 @@ def shelf_text(shelf: Shelf) -> bytes:
 def read_shelf(data: bytes) -> tuple[Shelf, int]:
     """Parse a file; return the shelf and the number of unreadable messages.
 
-    Raises `NewerShelfError`, and `NepError` if it isn't a shelf.
+    Raises `NewerShelfError`, or `NepError` if the file isn't a shelf.
     """
     try:
         value = json.loads(data.decode("utf-8-sig"))

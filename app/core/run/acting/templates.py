@@ -1,4 +1,4 @@
-"""Templates of messages: the last one of a topic, or an empty one of a type."""
+"""Templates for messages: the last one on a topic, or an empty one of a type."""
 
 from __future__ import annotations
 
@@ -20,12 +20,12 @@ _MAX_DEPTH = 10
 
 
 def is_written(msg_type: str) -> bool:
-    """Return whether messages of this type can be written as text: no images, no bytes."""
+    """Return True if messages of this type can be written as text, which excludes images and bytes."""
     return codec_for(msg_type).name in WRITTEN
 
 
 def is_plain(msg_type: str) -> bool:
-    """Return whether messages of this type are plain text, not JSON."""
+    """Return True if messages of this type are plain text, not JSON."""
     return codec_for(msg_type).name == "string"
 
 
@@ -40,7 +40,7 @@ def text_of_message(message: Message) -> str:
 
 
 def text_of_type(msg_type: str) -> str:
-    """Return an empty message of a type; an empty map where the type declares no fields."""
+    """Return an empty message of a type as text; an empty object if the type has no known fields."""
     if is_plain(msg_type):
         return ""
     return pretty(_example(orjson.loads(schema_of(msg_type)), 0))
