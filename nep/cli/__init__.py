@@ -1,6 +1,6 @@
-"""The command `nep`.
+"""Command-line program `nep`.
 
-`app` assembles the commands; each is one module, such as `echo` for `nep topic echo`.
+`app` assembles the commands; each command is one module, such as `echo` for `nep topic echo`.
 """
 
 from __future__ import annotations

@@ -19,7 +19,7 @@ _LIBRARY = "nep"
 
 
 class AlertChanges:
-    """Difference between the alerts of successive graph snapshots."""
+    """Tracker of alerts that returns the difference between successive graph snapshots."""
 
     def __init__(self) -> None:
         self._known: dict[str, Alert] = {}
@@ -44,7 +44,7 @@ class AlertPrinter:
         self._changes = AlertChanges()
 
     def start(self, _master: Master) -> None:
-        """Do nothing: alerts are printed from the first change on."""
+        """Do nothing; alerts are printed from the first graph change on."""
 
     def changed(self, view: GraphView) -> None:
         """Print the alerts that are new, changed or resolved in `view`."""
@@ -59,7 +59,7 @@ class AlertPrinter:
 
 
 class AlertLog:
-    """Master attachment that publishes alerts and the library's warnings as log records.
+    """Master attachment that publishes alerts, and warnings of the library, as log records.
 
     The records come from a node named "master".
     """
@@ -69,7 +69,7 @@ class AlertLog:
         self._node: Node | None = None
 
     def start(self, master: Master) -> None:
-        """Create the node and forward the library's log records to it."""
+        """Create the node and forward log records of the library to it."""
         self._node = Node("master", master=master.address, wait_s=3.0)
         self._node.log.propagate = False  # AlertPrinter already prints the alerts
         logging.getLogger(_LIBRARY).addHandler(self._node.log_handler)

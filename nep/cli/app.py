@@ -1,4 +1,4 @@
-"""Assembly of the command `nep`: its groups, help texts and exit codes."""
+"""Assembly of the command `nep`: command groups, help texts and exit codes."""
 
 from __future__ import annotations
 
@@ -68,7 +68,7 @@ _COMMANDS: Mapping[str, Callable[[], object]] = {
     "recording": lambda: recordings.app,
     "wire": lambda: wire.app,
 }
-"""Command functions and groups by name, in the order of the help; each is imported on first use."""
+"""Functions that import a command or group, by its name, in the order of the help."""
 
 
 def _show_version(is_wanted: bool) -> None:
@@ -78,7 +78,7 @@ def _show_version(is_wanted: bool) -> None:
 
 
 class _LazyCommands(Mapping[str, Any]):
-    """Lazy mapping of command names to click commands: each is imported and built on first use."""
+    """Lazy mapping of command names to click commands. A command is imported and built on first access."""
 
     def __init__(self) -> None:
         self._built: dict[str, Any] = {}
@@ -96,7 +96,7 @@ class _LazyCommands(Mapping[str, Any]):
 
 
 class _LazyGroup(TranslatedGroup):
-    """Root group that imports only the commands a command line needs."""
+    """Root group that imports only the commands that a command line needs."""
 
     def __init__(self, **named: Any) -> None:  # noqa: ANN401 - see above
         super().__init__(**{**named, "commands": _LazyCommands()})
@@ -147,7 +147,7 @@ def _built_command(name: str) -> typer.Typer:
 
 
 def docstrings() -> Iterator[tuple[CommandInfo, str]]:
-    """Yield each command with the English docstring that is its help."""
+    """Yield each command with its help in English, which is the docstring of the command's function."""
     for name in _COMMANDS:
         yield from _docstrings(_built_command(name))
 
@@ -161,9 +161,10 @@ def _docstrings(group: typer.Typer) -> Iterator[tuple[CommandInfo, str]]:
 
 
 def run() -> int:
-    """Run the command line and return its exit code. Errors are printed to stderr as one sentence.
+    """Run the command line and return its exit code.
 
-    If the reader of the output has closed it (`| head`), the command ends silently with code 1.
+    Errors are printed to stderr as one sentence. If the reader of the output has exited (`| head`), the
+    command ends silently with code 1.
     """
     raised: OSError | None = None
     try:

@@ -1,4 +1,4 @@
-"""`nep blackboard`: run a blackboard for other programs, and show the values of one."""
+"""`nep blackboard`: run a blackboard for other programs, and show the values of a blackboard."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ else:
     )
 
 _DEFAULT_TOPIC = "/blackboard"
-"""Topic on which programs of RIZE publish perceptions."""
+"""Topic on which RIZE programs publish perceptions."""
 _DEFAULT_NAME = "blackboard"
 _TIMEOUT_S = 5.0
 _RUN = "run"
@@ -56,7 +56,7 @@ class _DefaultRunGroup(TranslatedGroup):
     """Group in which `nep blackboard TOPIC` means `nep blackboard run TOPIC`."""
 
     def parse_args(self, ctx: Any, args: list[str]) -> Any:  # noqa: ANN401 - see `TranslatedGroup`
-        """Insert `run` when the first word is not a subcommand."""
+        """Insert the subcommand `run` if the first word is not a subcommand."""
         if not args or (args[0] not in self.commands and args[0] not in ctx.help_option_names):
             args = [_RUN, *args]
         return super().parse_args(ctx, args)

@@ -41,7 +41,7 @@ _CELL_WIDTH = 10
 _MAX_NAME_WIDTH = 60
 _MAX_NOTES = 100
 _MIN_COLUMNS = 6
-"""Number of leading columns that are shown even if all their figures are 0."""
+"""Number of leading columns that are shown even if all their values are 0."""
 _HEADS = (
     lazy("rate"),
     lazy("received"),
@@ -184,7 +184,7 @@ def _show_configuration(configuration: BridgeConfiguration) -> None:
 
 
 class _Notes(logging.Handler):
-    """Log handler for the library's warnings: buffers them while a live table is shown, else prints them."""
+    """Log handler that prints the library's warnings, or buffers them while a live table is shown."""
 
     def __init__(self) -> None:
         super().__init__(logging.WARNING)
@@ -228,7 +228,7 @@ def _published(running: Bridge) -> Iterator[None]:
 
 
 class _Row(NamedTuple):
-    """One route: its name, its figures in the order of `_HEADS`, and its problem."""
+    """Row of the report: name of a route, its counts in the order of `_HEADS`, and its problem."""
 
     name: str
     figures: tuple[str, ...]
@@ -236,7 +236,7 @@ class _Row(NamedTuple):
 
 
 class _Report:
-    """Counts of all routes, shown once a second."""
+    """Report of the counts of all routes, printed once a second."""
 
     def __init__(self, running: Bridge) -> None:
         self._running = running
@@ -282,7 +282,7 @@ def _problem(route: Route, counts: RouteCounts) -> str:
 
 
 class _JsonReport(_Report):
-    """One JSON line per second: the status as on `/nep/bridges`, with rates."""
+    """Report as one JSON line per second: the status as published on `/nep/bridges`, with rates."""
 
     def show(self) -> None:
         status = self._running.status()
@@ -296,7 +296,7 @@ class _JsonReport(_Report):
 
 
 class _PlainReport(_Report):
-    """Lines of the routes whose counts have changed, for a file or a pipe."""
+    """Report for a file or a pipe: prints only routes whose counts have changed."""
 
     def __init__(self, running: Bridge) -> None:
         super().__init__(running)
@@ -325,7 +325,7 @@ class _PlainReport(_Report):
 
 
 class _LiveReport(_Report):
-    """Table that is redrawn in place; warnings are printed above it."""
+    """Report as a table that is redrawn in place; warnings are printed above the table."""
 
     def __init__(self, running: Bridge, notes: _Notes) -> None:
         from rich.live import Live  # noqa: PLC0415 - only a terminal needs it

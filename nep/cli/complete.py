@@ -1,7 +1,7 @@
-"""Shell completion: topics, services, types, nodes and fields of the running master.
+"""Shell completion of topics, services, types, nodes and fields of the running master.
 
-Queries the master with short timeouts and returns nothing if there is none. Must never print or raise: the
-output would land in the line that is being typed.
+Queries the master with short time limits and returns nothing if no master replies. Must never print or raise,
+because the output would appear in the line that is being typed.
 """
 
 from __future__ import annotations
@@ -21,12 +21,12 @@ from nep.system.addresses import host_of, master_address
 
 _CONNECT_TIMEOUT_S = 0.4
 _REPLY_TIMEOUT_S = 3.0
-"""Upper bound for a busy computer; an idle one replies within milliseconds."""
+"""Time limit of a reply for a busy computer, in seconds; normally a master replies within milliseconds."""
 _MESSAGE_TIMEOUT_S = 0.6
 
 
 def complete_topic(ctx: typer.Context, incomplete: str) -> list[str]:
-    """Return topics with this prefix that are not yet on the command line."""
+    """Return the topics that start with `incomplete` and are not on the command line yet."""
     view = _view(ctx)
     given = _given(ctx)
     names = sorted(view.topics) if view is not None else []
@@ -34,34 +34,34 @@ def complete_topic(ctx: typer.Context, incomplete: str) -> list[str]:
 
 
 def complete_service(ctx: typer.Context, incomplete: str) -> list[str]:
-    """Return services with this prefix."""
+    """Return the services that start with `incomplete`."""
     view = _view(ctx)
     return sorted(each for each in view.services if each.startswith(incomplete)) if view is not None else []
 
 
 def complete_type(ctx: typer.Context, incomplete: str) -> list[str]:
-    """Return types of topics with this prefix."""
+    """Return the topic types that start with `incomplete`."""
     view = _view(ctx)
     types = {topic.msg_type for topic in view.topics.values()} if view is not None else set()
     return sorted(each for each in types if each.startswith(incomplete))
 
 
 def complete_service_type(ctx: typer.Context, incomplete: str) -> list[str]:
-    """Return types of services with this prefix."""
+    """Return the service types that start with `incomplete`."""
     view = _view(ctx)
     types = {service.msg_type for service in view.services.values()} if view is not None else set()
     return sorted(each for each in types if each.startswith(incomplete))
 
 
 def complete_node(ctx: typer.Context, incomplete: str) -> list[str]:
-    """Return names of nodes with this prefix."""
+    """Return the names of nodes that start with `incomplete`."""
     view = _view(ctx)
     names = {node.name for node in view.nodes.values()} if view is not None else set()
     return sorted(name for name in names if name.startswith(incomplete))
 
 
 def complete_more(ctx: typer.Context, incomplete: str) -> list[str]:
-    """Return what may follow a topic: fields of its next or latched message, and further topics."""
+    """Return completions after a topic: fields of its next or latched message, and further topics."""
     topic = ctx.params.get("topic")
     fields = _fields(ctx, topic) if isinstance(topic, str) else ()
     return [path for path in fields if path.startswith(incomplete)] + complete_topic(ctx, incomplete)

@@ -1,4 +1,4 @@
-"""`nep doctor`: find out why programs can't connect, and how to fix it."""
+"""`nep doctor`: diagnose why programs can't connect, and show how to fix it."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ MissedArgument = Annotated[
 _STYLES = {"error": "bold red", "warning": "bold yellow", "info": "dim", "ok": "green"}
 _SIGNS = dict(zip(_STYLES, "✗!·✓", strict=True))
 _PLAIN_SIGNS = dict(zip(_STYLES, "x!-+", strict=True))
-"""ASCII signs, for terminals and files that are not Unicode, as on Windows."""
+"""ASCII signs, for output whose encoding lacks the Unicode signs (often on Windows)."""
 
 
 def doctor(master: MasterOption = None, as_json: JsonOption = False, topic: MissedArgument = "") -> None:

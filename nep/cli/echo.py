@@ -34,9 +34,9 @@ from nep.text import escaped, shortened
 _MAX_SHOWN_BYTES = 64
 _MAX_SHOWN_CHARACTERS = 2_000
 _MAX_COLOURED_CHARACTERS = 100_000
-"""Characters; longer messages are not coloured, because that takes a second per megabyte."""
+"""Size in characters above which messages are not coloured; colouring takes a second per megabyte."""
 _RECEIVE_SLICE_S = 0.02
-"""Wait per receive while several topics are subscribed."""
+"""Duration of a single wait in seconds while several topics are subscribed."""
 
 
 TopicArgument = Annotated[
@@ -146,9 +146,9 @@ def _messages(
 
 
 def topics_and_fields(topic: str, more: Sequence[str], graph: GraphView) -> tuple[list[str], list[str]]:
-    """Split the words of a command line into topics and fields.
+    """Split the words of a command line into topics and field paths.
 
-    Words that the graph knows, that begin with "/" or that are patterns are topics.
+    A word is a topic if the graph contains it, if it starts with "/", or if it is a pattern.
     """
     topics, fields = [topic], []
     for word in more:
@@ -215,7 +215,7 @@ def _passes(condition: MessageFilter, message: Message) -> bool:
 
 
 def show_record(message: Message, fields: Fields | None = None) -> None:
-    """Print one message as a line of JSON; with `fields`, these replace the payload."""
+    """Print a message as a line of JSON. Values of `fields`, if given, replace the payload."""
     record: dict[str, object] = {
         "topic": message.topic,
         "msg_type": message.msg_type,
@@ -242,7 +242,7 @@ def show_record(message: Message, fields: Fields | None = None) -> None:
 
 
 class Lines:
-    """Printer of messages for people: time, number, topic and payload, coloured on a terminal."""
+    """Printer of messages for people: time, sequence number, topic and payload, coloured on a terminal."""
 
     def __init__(
         self, fields: Fields | None = None, *, names_topic: bool = False, whole: bool = False
@@ -252,7 +252,7 @@ class Lines:
         Args:
             fields: Fields to print; None prints the whole payload.
             names_topic: Print the topic of each message.
-            whole: Print long values in full, as into a file.
+            whole: Print long values in full on a terminal; files and pipes always get them in full.
         """
         self._fields = fields
         self._names_topic = names_topic

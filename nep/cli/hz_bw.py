@@ -29,7 +29,7 @@ _WAIT_SLICE_S = 0.1
 _MIN_TOPIC_WIDTH = 12
 _MEAN_COLUMN_WIDTH, _LATENCY_COLUMN_WIDTH = 22, 16
 _CLOCK_WARNING_REPORTS = 3
-"""Reports after which the master should have compared the clocks."""
+"""Number of reports after which the master should have compared the clocks."""
 
 TopicsArgument = Annotated[
     list[str],
@@ -115,7 +115,7 @@ def delay(
 
 
 class _Report:
-    """Sliding windows of topics, reported once a second."""
+    """Periodic report of sliding windows of topics."""
 
     def __init__(
         self,
@@ -212,7 +212,7 @@ class _Report:
 
 
 class _DelayReport(_Report):
-    """Report of latencies. Uses callbacks instead of a sink, which would add up to 5 ms."""
+    """Periodic report of latencies. Uses callbacks instead of a sink, which would add up to 5 ms."""
 
     def __init__(self, topics: Sequence[str], window_s: float) -> None:
         heads = (
@@ -228,7 +228,7 @@ class _DelayReport(_Report):
         self._windows = self._ages
         self._unstamped: set[str] = set()
         self._uncompared: dict[str, int] = {}
-        """Topics whose clocks are not compared, and since how many reports."""
+        """Number of reports for each topic whose publisher's clock is not compared yet."""
 
     def _subscribe(self, node: Node, topic: str, msg_type: str) -> Subscriber:
         window = self._ages[topic]
@@ -298,7 +298,7 @@ def _traffic_cells(window: RateWindow, now: float) -> tuple[Bandwidth | None, Se
 
 
 def age(seconds: float, uncertainty_s: float | None) -> str:
-    """Format a latency; a negative one within the clock uncertainty is shown as an upper bound."""
+    """Format a latency. A negative latency within the clock uncertainty is shown as an upper bound."""
     if uncertainty_s and -uncertainty_s <= seconds < 0:
         return _("under {gap}").format(gap=gap(uncertainty_s))
     return gap(seconds)

@@ -1,7 +1,7 @@
-"""Signal handling of a command: Ctrl+C, SIGTERM and SIGHUP.
+"""Signal handling of commands: Ctrl+C, SIGTERM and SIGHUP.
 
-Before and after the command's work Ctrl+C exits at once, because an interrupt during an import or the
-interpreter's shutdown would print a traceback. In between it raises `KeyboardInterrupt`.
+Before and after the command's work, Ctrl+C exits at once, because an interrupt during an import or the
+interpreter's shutdown would print a traceback. In between, Ctrl+C raises `KeyboardInterrupt`.
 """
 
 from __future__ import annotations
@@ -20,31 +20,32 @@ from nep.cli import INTERRUPTED
 __all__ = ["TERMINATED", "ask_first", "call_first", "end_at_once", "leave_when_told"]
 
 TERMINATED = 143
-"""Exit code of a program stopped by SIGTERM."""
+"""Exit code of a program that was stopped by SIGTERM."""
 
 RETRY_S = 0.02
 GRACE_S = 3.0
-"""Time a command has to stop after Ctrl+C; nodes leave the master within 2 s."""
+"""Time in seconds that a command has to stop after Ctrl+C; nodes leave the master within 2 s."""
 
 
 def end_at_once() -> None:
-    """Make Ctrl+C exit silently at once, while there is nothing to clean up."""
+    """Make Ctrl+C exit at once without a message. For phases in which nothing needs cleanup."""
     _handle_interrupt(_end)
 
 
 def ask_first() -> None:
     """Make Ctrl+C raise `KeyboardInterrupt`, so that nodes leave the master.
 
-    A second Ctrl+C, or `GRACE_S` after the first, exits at once: the terminal may be blocked.
+    After a second Ctrl+C, or `GRACE_S` after the first, the process exits at once, because the terminal may
+    be blocked.
     """
     _handle_interrupt(_ask)
 
 
 def call_first(action: Callable[[], object]) -> None:
-    """Make Ctrl+C, SIGTERM and SIGHUP call `action`, which asks the command to finish.
+    """Make Ctrl+C, SIGTERM and SIGHUP call `action`, which requests the command to finish.
 
-    A second signal exits at once. For commands that must finish cleanly, such as a recording. `action` runs
-    in a signal handler: it should only set a flag.
+    For commands that must finish cleanly, such as a recording. A second signal exits at once. `action` runs
+    in a signal handler, so it should only set a flag.
     """
 
     def handle(_signal: int, _frame: FrameType | None) -> None:
@@ -61,7 +62,7 @@ _callers: set[signal._HANDLER] = set()
 
 
 def leave_when_told(code: int = 0) -> None:
-    """Make SIGTERM and SIGHUP exit with `code` after cleanup; a second one exits at once.
+    """Make SIGTERM and SIGHUP exit with `code` after cleanup; a second signal exits at once.
 
     `docker stop`, systemd, `kill` and `timeout` send SIGTERM; a closing terminal sends SIGHUP.
     """

@@ -1,4 +1,4 @@
-"""Parsing of JSON from the command line, standard input and files, with precise error messages."""
+"""Parsing of JSON from the command line, standard input and files, with detailed error messages."""
 
 from __future__ import annotations
 
@@ -27,17 +27,17 @@ def parse_json(
     allow_nan: bool = False,
     other_types: bool = False,
 ) -> object:
-    """Return the value of a JSON text.
+    """Parse a JSON text.
 
     Args:
-        text: What was typed, or the content of `file`.
-        file: Name of the file, for the error message.
-        first_line: Number of the text's first line, for lines of standard input.
-        allow_nan: Accept NaN and Infinity, as Python's `json` writes them.
+        text: JSON from the command line, or the content of `file`.
+        file: Name of the file, for error messages.
+        first_line: Line number of the text in standard input, for error messages.
+        allow_nan: Accept NaN and Infinity, which Python's `json` writes.
         other_types: Suggest ``--type string`` and ``--type msgpack`` in error messages.
 
     Raises:
-        NepError: The text is not valid JSON; names the position and the reason.
+        NepError: The text is not valid JSON; the message names the position and the reason.
     """
     fault = find_json_fault(text, allow_nan=allow_nan)
     if fault is None:
@@ -53,7 +53,7 @@ def parse_json(
 
 
 def text_of(data: bytes, file: str) -> str:
-    """Decode the contents of a text file. Raises `NepError` if it is not UTF-8."""
+    """Decode the content of a text file. Raises `NepError` if the content is not UTF-8."""
     try:
         return data.decode("utf-8-sig")
     except UnicodeDecodeError as error:

@@ -1,4 +1,4 @@
-"""`nep master`: run the master, at which nodes register and find each other."""
+"""`nep master`: run the master."""
 
 from __future__ import annotations
 

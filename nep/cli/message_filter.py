@@ -1,6 +1,6 @@
 """Filter expressions of `nep topic echo --filter`, such as `pose.x > 1.5 and state == "moving"`.
 
-The syntax is the subset of Python that compares fields with values; it is parsed with `ast` and never
+The syntax is a subset of Python for comparisons of fields. Expressions are parsed with `ast` and never
 evaluated as Python. Fields are written as for `nep topic echo`; `m` is the whole message.
 """
 
@@ -35,7 +35,7 @@ class _UnsupportedError(Exception):
 
 
 class MessageFilter:
-    """Condition on payloads. Comparisons with missing fields or values of another type are false."""
+    """Condition on payloads. Comparisons with a missing field or a value of another type are false."""
 
     def __init__(self, text: str) -> None:
         # Raises `NepError` naming the part that is not supported.
@@ -56,7 +56,7 @@ class MessageFilter:
             raise NepError(message.format(part=quotable(part), example=_EXAMPLE)) from error
 
     def matches(self, payload: object) -> bool:
-        """Return whether the condition holds for a payload."""
+        """Return True if a payload fulfils the condition."""
         return _is_true(self._term(payload))
 
 

@@ -1,4 +1,4 @@
-"""Nodes and graph snapshots for commands: through the master, or over the back end of `--backend`."""
+"""Nodes and graph snapshots for commands, through the master or the back end given by `--backend`."""
 
 from __future__ import annotations
 
@@ -40,14 +40,15 @@ BackendOption = Annotated[
 
 
 def node_for(command: str, master: str | None, backend: str | None = None) -> Node:
-    """Open a node for one run of a topic command. Its name ends with the process id to be unique."""
+    """Open a node for one run of a topic command. The process id makes its name unique."""
     return open_node(f"nep-topic-{command}", master, backend)
 
 
 def open_node(name: str, master: str | None, backend: str | None = None) -> Node:
-    """Open a node whose name ends with the process id. NEP_MASTER applies to the default back end only.
+    """Open a node whose name ends with the process id.
 
-    Raises `UnknownBackendError`, `BackendUnavailableError`.
+    NEP_MASTER is used for the default back end only. Raises `UnknownBackendError` or
+    `BackendUnavailableError`.
     """
     name = f"{name}-{os.getpid()}"
     if backend is None:
@@ -57,7 +58,10 @@ def open_node(name: str, master: str | None, backend: str | None = None) -> Node
 
 
 def graph_of(master: str | None, backend: str | None = None) -> GraphView:
-    """Return the graph without the querying node. Raises `MasterUnreachable`, and as `open_node` does."""
+    """Return the graph without the querying node.
+
+    Raises `MasterUnreachable`, and the exceptions of `open_node`.
+    """
     if backend is None:
         return view(master)
     with open_node("nep-graph", master, backend) as node:

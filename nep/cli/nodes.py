@@ -46,7 +46,7 @@ _SERVICE_COLUMNS = (
     TextColumn(lazy("serves"), style="green"),
     TextColumn(lazy("calls"), style="cyan"),
 )
-"""Shown if there are services."""
+"""Columns that are added if there are services."""
 _WIRES = {
     "native": lazy("native"),
     "A": "NEP ≤ 0.5.4.5",

@@ -35,7 +35,7 @@ JsonOption = Annotated[bool, typer.Option("--json", help=_("Print JSON."))]
 
 
 def checked_time(given: float | None) -> float | None:
-    """Return `given` if it is a duration of 0 or more seconds, else raise `typer.BadParameter`."""
+    """Validate a duration in seconds, which must not be negative; raise `typer.BadParameter` otherwise."""
     if given is not None and not given >= 0.0:  # rejects NaN, too
         raise typer.BadParameter(
             _("{given:g} is not a valid duration; use seconds, 0 or more").format(given=given)

@@ -1,4 +1,4 @@
-"""`nep param`: list, get, set and watch parameters of a node; dump them to a file and load them."""
+"""`nep param`: list, get, set and watch parameters of a node; save them to a file and load them."""
 
 from __future__ import annotations
 
@@ -43,7 +43,7 @@ _COLUMNS = (
     TextColumn(lazy("description")),
 )
 _PRESENCE_CHECK_S = 1.0
-"""Interval at which the node's presence is checked."""
+"""Interval in seconds at which the command checks that the node still exists."""
 _NodeArgument = Annotated[
     str,
     typer.Argument(

@@ -46,9 +46,9 @@ else:  # imported on use: other commands stay fast and need no extra packages
 
 _STATUS_PERIOD_S = 0.2
 _ROBOT_DISCOVERY_S = 1.0
-"""Time for robot descriptions to arrive; until then the topics of their programs are blocked."""
+"""Time in seconds to wait for robot descriptions; until then the topics of their programs are blocked."""
 _MAX_TOPICS = 1_000
-"""Each topic needs a publisher, which is announced to the whole network."""
+"""Maximum number of topics, because each needs a publisher that is announced to the whole network."""
 
 
 def play(
@@ -128,7 +128,7 @@ def _named_topics(recording: reader.Recording, words: Sequence[str], *, publish_
 
 
 class _MotionLimits:
-    """Topics that must not be published because they would move robots without permission."""
+    """Set of topics that must not be published because they would move robots without permission."""
 
     def __init__(
         self,

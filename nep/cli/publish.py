@@ -1,4 +1,4 @@
-"""`nep topic pub`: publish messages by hand."""
+"""`nep topic pub`: publish messages from the command line."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ from nep.protocol.graph_view import TopicInfo
 from nep.text import escaped
 
 _MAX_FILE_BYTES = 10**9
-"""Size limit of input files: far above any message, but a device such as /dev/zero never ends."""
+"""Size limit of input files, far above any message; reading a device such as /dev/zero would never end."""
 _MAX_CATCH_UP_S = 0.01
 _WAIT_SLICE_S = 0.02
 _TEXT_TYPES = frozenset({"string"})
@@ -164,12 +164,15 @@ def _warn_of_type(topic: str, kind: str, known: TopicInfo | None) -> None:
 
 
 def encoded_of(text: str, msg_type: str, first_line: int = 1) -> Encoded:
-    """Encode `value_of(text)`, so that invalid values fail before publishing. Raises as it does."""
+    """Encode the payload in `text`, so that an invalid value fails before publishing.
+
+    Arguments and exceptions are those of `value_of`.
+    """
     return codec_for(msg_type).encode(value_of(text, msg_type, first_line))
 
 
 def value_of(text: str, msg_type: str, first_line: int = 1) -> object:
-    """Return the payload that `text` stands for. Raises `NepError`.
+    """Parse the payload in a text. Raises `NepError`.
 
     Args:
         text: JSON, text, or @FILE.
@@ -201,7 +204,7 @@ def _encode_typed(text: str) -> bytes:
 
 
 def read_file(file: Path, msg_type: str) -> bytes:
-    """Read a file of at most `_MAX_FILE_BYTES`. Raises `EncodeError`."""
+    """Read a file of at most `_MAX_FILE_BYTES`. Raises `EncodeError` if the file is larger or unreadable."""
     shown = escaped(str(file))
     try:
         with file.open("rb") as opened:  # bounded: it may be a pipe or an endless device
@@ -261,10 +264,17 @@ def repeat(
     clock: Callable[[], float] = time.monotonic,
     wait: Callable[[float], object] | None = None,
 ) -> None:
-    """Call `send` `count` times (0: forever) at `rate_hz`, in phase with the clock.
+    """Call `send` repeatedly at a fixed rate.
 
-    After a delay of more than `_MAX_CATCH_UP_S` (suspended computer or process) missed calls are skipped, not
-    sent as a burst.
+    After a delay of more than `_MAX_CATCH_UP_S` (suspended computer or process), missed calls are skipped
+    instead of being made up in a burst.
+
+    Args:
+        send: Function to call.
+        rate_hz: Calls per second.
+        count: Number of calls; 0 for no limit.
+        clock: Monotonic clock in seconds.
+        wait: Waits for a number of seconds.
     """
     wait_s, period_s = wait or threading.Event().wait, 1 / rate_hz
     due = clock()

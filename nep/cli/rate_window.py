@@ -1,4 +1,4 @@
-"""Sliding windows behind `nep topic hz`, `bw` and `delay`."""
+"""Sliding windows for `nep topic hz`, `bw` and `delay`."""
 
 from __future__ import annotations
 
@@ -14,12 +14,12 @@ from nep.messages.message import Message
 __all__ = ["MAX_MESSAGES", "AgeWindow", "Bandwidth", "Delay", "Frequency", "RateWindow", "ReplayFilter"]
 
 MAX_MESSAGES = 100_000
-"""Capacity of a window in messages; faster topics are measured over a shorter time."""
+"""Maximum number of messages in a window; topics with higher rates are measured over a shorter time."""
 
 
 @dataclass(frozen=True)
 class Frequency:
-    """Rate (Hz), and the minimum, maximum and standard deviation of the gaps (s)."""
+    """Rate in Hz, and minimum, maximum and standard deviation of the gaps between messages in seconds."""
 
     rate_hz: float
     min_s: float
@@ -30,7 +30,7 @@ class Frequency:
 
 @dataclass(frozen=True)
 class Bandwidth:
-    """Bandwidth (bytes/s), and the mean, minimum and maximum message size (bytes)."""
+    """Bandwidth in bytes/s, and mean, minimum and maximum size of messages in bytes."""
 
     bandwidth_Bps: float  # noqa: N815 - B/s
     mean_bytes: float
@@ -41,9 +41,9 @@ class Bandwidth:
 
 @dataclass(frozen=True)
 class Delay:
-    """Latency: mean, minimum, maximum and standard deviation (s).
+    """Latency of messages: mean, minimum, maximum and standard deviation in seconds.
 
-    `uncertainty_s` is the error bound in either direction, None if the clocks are not compared.
+    `uncertainty_s` is the error bound in either direction; None if the clocks were not compared.
     """
 
     mean_s: float
@@ -67,8 +67,8 @@ class RateWindow:
         """Add a message.
 
         Args:
-            arrived: Arrival time (s, monotonic).
-            stamp_s: Publishing time (s, the publisher's clock); None (original NEP) uses the arrival time.
+            arrived: Time of arrival (s, monotonic).
+            stamp_s: Time of publication (s, publisher's clock); None (original NEP) uses the time of arrival.
             size_bytes: Size of the encoded message.
         """
         with self._lock:
@@ -76,7 +76,7 @@ class RateWindow:
             self._messages.append((arrived, arrived if stamp_s is None else stamp_s, size_bytes))
 
     def frequency(self, now: float) -> Frequency | None:
-        """Return the figures at `now`, or None with fewer than two messages."""
+        """Return the rate at the time `now`, or None if the window has fewer than two messages."""
         moments = sorted(stamp for _, stamp, _ in self._recent(now))
         if len(moments) < 2 or moments[-1] <= moments[0]:
             return None
@@ -86,7 +86,7 @@ class RateWindow:
         return Frequency(1 / mean, min(gaps), max(gaps), deviation, len(moments))
 
     def traffic(self, now: float) -> Bandwidth | None:
-        """Return the figures at `now`, or None with fewer than two messages."""
+        """Return the bandwidth at the time `now`, or None if the window has fewer than two messages."""
         recent = self._recent(now)
         if len(recent) < 2:
             return None
@@ -108,7 +108,10 @@ class RateWindow:
 class ReplayFilter:
     """Detector of latched messages from before the subscription, which would distort the rate.
 
-    `opened` is when the subscription began (s, monotonic). Not thread-safe.
+    Not thread-safe.
+
+    Args:
+        opened: Start of the subscription (s, monotonic).
     """
 
     def __init__(self, opened: float) -> None:
@@ -116,10 +119,14 @@ class ReplayFilter:
         self._publishers: set[int | None] = set()
 
     def is_replay(self, message: Message, now: float) -> bool:
-        """Return whether a message that arrived at `now` (s, monotonic) predates the subscription.
+        """Return True if a message was published before the subscription started.
 
-        While the publisher's clock isn't compared with this one, the first message of each latched publisher
-        counts as a replay.
+        Until the publisher's clock is compared with this computer's clock, the first message of each latched
+        publisher counts as published before.
+
+        Args:
+            message: Received message.
+            now: Time of arrival (s, monotonic).
         """
         if not message.is_latched:
             return False
@@ -130,7 +137,7 @@ class ReplayFilter:
 
 
 class AgeWindow(RateWindow):
-    """Latencies of one topic's messages from the last `seconds`. Thread-safe."""
+    """Latencies of one topic's messages in the last `seconds`. Thread-safe."""
 
     def __init__(self, seconds: float) -> None:
         super().__init__(seconds)
@@ -141,14 +148,15 @@ class AgeWindow(RateWindow):
     ) -> None:
         """Add a message and its latency.
 
-        Latencies from before and after the clocks were compared can't be combined: when `uncertainty_s`
-        changes between None and a number, earlier ones are dropped.
+        Latencies measured before and after the clocks were compared can't be combined: if `uncertainty_s`
+        changes between None and a number, earlier latencies are discarded.
 
         Args:
-            arrived: Arrival time (s, monotonic).
-            age_s: Latency (s), negative if the publisher's clock is ahead; None only counts the message.
+            arrived: Time of arrival (s, monotonic).
+            age_s: Latency in seconds, negative if the publisher's clock is ahead; None only counts the
+                message.
             size_bytes: Size of the encoded message.
-            uncertainty_s: Error bound of the latency, None if the clocks are not compared.
+            uncertainty_s: Error bound of the latency; None if the clocks were not compared.
         """
         if age_s is None:
             with self._lock:
@@ -161,7 +169,7 @@ class AgeWindow(RateWindow):
         self.add(arrived, age_s, size_bytes)
 
     def delay(self, now: float) -> Delay | None:
-        """Return the figures at `now`, or None without a message of known latency."""
+        """Return the latency at the time `now`, or None if the window has no message of known latency."""
         ages = [age for _, age, _ in self._recent(now)]
         if not ages:
             return None

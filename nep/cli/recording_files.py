@@ -1,4 +1,4 @@
-"""Shared parts of the recording commands: arguments, topic selection, progress, times."""
+"""Common parts of the recording commands: arguments, topic selection, progress bar, times."""
 
 from __future__ import annotations
 
@@ -99,7 +99,7 @@ RecordedTopicsArgument = Annotated[
 
 
 def chosen_topics(recording: reader.Recording, words: Sequence[str]) -> list[str]:
-    """Return the topics that names and patterns select, in their order.
+    """Return the topics selected by names and patterns, in the order of these words.
 
     Raises:
         typer.BadParameter: A word matches no topic.
@@ -123,7 +123,7 @@ def chosen_topics(recording: reader.Recording, words: Sequence[str]) -> list[str
 
 
 def end_with_damage(recording: reader.Recording) -> None:
-    """Report damage found in the file and exit with 1; do nothing for an intact file."""
+    """Print the damage of a recording and exit with code 1; do nothing if the recording is intact."""
     words = damage.damage_words(recording.damage, recording.start_ns)
     if words:
         print_status(words)
@@ -133,7 +133,7 @@ def end_with_damage(recording: reader.Recording) -> None:
 def span_ns(
     recording: reader.Recording, begin: str | float | None, end: str | float | None
 ) -> tuple[int | None, int | None]:
-    """Return begin and end of a part of a recording in ns since 1970; see `time_ns`.
+    """Parse begin and end of a part of a recording; return them in ns since 1970. See `time_ns`.
 
     Raises:
         typer.BadParameter: A time is invalid, or the part is empty.
@@ -146,11 +146,11 @@ def span_ns(
 
 
 def time_ns(text: str, start_ns: int, end_ns: int) -> int:
-    """Parse a time within a recording; return ns since 1970.
+    """Parse a time within a recording and return it in ns since 1970.
 
     Accepts seconds after the start ("12.5"), a time of day ("15:04:05", "15:04:05.250", "15:04:05Z") or a
-    date and time ("2026-11-17T15:04:05"); local time unless it ends with "Z" or an offset such as "+02:00". A
-    time of day before the start means the next day if the recording lasts until then.
+    date and time ("2026-11-17T15:04:05"). Times are local unless they end with "Z" or an offset such as
+    "+02:00". A time of day before the start means the next day if the recording lasts until then.
 
     Raises:
         typer.BadParameter: The time is invalid.
@@ -201,7 +201,7 @@ def clock_text(seconds: float) -> str:
 
 @contextmanager
 def progress_bar(said: str) -> Iterator[Callable[[int, int], object]]:
-    """Show a progress bar on stderr if it is a terminal; yield a callback (done, total)."""
+    """Show a progress bar on stderr if stderr is a terminal; yield a callback (done, total)."""
     out = console(stderr=True)
     if not out.is_terminal:
         yield lambda _done, _total: None

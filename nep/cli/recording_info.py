@@ -1,4 +1,4 @@
-"""`nep recording info`: show the content of a recording and its damage."""
+"""`nep recording info`: show the content and the damage of a recording."""
 
 from __future__ import annotations
 

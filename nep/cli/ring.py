@@ -1,4 +1,4 @@
-"""`nep recording ring` and `keep`: buffer the last seconds of messages, and save them on request."""
+"""`nep recording ring` and `keep`: buffer the last seconds of messages and save them on request."""
 
 from __future__ import annotations
 
@@ -34,12 +34,12 @@ else:  # imported on use: other commands stay fast and need no extra packages
 
 _STATUS_PERIOD_S = 0.2
 SAVE_TIMEOUT_S = 120.0
-"""Timeout of a save: copying some GB takes long on a slow disk."""
+"""Time limit of a save in seconds; copying some GB to a slow disk takes long."""
 _FOLDER = ".nep-ring"
 _STOP, _KEEP = "end", "keep"
 _NAME = "flight_recorder"
 KEEP_SERVICE = f"{_NAME}/keep"
-"""Service that saves the last seconds, for a flight recorder with the default name."""
+"""Name of the service that saves the buffer of a flight recorder with the default name."""
 NameOption = Annotated[
     str,
     typer.Option("--name", metavar=_("NAME"), help=_("Name of the flight recorder, if several are running.")),
@@ -47,7 +47,7 @@ NameOption = Annotated[
 
 
 class _Saver:
-    """Saver of a ring's content, one file at a time. Thread-safe."""
+    """Saves the content of a flight recorder to files, one at a time. Thread-safe."""
 
     def __init__(self, ring: rings.FlightRecorder, folder: Path, seconds: float, *, as_json: bool) -> None:
         self._ring, self._folder, self._seconds, self._as_json = ring, folder, seconds, as_json
@@ -186,7 +186,10 @@ def _run_commands(commands: queue.SimpleQueue[str], keeper: _Saver, kept: rings.
 
 
 def has_ring(graph: GraphView, service: str = KEEP_SERVICE) -> bool:
-    """Return whether a flight recorder is running; calling a missing service would wait for its timeout."""
+    """Return True if a flight recorder is running.
+
+    Calling a missing service would wait for the time limit.
+    """
     known = graph.services.get(service)
     return known is not None and bool(known.servers)
 

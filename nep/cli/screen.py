@@ -1,4 +1,4 @@
-"""Output of the command line: tables for people, JSON lines for programs, sentences for errors."""
+"""Output of the command line: tables, JSON lines, status and error messages."""
 
 from __future__ import annotations
 
@@ -26,10 +26,10 @@ if TYPE_CHECKING:
 _COLUMN_GAP = 3
 _MIN_COLUMN_WIDTH = 6
 _MAX_RICH_ROWS = 200
-"""Tables with more rows are laid out without rich, which is slow."""
+"""Number of rows above which tables are laid out without rich, which is slow."""
 _UNLIMITED_WIDTH = 10_000
 UNKNOWN = "\N{EN DASH}"
-"""Placeholder for unknown values."""
+"""Text shown for unknown values."""
 
 
 @dataclass(frozen=True)
@@ -40,11 +40,11 @@ class TextColumn:
     justify: Literal["left", "right"] = "left"
     style: str = ""
     is_whole: bool = False
-    """True if other columns are folded first on a narrow terminal. Numbers are never folded."""
+    """True if this column is folded last on a narrow terminal. Columns of numbers are never folded."""
 
 
 def console(*, stderr: bool = False, out: Terminal | None = None) -> Console:
-    """Return a console for coloured text, on `out` if given. Rich is imported on the first call."""
+    """Return a console for coloured text, writing to `out` if given. Imports rich on the first call."""
     console_type = _console_class()
     return console_type(stderr=stderr, file=cast("IO[str] | None", out), highlight=False, soft_wrap=True)
 
@@ -54,7 +54,7 @@ def _console_class() -> type[Console]:
     from rich.console import Console  # noqa: PLC0415 - 40 ms that `--json` and `--help` need not wait for
 
     class OpenConsole(Console):
-        """Console that raises `BrokenPipeError` for a closed pipe, as plain streams do."""
+        """Console that raises `BrokenPipeError` on a closed pipe, as plain streams do."""
 
         def on_broken_pipe(self) -> None:
             raise BrokenPipeError(errno.EPIPE, _("the output was closed"))
@@ -63,7 +63,7 @@ def _console_class() -> type[Console]:
 
 
 def json_painter() -> Callable[[str, str], Text]:
-    """Return a function that colours a message: a dim head and a JSON body."""
+    """Return a function (head, body) that formats a message with a dim head and a coloured JSON body."""
     from rich.highlighter import JSONHighlighter  # noqa: PLC0415 - see `console`
     from rich.text import Text  # noqa: PLC0415
 
@@ -78,7 +78,7 @@ def json_painter() -> Callable[[str, str], Text]:
 
 
 def show_table(columns: Sequence[TextColumn], rows: Iterable[Sequence[str]]) -> None:
-    """Print a table to stdout, folded to the width of a terminal."""
+    """Print a table to stdout, folded to the width of the terminal."""
     columns = [replace(column, head=_(column.head)) for column in columns]
     is_terminal = sys.stdout.isatty()  # files and pipes have no width
     room = shutil.get_terminal_size().columns if is_terminal else _UNLIMITED_WIDTH
@@ -186,13 +186,13 @@ def show_alerts(alerts: Iterable[Alert], out: Terminal | None = None) -> None:
 
 
 def print_status(sentence: str, out: Terminal | None = None) -> None:
-    """Print a status sentence to stderr or `out`."""
+    """Print a status message to stderr or `out`, ignoring write errors."""
     with suppress(OSError):  # a closed stream is not an error
         console(stderr=True, out=out).print(escaped(sentence), style="dim", markup=False)
 
 
 def say_error(sentence: str) -> None:
-    """Print an error to stderr."""
+    """Print an error message to stderr."""
     print_error(f"nep: {escaped(sentence, lines=True)}")  # plain text: unbuffered and readable for programs
 
 
@@ -203,7 +203,7 @@ def write(text: str) -> None:
 
 
 def show_json(value: object) -> None:
-    """Write a value as one line of JSON in UTF-8, whatever the terminal's encoding, and flush."""
+    """Write a value to stdout as one line of UTF-8 JSON, regardless of the terminal's encoding, and flush."""
     data = json_of(value) + b"\n"
     sys.stdout.flush()
     sys.stdout.buffer.write(data)
@@ -211,7 +211,7 @@ def show_json(value: object) -> None:
 
 
 def rate(value_hz: float | None) -> str:
-    """Format a message rate."""
+    """Format a message rate in messages per second."""
     if value_hz is None:
         return UNKNOWN
     return f"{value_hz:.0f} /s" if value_hz >= 100 else f"{value_hz:.1f} /s"
@@ -230,14 +230,14 @@ def size(value: float | None, per: str = "") -> str:
 
 
 def bandwidth(topic: TopicInfo) -> str:
-    """Format a topic's bandwidth; unknown without subscribers, because messages are not encoded then."""
+    """Format a topic's bandwidth. Unknown for a topic without subscribers, whose messages are not encoded."""
     if topic.rate_hz and not topic.bandwidth_Bps and not topic.subscribers:
         return _("not subscribed")
     return size(topic.bandwidth_Bps, "/s")
 
 
 def duration(seconds: float) -> str:
-    """Format a duration in the largest fitting unit."""
+    """Format a duration in the largest suitable unit."""
     if seconds < 60:
         return f"{max(seconds, 0):.0f} s"
     if seconds < 3600:

@@ -1,4 +1,4 @@
-"""`nep topic echo TOPIC FIELD... --csv`: selected fields as a table (RFC 4180)."""
+"""Output of `nep topic echo TOPIC FIELD... --csv`: selected fields as a table (RFC 4180)."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ class TextSink(Protocol):
 
 
 class Fields:
-    """Extractor of fields from messages; counts messages that lack them."""
+    """Extractor of fields from messages. Counts messages in which a field is missing."""
 
     def __init__(self, names: Sequence[str]) -> None:
         # Raises `NepError` for an invalid field path.
@@ -43,7 +43,7 @@ class Fields:
         self.unreadable = 0
 
     def of(self, message: Message) -> list[object] | None:
-        """Return the field values, with `MISSING` for absent ones; None for an undecodable message."""
+        """Return the field values of a message (`MISSING` for missing ones); None if it can't be decoded."""
         try:
             payload = dict(message.extension) if message.codec == "image" else message.payload
         except DecodeError:
@@ -55,11 +55,11 @@ class Fields:
         return values
 
     def plain(self, values: Sequence[object]) -> dict[str, object]:
-        """Return values from `of` by name, without the missing ones."""
+        """Convert the result of `of` to a dict by field name, without missing fields."""
         return {name: value for name, value in zip(self.names, values, strict=True) if value is not MISSING}
 
     def report_missing(self) -> None:
-        """Print counts of missing fields and undecodable messages to stderr."""
+        """Print the counts of missing fields and of undecodable messages to stderr."""
         for name in self.names:
             if self.missing[name]:
                 print_status(
@@ -77,7 +77,7 @@ class Fields:
 
 
 class Table:
-    """Writer of comma-separated values: the publishing time (s since 1970), then the fields."""
+    """Writer of comma-separated values: the time of publication (s since 1970), followed by the fields."""
 
     def __init__(self, fields: Fields, out: TextSink | None = None, *, names_topic: bool = False) -> None:
         self._fields = fields

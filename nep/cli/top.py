@@ -48,13 +48,13 @@ __all__ = ["TopicOrder", "node_rows", "top", "topic_rows"]
 _WAIT_SLICE_S = 0.1
 _MAX_NAMES_LENGTH = 40
 _FRAME_LINES = 6
-"""Terminal lines without rows: two headings with rules, the summary, and one spare."""
+"""Number of terminal lines that are not rows: two headings with rules, the summary, and a spare line."""
 _NODES_SHARE = 3
-"""Nodes get 1/3 of the rows, plus those that topics don't need."""
+"""Divisor of the rows for nodes: a third, plus rows that topics don't need."""
 
 
 class TopicOrder(str, enum.Enum):
-    """Sort key of the topics: largest figure first, or by name."""
+    """Sort order of topics: by a value, largest first, or by name."""
 
     RATE = "rate"
     BANDWIDTH = "bandwidth"
@@ -168,7 +168,7 @@ def _matches(name: str, pattern: str) -> bool:
 
 
 def topic_rows(graph: GraphView, pattern: str = "", order: TopicOrder = TopicOrder.RATE) -> list[TopicInfo]:
-    """Return the matching topics in this order; equal figures are ordered by name."""
+    """Return the topics that match the pattern, sorted; topics with equal values are sorted by name."""
     found = sorted(
         (topic for topic in graph.topics.values() if _matches(topic.name, pattern)),
         key=lambda each: each.name,
@@ -184,7 +184,7 @@ def topic_rows(graph: GraphView, pattern: str = "", order: TopicOrder = TopicOrd
 
 
 def node_rows(graph: GraphView) -> list[tuple[NodeInfo, float | None]]:
-    """Return nodes with their total publishing rate (Hz), by decreasing CPU use."""
+    """Return the nodes and their total publishing rates in Hz, sorted by decreasing CPU usage."""
     published: dict[str, float] = {}
     for topic in graph.topics.values():
         for publisher in topic.publishers:
@@ -196,7 +196,7 @@ def node_rows(graph: GraphView) -> list[tuple[NodeInfo, float | None]]:
 
 @dataclass
 class _GraphPrinter:
-    """Selection and formatting of a graph snapshot."""
+    """Filtering and formatting of graph snapshots."""
 
     pattern: str
     order: TopicOrder
@@ -265,7 +265,7 @@ class _GraphPrinter:
 
 
 class _LiveTables:
-    """Full-screen tables, cut to the terminal's height; loss counts that have grown are yellow."""
+    """Full-screen tables, truncated to the terminal's height. Loss counts that have increased are yellow."""
 
     def __init__(self, shown: _GraphPrinter, live: Live) -> None:
         self._shown, self._live = shown, live

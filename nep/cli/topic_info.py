@@ -1,4 +1,4 @@
-"""`nep topic info`, `type` and `find`: details and type of a topic, and topics of a type."""
+"""`nep topic info`, `type` and `find`: details and type of a topic, and topics with a given type."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Topic patterns of a command, such as `/*/odom`."""
+"""Topic patterns on the command line, such as `/*/odom`."""
 
 from __future__ import annotations
 
@@ -19,16 +19,16 @@ __all__ = ["TopicPatterns", "is_pattern", "matches"]
 
 _GRAPH_POLL_S = 1.0
 _GRAPH_TIMEOUT_S = 0.3
-"""Short, because waiting for a master that is down delays messages."""
+"""Time limit of a graph query in seconds; short, because waiting for a missing master delays messages."""
 
 
 def is_pattern(word: str) -> bool:
-    """Return whether a word is a topic pattern; words with brackets or quotes are fields."""
+    """Return True if a word is a topic pattern; words with brackets or quotes are field paths."""
     return is_glob(word) and not any(letter in word for letter in "[\"'")
 
 
 class TopicPatterns:
-    """Published topics that match patterns. Queries the graph once a second."""
+    """Finds published topics that match patterns by querying the graph once a second."""
 
     def __init__(self, node: Node, patterns: Sequence[str], known: Collection[str]) -> None:
         # `known`: topics that are already subscribed. Raises `BadTopicError` for an invalid pattern.
@@ -39,7 +39,7 @@ class TopicPatterns:
         self._poll_at = 0.0
 
     def new_in(self, graph: GraphView) -> list[tuple[str, str]]:
-        """Return new matching topics with their types; report patterns without a match once."""
+        """Return new matching topics with their types. Patterns without a match are reported once."""
         self._poll_at = time.monotonic() + _GRAPH_POLL_S
         published = {name: each for name, each in graph.topics.items() if each.publishers}
         for pattern in self.patterns:
@@ -57,7 +57,10 @@ class TopicPatterns:
         return found
 
     def poll(self) -> list[tuple[str, str]]:
-        """Return `new_in` of the current graph, at most once a second; nothing while the master is down."""
+        """Return new matching topics, querying the graph at most once a second.
+
+        Returns none while the master is down.
+        """
         if self.patterns and time.monotonic() >= self._poll_at:
             self._poll_at = time.monotonic() + _GRAPH_POLL_S
             with suppress(NepError):

@@ -1,4 +1,4 @@
-"""Waiting for topics without publishers."""
+"""Waiting for topics that have no publisher yet."""
 
 from __future__ import annotations
 
@@ -16,13 +16,13 @@ from nep.protocol.wire import check_topic
 _GRAPH_POLL_S = 1.0
 _SLICE_S = 0.1
 _GRAPH_TIMEOUT_S = 0.3
-"""Short, because waiting for a master that is down delays messages."""
+"""Time limit of a graph query in seconds; short, because waiting for a missing master delays messages."""
 
 
 class TopicWait:
-    """Topics that a command waits for; each that has no publisher is reported once.
+    """Topics that a command receives. Each topic without publishers is reported once.
 
-    The graph is queried only while no message arrives.
+    The graph is queried only while no messages arrive.
     """
 
     def __init__(self, node: Node, topics: Sequence[str]) -> None:
@@ -34,7 +34,7 @@ class TopicWait:
         self._poll_at = 0.0
 
     def msg_type(self, topic: str) -> str:
-        """Return the topic's type; "json" while it has no publisher."""
+        """Return the type of a topic; "json" while the topic has no publisher."""
         return self._types[topic]
 
     @property
@@ -43,7 +43,7 @@ class TopicWait:
         return frozenset(self._silent)
 
     def update(self, graph: GraphView) -> None:
-        """Report topics that have no publisher (any more), suggesting similar names."""
+        """Report topics that have no publisher, or none any more, and suggest similar names."""
         for topic in self._types:
             known = graph.topics.get(topic)
             if known is not None and known.publishers:
@@ -63,17 +63,17 @@ class TopicWait:
         self._poll_at = time.monotonic() + _GRAPH_POLL_S
 
     def mark_received(self, topics: Collection[str]) -> None:
-        """Note that messages arrived on these topics."""
+        """Record that messages arrived on these topics."""
         self._published_before.update(topics)
         self._silent.difference_update(topics)
         self._poll_at = time.monotonic() + _GRAPH_POLL_S
 
     def slice_s(self, timeout_s: float | None) -> float:
-        """Return how long to wait for a message until the next poll or timeout."""
+        """Return the maximum time in seconds to wait for a message before the next poll."""
         return _SLICE_S if timeout_s is None else min(_SLICE_S, max(0.0, timeout_s))
 
     def poll(self) -> None:
-        """Query the graph if no message arrived for a while; do nothing while the master is down."""
+        """Query the graph if no message arrived for a while. Does nothing while the master is down."""
         if time.monotonic() >= self._poll_at:
             self._poll_at = time.monotonic() + _GRAPH_POLL_S
             with suppress(NepError):
@@ -81,6 +81,6 @@ class TopicWait:
 
 
 def meant(topic: str, names: Sequence[str]) -> str:
-    """Return a "did you mean" sentence with a trailing space, or an empty string."""
+    """Return a "did you mean" question followed by a space, or "" if no name is similar."""
     near = nearest(topic, names)
     return "" if near is None else _("did you mean '{near}'?").format(near=near) + " "

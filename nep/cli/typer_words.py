@@ -1,7 +1,7 @@
 """Translation of typer's own output: usage line, built-in options and usage errors.
 
-Half of typer's sentences go through gettext, to which `nep.i18n.begin` adds our catalogue. The ones here
-don't: they are matched by their English text, so sentences of a later typer may stay English.
+Half of typer's messages are translated with gettext, to which `nep.i18n.begin` adds our catalogue. The
+messages here are matched by their English text, so messages of later typer versions may stay English.
 """
 
 from __future__ import annotations
@@ -43,13 +43,13 @@ _USAGE_ERRORS = (
     lazy("Input should be greater than or equal to {limit}"),
     lazy("Input should be less than or equal to {limit}"),
 )
-"""Templates of usage errors; the first match wins."""
+"""Templates of usage errors; the first matching template is used."""
 _UsageError: Any = typer.BadParameter.__mro__[1]
 """Base class of typer's usage errors, which has no public name."""
 
 
 def translated(english: str) -> str:
-    """Translate a usage error of typer; return unknown sentences unchanged."""
+    """Translate a usage error of typer; an unknown message is returned unchanged."""
     for words, pattern in _patterns():
         found = pattern.fullmatch(english)
         if found is not None:
@@ -94,10 +94,10 @@ def _reflowed(text: str) -> str:
 
 
 class TranslatedCommand(TyperCommand):
-    """Command with translated help."""
+    """Command with translated help texts."""
 
     def format_help(self, ctx: Any, formatter: Any) -> None:  # noqa: ANN401
-        """Write the help with each paragraph joined to one line, so that rich wraps it."""
+        """Write the help with each paragraph joined to one line, because rich wraps the lines."""
         text = self.help
         self.help = _reflowed(text or "")
         try:
@@ -106,7 +106,7 @@ class TranslatedCommand(TyperCommand):
             self.help = text
 
     def get_params(self, ctx: Any) -> Any:  # noqa: ANN401
-        """Return the parameters with translated built-in help."""
+        """Return the parameters, with the help of built-in ones translated."""
         return _translate_helps(super().get_params(ctx))
 
     def format_usage(self, ctx: Any, formatter: Any) -> None:  # noqa: ANN401
@@ -115,10 +115,10 @@ class TranslatedCommand(TyperCommand):
 
 
 class TranslatedGroup(TyperGroup):
-    """Group with translated help and usage errors."""
+    """Command group with translated help texts and usage errors."""
 
     def get_params(self, ctx: Any) -> Any:  # noqa: ANN401
-        """Return the parameters with translated built-in help."""
+        """Return the parameters, with the help of built-in ones translated."""
         return _translate_helps(super().get_params(ctx))
 
     def format_usage(self, ctx: Any, formatter: Any) -> None:  # noqa: ANN401
@@ -126,11 +126,11 @@ class TranslatedGroup(TyperGroup):
         _write_usage(self, ctx, formatter)
 
     def make_context(self, *given: Any, **named: Any) -> Any:  # noqa: ANN401
-        """Parse a command line; translate usage errors."""
+        """Parse the command line, translating usage errors."""
         with _translate_usage_errors():
             return super().make_context(*given, **named)
 
     def invoke(self, ctx: Any) -> Any:  # noqa: ANN401
-        """Run a command; translate usage errors."""
+        """Run the command, translating usage errors."""
         with _translate_usage_errors():
             return super().invoke(ctx)

@@ -1,4 +1,4 @@
-"""Payloads as text: complete JSON for programs, and a shortened form for people."""
+"""Formatting of payloads: complete JSON for programs, and a shortened form for people."""
 
 from __future__ import annotations
 
@@ -17,12 +17,12 @@ from nep.text import escaped, shortened
 __all__ = ["ids_as_text", "json_of", "presented"]
 
 MAX_ITEMS = 20
-"""List items shown on a terminal; the rest is counted."""
+"""Maximum number of list items shown on a terminal; further items are counted."""
 MAX_FIELDS = 100
 MAX_CHARACTERS = 500
 MAX_DEPTH = 40
 _MAX_JSON_DEPTH = 200
-"""Nesting depth of JSON output; deeper values are written as text."""
+"""Maximum nesting depth of JSON output; deeper values are written as text."""
 _IDS = frozenset({"id", "publisher"})
 _CONTROL = re.compile("[\x7f-\x9f\u061c\u200e\u200f\u2028-\u202e\u2066-\u2069\ufeff]")
 _SAFE_INTEGERS = range(-(1 << 63), 1 << 64)
@@ -31,7 +31,7 @@ _SAFE_INTEGERS = range(-(1 << 63), 1 << 64)
 def json_of(value: object, *, indent: bool = False) -> bytes:
     r"""Encode any value as JSON: NaN and infinity become `null`, bytes become hexadecimal digits.
 
-    Terminal control characters are escaped like U+009B as ``\u009b``, which is equivalent JSON.
+    Control characters of terminals are escaped, such as U+009B as ``\u009b``, which is equivalent JSON.
     """
     option = orjson.OPT_NON_STR_KEYS | numpy_option() | (orjson.OPT_INDENT_2 if indent else 0)
     try:
@@ -68,7 +68,7 @@ def _valid_text(text: str) -> str:
 
 
 def ids_as_text(value: object) -> object:
-    """Convert ids in maps and lists to strings: readers with only doubles lose digits beyond 2^53."""
+    """Convert ids in maps and lists to strings, because many JSON readers lose digits beyond 2^53."""
     if isinstance(value, Mapping):
         return {
             key: str(each) if key in _IDS and isinstance(each, int) else ids_as_text(each)
@@ -78,7 +78,7 @@ def ids_as_text(value: object) -> object:
 
 
 def presented(value: object, *, whole: bool, indent: bool = False) -> str:
-    """Format a payload for people: JSON with NaN; long values are shortened unless `whole`."""
+    """Format a payload for people as JSON that may contain NaN. Long values are shortened unless `whole`."""
     limits = (
         (math.inf, math.inf, math.inf, _MAX_JSON_DEPTH)
         if whole
@@ -122,12 +122,12 @@ def _list(value: Sequence[object], items: float, fields: float, letters: float, 
 
 
 def service_type_text(service: ServiceInfo) -> str:
-    """Return the type of a service; nep's own services are untyped."""
+    """Return a description of a service's type; services of nep are untyped."""
     if service.msg_type == SERVICE_TYPE:
         return _("any (each client chooses json or msgpack)")
     return escaped(service.msg_type)
 
 
 def cleaned(text: str) -> str:
-    """Escape control characters in a text of several lines and indent continuation lines."""
+    """Escape control characters in a text of several lines, and indent its continuation lines."""
     return escaped(text, lines=True).replace("\n", "\n    ")

@@ -40,7 +40,7 @@ _GRAPH_TIMEOUT_S = 0.5
 _EVENT_WAIT_S = 0.05
 _ROBOT_DISCOVERY_S = 1.0
 _STUDIO_ACTIONS = frozenset({"run", "stop"})
-"""Actions that only Studio can carry out."""
+"""Kinds of actions that require Studio."""
 _STYLES = {"on": "bold red", "off": "green", "still": "bold red"}
 
 FileArgument = Annotated[
@@ -153,7 +153,7 @@ class _JsonEvents:
 
 
 class _AlarmRunner:
-    """Evaluation of alarms with one node: subscriptions, graph polling and actions."""
+    """Evaluates alarms with one node: subscribes, polls the graph and runs actions."""
 
     def __init__(
         self, node: Node, rules: tuple[AlarmRule, ...], out: _EventLines | _JsonEvents, guard: MotionGuard

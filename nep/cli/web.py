@@ -135,7 +135,7 @@ def _start(server: WebServer) -> None:
 
 
 def _token(file: Path | None, *, is_needed: bool) -> str:
-    """Return the required token, or an empty string. Raises `NepError`."""
+    """Return the token, reading or creating it if needed; "" if none is required. Raises `NepError`."""
     if file is None:
         return new_token() if is_needed else ""
     try:
@@ -158,7 +158,7 @@ def _token(file: Path | None, *, is_needed: bool) -> str:
 
 
 def _written(file: Path) -> str:
-    """Create a file that only its owner can read, with a new token; return the token."""
+    """Create a file with a new token, readable by its owner only; return the token."""
     token = new_token()
     descriptor = os.open(file, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o600)
     with os.fdopen(descriptor, "w", encoding="utf-8") as opened:
@@ -167,7 +167,7 @@ def _written(file: Path) -> str:
 
 
 def _say_running(server: WebServer, terminal: Terminal, *, token_file: Path | None) -> None:
-    """Print the URLs, the access rules, and a missing master."""
+    """Print the URLs and the access rules, and report a missing master."""
     out = console(out=terminal)
     token = server.settings.access.token
     query = query_of(token) if token and token_file is None else ""

@@ -1,4 +1,4 @@
-"""`nep wire`: conformance tests of clients of the native wire."""
+"""`nep wire`: conformance tests for clients of the native wire."""
 
 from __future__ import annotations
 
