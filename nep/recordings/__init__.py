@@ -1,13 +1,13 @@
 """Recordings of messages in MCAP files. See docs/recordings.md.
 
     Record:   with RecordingWriter(path) as writer, Recorder(node, writer, TopicSelection(("/arm/*",))): ...
-              in a process of its own: `nep.recordings.child`; flight recorder: `FlightRecorder`
+              in a separate process: `nep.recordings.child`; flight recorder: `FlightRecorder`
     Read:     with Recording(path) as recording: for log_ns, message in recording.read(start_ns): ...
-              `newest` to seek, `densities` for a timeline, `figures` of losses, `said` by the recorder
+              `newest` to seek, `densities` for a timeline, `figures` for losses, `said` for own entries
     Play:     Player(Playback(recording), sink)
     Repair:   repair(path)
     Export:   export(recording, "csv", folder)
 
-Each name is in the module of its name. The packages of `nep-studio[recordings]` are imported when a recording
-is opened or created; without them `RecordingsUnavailableError` is raised.
+Each class or function is in the module named after it. The packages of `nep-studio[recordings]` are imported
+when a recording is opened or created; without them `RecordingsUnavailableError` is raised.
 """

@@ -1,7 +1,7 @@
 """Bookmarks of a recording: named moments.
 
-Bookmarks made while recording are notes in the file itself. Later ones are in a JSON file beside it: the
-recording is never changed.
+Bookmarks set while recording are stored as notes in the file itself. Later ones are stored in a JSON file
+next to the recording, which is never changed.
 """
 
 from __future__ import annotations
@@ -29,7 +29,10 @@ _MAX_NAME_LENGTH = 200
 
 @dataclass(frozen=True)
 class Bookmark:
-    """Bookmark: time in ns since 1970, and name (may be ""). `is_note`: it is part of the recording."""
+    """Bookmark: time in ns since 1970, and name (may be "").
+
+    `is_note` is True if the recording contains it.
+    """
 
     at_ns: int
     name: str
@@ -37,13 +40,13 @@ class Bookmark:
 
 
 class Bookmarks:
-    """Bookmarks of one recording in order of time. Not thread-safe. Changes are saved at once."""
+    """Bookmarks of one recording, sorted by time. Changes are saved immediately. Not thread-safe."""
 
     def __init__(self, recording: Recording) -> None:
-        """Read the bookmarks. A damaged file counts as empty and is renamed at the next change."""
+        """Read the bookmarks. An unreadable file counts as empty and is renamed at the next change."""
         self._recording = recording
         self.path = recording.path.with_name(f"{recording.path.name}.bookmarks.json")
-        """File of the bookmarks that are not notes."""
+        """File with the bookmarks that are not notes."""
         self._is_damaged = False
         notes: list[Bookmark] = []
         for at_ns, value in recording.said("notes"):
@@ -75,7 +78,10 @@ class Bookmarks:
     # ---- changing them
 
     def add(self, at_ns: int, name: str = "") -> Bookmark:
-        """Add a bookmark within the recording's time. Raises `RecordingError` if it can't be saved."""
+        """Add a bookmark; the time is limited to that of the recording.
+
+        Raises `RecordingError` if the bookmark can't be saved.
+        """
         if len(self._saved) >= MAX_BOOKMARKS:
             reason = _("it already has {most} bookmarks, the maximum; delete one first").format(
                 most=MAX_BOOKMARKS
@@ -87,7 +93,10 @@ class Bookmarks:
         return bookmark
 
     def rename(self, bookmark: Bookmark, name: str) -> Bookmark:
-        """Rename a bookmark. Raises `ValueError` for a note or an unknown bookmark, else as `add` does."""
+        """Rename a bookmark.
+
+        Raises `ValueError` for a note or an unknown bookmark, and `RecordingError` if it can't be saved.
+        """
         new = replace(bookmark, name=name[:_MAX_NAME_LENGTH])
         saved = list(self._saved)
         saved[self._index_of(bookmark)] = new
@@ -95,7 +104,7 @@ class Bookmarks:
         return new
 
     def remove(self, bookmark: Bookmark) -> None:
-        """Remove a bookmark. Raises as `rename` does."""
+        """Remove a bookmark. Raises the exceptions of `rename`."""
         saved = list(self._saved)
         del saved[self._index_of(bookmark)]
         self._save(saved)

@@ -56,15 +56,15 @@ FIGURES_S = 1.0
 _MAX_LINE_BYTES = 1_000_000
 _MAX_SECONDS = 1e9
 _RUN_ROLES = ("runs", "alarms")
-"""Roles accepted by "say"; the recorder itself writes the others."""
+"""Roles that the command "say" accepts; the recorder itself writes the others."""
 _MAX_COPIES = 4
-"""Maximum number of concurrent copies of the ring: each reads and writes at the speed of the disk."""
+"""Maximum number of concurrent copies of the ring; each reads and writes at full disk speed."""
 Tell = Callable[[Mapping[str, object]], object]
 
 
 @dataclass(frozen=True)
 class _OneRecording:
-    """Current recording; it stops at the time `until` (of the clock) or at `most_bytes`, if set."""
+    """Current recording. Stops at the time `until` (of the clock) or at `most_bytes`, if set."""
 
     writer: RecordingWriter
     recorder: Recorder
@@ -81,7 +81,14 @@ class _OneRecording:
 
 
 class RecorderService:
-    """Executor of commands. `tell` is called with events, from any thread, one at a time."""
+    """Executor of commands.
+
+    Args:
+        node: Node that subscribes to the topics; stays open.
+        tell: Called with events, from any thread, one at a time.
+        figures_s: Interval between "figures" events in seconds.
+        clock: Monotonic clock in seconds.
+    """
 
     def __init__(
         self,
@@ -91,12 +98,12 @@ class RecorderService:
         figures_s: float = FIGURES_S,
         clock: Callable[[], float] = time.monotonic,
     ) -> None:
-        """The node remains open."""
+        """Initialize the service; the node is not closed with it."""
         self._clock = clock
         self._node, self._report = node, tell
         self._tell_lock = threading.Lock()
         self._lock = threading.RLock()
-        """Held while a recording or the ring starts or stops."""
+        """Lock that is held while a recording or the ring starts or stops."""
         self._recording: _OneRecording | None = None
         self._ring: tuple[FlightRecorder, Recorder] | None = None
         self._copies: list[threading.Thread] = []
@@ -116,7 +123,7 @@ class RecorderService:
         self._thread.start()
 
     def order(self, line: bytes) -> None:
-        """Execute one line. Errors are reported as events, not raised."""
+        """Execute the command in a line. Errors are reported as events, not raised."""
         try:
             order = orjson.loads(line)
         except orjson.JSONDecodeError:
@@ -140,7 +147,7 @@ class RecorderService:
             self._problem(op, words, path)
 
     def close(self) -> None:
-        """Stop everything and finish the recording. Errors are reported as events, not raised."""
+        """Stop all recording and finish the file. Errors are reported as events, not raised."""
         self._is_ending = True
         self._check_now.set()
         self._thread.join()
@@ -151,7 +158,7 @@ class RecorderService:
             self._report_errors("end_ring", "", lambda: self._end_ring({}))
 
     def report(self, event: str, **content: object) -> None:
-        """Report an event."""
+        """Send an event to the parent process."""
         with self._tell_lock:
             self._report({"event": event, **content})
 
@@ -355,7 +362,7 @@ def _stop_on_signals() -> None:
 
 
 def main(arguments: list[str] | None = None) -> None:
-    """Execute commands from standard input until it ends."""
+    """Run the recorder process: execute commands from standard input until it ends."""
     parser = argparse.ArgumentParser(prog="nep.recordings.child")
     parser.add_argument("--master", default=None)
     parser.add_argument("--transport", default="zeromq")

@@ -1,6 +1,6 @@
-"""Copy a part of a recording with the original channels, bytes, sequence numbers and times.
+"""Copying of a part of a recording with the original channels, bytes, sequence numbers and times.
 
-Recordings of other programs keep their encodings and schemas and get no counts. In nep's own recordings, lost
+Recordings of other programs keep their encodings and schemas and get no counts. In recordings of nep, lost
 and late messages are counted again within the part.
 """
 
@@ -38,8 +38,8 @@ def copy_part(
     """Write a part of a recording to a new, complete file; return its number of messages.
 
     Args:
-        recording: The original.
-        path: The new file; an existing one is overwritten.
+        recording: Recording to copy from.
+        path: File to write; an existing file is overwritten.
         span: Start (inclusive) and end (exclusive) in ns since 1970; None for no limit.
         topics: Topics of the part; topics without messages are included.
         copied: Called for each message.
@@ -152,7 +152,7 @@ class _Copy:
 
 
 class _Figures:
-    """Counter of lost and late messages within the part."""
+    """Counter of the lost and late messages within the part."""
 
     def __init__(self, recording: Recording) -> None:
         self._decoders = {number: ChannelDecoder(each) for number, each in recording.facts.channels.items()}

@@ -1,7 +1,7 @@
 """Export of recordings: values as CSV or Parquet, images as files or video, parts as MCAP.
 
-One file (or folder of images) per topic; one MCAP file of all topics. Existing files are not overwritten, and
-incomplete files are removed. Messages that can't be decoded are skipped and counted.
+Writes one file (or folder of images) per topic, or one MCAP file with all topics. Existing files are not
+overwritten, and incomplete files are removed. Messages that can't be decoded are skipped and counted.
 """
 
 from __future__ import annotations
@@ -30,9 +30,9 @@ __all__ = ["ALL_OF_IT", "FORMATS", "Exported", "Part", "export", "flattened"]
 FORMATS = ("csv", "parquet", "pictures", "mp4", "mcap")
 MAX_COLUMNS = 5_000
 MAX_FILES = 1_000
-"""Maximum number of files, one per topic."""
+"""Maximum number of exported files; there is one per topic."""
 _MAX_LIST_COLUMNS = 100
-"""Maximum length of a list with a column per item; longer lists are one column of JSON."""
+"""Maximum length of a list for a separate column per item; a longer list is one column of JSON."""
 _MAX_DEPTH = 20
 _CELLS_PER_BATCH = 200_000
 _FIRST_COLUMNS = ("time_ns", "time_s", "stamp_ns", "stamp_s", "seq", "publisher")
@@ -43,7 +43,13 @@ Progress = Callable[[int, int], object]
 
 @dataclass(frozen=True)
 class Part:
-    """Part of a recording: times in ns since 1970 (None: no limit), topics (None: all that are suitable)."""
+    """Part of a recording.
+
+    Attributes:
+        start_ns: Start in ns since 1970; None for no limit.
+        end_ns: End in ns since 1970; None for no limit.
+        topics: Names of topics; None for all topics that the format supports.
+    """
 
     start_ns: int | None = None
     end_ns: int | None = None
@@ -58,10 +64,10 @@ class Exported:
     """Exported file or folder.
 
     Attributes:
-        topic: Topic, or "" for a file of all topics.
+        topic: Name of the topic, or "" for a file with all topics.
         path: File or folder.
         count: Number of messages in it.
-        unreadable: Number of messages skipped because they can't be decoded.
+        unreadable: Number of messages that were skipped because they can't be decoded.
     """
 
     topic: str
@@ -81,10 +87,10 @@ def export(
 ) -> list[Exported]:
     """Export a recording to files in a folder, which is created if needed.
 
-    A video is an .avi file where MP4 can't be written.
+    A video is written as .avi if this computer can't write MP4.
 
     Args:
-        recording: The recording.
+        recording: Recording to export.
         kind: One of `FORMATS`.
         folder: Target folder.
         part: Part of the recording.
@@ -97,6 +103,7 @@ def export(
     Raises:
         RecordingError: No topic is suitable, or a file can't be written.
         RecordingsUnavailableError: A package is not installed.
+        ValueError: The format is unknown.
     """
     if kind not in FORMATS:
         raise ValueError(_("unknown format '{kind}'").format(kind=kind))
@@ -131,7 +138,7 @@ def export(
 
 
 def takes(kind: str, codec: str) -> bool:
-    """Return True if messages of this codec can be exported to the format."""
+    """Return True if messages of a codec can be exported to a format."""
     if kind in {"pictures", "mp4"}:
         return codec == "image"
     return kind == "mcap" or codec in {"json", "msgpack", "string"}
@@ -205,7 +212,7 @@ def _file_name(topic: str, used_names: set[str], suffix: str) -> str:
 
 
 class _Progress:
-    """Progress of the whole export."""
+    """Progress of the whole export, over all its files."""
 
     def __init__(self, total: int, progress: Progress | None) -> None:
         self._total, self._progress = total, progress
@@ -218,7 +225,7 @@ class _Progress:
 
 
 class _Source:
-    """Messages of one topic."""
+    """Messages of one topic in the exported part."""
 
     def __init__(self, recording: Recording, topic: str, part: Part, counted: _Progress) -> None:
         self._recording, self.topic, self._part, self._counted = recording, topic, part, counted
@@ -264,7 +271,10 @@ def _encodable(text: str) -> str:
 
 
 def flattened(payload: object) -> dict[str, object]:
-    """Return scalar values by path, such as "pose.x" and "joints[3]", or "value" for a scalar payload."""
+    """Return the scalar values of a payload by field path, such as "pose.x" and "joints[3]".
+
+    The key for a scalar payload is "value".
+    """
     columns: dict[str, object] = {}
     _flatten(payload, "", columns, _MAX_DEPTH)
     return columns

@@ -1,7 +1,7 @@
-"""Raw messages of a recording from any time, with bounded memory.
+"""Reading of raw messages from any time of a recording, with bounded memory.
 
-It works with channels and bytes, not topics and messages (`nep.recordings.reader`), so that it can run in
-another process (`nep.recordings.apart.remote`).
+This module handles channels and bytes; `nep.recordings.reader` handles topics and messages. Therefore it can
+run in another process (`nep.recordings.apart.remote`).
 """
 
 from __future__ import annotations
@@ -32,13 +32,13 @@ __all__ = ["CACHE_BYTES", "FileFacts", "FileReader", "RawFile"]
 
 CACHE_BYTES = 64_000_000
 _MAX_EXACT_CHUNKS = 200
-"""Maximum number of chunks whose message indexes are read for exact counts: some minutes on a screen."""
+"""Maximum number of chunks whose message indexes are read for exact counts; enough for some minutes."""
 _MAX_COUNTED_CHUNKS = 10_000
-"""Maximum number of chunks that are counted; beyond it the file's own statistics are used."""
+"""Maximum number of chunks that are counted; beyond, the statistics in the file are used."""
 _MAX_HELD_BYTES = 64_000_000
-"""Maximum size of overlapping chunks held to sort their messages. Beyond it messages are unsorted."""
+"""Maximum size of overlapping chunks kept in memory to sort their messages; beyond, they are not sorted."""
 _LARGE_CHUNK_BYTES = 8_000_000
-"""Messages of larger chunks are copied, so that a message doesn't keep its whole chunk in memory."""
+"""Chunk size above which messages are copied, so that a message doesn't keep its chunk in memory."""
 
 
 @dataclass(frozen=True)
@@ -47,9 +47,9 @@ class FileFacts:
 
     Attributes:
         channels: Channels by number.
-        counts: Number of messages by channel; 0 for channels without messages.
-        start_ns: Time of the first message in ns since 1970; 0 without messages.
-        end_ns: Time of the last message; 0 without messages.
+        counts: Number of messages by channel, including channels without messages.
+        start_ns: Time of the first message in ns since 1970; 0 if there are no messages.
+        end_ns: Time of the last message; 0 if there are no messages.
         size_bytes: Size of the intact part of the file.
         is_complete: True if the file was closed properly.
         metadata: Metadata records.
@@ -73,7 +73,7 @@ class FileFacts:
 
 
 class RawFile(Protocol):
-    """Recording file that is open for reading, in this or another process. Thread-safe."""
+    """Recording file that is open for reading in this or another process. Thread-safe."""
 
     @property
     def facts(self) -> FileFacts:
@@ -90,16 +90,20 @@ class RawFile(Protocol):
         channels: Collection[int],
         pieces: Collection[int] | None = None,
     ) -> Iterator[RawMessage]:
-        """Iterate over messages of channels by log time, from ``start_ns`` and before ``end_ns``.
+        """Iterate over the messages of channels by log time.
 
-        ``pieces`` restricts it to these chunks (`pieces_of`).
+        Args:
+            start_ns: Start (inclusive), or None.
+            end_ns: End (exclusive), or None.
+            channels: Numbers of the channels.
+            pieces: Chunks to read, as returned by `pieces_of`; None for all.
         """
 
     def newest(self, at_ns: int, groups: Sequence[Collection[int]]) -> list[RawMessage | None]:
-        """Return the last message up to a time for each group of channels."""
+        """Return the last message at or before `at_ns` for each group of channels."""
 
     def newest_times(self, at_ns: int, channels: Collection[int]) -> dict[int, int]:
-        """Return the log time of the last message up to a time by channel, from indexes only."""
+        """Return the log time of the last message at or before `at_ns` by channel. Reads only indexes."""
 
     def densities(
         self, start_ns: int, end_ns: int, buckets: int, channels: Collection[int]
@@ -107,14 +111,14 @@ class RawFile(Protocol):
         """Return the number of messages by channel in each of ``buckets`` equal parts of [start, end)."""
 
     def pieces_of(self, channels: Collection[int]) -> Sequence[int]:
-        """Return the chunks with messages of these channels, in order."""
+        """Return the numbers of the chunks that contain messages of these channels, in order."""
 
     def close(self) -> None:
         """Close the file; later calls raise `ClosedError`. Idempotent."""
 
 
 class _LoadedChunk:
-    """Chunk in memory."""
+    """Decompressed chunk in memory."""
 
     def __init__(self, data: bytes | memoryview) -> None:
         self.data = data
@@ -146,7 +150,7 @@ class _LoadedChunk:
 
 
 class FileReader:
-    """Recording file read in this process (a `RawFile`)."""
+    """Recording file that is read in this process (a `RawFile`)."""
 
     def __init__(
         self,
@@ -156,12 +160,12 @@ class FileReader:
         progress: Callable[[int, int], object] | None = None,
         budget: ReadBudget | None = None,
     ) -> None:
-        """Open the file, from its summary, or by walking over its records without one.
+        """Open a file using its summary; if there is none, by scanning the records.
 
         Args:
-            path: The file.
+            path: File to open.
             cache_bytes: Maximum size of cached decompressed chunks.
-            progress: Called with bytes done and in total during a walk; its exceptions propagate.
+            progress: Called with bytes done and in total during a scan; its exceptions propagate.
             budget: Limit of the work until the file is closed. Default: only opening is limited.
 
         Raises:
@@ -247,7 +251,7 @@ class FileReader:
             )
 
     def chunks(self) -> Sequence[ChunkInfo]:
-        """Return the chunks of the file in order of time."""
+        """Return the chunks of the file, sorted by time."""
         return tuple(self._chunks)
 
     # ---- reading
@@ -312,7 +316,7 @@ class FileReader:
         return numbers[bisect_left(numbers, first) : bisect_left(numbers, last)]
 
     def newest(self, at_ns: int, groups: Sequence[Collection[int]]) -> list[RawMessage | None]:
-        """Return the last message up to a time for each group of channels. See `RawFile.newest`."""
+        """Return the last message at or before a time for each group of channels. See `RawFile.newest`."""
         found: list[RawMessage | None] = []
         for group in groups:
             places = [
@@ -324,7 +328,7 @@ class FileReader:
         return found
 
     def newest_times(self, at_ns: int, channels: Collection[int]) -> dict[int, int]:
-        """Return the log time of the last message up to a time by channel. See `RawFile.newest_times`."""
+        """Return the log time of the last message by channel. See `RawFile.newest_times`."""
         places = {channel: self._last_before(channel, at_ns) for channel in channels}
         return {channel: place[0] for channel, place in places.items() if place is not None}
 
@@ -374,8 +378,9 @@ class FileReader:
     ) -> dict[int, Sequence[int]]:
         """Return the number of messages by channel in each part of [start, end). See `RawFile.densities`.
 
-        Payloads are not read. Short times are counted exactly from the indexes; for long ones the messages of
-        a chunk are spread evenly over its time, at most half a second in nep's own recordings.
+        Payloads are not read. Short spans are counted exactly with the indexes. For long spans, the messages
+        of a chunk are distributed evenly over its duration, which is at most half a second in recordings of
+        nep.
         """
         result: dict[int, list[int]] = {}
         first = bisect_left(self._latest_ends, max(0, start_ns))
@@ -397,7 +402,7 @@ class FileReader:
         return dict(result)
 
     def pieces_of(self, channels: Collection[int]) -> Sequence[int]:
-        """Return the chunks with messages of these channels. See `RawFile.pieces_of`."""
+        """Return the numbers of the chunks with messages of these channels. See `RawFile.pieces_of`."""
         return sorted({number for channel in channels for number in self._in_chunks.get(channel, ())})
 
     def _counts(self, number: int) -> Mapping[int, int]:
@@ -415,7 +420,15 @@ class FileReader:
     def check(
         self, progress: Callable[[int, int], object] | None = None, most_bytes: int | None = None
     ) -> bool:
-        """Read every chunk once, to complete `damage`; return False if ``most_bytes`` was exceeded."""
+        """Read every chunk once, so that `damage` is complete.
+
+        Args:
+            progress: Called with bytes done and in total.
+            most_bytes: Maximum decompressed size to read; None for no limit.
+
+        Returns:
+            False if the check stopped at `most_bytes`.
+        """
         done, whole = 0, sum(each.length for each in self._chunks)
         expanded = 0
         for number, chunk in enumerate(self._chunks):

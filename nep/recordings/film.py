@@ -1,7 +1,7 @@
-"""Videos of a recording's images, in a container that OpenCV can write on this computer.
+"""Videos from a recording's images, in a container that OpenCV can write on this computer.
 
-MP4 needs FFmpeg, which Studio's packages leave out; OpenCV itself writes Motion JPEG in .avi files, which the
-players of Windows and Linux, and VLC, can play.
+MP4 requires FFmpeg, which Studio's packages don't include. OpenCV itself can write Motion JPEG in .avi files,
+which VLC and the players of Windows and Linux support.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from nep.system.replace_file import replace_file
 __all__ = ["Container", "Film", "available_container", "frame_of"]
 
 MAX_S = 86_400.0
-"""Maximum duration: an image of another day would lead to millions of frames."""
+"""Maximum duration in seconds; an image from another day would cause millions of frames."""
 _TRIAL_SIZE_PX = (64, 48)
 
 
@@ -33,7 +33,7 @@ class Container:
     api: str
 
     def writer(self, opencv: Any, path: Path, fps: float, size: tuple[int, int]) -> Any:  # noqa: ANN401
-        """Return an OpenCV writer for such a file; it may not be open."""
+        """Create an OpenCV writer for a file; check `isOpened` of the writer."""
         code = opencv.VideoWriter_fourcc(*self.fourcc)
         return opencv.VideoWriter(str(path), getattr(opencv, self.api), code, fps, size)
 
@@ -43,7 +43,7 @@ CONTAINERS = (Container(".mp4", "mp4v", "CAP_ANY"), Container(".avi", "MJPG", "C
 
 
 def available_container(opencv: Any, folder: Path) -> Container:  # noqa: ANN401 - a module
-    """Return the first container that can be written to a folder, whose files are not touched.
+    """Return the first container that OpenCV can write, trying in a temporary subfolder of `folder`.
 
     Raises `RecordingError` if there is none, and `OSError` if the folder is not writable.
     """
@@ -58,7 +58,7 @@ def available_container(opencv: Any, folder: Path) -> Container:  # noqa: ANN401
 
 
 def frame_of(opencv: Any, message: Message) -> Any:  # noqa: ANN401 - an array
-    """Return an image with three channels of 8 bits, or None if it can't be decoded."""
+    """Convert an image to three channels of 8 bits; return None if the image can't be decoded."""
     try:
         frame: Any = message.payload
     except DecodeError:
@@ -73,7 +73,7 @@ def frame_of(opencv: Any, message: Message) -> Any:  # noqa: ANN401 - an array
 
 
 class Film:
-    """Video with a constant frame rate, in the size of its first image."""
+    """Video file with a constant frame rate. The first image determines the frame size."""
 
     def __init__(
         self,
@@ -92,7 +92,10 @@ class Film:
         self._written = path.with_name(f"{path.name}{container.suffix}")
 
     def add(self, log_ns: int, frame: Any) -> None:  # noqa: ANN401 - an array
-        """Add an image. Raises `RecordingError` if the video can't be written or is too long."""
+        """Add an image at a time in ns since 1970.
+
+        Raises `RecordingError` if the video can't be written or is too long.
+        """
         if self._film is None:
             height, width = frame.shape[:2]
             self._size = (width // 2 * 2 or 2, height // 2 * 2 or 2)
@@ -111,9 +114,9 @@ class Film:
         self._last = frame
 
     def finish(self) -> None:
-        """Write the last frame and close. Raises `RecordingError` if frames are missing in the file.
+        """Write the last frame and close the file. Raises `RecordingError` if frames are missing in the file.
 
-        OpenCV does not report a full disk, so the frames are counted.
+        OpenCV does not report a full disk, so the frames in the file are counted.
         """
         if self._film is None:
             return
@@ -128,12 +131,12 @@ class Film:
         replace_file(self._written, self._path)
 
     def close(self) -> None:
-        """Close the file as it is. Idempotent."""
+        """Close the file without completing the video. Idempotent."""
         if self._film is not None:
             self._film.release()
 
     def remove(self) -> None:
-        """Close and remove an incomplete file."""
+        """Close and delete an incomplete file."""
         self.close()
         with suppress(OSError):
             self._written.unlink(missing_ok=True)

@@ -1,8 +1,8 @@
-"""Replay of recordings in their original timing.
+"""Replay of recordings with their original timing.
 
-`Playback` is the timing, with an injected clock and without waiting. `Player` is a thread that passes due
-messages to a sink. Neither publishes: a sink may do so. Helpers for such sinks, above all to find the topics
-that move robots, are here, too.
+`Playback` contains the timing, with an injected clock and without waiting. `Player` is a thread that passes
+due messages to a sink. Neither publishes messages; a sink may. The module also contains functions for such
+sinks, above all to find the topics that move robots.
 """
 
 from __future__ import annotations
@@ -46,13 +46,16 @@ __all__ = [
 
 SPEED_MIN, SPEED_MAX = 0.1, 10.0
 _MAX_LAG_S = 0.25
-"""Maximum backlog of a slow sink: instead of a burst the playback slows down, reported in `true_speed`."""
+"""Maximum delay caused by a slow sink in seconds.
+
+Beyond, playback slows down (see `PlayerStatus.true_speed`) instead of catching up with a burst.
+"""
 _MAX_BATCH = 2_000
 _MAX_WAIT_S = 0.05
 _SPEED_WINDOW_S = 1.0
 _MAX_KINDS = 10_000
 _COMMAND_TYPES = frozenset({COMMAND_TYPE, "geometry_msgs/Twist", "geometry_msgs/TwistStamped"})
-"""Message types that move a robot or a ROS base (docs/robots.md)."""
+"""Message types of commands that move a robot or a ROS base (docs/robots.md)."""
 _MAX_DESCRIPTIONS = 10_000
 
 
@@ -65,9 +68,9 @@ class PlayerStatus:
         is_playing: True while playing.
         is_at_end: True at the end of the part or recording.
         speed: Requested speed.
-        true_speed: Speed over the last second, or None while paused or unknown.
-        loop: Start and end of the looped part, or None for all.
-        is_looping: True if the part repeats.
+        true_speed: Speed over the last second; None while paused or unknown.
+        loop: Start and end of the chosen part; None for the whole recording.
+        is_looping: True if the part is repeated.
     """
 
     position_ns: int
@@ -81,13 +84,14 @@ class PlayerStatus:
 
 @dataclass(frozen=True)
 class Due:
-    """Messages due now.
+    """Messages that are due now.
 
     Attributes:
         messages: Messages in order.
-        is_jump: True if they are the newest of each topic after a seek, not the next ones.
-        wait_s: Seconds until the next call, or None while paused.
-        log_ns: Time of recording of each message; empty for a jump.
+        is_jump: True if these are the newest messages of each topic after a seek, instead of the next
+            messages.
+        wait_s: Seconds until the next call; None while paused.
+        log_ns: Time of receipt of each message; empty for a jump.
     """
 
     messages: Sequence[Message]
@@ -107,7 +111,14 @@ class Playback:
         topics: Collection[str] | None = None,
         remap: Mapping[str, str] | None = None,
     ) -> None:
-        """Start paused before the first message. `topics`: None for all; `remap`: new names of topics."""
+        """Initialize, paused before the first message.
+
+        Args:
+            recording: Recording to play.
+            clock: Monotonic clock in seconds.
+            topics: Names of the topics to play; None for all.
+            remap: New names of topics.
+        """
         self._recording, self._clock = recording, clock
         self._topics = topics
         self._remap = dict(remap or {})
@@ -121,7 +132,7 @@ class Playback:
         self._jump: list[Message] | None = None
         self._shown_ns = recording.start_ns
         self._from_ns = recording.start_ns
-        """Time from which no message was returned yet."""
+        """Time in ns from which messages have not been returned yet."""
         self._upcoming: Iterator[RecordedMessage] = iter(())
         self._next: RecordedMessage | None = None
         self._read_from(recording.start_ns)
@@ -129,7 +140,7 @@ class Playback:
     # ---- controls
 
     def play(self) -> None:
-        """Play, from the beginning if the position is at the end."""
+        """Start to play; from the beginning if the position is at the end."""
         if not self._is_playing:
             if self._is_at_end():
                 self.begin()
@@ -137,13 +148,13 @@ class Playback:
             self._anchor_here()
 
     def pause(self) -> None:
-        """Pause."""
+        """Pause the playback at the current position."""
         if self._is_playing:
             self._is_playing = False
             self._anchor_here()
 
     def seek(self, at_ns: int) -> None:
-        """Move to a time; the newest message of each topic up to it becomes due at once."""
+        """Move to a time. The newest message of each topic at or before that time becomes due at once."""
         at_ns = max(self._recording.start_ns, min(at_ns, self._recording.end_ns))
         self._show_and_read_from(at_ns, at_ns)
 
@@ -156,7 +167,7 @@ class Playback:
         self._anchor_here()
 
     def step(self, topic: str, *, forward: bool = True) -> bool:
-        """Move to the next or previous message of a topic and pause; return False if there is none."""
+        """Move to the next or previous message of a topic, and pause; return False if there is none."""
         find = self._recording.after if forward else self._recording.before
         found = find(self._position_ns, topic)
         self.pause()
@@ -166,9 +177,10 @@ class Playback:
         return True
 
     def choose(self, topics: Collection[str]) -> Sequence[Message]:
-        """Play only these topics from now on.
+        """Replace the topics to play.
 
-        Return the newest message of each added topic; empty if a jump is due, which includes them.
+        Returns:
+            The newest message of each added topic; empty if a jump is due, which includes these messages.
         """
         new = set(topics) if self._topics is None else set(topics).difference(self._topics)
         self._topics = frozenset(topics)
@@ -181,7 +193,7 @@ class Playback:
 
     @property
     def speed(self) -> float:
-        """Speed factor, 0.1 to 10."""
+        """Requested speed factor, 0.1 to 10."""
         return self._speed
 
     @speed.setter
@@ -196,7 +208,7 @@ class Playback:
         self._anchor_here()
 
     def loop(self, start_ns: int | None = None, end_ns: int | None = None) -> None:
-        """Repeat a part of the recording, or all of it. Raises `ValueError` for an empty part."""
+        """Repeat a part of the recording, or the whole recording. Raises `ValueError` for an empty part."""
         if start_ns is None or end_ns is None:
             self._loop = None
         else:
@@ -212,15 +224,15 @@ class Playback:
         self._is_looping = True
 
     def end_loop(self) -> None:
-        """Continue beyond the end of the part."""
+        """Stop repeating, and play beyond the end of the part."""
         self._is_looping, self._loop = False, None
 
     def once(self) -> None:
-        """Stop at the end of the part instead of repeating it."""
+        """Stop repeating; playback ends at the end of the part."""
         self._is_looping = False
 
     def begin(self) -> None:
-        """Move before the first message of the part, without a jump."""
+        """Move before the first message of the part without making messages due at once."""
         self._position_ns, self._jump = self._first_ns(), None
         self._read_from(self._position_ns)
         self._anchor_here()
@@ -228,7 +240,7 @@ class Playback:
     # ---- timing
 
     def status(self) -> PlayerStatus:
-        """Return the current state."""
+        """Return the current state of the playback."""
         return PlayerStatus(
             self._position_ns,
             self._is_playing,
@@ -240,7 +252,7 @@ class Playback:
         )
 
     def advance(self) -> Due:
-        """Return the messages due by the clock. Call it again within `wait_s` seconds."""
+        """Return the messages that are due. Call this again within `wait_s` seconds."""
         if self._jump is not None:
             messages, self._jump = self._jump, None
             return Due(messages, is_jump=True, wait_s=0.0 if self._is_playing else None)
@@ -260,9 +272,10 @@ class Playback:
         return Due(messages, False, self._wait_s(), [each.log_ns for each in due])
 
     def shown_first(self, topics: Collection[str]) -> Sequence[Message]:
-        """Return the messages at the start of the part, if a jump has shown them and they won't be due again.
+        """Return the messages at the start of the part if a jump has already shown them.
 
-        For sinks that ignore jumps and would miss them when playing from the beginning.
+        For sinks that ignore jumps: these messages are not due again, so such a sink would miss them when
+        playing from the beginning.
         """
         first_ns = self._first_ns()
         if self._position_ns != first_ns or self._from_ns != first_ns + 1:
@@ -362,9 +375,9 @@ def _log_ns(each: RecordedMessage) -> int:
 
 
 def moving_topics(recording: Recording) -> MovingTopics:
-    """Return the topics that move robots, as far as the recording shows; they may not be in it.
+    """Return the topics that move robots, according to descriptions, message types and names.
 
-    Derived from descriptions, message types and names: the commanded robot may not be in the recording.
+    The commanded robot may not be in the recording, so its description may be missing.
     """
     described = {each.name for each in recording.topics.values() if each.msg_type == DESCRIPTION_TYPE}
     robots = dict[RobotControls, None]()
@@ -378,27 +391,27 @@ def moving_topics(recording: Recording) -> MovingTopics:
 
 
 def latched_topics(recording: Recording, topics: Iterable[str]) -> frozenset[str]:
-    """Return the latched topics among these."""
+    """Return those of the topics that are latched."""
     newest = recording.newest(recording.end_ns, list(topics))
     return frozenset(each.message.topic for each in newest.values() if each.message.is_latched)
 
 
 def published_type(message: Message) -> str:
-    """Return the message type for republishing a message so that its bytes are decoded as before."""
+    """Return the message type for publishing a recorded message so that its bytes are decoded as before."""
     return message.msg_type if codec_for(message.msg_type).name == message.codec else message.codec
 
 
 class Player:
     """Thread that plays a recording into a sink. Thread-safe; usable as a context manager.
 
-    Slow callbacks slow the playback down; no message is lost.
+    Slow callbacks slow down the playback; no message is lost.
 
     Args:
-        playback: The playback; afterwards change it with `order` only.
-        sink: Called in the player's thread with a few messages in order.
+        playback: Playback to run. After this, change it only with `order`.
+        sink: Called in the player's thread with batches of messages in order.
         on_jump: Called with the newest message of each topic after a seek. Default: `sink`.
-        on_end: Called at the end, and after an exception of a callback or of the recording, stored in
-            `problem`.
+        on_end: Called at the end, and after an exception of a callback or of the recording, which is stored
+            in `problem`.
     """
 
     def __init__(
@@ -419,7 +432,7 @@ class Player:
         self._thread.start()
 
     def order(self, change: Callable[[Playback], object]) -> PlayerStatus:
-        """Change the playback: `player.order(Playback.play)`. Exceptions propagate."""
+        """Change the playback and return its state: `player.order(Playback.play)`. Exceptions propagate."""
         with self._lock:
             change(self._playback)
             self._lock.notify_all()
@@ -427,7 +440,7 @@ class Player:
 
     @property
     def status(self) -> PlayerStatus:
-        """Current state."""
+        """Current state of the playback."""
         with self._lock:
             return self._playback.status()
 
@@ -458,7 +471,7 @@ class Player:
                 self._on_end()
 
     def close(self, timeout_s: float = 10.0) -> None:
-        """Stop. The recording stays open. Idempotent."""
+        """Stop the thread; the recording stays open. Idempotent."""
         with self._lock:
             self._is_closed = True
             self._lock.notify_all()

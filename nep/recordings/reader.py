@@ -1,4 +1,4 @@
-"""Recording: random access to a recording by time, with bounded memory."""
+"""`Recording`: random access to recorded messages by time, with bounded memory."""
 
 from __future__ import annotations
 
@@ -32,14 +32,14 @@ class RecordedMessage(NamedTuple):
 
 @dataclass(frozen=True)
 class RecordedTopic:
-    """Topic of a recording. `codec` and `msg_type` are those of its first channel.
+    """Topic of a recording.
 
     Attributes:
         name: Name of the topic.
-        msg_type: Message type.
-        codec: Codec.
+        msg_type: Message type, according to the first channel.
+        codec: Codec, according to the first channel.
         message_count: Number of messages.
-        publishers: Ids of the publishers, None where unknown.
+        publishers: Ids of the publishers; None where unknown.
         encoding: Message encoding as named in the file.
         schema_encoding: Schema encoding as named in the file, or "".
     """
@@ -61,11 +61,11 @@ class Recording:
                 show(message.payload)
 
     Attributes:
-        start_ns: Time of the first message in ns since 1970, or 0 without messages.
-        end_ns: Time of the last message, or 0 without messages.
-        is_complete: False if the file was not closed (killed program, truncated file). The intact part is
-            read; `nep.recordings.repair` completes it.
-        topics: Topics by name, also those without messages.
+        start_ns: Time of the first message in ns since 1970; 0 if there are no messages.
+        end_ns: Time of the last message; 0 if there are no messages.
+        is_complete: False if the file was not closed properly (killed program, truncated file). Its intact
+            part can be read; `nep.recordings.repair` completes the file.
+        topics: Topics by name, including those without messages.
     """
 
     def __init__(
@@ -76,14 +76,14 @@ class Recording:
         progress: Callable[[int, int], object] | None = None,
         file: RawFile | None = None,
     ) -> None:
-        """Open a recording, in this process unless a `file` is given.
+        """Open a recording, in this process unless `file` is given.
 
         Args:
-            path: The file.
+            path: File to open.
             cache_bytes: Maximum size of cached decompressed chunks.
-            progress: Called with bytes done and in total if the whole file must be walked; its exceptions
+            progress: Called with bytes done and in total if the whole file must be scanned; its exceptions
                 propagate.
-            file: Open file to use instead, for example in another process; closed with the recording.
+            file: File that is already open, for example in another process; closed with the recording.
 
         Raises:
             RecordingError: The file can't be opened or is not a recording.
@@ -147,7 +147,7 @@ class Recording:
 
     @property
     def message_count(self) -> int:
-        """Number of messages of all topics."""
+        """Total number of messages of all topics."""
         return sum(each.message_count for each in self.topics.values())
 
     @property
@@ -167,7 +167,7 @@ class Recording:
 
     @property
     def words(self) -> Mapping[str, str]:
-        """Metadata of the recorder: "note", "end", "started_ns", "ended_ns", as far as known."""
+        """Metadata written by the recorder, as far as known: "note", "end", "started_ns", "ended_ns"."""
         metadata: dict[str, str] = {}
         for name, values in self.facts.metadata:
             if name == "nep.recording":
@@ -177,7 +177,8 @@ class Recording:
     def figures(self) -> dict[str, TopicFigures]:
         """Return the recorder's counts by topic; empty for recordings of other programs.
 
-        They are in the metadata of a complete recording; otherwise its entries, once a second, are read.
+        A complete recording has the counts in its metadata. Otherwise they are collected from the recorder's
+        entries, which are written once a second.
         """
         totals: dict[str, TopicFigures] = {}
         for name, values in self.facts.metadata:
@@ -193,7 +194,7 @@ class Recording:
         return totals
 
     def figure_pieces(self) -> Sequence[int]:
-        """Return the pieces of the file with counts, in order of time, without reading them."""
+        """Return the pieces of the file that contain counts, sorted by time, without reading them."""
         return self.file.pieces_of(self._channels_with("figures"))
 
     def figures_over_time(
@@ -201,7 +202,8 @@ class Recording:
     ) -> Iterator[tuple[int, dict[str, TopicFigures]]]:
         """Iterate over (time, changed counts by topic), to locate losses in time.
 
-        From the whole file, or from some of `figure_pieces`.
+        Args:
+            pieces: Pieces to read, from `figure_pieces`; None for the whole file.
         """
         for log_ns, value in self.said("figures", pieces):
             topics = value.get("topics") if isinstance(value, dict) else None
@@ -210,9 +212,11 @@ class Recording:
                 yield log_ns, {topic: each for topic, each in parsed.items() if each is not None}
 
     def said(self, role: Role, pieces: Collection[int] | None = None) -> Iterator[tuple[int, object]]:
-        """Iterate over (time, value) of a role of the recorder's own entries: "alerts", "notes", "runs" etc.
+        """Iterate over (time, value) of the recorder's own entries of a role, such as "alerts" or "notes".
 
-        From the whole file, or from these pieces.
+        Args:
+            role: Role of the entries.
+            pieces: Pieces of the file to read; None for the whole file.
         """
         for raw in self.file.raw(None, None, self._channels_with(role), pieces):
             try:
@@ -231,14 +235,14 @@ class Recording:
         end_ns: int | None = None,
         topics: Collection[str] | None = None,
     ) -> Iterator[RecordedMessage]:
-        """Iterate over messages by time of receipt, from `start_ns` and before `end_ns`.
+        """Iterate over messages, sorted by time of receipt.
 
         Damaged pieces of the file are skipped and listed in `damage`.
 
         Args:
-            start_ns: Start in ns since 1970, or None.
-            end_ns: End in ns since 1970, or None.
-            topics: Names of topics, or None for all.
+            start_ns: Start in ns since 1970 (inclusive), or None.
+            end_ns: End in ns since 1970 (exclusive), or None.
+            topics: Names of topics; None for all.
         """
         for raw in self.read_raw(start_ns, end_ns, topics):
             yield RecordedMessage(raw.log_ns, self._decoders[raw.channel].message(raw))
@@ -249,7 +253,10 @@ class Recording:
         end_ns: int | None = None,
         topics: Collection[str] | None = None,
     ) -> Iterator[RawMessage]:
-        """Iterate over raw messages with their channel numbers (`facts.channels`), as `read` does."""
+        """Iterate over raw messages with their channel numbers (`facts.channels`).
+
+        Arguments are those of `read`.
+        """
         return self.file.raw(start_ns, end_ns, self._channels(topics))
 
     def _channels(self, topics: Collection[str] | None) -> set[int]:
@@ -258,7 +265,7 @@ class Recording:
         return {number for topic in topics for number in self._channels_of.get(topic, ())}
 
     def newest(self, at_ns: int, topics: Collection[str] | None = None) -> dict[str, RecordedMessage]:
-        """Return the newest message up to `at_ns` by topic; topics without one are missing."""
+        """Return the newest message of each topic at or before `at_ns`; topics without one are omitted."""
         wanted = [topic for topic in self._named(topics) if self.topics[topic].message_count]
         found = self.file.newest(at_ns, [self._channels_of[topic] for topic in wanted])
         return {
@@ -275,7 +282,7 @@ class Recording:
         )
 
     def newest_times(self, at_ns: int, topics: Collection[str] | None = None) -> dict[str, int]:
-        """Return the time of the newest message up to `at_ns` by topic, from indexes only."""
+        """Return the time of the newest message of each topic at or before `at_ns`. Reads only indexes."""
         times: dict[str, int] = {}
         for channel, log_ns in self.file.newest_times(at_ns, self._channels(topics)).items():
             topic = self.facts.channels[channel].topic
@@ -295,8 +302,9 @@ class Recording:
     ) -> dict[str, list[int]]:
         """Return the number of messages by topic in each of `buckets` equal parts of [start, end).
 
-        Payloads are not read. Short times are counted exactly from the indexes; for long ones the messages of
-        a chunk are spread evenly over its time, at most half a second in nep's own recordings.
+        Payloads are not read. Short spans are counted exactly with the indexes. For long spans, the messages
+        of a chunk are distributed evenly over its duration, which is at most half a second in recordings of
+        nep.
         """
         result: dict[str, list[int]] = {}
         if buckets < 1 or end_ns <= start_ns:
@@ -319,7 +327,7 @@ class Recording:
 
 
 class _Decoders(dict[int, ChannelDecoder]):
-    """Decoders by channel, created at their first use."""
+    """Decoders by channel number, created at their first use."""
 
     def __init__(self, definitions: Mapping[int, ChannelDefinition]) -> None:
         super().__init__()

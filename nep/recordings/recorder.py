@@ -1,4 +1,4 @@
-"""Recorder: subscribes to chosen topics, also new ones, and passes their messages to a writer."""
+"""Recorder: subscribes to selected topics, including new ones, and passes their messages to a writer."""
 
 from __future__ import annotations
 
@@ -26,26 +26,28 @@ __all__ = ["Recorder", "TopicSelection"]
 
 _GRAPH_POLL_S = 1.0
 _MASTER_TIMEOUT_S = 0.5
-"""Time limit of requests to the master, so that an absent one does not delay the recorder."""
+"""Time limit of requests to the master in seconds, so that a missing master does not delay the recorder."""
 _MAX_CACHED_TOPICS = 20_000
 _ALL = "**"
 
 
 class _Writer(Protocol):
-    """Writer: a `RecordingWriter` or a `FlightRecorder`."""
+    """Interface of a `RecordingWriter` or a `FlightRecorder` to the recorder."""
 
     def post(self, messages: Sequence[Message]) -> None:
-        """Record messages received now."""
+        """Record messages that were just received."""
 
     def write_entry(self, role: Role, value: object) -> None:
-        """Write an entry of the recorder's own."""
+        """Write an own entry of the recorder."""
 
 
 @dataclass(frozen=True)
 class TopicSelection:
-    """Selection of topics: names and patterns (`*`, `?`, `**`) to include (none for all) and to exclude.
+    """Selection of topics by names and patterns (`*`, `?`, `**`). Raises `BadTopicError` for invalid names.
 
-    Excluded topics win. Raises `BadTopicError` for invalid names.
+    Attributes:
+        topics: Included topics; empty for all.
+        left_out: Excluded topics, which take precedence.
     """
 
     topics: tuple[str, ...] = ()
@@ -71,16 +73,16 @@ class TopicSelection:
         return not self.topics or any(glob_matches(each, topic) for each in self.topics)
 
     def leaves_out(self, topic: str) -> bool:
-        """Return True if a topic is excluded explicitly."""
+        """Return True if a topic is explicitly excluded."""
         return any(glob_matches(each, topic) for each in self.left_out)
 
 
 class Recorder:
-    """Recorder of chosen topics into a writer. Usable as a context manager.
+    """Recorder of selected topics. Usable as a context manager.
 
-    Everything published after its creation is recorded, including the first message of new topics where the
-    back end has patterns (otherwise within a second). Once a second it records changed alerts, and subscribes
-    to descriptions of robots.
+    Everything published after its creation is recorded. This includes the first message of a new topic if the
+    back end supports patterns; otherwise a new topic is recorded within a second. The recorder also records
+    changed alerts, and subscribes to descriptions of robots, once a second.
     """
 
     def __init__(
@@ -91,7 +93,10 @@ class Recorder:
         *,
         look_s: float = _GRAPH_POLL_S,
     ) -> None:
-        """Subscribe. The node remains open. Raises the exceptions of `Node.new_sub`."""
+        """Subscribe to the topics; the node is not closed with the recorder.
+
+        Raises the exceptions of `Node.new_sub`.
+        """
         self._node, self._writer, self._selection = node, writer, selection
         self._subscriptions = selection.subscriptions
         self._owners: dict[str, int] = {}

@@ -1,8 +1,8 @@
 """Repair of truncated and damaged recordings, into a new file.
 
-Records are read up to the end or a damaged place. A damaged chunk (by its CRC) is skipped, and the next
-intact one is searched; all whole messages of a truncated last chunk are kept. The new file is verified, and
-the old one is not changed.
+Records are read up to the end or a damaged place. A chunk with a wrong CRC is skipped, and the search
+continues with the next intact chunk. All whole messages of a truncated last chunk are recovered. The new file
+is verified, and the old file is not changed.
 """
 
 from __future__ import annotations
@@ -48,12 +48,12 @@ __all__ = ["RepairReport", "repair", "repaired_path"]
 
 _WINDOW = 4_000_000
 _CHUNK_PATTERN = re.compile(rb"\x06.{4}[\x00-\x7f]\x00\x00\x00", re.DOTALL)
-"""Opcode of a chunk, and a length below 2^39."""
+"""Pattern of a chunk's opcode, followed by a length below 2^39."""
 _FLUSH_BYTES = 1_000_000
 _PARSED_OPCODES = frozenset(
     {Opcode.MESSAGE, Opcode.MESSAGE_INDEX, Opcode.SCHEMA, Opcode.CHANNEL, Opcode.METADATA}
 )
-"""Records parsed here; a very long one has a damaged length."""
+"""Opcodes of records that are parsed during a repair; one that is very long has a damaged length."""
 
 
 @dataclass(frozen=True)
@@ -61,12 +61,12 @@ class RepairReport:
     """Result of a repair.
 
     Attributes:
-        path: The new file.
-        recovered: Number of messages in it.
-        discarded: Number of lost messages, or None if unknown.
-        discarded_bytes: Unreadable bytes of the old file; 0 if nothing was lost.
-        lost_s: Time between the last recovered message and the end of the recording, as far as known.
-        duration_s: Duration of the new file.
+        path: New file.
+        recovered: Number of messages in the new file.
+        discarded: Number of lost messages; None if unknown.
+        discarded_bytes: Number of unreadable bytes in the old file; 0 if nothing was lost.
+        lost_s: Time between the last recovered message and the end of the recording in seconds, if known.
+        duration_s: Duration of the new file in seconds.
         damaged_places: Number of damaged places.
     """
 
@@ -80,7 +80,7 @@ class RepairReport:
 
     @property
     def is_whole(self) -> bool:
-        """True if nothing was lost: the file was only not closed."""
+        """True if nothing was lost, because the file was undamaged but not closed properly."""
         return not self.discarded_bytes and not self.discarded
 
 
@@ -93,14 +93,14 @@ class _Counts:
     """True if the number of lost messages is unknown."""
     damaged_places: int = 0
     last_ns: int = 0
-    """End of the recording as far as known."""
+    """Time of the end of the recording in ns, as far as known."""
     figures: dict[str, object] = field(default_factory=dict)
     words: dict[str, str] = field(default_factory=dict)
     metadata: list[tuple[str, dict[str, str]]] = field(default_factory=list)
 
 
 def repaired_path(path: Path) -> Path:
-    """Return an unused file name beside a damaged recording."""
+    """Return an unused file name next to a damaged recording."""
     candidate = path.with_name(f"{path.stem}.repaired.mcap")
     number = 2
     while candidate.exists():
@@ -112,11 +112,11 @@ def repaired_path(path: Path) -> Path:
 def repair(
     path: Path, target: Path | None = None, progress: Callable[[int, int], object] | None = None
 ) -> RepairReport:
-    """Write the intact part of a recording to a new file and verify it.
+    """Write the intact part of a recording to a new file and verify the new file.
 
     Args:
-        path: The damaged recording.
-        target: The new file. Default: `repaired_path`.
+        path: Damaged recording.
+        target: File to write. Default: `repaired_path`.
         progress: Called with bytes done and in total.
 
     Raises:
@@ -183,7 +183,7 @@ def _read_back(path: Path, writer: FileWriter) -> tuple[int, int]:
 
 
 class _Repair:
-    """Repair of one file."""
+    """State of the repair of one file."""
 
     def __init__(
         self, file: BinaryIO, path: Path, target: Path, progress: Callable[[int, int], object]

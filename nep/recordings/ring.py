@@ -1,7 +1,8 @@
-"""FlightRecorder: ring of files on disk with the last minute of messages, bounded in bytes and seconds.
+"""`FlightRecorder`: ring of files on disk with the last messages, bounded in bytes and seconds.
 
-Messages are written to segments; the oldest segment is removed when the ring exceeds its size, or when it is
-older than the time. `keep` copies the chunks of the last seconds to a recording while the ring continues.
+Messages are written to segments. The oldest segment is deleted if the ring exceeds its size, or if the
+segment is older than the time limit. `keep` copies the chunks of the last seconds to a recording while the
+ring continues.
 """
 
 from __future__ import annotations
@@ -49,7 +50,7 @@ _MAX_SECONDS = 1e9
 
 @dataclass(frozen=True)
 class RingStatus:
-    """State of the ring, with the `problem` that stopped it, or ""."""
+    """State of the ring; `problem` is the error that stopped it, or ""."""
 
     seconds: float
     size_bytes: int
@@ -59,7 +60,7 @@ class RingStatus:
 
 @dataclass(frozen=True)
 class KeptRecording:
-    """Recording made by `keep`."""
+    """Recording that was saved by `keep`."""
 
     path: Path
     message_count: int
@@ -68,7 +69,7 @@ class KeptRecording:
 
 @dataclass
 class _Segment:
-    """File of the ring. `users`: number of recordings being copied from it."""
+    """File of the ring; `users` is the number of recordings that are being copied from it."""
 
     writer: FileWriter
     users: int = 0
@@ -80,7 +81,7 @@ class _Segment:
 
 
 class _Segments:
-    """Destination of a ring's writer. `take`, `release(` and `status` are thread-safe."""
+    """Destination of the ring's writer. `select`, `release` and `status` are thread-safe."""
 
     def __init__(self, folder: Path, seconds: float, size_bytes: int, least_free_bytes: int) -> None:
         self.table = ChannelTable()
@@ -142,7 +143,7 @@ class _Segments:
                 self._remove_oldest_locked()
 
     is_full = False
-    """Always False: segments are removed as a whole and have no counts of their own."""
+    """Always False. Old segments are deleted without finishing them."""
 
     def next_file(self) -> None: ...
 
@@ -201,11 +202,13 @@ def _remove_stale_segments(folder: Path) -> None:
 
 
 class FlightRecorder:
-    """Flight recorder: keeps the last seconds of posted messages. Thread-safe; usable as a context manager.
+    """Flight recorder: buffers the last seconds of messages on disk.
 
-    with FlightRecorder("ring", seconds=60.0) as ring, Recorder(node, ring):
-        ...
-        ring.keep("incident.mcap", seconds=30.0)
+    Thread-safe; usable as a context manager.
+
+        with FlightRecorder("ring", seconds=60.0) as ring, Recorder(node, ring):
+            ...
+            ring.keep("incident.mcap", seconds=30.0)
     """
 
     def __init__(
@@ -221,12 +224,12 @@ class FlightRecorder:
         """Start the ring.
 
         Args:
-            folder: Folder for its files only; created if needed.
-            seconds: Time to keep.
+            folder: Folder used only for the ring's files; created if needed.
+            seconds: Length of the buffer.
             size_bytes: Maximum size on disk.
-            clock: Time of receipt in ns since 1970, never decreasing.
+            clock: Time of receipt in ns since 1970; must not decrease.
             limits: Limits of the writer.
-            on_problem: Called once with the reason if it stops.
+            on_problem: Called once with the reason if the ring stops because of an error.
 
         Raises:
             RecordingError: The folder can't be written.
@@ -245,29 +248,32 @@ class FlightRecorder:
         )
 
     def post(self, messages: Sequence[Message]) -> None:
-        """Record messages received now. Never blocks, never raises; usable as `sink` of `Node.new_sub`."""
+        """Add messages that were just received.
+
+        Never blocks or raises; usable as `sink` of `Node.new_sub`.
+        """
         self._writer.post(messages)
 
     def write_entry(self, role: Role, value: object) -> None:
-        """Write an entry of the recorder's own. See `RecordingWriter.write_entry`."""
+        """Write an own entry of the recorder. See `RecordingWriter.write_entry`."""
         self._writer.write_entry(role, value)
 
     @property
     def status(self) -> RingStatus:
-        """Current state."""
+        """Current state of the ring."""
         seconds, size_bytes = self._segments.status()
         status = self._writer.status
         return RingStatus(seconds, size_bytes, status.unkept, status.problem)
 
     def keep(self, path: str | os.PathLike[str], seconds: float, note: str = "") -> KeptRecording:
-        """Save the last seconds, up to the newest message, to a recording.
+        """Save the last seconds, up to the newest message, as a recording.
 
-        It may start up to half a second earlier. Takes as long as copying the bytes; the ring continues
-        meanwhile.
+        The recording may start up to half a second earlier. The call takes as long as copying the bytes;
+        meanwhile the ring continues.
 
         Args:
-            path: The new file.
-            seconds: Duration.
+            path: File to write.
+            seconds: Duration to save.
             note: Text for the metadata.
 
         Raises:
@@ -321,7 +327,7 @@ class FlightRecorder:
         return KeptRecording(target, count, (writer.end_ns - (writer.start_ns or writer.end_ns)) / 1e9)
 
     def close(self) -> None:
-        """Stop, and remove the files. Idempotent."""
+        """Stop the ring and delete its files. Idempotent."""
         self._writer.close()
 
     def __enter__(self) -> Self:
@@ -361,7 +367,7 @@ def _indexes(data: bytes) -> Iterator[tuple[int, bytes]]:
 
 
 class _FiguresInChunks:
-    """Counts within some chunks: the ring's own counts start with the ring."""
+    """Counts of messages within the saved chunks, because the ring's counts start when the ring starts."""
 
     def __init__(self, table: ChannelTable) -> None:
         self._table = table

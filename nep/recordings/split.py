@@ -1,4 +1,4 @@
-"""Recording split into several files of limited size, each complete in itself."""
+"""Recording split into several files of limited size, each of which is complete."""
 
 from __future__ import annotations
 
@@ -15,12 +15,12 @@ MIN_PART_BYTES = 100_000
 
 
 def part_path(path: Path, number: int) -> Path:
-    """Return the name of a part: "tour.mcap" gives "tour-001.mcap"."""
+    """Return the path of a part: part 1 of "tour.mcap" is "tour-001.mcap"."""
     return path.with_name(f"{path.stem}-{number:03d}{path.suffix}")
 
 
 class SplitFiles:
-    """Destination that starts a new file at a size (a `nep.recordings.writer.Destination`).
+    """Destination that starts a new file at a given size (a `nep.recordings.writer.Destination`).
 
     A file ends with the chunk that reaches the size, so it may be larger by one chunk: 1 MB, or one message.
     """
@@ -30,7 +30,7 @@ class SplitFiles:
         self._path, self._part_bytes, self._limits = path, part_bytes, limits
         self._table = ChannelTable()
         self.paths: list[Path] = []
-        """Files so far."""
+        """Files created so far."""
         self._part = self._new()
 
     def _new(self) -> OneFile:
@@ -46,25 +46,25 @@ class SplitFiles:
 
     @property
     def file(self) -> FileWriter:
-        """Current file."""
+        """File that is currently written."""
         return self._part.file
 
     @property
     def is_full(self) -> bool:
-        """True if the file has reached the size."""
+        """True if the current file has reached its maximum size."""
         return self.file.size_bytes >= self._part_bytes
 
     def flushed(self) -> None:
         """Do nothing."""
 
     def next_file(self) -> None:
-        """Open the next file and finish this one."""
+        """Open the next file, and finish the current one."""
         full = self._part
         self._part = self._new()
         full.finish()
 
     def check_file(self) -> None:
-        """Check file and disk. Raises `RecordingError`."""
+        """Check the current file and its disk. Raises `RecordingError`."""
         self._part.check_file()
 
     def finish(self) -> None:
@@ -72,5 +72,5 @@ class SplitFiles:
         self._part.finish()
 
     def fail(self) -> None:
-        """Close the last file as it is."""
+        """Close the last file without a summary."""
         self._part.fail()

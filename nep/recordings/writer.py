@@ -1,8 +1,8 @@
-"""RecordingWriter: records messages from any thread in a thread of its own.
+"""`RecordingWriter`: accepts messages from any thread and records them in a background thread.
 
-`post` never blocks. The queue is bounded in bytes and number; dropped messages are counted, shown and
-recorded. Chunks are written at 1 MB or after half a second: a process that is killed loses less than a
-second, and readers find whole records up to there.
+`post` never blocks. The queue is bounded in bytes and number; dropped messages are counted, and the counts
+are recorded. Chunks are written at 1 MB or after half a second: if the process is killed, less than a second
+is lost, and the file ends with whole records.
 """
 
 from __future__ import annotations
@@ -40,26 +40,26 @@ if TYPE_CHECKING:
 __all__ = ["LogClock", "RecordingStatus", "RecordingWriter"]
 
 MAX_PUBLISHER_CHANNELS = 10_000
-"""Number of channels beyond which new publishers share a channel per topic."""
+"""Number of channels beyond which new publishers share one channel per topic."""
 _CLOSE_S = 30.0
 _MAX_CACHED_KINDS = 10_000
 _MAX_LATCHED, _MAX_LATCHED_BYTES = 1_000, 16_000_000
 _OTHER_TOPICS = ""
-"""Key of the counter for all topics beyond the limit."""
+"""Key of the counter that all topics beyond the limit share."""
 _log = logging.getLogger("nep.recordings")
 
 
 class LogClock:
-    """Clock of receipt times in nanoseconds since 1970: system time at its creation, then monotonic.
+    """Clock for times of receipt in ns since 1970: the system time at its creation, continued monotonically.
 
-    So the time of a recording never jumps, even if the system clock is set.
+    The time of a recording therefore never jumps, even if the system clock is set.
     """
 
     def __init__(self) -> None:
         self._add_ns = time.time_ns() - time.monotonic_ns()
 
     def __call__(self) -> int:
-        """Return the current time."""
+        """Return the current time in ns since 1970."""
         return time.monotonic_ns() + self._add_ns
 
 
@@ -70,11 +70,11 @@ class RecordingStatus:
     Attributes:
         message_count: Number of messages in the file.
         size_bytes: Size of the file.
-        duration_s: Time since the first message.
-        queued_bytes: Size of messages waiting to be written.
-        unkept: Number of received messages that are not recorded.
+        duration_s: Time since the first message in seconds.
+        queued_bytes: Size of messages that wait to be written.
+        unkept: Number of received messages that were not recorded.
         topics: Counts by topic.
-        problem: Reason why it stopped by itself, or "".
+        problem: Error that stopped the writer, or "".
     """
 
     message_count: int
@@ -88,7 +88,7 @@ class RecordingStatus:
 
 @dataclass
 class _KindCache:
-    """Cached properties of a publisher's messages, by their `MessageKind`."""
+    """Cached properties of messages with the same `MessageKind` and publisher."""
 
     kind: MessageKind
     publisher: int | None
@@ -97,7 +97,7 @@ class _KindCache:
 
 
 class _Entry:
-    """Entry of the recorder's own."""
+    """Own entry of the recorder in the queue."""
 
     __slots__ = ("role", "text")
 
@@ -108,15 +108,15 @@ class _Entry:
 
 @dataclass
 class _Part:
-    """State of one file of a split recording."""
+    """State of the current file of a split recording."""
 
     number: int = 1
     messages_before: int = 0
     bytes_before: int = 0
     repeated: int = 0
-    """Number of latched messages repeated from an earlier file."""
+    """Number of latched messages that were repeated from earlier files."""
     before: Mapping[str, TopicFigures] = field(default_factory=dict)
-    """Counts at its start."""
+    """Counts at the start of the file."""
     latched: dict[tuple[str, int | None], Message] = field(default_factory=dict)
     latched_bytes: int = 0
 
@@ -163,14 +163,14 @@ class RecordingWriter:
         limits: WriterLimits = USUAL_LIMITS,
         on_problem: Callable[[str], object] | None = None,
     ) -> None:
-        """Create a file and start the thread.
+        """Create the file and start the thread.
 
         Args:
-            path: The new file, which must not exist, or a destination.
+            path: File to create, which must not exist, or a destination.
             note: Text for the metadata.
-            clock: Time of receipt in ns since 1970, never decreasing.
+            clock: Time of receipt in ns since 1970; must not decrease.
             limits: Limits of queue, disk and times.
-            on_problem: Called once in the writer's thread with the reason if it stops by itself.
+            on_problem: Called once in the writer's thread with the reason if an error stops the writer.
 
         Raises:
             RecordingError: The file can't be created.
@@ -207,7 +207,7 @@ class RecordingWriter:
         self._part = _Part()
         self._own_numbers: set[int] = set()
         self._unwritten: list[Sequence[Message]] = []
-        """Messages taken from the queue but not added to the file when writing failed."""
+        """Number of messages taken from the queue but not added to the file when writing failed."""
         self._message_count = self._size_bytes = 0
         self._thread = threading.Thread(target=self._run, name="recording-writer", daemon=True)
         self._thread.start()
@@ -215,9 +215,9 @@ class RecordingWriter:
     # ---- any thread
 
     def post(self, messages: Sequence[Message]) -> None:
-        """Record messages received now, in this order.
+        """Queue messages that were just received, in this order.
 
-        Never blocks, never raises; usable as `sink` of `new_sub`.
+        Never blocks or raises; usable as `sink` of `Node.new_sub`.
         """
         now = self._clock()
         size = sum([each.size_bytes for each in messages])
@@ -259,7 +259,10 @@ class RecordingWriter:
             self._lock.notify_all()
 
     def write_entry(self, role: Role, value: object) -> None:
-        """Write an entry of the recorder's own as JSON, such as "alerts" or "notes". Never blocks."""
+        """Queue an own entry of the recorder, such as "alerts" or "notes", to be written as JSON.
+
+        Never blocks.
+        """
         text = orjson.dumps(value, option=orjson.OPT_NON_STR_KEYS)
         with self._lock:
             if (
@@ -272,7 +275,7 @@ class RecordingWriter:
                 self._lock.notify_all()
 
     def flush(self, timeout_s: float = 10.0) -> bool:
-        """Wait until everything posted is in the file. Return False after the time limit or an error."""
+        """Wait until everything posted is in the file; return False after the time limit or an error."""
         with self._lock:
             self._flush_wanted += 1
             wanted = self._flush_wanted
@@ -284,7 +287,7 @@ class RecordingWriter:
 
     @property
     def status(self) -> RecordingStatus:
-        """Current state; counts by topic are at most a second old."""
+        """Current state of the writer. Counts by topic are at most a second old."""
         with self._lock:
             first = self._first_ns
             waiting = sum(count for count, _size in self._dropped_counts.values())
@@ -300,11 +303,14 @@ class RecordingWriter:
 
     @property
     def problem(self) -> str:
-        """Reason why the writer stopped by itself, or ""."""
+        """Error that stopped the writer, or ""."""
         return self._problem
 
     def close(self, timeout_s: float = _CLOSE_S) -> RecordingStatus:
-        """Write queued messages and finish the file. Idempotent. Errors are in the returned status.
+        """Write queued messages and finish the file. Idempotent.
+
+        Returns:
+            The final state, which includes an error that occurred.
 
         Raises:
             ClosedError: The disk did not respond within `timeout_s` seconds.

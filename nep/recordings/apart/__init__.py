@@ -1,1 +1,1 @@
-"""Reading recordings in a process of its own, and the frames exchanged with it."""
+"""Reading recordings in a separate process, and the frames exchanged with this process."""

@@ -28,7 +28,7 @@ _MAX_FRAME_BYTES = 2**31 - 1
 
 
 def write_frame(stream: IO[bytes], content: Mapping[str, object]) -> None:
-    """Write a frame and flush. Raises `OSError`, and `ValueError` for a closed stream."""
+    """Write a frame and flush. Raises `OSError`, or `ValueError` if the stream is closed."""
     packed = pack(content)
     stream.write(_LENGTH.pack(len(packed)))
     stream.write(packed)
@@ -36,7 +36,7 @@ def write_frame(stream: IO[bytes], content: Mapping[str, object]) -> None:
 
 
 def read_frame(stream: IO[bytes]) -> dict[str, object] | None:
-    """Read a frame; return None at the end of the stream or for invalid data. Raises `OSError`."""
+    """Read a frame; return None at the end of the stream or if the data is invalid. Raises `OSError`."""
     head = stream.read(_LENGTH.size)
     if len(head) < _LENGTH.size:
         return None
@@ -52,7 +52,7 @@ def read_frame(stream: IO[bytes]) -> dict[str, object] | None:
 
 
 def packed_messages(messages: Iterable[RawMessage]) -> bytes:
-    """Return messages as consecutive MCAP records, which `messages_in` reads."""
+    """Encode messages as consecutive MCAP records, to be read with `messages_in`."""
     pieces: list[bytes | memoryview] = []
     for raw in messages:
         size = raw.data.nbytes
@@ -61,17 +61,17 @@ def packed_messages(messages: Iterable[RawMessage]) -> bytes:
 
 
 def plain_damage(damage: Iterable[Damage]) -> list[dict[str, object]]:
-    """Return damage as plain values for a frame."""
+    """Convert damage to plain values for a frame."""
     return [asdict(each) for each in damage]
 
 
 def damage_of(plain: object) -> tuple[Damage, ...]:
-    """Return the damage in a frame. Raises `TypeError` for invalid data."""
+    """Convert plain values of a frame to damage. Raises `TypeError` for invalid data."""
     return tuple(Damage(**each) for each in plain) if isinstance(plain, list) else ()
 
 
 def plain_facts(facts: FileFacts) -> dict[str, object]:
-    """Return facts of a file as plain values for a frame."""
+    """Convert the facts about a file to plain values for a frame."""
     return {
         **{name: getattr(facts, name) for name in _SCALARS},
         "channels": {
@@ -96,7 +96,7 @@ _SCALARS = ("start_ns", "end_ns", "size_bytes", "is_complete", "profile", "libra
 
 
 def facts_of(plain: object) -> FileFacts:
-    """Return the facts in a frame. Raises `TypeError` or `KeyError` for invalid data."""
+    """Convert plain values of a frame to facts. Raises `TypeError` or `KeyError` for invalid data."""
     if not isinstance(plain, dict):
         raise TypeError("facts")
     definitions = {

@@ -1,8 +1,8 @@
 """Process that reads recordings for another program: `python -m nep.recordings.apart.reader_process`.
 
 Recordings may be untrusted, so Studio reads them in this process, whose memory is limited and which can be
-killed at any time. Requests are frames (`nep.recordings.apart.frames`) on standard input, one at a time; each
-is answered by any number of progress frames and one reply frame.
+killed at any time. Requests are frames (`nep.recordings.apart.frames`) on standard input, one at a time. Each
+request gets any number of progress frames and one reply frame.
 """
 
 from __future__ import annotations
@@ -32,7 +32,11 @@ Answer = Mapping[str, object]
 
 
 class RecordingService:
-    """Executor of requests. `tell` is called with progress frames."""
+    """Executor of requests.
+
+    Args:
+        tell: Called with progress frames.
+    """
 
     def __init__(self, tell: Callable[[Answer], object]) -> None:
         self._report_progress = tell
@@ -158,14 +162,14 @@ def _limit_memory(limit_mb: int) -> None:
 
 
 def serve(requests: IO[bytes], answers: IO[bytes]) -> None:
-    """Execute requests until the input ends."""
+    """Execute requests until the input stream ends."""
     service = RecordingService(lambda content: write_frame(answers, content))
     while (request := read_frame(requests)) is not None:
         write_frame(answers, service.answer(request))
 
 
 def main(arguments: list[str] | None = None) -> None:
-    """Execute requests from standard input until it ends."""
+    """Run the process: execute requests from standard input until it ends."""
     parser = argparse.ArgumentParser(prog="nep.recordings.apart.reader_process")
     parser.add_argument("--memory-mb", type=int, default=1024)
     _limit_memory(parser.parse_args(arguments).memory_mb)

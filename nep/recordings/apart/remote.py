@@ -1,7 +1,7 @@
 """Client of the process that reads recordings (`nep.recordings.apart.reader_process`).
 
-When the process takes too long, needs too much memory or crashes, reading its files raises `RecordingError`.
-The next file that is opened starts a new process.
+If the process takes too long, needs too much memory or crashes, reading its files raises `RecordingError`.
+Opening the next file starts a new process.
 """
 
 from __future__ import annotations
@@ -36,17 +36,17 @@ _FIRST_BATCH, _GROWTH, _MAX_BATCH = 16, 4, 4_096
 class ReaderProcess:
     """Process that reads recordings. Thread-safe; usable as a context manager.
 
-    Requests are executed one at a time. Iterating requests at most a megabyte at once, so that other requests
-    don't wait long.
+    Requests are executed one at a time. Iteration requests at most a megabyte at a time, so that other
+    requests don't wait long.
     """
 
     def __init__(self, command: Sequence[str], *, timeout_s: float = _TIMEOUT_S) -> None:
-        """Create it without starting a process.
+        """Initialize without starting a process.
 
         Args:
             command: Command line of `nep.recordings.apart.reader_process`.
             timeout_s: Time limit of a request in seconds, after which the process is killed. Opening a file
-                may take longer as long as it makes progress.
+                may take longer as long as there is progress.
         """
         self._command, self._timeout_s = command, timeout_s
         self._lock = threading.Lock()
@@ -61,10 +61,10 @@ class ReaderProcess:
         progress: Callable[[int, int], object] | None = None,
         budget: tuple[int, float | None] | None = None,
     ) -> Recording:
-        """Open a recording.
+        """Open a recording, starting the process if needed.
 
         Args:
-            path: The file.
+            path: File to open.
             cache_bytes: Maximum size of decompressed chunks that the process caches.
             progress: As for `Recording`; an exception kills the process and propagates.
             budget: Maximum work for the file in bytes and seconds, including opening.
@@ -100,7 +100,7 @@ class ReaderProcess:
 
 
 class _Pipe:
-    """Process with its pipes. A thread reads the replies, so that waiting for them can time out."""
+    """Process with its pipes. A thread reads the replies, so that waiting for a reply can time out."""
 
     def __init__(self, command: Sequence[str], path: Path) -> None:
         try:
@@ -202,7 +202,7 @@ class _Pipe:
 
 
 class _RemoteFile:
-    """Open file in the reader process (a `RawFile`)."""
+    """File that is open in the reader process (a `RawFile`)."""
 
     def __init__(self, pipe: _Pipe, path: Path, opened: Mapping[str, Any], timeout_s: float) -> None:
         self._pipe, self._path, self._timeout_s = pipe, path, timeout_s

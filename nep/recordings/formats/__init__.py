@@ -1,4 +1,4 @@
 """File format of recordings: records, chunks, channels, indexes, limits and damage.
 
-Reading, playing, repairing and exporting messages are in the parent package.
+The parent package reads, plays, repairs and exports messages.
 """

@@ -1,11 +1,12 @@
-"""Channels of a recording: encoding of messages so that they can be restored exactly.
+"""Channels of a recording: encodings from which messages can be restored exactly.
 
-A channel holds similar messages of one publisher on one topic: its metadata has their common properties
-(codec, type, publisher, latched), a record has log time (time of receipt), publish time (time stamp) and the
-lower half of the sequence number. JSON and msgpack are stored as received; images, text and bytes in a
-Protocol Buffers message that contains them unchanged (`nep.recordings.formats.protobuf`). Other data, such as
-sequence numbers above 2^32 or invalid JSON, are wrapped in one, too, with the rest in its field 1000. See the
-table in docs/recordings.md.
+A channel contains similar messages of one publisher on one topic. The channel's metadata has their common
+properties (codec, type, publisher, latched). A record has the log time (time of receipt), the publish time
+(time stamp) and the lower half of the sequence number. JSON and msgpack are stored as received. Images, text
+and bytes are stored in a Protocol Buffers message that contains them unchanged
+(`nep.recordings.formats.protobuf`). Other data, such as invalid JSON, is wrapped in such a message, too;
+properties that don't fit a record, such as sequence numbers above 2^32, are in its field 1000. See the table
+in docs/recordings.md.
 """
 
 from __future__ import annotations
@@ -46,7 +47,7 @@ __all__ = [
 ]
 
 PREFIX = "nep."
-"""Prefix of nep's metadata keys."""
+"""Prefix of metadata keys that nep uses."""
 _U32, _U64 = 2**32 - 1, 2**64 - 1
 Role = str
 OWN_TOPICS: Mapping[Role, str] = {
@@ -61,7 +62,7 @@ OWN_TOPICS: Mapping[Role, str] = {
 
 @dataclass(frozen=True)
 class ChannelDefinition:
-    """Channel and schema as stored in the file."""
+    """Channel and its schema as stored in the file."""
 
     topic: str
     message_encoding: str
@@ -72,7 +73,15 @@ class ChannelDefinition:
 
 
 class Encoding(NamedTuple):
-    """Encoding of a message: form, bytes before its data, and the two numbers of its record."""
+    """Encoding of a message in a record.
+
+    Attributes:
+        form: Name of the encoding, such as "json" or "picture".
+        before: Bytes that precede the message's data.
+        sequence: Sequence number in the record.
+        publish_ns: Publish time in the record.
+        is_decodable: True if the message can be decoded.
+    """
 
     form: str
     before: bytes
@@ -80,7 +89,7 @@ class Encoding(NamedTuple):
     publish_ns: int
     is_decodable: bool
     is_self_contained: bool = False
-    """True if the record includes its publisher and type, because the recording has too many channels."""
+    """True if the record contains its publisher and type, because the recording has too many channels."""
 
 
 _SCHEMAS = {"picture": "foxglove.CompressedImage", "raw": "foxglove.RawImage", "text": "nep.Text"}
@@ -97,7 +106,7 @@ _VIEWABLE_LAYOUTS = frozenset({
 def encoding_of(message: Message, log_ns: int, *, is_self_contained: bool = False) -> Encoding:
     """Return the encoding of a message received at `log_ns`. Never raises.
 
-    `is_self_contained`: include all properties in the record, because its publisher has no channel.
+    With `is_self_contained`, the record contains all properties, because its publisher has no channel.
     """
     seq, stamp = message.seq, message.stamp_ns
     codec, extension = message.kind.codec, message.extension
@@ -197,7 +206,7 @@ def _pixel_bytes(numbers: str, channels: int) -> int:
 
 
 def definition_of(message: Message, encoding: Encoding) -> ChannelDefinition:
-    """Return the channel of a message with this encoding."""
+    """Return the channel for a message with this encoding."""
     kind, form = message.kind, encoding.form
     metadata = [("nep.form", form)]
     if not encoding.is_self_contained:
@@ -222,7 +231,7 @@ def definition_of(message: Message, encoding: Encoding) -> ChannelDefinition:
 
 
 def own_channel(role: Role) -> ChannelDefinition:
-    """Return a JSON channel for the recorder's own entries."""
+    """Return the JSON channel for the recorder's own entries of a role."""
     topic = OWN_TOPICS[role]
     return ChannelDefinition(
         topic, "json", f"nep/{role}", "jsonschema", b'{"type":"object"}', (("nep.role", role),)
@@ -230,24 +239,25 @@ def own_channel(role: Role) -> ChannelDefinition:
 
 
 class LiveChannels:
-    """Channels of live topics, without a file, for clients that read them (`nep web --foxglove`)."""
+    """Channels of live topics, for clients that use the encodings of recordings (`nep web --foxglove`)."""
 
     _FORMS: ClassVar[Mapping[str, str]] = {
         "json": "json", "msgpack": "msgpack", "string": "text", "image": "picture",
     }  # fmt: skip
 
     def expected(self, topic: str, msg_type: str) -> ChannelDefinition:
-        """Return the most likely channel of a topic that has had no message yet."""
+        """Return the most likely channel for a topic on which no message was received yet."""
         codec = codec_for(msg_type).name
         message = arrived(kind_of(topic, codec, msg_type), b"", None, 0, 0)
         form = self._FORMS.get(codec, "wrapped")
         return definition_of(message, Encoding(form, b"", 0, 0, is_decodable=True))
 
     def encoded(self, message: Message, log_ns: int) -> tuple[ChannelDefinition, bytes]:
-        """Return the channel of a message that arrived at `log_ns`, and its bytes in that channel.
+        """Return the channel of a message that was received at `log_ns`, and the message's encoded data.
 
         Raises:
-            DecodeError: The message is malformed. A recorder keeps it; a client could not show it.
+            DecodeError: The message is malformed. A recorder stores such messages, but a client can't show
+                them.
         """
         encoding = encoding_of(message, log_ns)
         if not encoding.is_decodable:
@@ -259,7 +269,7 @@ class LiveChannels:
 
 
 class ChannelDecoder:
-    """Decoder of the records of one channel, also of other programs' recordings as far as possible."""
+    """Decoder for the records of one channel. Supports recordings of other programs as far as possible."""
 
     def __init__(self, definition: ChannelDefinition) -> None:
         self.definition = definition
@@ -299,11 +309,11 @@ class ChannelDecoder:
 
     @property
     def publisher(self) -> int | None:
-        """Publisher of the messages, if all have the same."""
+        """Id of the publisher, if all messages have the same one."""
         return self._publisher
 
     def message(self, raw: RawMessage) -> Message:
-        """Return the message as it was received, or a message of bytes for an invalid record."""
+        """Decode a record to the message as it was received; an invalid record becomes a message of bytes."""
         kind, data = self._kind, raw.data
         seq = raw.sequence if self._has_seq else None
         stamp = raw.publish_ns if self._has_stamp else None

@@ -1,7 +1,7 @@
-"""Compression of chunks, with limits for decompression. Pure functions.
+"""Compression of chunks, with limits for decompression. Performs no input or output.
 
-python-zstandard ignores ``max_output_size`` when a frame states its size, so that size is compared with the
-chunk's before anything is allocated; other frames are read from a stream with a limit.
+python-zstandard ignores ``max_output_size`` if a frame declares its size, so the declared size is compared
+with that of the chunk before memory is allocated. Other frames are decompressed as a stream with a limit.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ else:  # optional for programs that don't record
 __all__ = ["check_packages", "compressed", "decompressed", "decompressed_part"]
 
 _ZSTD_LEVEL = 1
-"""Level with the best throughput.
+"""Compression level with the best throughput.
 
 Compresses joint states in JSON to 40 % at 170 MB/s (lz4: 80 % at 360 MB/s) and skips JPEG at 1200 MB/s.
 Higher levels take three times as long without a gain (2 cores, 1 MB chunks).
@@ -37,7 +37,7 @@ _PART_STEP_BYTES = 16_384
 
 
 def check_packages() -> None:
-    """Raise `RecordingsUnavailableError` when a package that recordings need is not installed."""
+    """Raise `RecordingsUnavailableError` if a package required for recordings is not installed."""
     try:
         import lz4.frame  # noqa: F401, PLC0415 - optional
         import mcap.records  # noqa: F401, PLC0415
@@ -47,7 +47,7 @@ def check_packages() -> None:
 
 
 def compressed(data: bytes, compression: str) -> bytes:
-    """Compress the data of a chunk."""
+    """Compress the data of a chunk with "zstd", "lz4" or "" for none."""
     if compression == "zstd":
         return zstandard.ZstdCompressor(level=_ZSTD_LEVEL).compress(data)
     if compression == "lz4":
@@ -57,10 +57,10 @@ def compressed(data: bytes, compression: str) -> bytes:
 
 
 def decompressed(data: memoryview, head: ChunkHead) -> bytes | memoryview:
-    """Decompress the records of a chunk, and verify size and CRC.
+    """Decompress the records of a chunk, verifying size and CRC.
 
-    Raises `ValueError` if it is damaged or too large. Memory is limited to the declared size plus one step,
-    and the declared size to `max_chunk_bytes`.
+    Raises `ValueError` if the chunk is damaged or too large. Memory is limited to the declared size plus one
+    step, and the declared size to `max_chunk_bytes`.
     """
     size = head.uncompressed_bytes
     if size > max_chunk_bytes(head.data_bytes):
@@ -83,7 +83,7 @@ def decompressed(data: memoryview, head: ChunkHead) -> bytes | memoryview:
 
 
 def decompressed_part(data: memoryview, head: ChunkHead) -> bytes | memoryview:
-    """Decompress as many records as the first bytes of a chunk contain, without verification."""
+    """Decompress as many records as the first bytes of a truncated chunk contain, without verification."""
     if not head.compression:
         return data
     size = min(head.uncompressed_bytes, max_chunk_bytes(head.data_bytes))

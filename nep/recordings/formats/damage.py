@@ -1,4 +1,4 @@
-"""Summary of the damage of a recording, as a sentence without a full stop."""
+"""Summary of the damage of a recording, as a sentence without full stop."""
 
 from __future__ import annotations
 
@@ -13,9 +13,9 @@ _MAX_NAMED = 3
 
 
 def damage_words(damage: Sequence[Damage], start_ns: int) -> str:
-    """Return a summary of the skipped pieces, their times and the missing messages; "" without damage.
+    """Format a summary of the skipped pieces, their times and the missing messages; "" if there is no damage.
 
-    Times are seconds after ``start_ns``, the start of the recording.
+    Times are in seconds after ``start_ns``, the start of the recording.
     """
     if not damage:
         return ""

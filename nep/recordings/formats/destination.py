@@ -1,4 +1,4 @@
-"""Destination of a recording: one file, and checks of its disk."""
+"""Destination of a recording: a single file, with checks of the file and its disk."""
 
 from __future__ import annotations
 
@@ -22,9 +22,10 @@ class WriterLimits:
     Attributes:
         queue_bytes: Maximum size of queued messages.
         queue_messages: Maximum number of queued messages.
-        least_free_bytes: Free disk space below which a recording stops; other programs need some, too.
-        flush_s: Maximum time until a message is in the file.
-        figures_s: Interval of writing the counts by topic.
+        least_free_bytes: Free disk space below which a recording stops, so that other programs have some
+            left.
+        flush_s: Maximum time until a received message is written to the file.
+        figures_s: Interval at which the counts by topic are written.
     """
 
     queue_bytes: int = 256_000_000
@@ -38,33 +39,33 @@ USUAL_LIMITS = WriterLimits()
 
 
 class Destination(Protocol):
-    """Destination of a writer's thread, which alone calls it."""
+    """Destination of a writer. Called in the writer's thread only."""
 
     @property
     def file(self) -> FileWriter:
-        """Current file."""
+        """File that is currently written."""
 
     def flushed(self) -> None:
-        """Handle a written chunk. Raises `OSError` or `RecordingError`."""
+        """Process the end of a written chunk. Raises `OSError` or `RecordingError`."""
 
     @property
     def is_full(self) -> bool:
         """True if the recording should continue in another file."""
 
     def next_file(self) -> None:
-        """Finish the file, which has its counts and metadata, and open the next one.
+        """Finish the current file, which has its counts and metadata, and open the next one.
 
-        Raises as `finish` does.
+        Raises the exceptions of `finish`.
         """
 
     def check_file(self) -> None:
-        """Check the disk, once a second. Raises `RecordingError` if it is full."""
+        """Check the file and its disk. Called once a second. Raises `RecordingError` if the disk is full."""
 
     def finish(self) -> None:
         """Finish the recording. Raises `OSError`."""
 
     def fail(self) -> None:
-        """Close the file as it is, after an error."""
+        """Close the file without a summary, after an error."""
 
 
 class OneFile:
@@ -81,10 +82,10 @@ class OneFile:
         """Do nothing."""
 
     def next_file(self) -> None:
-        """Do nothing: there is only one file."""
+        """Do nothing, because there is only one file."""
 
     def check_file(self) -> None:
-        """Check that the file was not moved or deleted and the disk is not full. Raises `RecordingError`."""
+        """Check that the file still exists and the disk is not full. Raises `RecordingError`."""
         if _identity(self.file.path) != self._identity:
             raise RecordingError(str(self.file.path), _("the file was moved or deleted during recording"))
         if shutil.disk_usage(self.file.path.parent).free < self._least_free_bytes:
@@ -97,7 +98,7 @@ class OneFile:
         self.file.finish()
 
     def fail(self) -> None:
-        """Close the file as it is."""
+        """Close the file without a summary."""
         self.file.close()
 
 
@@ -110,7 +111,7 @@ def _identity(path: Path) -> tuple[int, int] | None:
 
 
 def disk_error(path: Path, error: OSError) -> RecordingError:
-    """Return the error of a recording for an I/O error."""
+    """Convert an I/O error to a `RecordingError`."""
     if error.errno in {errno.ENOSPC, errno.EDQUOT if hasattr(errno, "EDQUOT") else errno.ENOSPC, errno.EFBIG}:
         reason = _("the disk is full; everything recorded before is saved")
     else:

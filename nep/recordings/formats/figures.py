@@ -1,7 +1,7 @@
 """Counts of received, lost, late, undecodable and dropped messages by topic.
 
-Lost messages are gaps in the sequence numbers of a publisher. Free of input and output; used by the writer's
-thread.
+Lost messages are gaps in the sequence numbers of a publisher. Performs no input or output; used in the
+writer's thread.
 """
 
 from __future__ import annotations
@@ -14,11 +14,11 @@ import orjson
 __all__ = ["MAX_LOST", "MAX_PUBLISHERS", "MAX_TOPICS", "TopicCounter", "TopicFigures", "read_figures"]
 
 MAX_TOPICS = 10_000
-"""Maximum number of topics counted separately; the others are counted together."""
+"""Maximum number of topics that are counted separately; all others share one counter."""
 MAX_PUBLISHERS = 1_000
-"""Maximum number of publishers per topic whose sequence numbers are tracked; losses of others are unknown."""
+"""Maximum number of publishers per topic whose losses are counted; losses of others are unknown."""
 MAX_LOST = 2**63 - 1
-"""Limit of the count: random sequence numbers would lead to values that JSON can't represent."""
+"""Maximum count of losses; random sequence numbers would cause values that JSON can't represent."""
 
 
 @dataclass(frozen=True)
@@ -27,10 +27,10 @@ class TopicFigures:
 
     Attributes:
         received: Number of received messages.
-        lost: Number of lost messages by sequence numbers, or None without sequence numbers.
+        lost: Number of lost messages according to sequence numbers; None if there are no sequence numbers.
         late: Number of messages received out of order.
         undecodable: Number of recorded messages that can't be decoded.
-        unkept: Number of received messages that are not recorded, because writing was too slow.
+        unkept: Number of received messages that were not recorded because writing was too slow.
         size_bytes: Total size of the received payloads.
     """
 
@@ -53,7 +53,7 @@ class TopicFigures:
         )
 
     def to_plain(self) -> dict[str, int | None]:
-        """Return the counts as a map for JSON."""
+        """Return the counts as a JSON-serializable dict."""
         return {
             "received": self.received,
             "lost": self.lost,
@@ -65,7 +65,7 @@ class TopicFigures:
 
 
 def read_figures(value: object) -> TopicFigures | None:
-    """Parse counts from a map or its JSON text; return None for invalid data."""
+    """Parse counts from a map or its JSON text; return None if the data is invalid."""
     if isinstance(value, str):
         try:
             value = orjson.loads(value)
@@ -82,7 +82,7 @@ def read_figures(value: object) -> TopicFigures | None:
 
 @dataclass
 class _SequenceRange:
-    """Sequence numbers of one publisher."""
+    """Range of the sequence numbers received from one publisher."""
 
     first: int
     last: int
@@ -95,7 +95,7 @@ class _SequenceRange:
 
 @dataclass
 class TopicCounter:
-    """Counter of one topic."""
+    """Counter of one topic's messages."""
 
     received: int = 0
     late: int = 0
@@ -128,7 +128,7 @@ class TopicCounter:
             numbers.first = min(numbers.first, seq)
 
     def leave_out(self, publisher: int | None, count: int, size_bytes: int) -> None:
-        """Count received messages of a publisher that are not recorded."""
+        """Count messages of a publisher that were received but not recorded."""
         self.received += count
         self.unkept += count
         self.size_bytes += size_bytes
@@ -146,5 +146,5 @@ class TopicCounter:
 
 
 def changed(counters: Mapping[str, TopicCounter]) -> Iterable[tuple[str, TopicCounter]]:
-    """Return the counters that have changed."""
+    """Return the (topic, counter) pairs whose counts have changed since they were last written."""
     return [(topic, each) for topic, each in counters.items() if each.is_changed]

@@ -1,8 +1,8 @@
-"""Index of a recording, from its summary, or from a walk over its records without one.
+"""Index of a recording, from its summary or, without one, from a scan of its records.
 
-Files without summary, chunk index or chunks are read as they are. Messages outside of chunks (ROS 2's preset
+Files without summary, chunk index or chunks are supported. Messages outside of chunks (ROS 2's preset
 "fastwrite") are grouped into runs of about 1 MB, which are read like uncompressed chunks. The package `mcap`
-is not used, because its reader trusts the offsets, lengths and counts of the file
+is not used, because its reader trusts the offsets, lengths and counts in the file
 (docs/adr/0032-reading-foreign-recordings.md).
 """
 
@@ -58,7 +58,7 @@ __all__ = [
 
 _FOOTER_BYTES = HEAD_BYTES + 20 + len(MAGIC)
 MAX_RECORD_BYTES = 64_000_000
-"""Maximum size of records other than chunks; larger ones are damaged, or attachments that are not needed."""
+"""Maximum size of records other than chunks; larger ones are damaged, or attachments, which are not read."""
 _MAX_SCHEMA_BYTES = 8_000_000
 _MAX_CHANNEL_BYTES = 256_000
 _MAX_SIZES: Mapping[int, int] = {Opcode.SCHEMA: _MAX_SCHEMA_BYTES, Opcode.CHANNEL: _MAX_CHANNEL_BYTES}
@@ -66,13 +66,13 @@ _MAX_DEFINITION_BYTES = 64_000_000
 _MAX_OTHER_RECORDS = 200_000
 _UNCOUNTED_OPCODES = frozenset({Opcode.MESSAGE, Opcode.CHUNK, Opcode.MESSAGE_INDEX, Opcode.CHUNK_INDEX})
 _MAX_METADATA_BYTES = 4_000_000
-"""Maximum size of all metadata; a recording of 10,000 topics has half of it."""
+"""Maximum size of all metadata; that of a recording with 10,000 topics is half of this."""
 _MAX_ATTACHMENTS = 1_000
 _MAX_HEADER_BYTES = 64_000
 _MAX_COUNTED_CHUNKS = 10_000
 _RUN_BYTES = 1_000_000
 _MAX_INSIDE_BYTES = 65_536
-"""Records longer than this end a run of messages, so that they are not read with it."""
+"""Record size above which a run of messages ends, so that long records are not read with it."""
 _READ_BYTES = 1_048_576
 
 
@@ -83,8 +83,8 @@ class Damage:
     Attributes:
         offset: Offset in the file.
         length: Length in bytes.
-        start_ns: Start of its time in ns since 1970, or 0 if unknown.
-        end_ns: End of its time, or 0 if unknown.
+        start_ns: Time of the first message in the piece (ns since 1970), or 0 if unknown.
+        end_ns: Time of the last message in the piece, or 0 if unknown.
         message_count: Number of missing messages, or None if unknown.
     """
 
@@ -105,13 +105,13 @@ class AttachedFile:
 
 
 class RecordCounter:
-    """Counter of records other than chunks and messages, with a limit."""
+    """Counter that limits the number of records other than chunks and messages."""
 
     def __init__(self, path: Path) -> None:
         self._path, self._count = path, 0
 
     def add(self, opcode: int) -> None:
-        """Count a record. Raises `RecordingTooLargeError` beyond the limit."""
+        """Count a record. Raises `RecordingTooLargeError` if the limit is exceeded."""
         if opcode in _UNCOUNTED_OPCODES:
             return
         self._count += 1
@@ -127,21 +127,21 @@ class Definitions:
         self.channels: dict[int, ChannelDefinition] = {}
         self._schemas: dict[int, Schema] = {}
         self._without_schema: dict[int, dict[int, Channel]] = {}
-        """Channels by missing schema and channel number."""
+        """Channels whose schema is missing, by the number of the schema and of the channel."""
         self._read: dict[tuple[int, int], int] = {}
-        """Hashes of records by opcode and number, to skip the repetitions in a file."""
+        """Hashes of records by opcode and number, to skip repeated records."""
         self._size_bytes = 0
 
     @property
     def lacks_schemas(self) -> bool:
-        """True if the schema of a channel is still missing."""
+        """True if the schema of a channel has not been read yet."""
         return bool(self._without_schema)
 
     def add(self, opcode: int, content: bytes | memoryview) -> list[int]:
-        """Add a schema or channel record; ignore other, damaged and huge records.
+        """Add a schema or channel record. Other, damaged and oversized records are ignored.
 
         Returns:
-            The channels defined by it.
+            Numbers of the channels that the record completes.
         """
         most = _MAX_SIZES.get(opcode, 0)
         if not 2 <= len(content) <= most:
@@ -177,7 +177,7 @@ class Definitions:
 
 @dataclass
 class FileIndex:
-    """Index of a file. `chunks` are sorted by start; `is_complete`: the file has its footer."""
+    """Index of a file. `chunks` are sorted by start; `is_complete` is True if the file has a footer."""
 
     definitions: Definitions = field(default_factory=Definitions)
     chunks: list[ChunkInfo] = field(default_factory=list)
@@ -185,7 +185,7 @@ class FileIndex:
     attachments: list[AttachedFile] = field(default_factory=list)
     damage: list[Damage] = field(default_factory=list)
     counts: dict[int, int] | None = None
-    """Number of messages by channel, or None if the file lacks it."""
+    """Number of messages by channel; None if the file doesn't contain it."""
     is_complete: bool = True
     end: int = 0
     """Size of the intact part of the file in bytes."""
@@ -200,12 +200,12 @@ def read_index(
     progress: Callable[[int, int], object] | None = None,
     budget: ReadBudget | None = None,
 ) -> FileIndex:
-    """Return the index of a recording.
+    """Read or build the index of a recording.
 
     Args:
-        file: The open file.
-        path: Its path, for messages.
-        progress: Called with bytes done and in total during a walk.
+        file: Open file.
+        path: Path of the file, for error messages.
+        progress: Called with bytes done and in total during a scan.
         budget: Limit of the work.
 
     Raises:
@@ -272,7 +272,7 @@ def _read_metadata(file: BinaryIO, place: Place, index: FileIndex) -> None:
 
 
 class _Summary:
-    """Reader of a summary, which validates it."""
+    """Reader that validates a summary."""
 
     def __init__(self, file: BinaryIO, path: Path, size: int, budget: ReadBudget) -> None:
         self._file, self._size, self._budget = file, size, budget
@@ -376,7 +376,7 @@ class _Summary:
 
 
 class _Scan:
-    """Builder of the index of a file without a summary, from its chunks and runs of messages."""
+    """Builder of the index for a file without summary, from its chunks and runs of messages."""
 
     def __init__(
         self,
@@ -549,7 +549,10 @@ def _index_by_reading(
 
 
 def read_chunk(file: BinaryIO, info: ChunkInfo) -> bytes | memoryview:
-    """Return the records of a chunk. Raises `ValueError` if it is damaged or too large, and `OSError`."""
+    """Read and decompress the records of a chunk.
+
+    Raises `ValueError` if the chunk is damaged or too large, and `OSError`.
+    """
     if info.length > MAX_CHUNK_BYTES:
         raise ValueError("size")
     file.seek(info.offset)
@@ -567,7 +570,7 @@ def read_chunk(file: BinaryIO, info: ChunkInfo) -> bytes | memoryview:
 
 
 def read_entries(file: BinaryIO, info: ChunkInfo, channel: int) -> Sequence[tuple[int, int]] | None:
-    """Return (time, offset in the chunk) of a channel's messages, or None without a message index."""
+    """Return (time, offset in the chunk) for a channel's messages; None if there is no message index."""
     offset = info.index_offsets.get(channel, 0)
     if not info.has_index_at(offset):
         return None

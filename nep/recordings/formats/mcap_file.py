@@ -1,8 +1,8 @@
 """MCAP writer: chunks with indexes, and the summary.
 
-It replaces the writer of the package `mcap`, because chunks must be copied from other files unchanged (flight
-recorder), a failed write must leave a file that ends with a whole record, and channels are written before and
-outside of the chunk that first uses them, so that a damaged chunk doesn't lose them.
+This module replaces the writer of the package `mcap` for three reasons: the flight recorder copies chunks
+from other files unchanged; after a failed write, the file must end with a whole record; and channels are
+written before and outside of the chunk that first uses them, so that a damaged chunk doesn't affect them.
 """
 
 from __future__ import annotations
@@ -42,14 +42,17 @@ __all__ = ["CHUNK_BYTES", "MAX_CHANNELS", "ChannelTable", "FileWriter"]
 
 CHUNK_BYTES = 1_000_000
 MAX_CHANNELS = 65_535
-"""Maximum number of channels: their numbers have 16 bits."""
+"""Maximum number of channels, whose numbers have 16 bits."""
 
 
 class ChannelTable:
-    """Numbers of channels and schemas. Files that share a table can copy each other's chunks."""
+    """Table of the numbers of channels and schemas.
+
+    Files with a common table can copy each other's chunks.
+    """
 
     def __init__(self, definitions: Mapping[int, ChannelDefinition] | None = None) -> None:
-        """Create a table, with numbered channels in `definitions`."""
+        """Create a table with the numbered channels in `definitions`."""
         self.definitions: dict[int, ChannelDefinition] = {}
         self._numbers: dict[ChannelDefinition, int] = {}
         self._schemas: dict[tuple[str, str, bytes], int] = {}
@@ -58,7 +61,7 @@ class ChannelTable:
             self._add(number, definition)
 
     def number(self, definition: ChannelDefinition) -> int | None:
-        """Return the channel's number (from 1), or None if there are too many."""
+        """Return the number of a channel (from 1), assigning one if needed; None if there are too many."""
         known = self._numbers.get(definition)
         if known is None:
             if self._next > MAX_CHANNELS:
@@ -68,12 +71,12 @@ class ChannelTable:
         return known
 
     def put(self, number: int, definition: ChannelDefinition) -> None:
-        """Add a channel with its number, for copied chunks."""
+        """Add a channel with a given number, for copied chunks."""
         if number not in self.definitions:
             self._add(number, definition)
 
     def has(self, definition: ChannelDefinition) -> bool:
-        """Return True if the channel has a number."""
+        """Return True if the channel has a number already."""
         return definition in self._numbers
 
     def _add(self, number: int, definition: ChannelDefinition) -> None:
@@ -86,7 +89,7 @@ class ChannelTable:
         self._next = max(self._next, number + 1)
 
     def records(self, number: int) -> tuple[mcap_records.Schema | None, mcap_records.Channel]:
-        """Return schema and channel record of a channel."""
+        """Return the schema and channel records of a channel."""
         definition = self.definitions[number]
         key = (definition.schema_name, definition.schema_encoding, definition.schema_data)
         schema_number = self._schemas.get(key, 0)
@@ -113,7 +116,7 @@ def _open_private(path: str, flags: int) -> int:
 
 
 class _Chunk:
-    """Chunk being filled."""
+    """Chunk to which messages are being added."""
 
     def __init__(self) -> None:
         self.parts: list[bytes | memoryview] = []
@@ -124,9 +127,9 @@ class _Chunk:
 
 
 class FileWriter:
-    """Writer of one file. Not thread-safe. Every method raises `OSError` when the file can't be written.
+    """Writer of one file. Not thread-safe. Every method raises `OSError` if the file can't be written.
 
-    The file then ends with its last whole record, and `finish` may still be tried.
+    After an error, the file ends with its last whole record, and `finish` may still be called.
     """
 
     def __init__(
@@ -139,21 +142,30 @@ class FileWriter:
         keeps_chunks: bool = False,
         profile: str = "",
     ) -> None:
-        """Create the file. Raises `FileExistsError` if it exists, unless `is_new` is False.
+        """Create the file.
 
-        `profile` is the MCAP profile of the messages, such as "ros2".
+        Args:
+            path: File to write.
+            table: Table of channel numbers; None for a new one.
+            compression: "zstd", "lz4" or "" for none.
+            is_new: Raise `FileExistsError` if the file exists.
+            keeps_chunks: Keep `chunks` in memory.
+            profile: MCAP profile of the messages, such as "ros2".
         """
         check_packages()
         self.path = path
         self.table = ChannelTable() if table is None else table
         self.chunks: list[ChunkInfo] | None = [] if keeps_chunks else None
-        """Written chunks, if they may be copied later; they take much memory for hours of recording."""
+        """Written chunks, if they may be copied later.
+
+        None otherwise, because of the memory for hours of recording.
+        """
         self.start_ns: int | None = None
         self.end_ns = 0
         self._packed_chunks = bytearray()
         self._chunk_count = 0
         self.counts: dict[int, int] = {}
-        """Number of messages by channel in written chunks."""
+        """Number of messages by channel in the written chunks."""
         self._compression = compression
         self._file: BinaryIO = open(  # noqa: SIM115
             path, "xb" if is_new else "wb", buffering=0, opener=_open_private
@@ -180,12 +192,12 @@ class FileWriter:
 
     @property
     def pending_bytes(self) -> int:
-        """Size of the chunk being filled."""
+        """Size of the current chunk, which is not written yet."""
         return self._chunk.size
 
     @property
     def pending_counts(self) -> dict[int, int]:
-        """Number of messages by channel in the chunk being filled."""
+        """Number of messages by channel in the current chunk, which is not written yet."""
         return {number: len(entries) // 2 for number, entries in self._chunk.indexes.items()}
 
     @property
@@ -196,7 +208,15 @@ class FileWriter:
     def add(
         self, channel: int, times: tuple[int, int], sequence: int, before: bytes, data: bytes | memoryview
     ) -> None:
-        """Add a message to the current chunk, without writing. `times`: log and publish time."""
+        """Add a message to the current chunk in memory.
+
+        Args:
+            channel: Number of the channel.
+            times: Log time and publish time.
+            sequence: Sequence number in the record.
+            before: Bytes that precede the data.
+            data: Data of the message.
+        """
         chunk = self._chunk
         log_ns = times[0]
         size = len(before) + (len(data) if isinstance(data, bytes) else data.nbytes)
@@ -246,7 +266,13 @@ class FileWriter:
         return sum(counts.values())
 
     def copy_chunk(self, record: bytes | memoryview, info: ChunkInfo, indexes: Mapping[int, bytes]) -> None:
-        """Copy a chunk of another file with the same channels. `indexes`: its message indexes by channel."""
+        """Copy a chunk of another file that uses the same channel table.
+
+        Args:
+            record: Chunk record.
+            info: Metadata of the chunk.
+            indexes: Message index records by channel.
+        """
         self.flush()
         counts = {number: message_count(index) for number, index in indexes.items()}
         self.define(counts)
@@ -277,7 +303,7 @@ class FileWriter:
             self.counts[number] = self.counts.get(number, 0) + count
 
     def define(self, channels: Mapping[int, object]) -> None:
-        """Write channels, and their schemas, that are not yet in the file."""
+        """Write the channels, and their schemas, that the file does not contain yet."""
         new = [number for number in channels if number not in self._written_channels]
         if not new:
             return
@@ -294,7 +320,7 @@ class FileWriter:
         self._written_schemas |= schemas
 
     def add_metadata(self, name: str, values: Mapping[str, str]) -> None:
-        """Write a metadata record after the current chunk."""
+        """Write the current chunk, followed by a metadata record."""
         self.flush()
         record = packed(mcap_records.Metadata(name=name, metadata=dict(values)))
         index = mcap_records.MetadataIndex(offset=self._at, length=len(record), name=name)
@@ -317,7 +343,7 @@ class FileWriter:
         self._at += size
 
     def truncate(self) -> None:
-        """Truncate the file after its last whole record, as far as possible."""
+        """Truncate the file after its last whole record; errors are ignored."""
         try:
             self._file.truncate(self._at)
             self._file.seek(self._at)
@@ -336,7 +362,7 @@ class FileWriter:
             self._file.close()
 
     def close(self) -> None:
-        """Close the file without a summary, which readers then rebuild."""
+        """Close the file without a summary; readers then scan the records."""
         self._file.close()
 
     def _summary(self) -> bytes:

@@ -1,16 +1,16 @@
-"""Protocol Buffers messages that wrap recorded data: images, text and bytes.
+"""Protocol Buffers messages that wrap recorded images, text and bytes.
 
-The payload is contained unchanged and in one piece: writing needs no conversion, reading is a slice. So
-programs without nep (Foxglove, Lichtblick) can show it, and replay has the original bytes. JSON would need
-base64: a third larger, and 0.8 ms per image. There are four messages:
+The payload is contained unchanged and in one piece, so writing needs no conversion and reading is a slice.
+Programs without nep (Foxglove, Lichtblick) can show the payload, and a replay has the original bytes. JSON
+would need base64: a third larger, and 0.8 ms per image. There are four messages:
 
     foxglove.CompressedImage    timestamp 1, data 2, format 3, frame_id 4
     foxglove.RawImage           timestamp 1, width 2, height 3, encoding 4, step 5, data 6, frame_id 7
     nep.Text                    data 1 (string)
     nep.Bytes                   data 1 (bytes)
 
-Each may have the field 1000, ignored by others: a msgpack map of properties that the channel lacks
-(`nep.recordings.formats.channels`), before the data.
+Each message may have the field 1000, placed before the data, which other programs ignore: a msgpack map of
+properties that the channel lacks (`nep.recordings.formats.channels`).
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ from functools import cache
 __all__ = ["EXTRA", "SCHEMAS", "bytes_field", "descriptor_set", "fields", "fixed_field", "timestamp_field"]
 
 EXTRA = 1000
-"""Number of the field with nep's own properties."""
+"""Number of the field with properties of nep."""
 _VARINT, _FIXED64, _BYTES, _FIXED32 = 0, 1, 2, 5
 _U32, _U64 = struct.Struct("<I"), struct.Struct("<Q")
 _NS = 1_000_000_000
@@ -38,7 +38,7 @@ def _varint(number: int) -> bytes:
 
 
 def bytes_field(number: int, size_bytes: int) -> bytes:
-    """Return the prefix of a field of bytes, text or a message, whose content follows."""
+    """Encode the prefix of a field of bytes, text or a message; the content follows."""
     return _varint(number << 3 | _BYTES) + _varint(size_bytes)
 
 
@@ -47,12 +47,12 @@ def _whole(number: int, data: bytes) -> bytes:
 
 
 def fixed_field(number: int, value: int) -> bytes:
-    """Return a field of type `fixed32`."""
+    """Encode a field of type `fixed32`."""
     return _varint(number << 3 | _FIXED32) + _U32.pack(value)
 
 
 def timestamp_field(number: int, stamp_ns: int) -> bytes:
-    """Return a field of type `google.protobuf.Timestamp`."""
+    """Encode a field of type `google.protobuf.Timestamp`."""
     seconds, rest = divmod(stamp_ns, _NS)
     return _whole(number, b"\x08" + _varint(seconds) + b"\x10" + _varint(rest))
 
@@ -70,7 +70,7 @@ def _read_varint(data: memoryview, at: int) -> tuple[int, int]:
 
 
 def fields(message: memoryview) -> Iterator[tuple[int, int | memoryview]]:
-    """Iterate over the fields of a message: numbers, and slices of it.
+    """Iterate over the fields of a message as (number, value); bytes are slices of the message.
 
     Raises `ValueError` for invalid data.
     """
@@ -103,7 +103,7 @@ def fields(message: memoryview) -> Iterator[tuple[int, int | memoryview]]:
 _INT64, _FIXED32_TYPE, _INT32, _STRING, _BYTES_TYPE, _MESSAGE = 3, 7, 5, 9, 12, 11
 _STAMP = "google.protobuf.Timestamp"
 _Fields = Mapping[str, tuple[int, int]]
-"""Field numbers and types by name."""
+"""Field numbers and types by field name."""
 
 SCHEMAS: Mapping[str, _Fields] = {
     "foxglove.CompressedImage": {
@@ -124,7 +124,7 @@ SCHEMAS: Mapping[str, _Fields] = {
     "nep.Text": {"data": (1, _STRING)},
     "nep.Bytes": {"data": (1, _BYTES_TYPE)},
 }
-"""Fields by message name."""
+"""Fields of each message by the message's name."""
 
 
 def _message_type(name: str, fields_of_it: _Fields) -> bytes:
@@ -147,7 +147,7 @@ def _file(name: str, package: str, depends_on: str, message: bytes) -> bytes:
 
 @cache
 def descriptor_set(schema: str) -> bytes:
-    """Return the data of an MCAP schema record: the message's file with its dependencies."""
+    """Return the data of an MCAP schema record: the message's descriptor and its dependencies."""
     package, name = schema.split(".")
     message = _message_type(name, SCHEMAS[schema])
     needs = "google/protobuf/timestamp.proto" if "timestamp" in SCHEMAS[schema] else ""

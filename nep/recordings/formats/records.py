@@ -1,8 +1,8 @@
-"""MCAP records as bytes.
+"""Encoding and decoding of MCAP records. Performs no input or output.
 
-The format is at https://mcap.dev/spec. Rare records (schemas, channels, statistics) are those of the package
-`mcap`; messages, chunks and their indexes, thousands per second, are encoded and decoded here. Pure
-functions.
+The specification is at https://mcap.dev/spec. Messages, chunks and their indexes, of which there are
+thousands per second, are encoded and decoded here. Rare records (schemas, channels, statistics) use the
+classes of the package `mcap`.
 """
 
 from __future__ import annotations
@@ -72,13 +72,13 @@ _INFO = struct.Struct("<QQQQI")  # start, end, offset, length, bytes of the inde
 _INDEX_LENGTH = struct.Struct("<QI")
 _SIZES = struct.Struct("<QQ")
 MAX_CHUNK_BYTES = 2**31
-"""Maximum size of a chunk; larger ones can't be read in memory."""
+"""Maximum size of a chunk; larger ones can't be read into memory."""
 CHUNK_HEAD_BYTES = HEAD_BYTES + _CHUNK.size + 16 + _SIZE.size
-"""Number of bytes that contain the header of any chunk."""
+"""Number of bytes that is enough for the header of any chunk."""
 
 
 class Opcode(IntEnum):
-    """Kinds of records, as numbered by the specification."""
+    """Opcodes of records, as in the specification."""
 
     HEADER = 1
     FOOTER = 2
@@ -98,7 +98,7 @@ class Opcode(IntEnum):
 
 
 def read_record(kind: str, content: bytes | memoryview) -> Any:  # noqa: ANN401 - any record of mcap
-    """Parse a record by the name of its class in `mcap`. Raises `ValueError`."""
+    """Parse a record, given the name of its class in `mcap`. Raises `ValueError`."""
     stream_class, record_class = _classes(kind)
     try:
         return record_class.read(stream_class(io.BytesIO(content)))
@@ -139,14 +139,14 @@ class RawMessage(NamedTuple):
 
 
 def message_head(channel: int, sequence: int, log_ns: int, publish_ns: int, size_bytes: int) -> bytes:
-    """Return the bytes of a record before the message's data."""
+    """Encode the part of a message record that precedes the data."""
     return MESSAGE_HEAD.pack(
         Opcode.MESSAGE, MESSAGE_REST_BYTES + size_bytes, channel, sequence, log_ns, publish_ns
     )
 
 
 def messages_in(chunk: bytes | memoryview, offset: int = 0) -> Iterator[RawMessage | tuple[int, memoryview]]:
-    """Iterate over the records of a chunk from an offset: messages, and others as (opcode, content).
+    """Iterate over the records of a chunk from an offset: messages, and other records as (opcode, content).
 
     Stops without an error at the end or at invalid bytes, because the last record may be truncated.
     """
@@ -176,7 +176,7 @@ def messages_in(chunk: bytes | memoryview, offset: int = 0) -> Iterator[RawMessa
 
 
 class ChunkHead(NamedTuple):
-    """Header of a chunk record. `data_at`: offset of the data in the record."""
+    """Header of a chunk record; `data_at` is the offset of the data in the record."""
 
     start_ns: int
     end_ns: int
@@ -188,9 +188,9 @@ class ChunkHead(NamedTuple):
 
 
 def chunk_head(record: bytes | memoryview, length: int) -> ChunkHead | None:
-    """Parse the header of a chunk record of this length; return None for invalid bytes.
+    """Parse the header of a chunk record of this length; return None if the bytes are invalid.
 
-    It is validated strictly, so that arbitrary bytes of a damaged file are not mistaken for a chunk.
+    Validation is strict, so that arbitrary bytes of a damaged file are not mistaken for a chunk.
     """
     if len(record) < HEAD_BYTES + _CHUNK.size:
         return None
@@ -211,7 +211,7 @@ def chunk_head(record: bytes | memoryview, length: int) -> ChunkHead | None:
 def pack_chunk(
     data: bytes, compression: str, uncompressed_bytes: int, crc: int, times: tuple[int, int]
 ) -> bytes:
-    """Return the bytes of a chunk record before its data."""
+    """Encode the part of a chunk record that precedes its data."""
     letters = compression.encode("ascii")
     rest = _CHUNK.pack(*times, uncompressed_bytes, crc, len(letters)) + letters + _SIZE.pack(len(data))
     return RECORD_HEAD.pack(Opcode.CHUNK, len(rest) + len(data)) + rest
@@ -221,14 +221,14 @@ def pack_chunk(
 
 
 class IndexEntry(NamedTuple):
-    """Time and position of a message in its chunk."""
+    """Time of a message and its offset in the chunk."""
 
     log_ns: int
     offset: int
 
 
 def pack_message_index(channel: int, entries: Sequence[int]) -> bytes:
-    """Return a message index record from (time, offset, time, offset, …) of a channel in a chunk."""
+    """Encode the message index record of a channel, from (time, offset, time, offset, …)."""
     rest = struct.pack(f"<HI{len(entries)}Q", channel, 8 * len(entries), *entries)
     return RECORD_HEAD.pack(Opcode.MESSAGE_INDEX, len(rest)) + rest
 
@@ -257,16 +257,17 @@ class ChunkInfo:
     Attributes:
         start_ns: Time of the first message.
         end_ns: Time of the last message.
-        offset: Offset of its record in the file.
-        length: Length of its record.
-        packed_offsets: Offsets of the message indexes by channel, encoded as in the file; few of them are
+        offset: Offset of the chunk record in the file.
+        length: Length of the chunk record.
+        packed_offsets: Offsets of the message indexes by channel, encoded as in the file, because few are
             used.
         index_bytes: Total size of the message indexes.
         compression: Name of the compression.
-        compressed_bytes: Size in the file.
-        uncompressed_bytes: Size in memory.
+        compressed_bytes: Size of the data in the file.
+        uncompressed_bytes: Size of the decompressed data.
         is_run: True for consecutive messages outside of chunks.
-        packed_counts: Number of messages by channel, if counted because there are no indexes.
+        packed_counts: Number of messages by channel, encoded; set if they were counted because there are no
+            indexes.
     """
 
     start_ns: int
@@ -283,24 +284,24 @@ class ChunkInfo:
 
     @property
     def channels(self) -> list[int]:
-        """Channels with messages in the chunk."""
+        """Numbers of the channels with messages in the chunk."""
         return [channel for channel, _offset in _OFFSET.iter_unpack(self.packed_offsets)]
 
     @property
     def index_offsets(self) -> dict[int, int]:
-        """Offset of the message index in the file by channel."""
+        """Offsets of the message indexes in the file, by channel."""
         return dict(_OFFSET.iter_unpack(self.packed_offsets))
 
     def has_index_at(self, offset: int) -> bool:
-        """Return True if a message index can be at the offset: they follow the chunk."""
+        """Return True if a message index can be at the offset, which must be directly after the chunk."""
         after = self.offset + self.length
         return after <= offset < after + self.index_bytes
 
     @property
     def counts(self) -> dict[int, int]:
-        """Number of messages by channel, from the distances of the indexes (16 bytes per message).
+        """Number of messages by channel, from the distances between the indexes (16 bytes per message).
 
-        Channels without an index are missing; the chunk must be read to count them.
+        Channels without an index are omitted; they can be counted only by reading the chunk.
         """
         if self.packed_counts:
             return dict(_OFFSET.iter_unpack(self.packed_counts))
@@ -325,7 +326,7 @@ _second = itemgetter(1)
 
 
 def pack_offsets(offsets: Mapping[int, int]) -> bytes:
-    """Encode `ChunkInfo.packed_offsets`."""
+    """Encode offsets of message indexes for `ChunkInfo.packed_offsets`."""
     return b"".join([_OFFSET.pack(*each) for each in offsets.items()])
 
 

@@ -1,8 +1,8 @@
 """JSON Schemas of message types: those of `nep.geometry` and `nep.sensor`, and declared types.
 
-Viewers list the fields of a topic from them before the first message. They support little of JSON Schema:
-scalars, objects, and lists of these. Other fields are left out, and unknown types are objects with any
-fields.
+From a schema, viewers list the fields of a topic before the first message. They support a small part of JSON
+Schema: scalars, objects, and lists of these. Other fields are omitted, and an unknown type is an object with
+any fields.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ def _known() -> Mapping[str, type]:
 
 
 def schema_of(msg_type: str) -> bytes:
-    """Return the JSON Schema of a message type by its name."""
+    """Return the JSON Schema of a message type, given its name."""
     declared = _known().get(msg_type)
     return ANY_OBJECT if declared is None else json_schema(declared)
 

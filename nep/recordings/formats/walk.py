@@ -1,4 +1,4 @@
-"""Walk over the records of an MCAP file without reading their content."""
+"""Iteration over the records of an MCAP file without reading their content."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ _SPEND_EVERY = 1_000
 
 
 class Place(NamedTuple):
-    """Record in a file. ``begin``: the first bytes of its content that were read with its header."""
+    """Place of a record in a file; `begin` has the first bytes of the content, read with the header."""
 
     offset: int
     opcode: int
@@ -37,8 +37,8 @@ def walk(
 ) -> Iterator[Place]:
     """Iterate over the records from an offset, up to ``size`` or to invalid bytes.
 
-    The file is read in windows that grow while records are short: millions of empty records take a second,
-    and of gigabytes of chunks only the headers are read. Raises `RecordingTooLargeError` or `OSError`.
+    The file is read in windows that grow while records are short, so that millions of empty records take a
+    second, and only the headers of large chunks are read. Raises `RecordingTooLargeError` or `OSError`.
     """
     window, base, step, count = b"", offset, _SMALL_WINDOW, 0
     while offset + HEAD_BYTES <= size:
