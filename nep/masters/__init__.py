@@ -1,4 +1,5 @@
 """Master: registry of nodes, publishers and subscribers. Messages never pass through it.
 
-The server thread, the graph with its leases, and functions to find and start a master.
+This package contains the server thread, the graph with its leases, and functions that find and start a
+master.
 """

@@ -1,4 +1,4 @@
-"""Malformed requests at the master by sender: counted, logged at increasing intervals, reported as alerts."""
+"""BadRequests: counts malformed requests per sender, logs them, and reports them as alerts."""
 
 from __future__ import annotations
 
@@ -15,17 +15,17 @@ __all__ = ["BadRequests", "describe_sender"]
 
 _logger = logging.getLogger("nep.master")
 _LOG_BURST, _LOG_RATE_HZ = 10.0, 0.2
-"""Burst and rate (per second) of log lines: each connection may be another sender."""
+"""Burst and rate (per second) of log lines. Limited, because each connection may be another sender."""
 _MAX_SENDERS = 100
-"""Maximum number of senders; beyond it the one inactive for longest is evicted."""
+"""Maximum number of senders; beyond it the sender that was inactive for longest is evicted."""
 _MAX_ALERTS = 5
-"""Number of senders with an alert of their own."""
+"""Maximum number of senders that get an alert each; the others share one."""
 _ALERT_DURATION_S = 10.0
-"""Duration of an alert after the newest malformed request."""
+"""Duration of an alert in seconds after the newest malformed request."""
 _ALERT_INTERVAL_S = 1.0
-"""Minimum time between changes of the alerts, each of which is sent to all observers of the graph."""
+"""Minimum time in seconds between changes of the alerts, which are sent to all observers of the graph."""
 _MAX_REASON_LENGTH = 200
-"""Maximum length of a reason, which may quote untrusted input."""
+"""Maximum length of a reason in characters; it may quote untrusted input."""
 _HINT = lazy(
     "It may use another version of nep, or not be a nep program. Check which program connects "
     "to the master's port."
@@ -50,7 +50,14 @@ class BadRequests:
         self._log_tokens, self._refilled_at = _LOG_BURST, 0.0
 
     def add(self, sender: str, name: str, reason: str, now: float) -> None:
-        """Count a request of `sender`, called `name` in messages. Logs the first, tenth, … of each sender."""
+        """Count a malformed request, and log the first, tenth, … of each sender.
+
+        Args:
+            sender: Key of the sender.
+            name: Name of the sender in messages.
+            reason: What is wrong with the request.
+            now: Current time.
+        """
         known = self._senders.pop(sender, None) or _Sender(name)
         self._senders[sender] = known
         known.name, known.reason, known.newest_at = name, escaped(shortened(reason, _MAX_REASON_LENGTH)), now
@@ -64,7 +71,7 @@ class BadRequests:
             self._senders.popitem(last=False)
 
     def alerts(self, now: float) -> tuple[Alert, ...]:
-        """Return an alert for each of the newest senders, and one for all others. Constant for a second."""
+        """Return an alert for each of the newest senders, and one for all others. Updated once per second."""
         if (self._senders or self._alerts) and now >= self._alerts_at + _ALERT_INTERVAL_S:
             self._alerts_at = now
             self._alerts = self._current_alerts(now)
@@ -90,7 +97,7 @@ class BadRequests:
 
 
 def describe_sender(node_id: str, node_name: str, peer: str) -> tuple[str, str]:
-    """Return the key to count a sender by, and its name for messages.
+    """Return the key by which a sender's requests are counted, and the sender's name in messages.
 
     Connections that speak for a node (`node_id`) are counted by node. Others are counted by computer
     (`peer`), because each connection would be another sender.

@@ -11,14 +11,14 @@ from nep.messages.clocks import drift_ns, is_clock
 __all__ = ["Clocks", "Differences"]
 
 Differences = dict[str, tuple[int, int]]
-"""By node id: offset to add to its times for the requester's clock, and its uncertainty (ns)."""
+"""Clock differences by node id: offset to add to its times for the receiver's clock, and uncertainty (ns)."""
 _MASTER_CLOCK = NodeClock(0, 0, None)
 
 
 class Clocks:
-    """Clocks of the nodes in `registry`. `computer` is the master's own, or "" if unknown.
+    """Clocks of the nodes in `registry`.
 
-    `now` is a monotonic time in seconds.
+    `computer` is the id of the master's computer, or "" if unknown. `now` is a monotonic time in seconds.
     """
 
     def __init__(self, registry: Registry, computer: str) -> None:
@@ -30,9 +30,13 @@ class Clocks:
         return bool(self._computer) and member.node.computer == self._computer
 
     def note(self, member: RegisteredNode, clock: tuple[int, ...] | None, now: float) -> None:
-        """Store a node's reported clock offset: None if it has none, empty if unknown yet.
+        """Store the clock offset and uncertainty that a node reports.
 
-        Implausible values count as unknown.
+        Args:
+            member: The node.
+            clock: Offset and uncertainty; empty if unknown yet, None if the node doesn't compare clocks.
+                Implausible values count as unknown.
+            now: Current time.
         """
         if clock is not None and self.is_here(member):
             member.clock = _MASTER_CLOCK
@@ -42,7 +46,7 @@ class Clocks:
             member.clock = None
 
     def differences(self, member: RegisteredNode, now: float) -> Differences:
-        """Return the known clock differences to remote nodes whose publishers this node receives."""
+        """Return the known clock differences to remote nodes whose publishers the node receives."""
         own = member.clock
         if own is None:
             return {}
@@ -56,7 +60,7 @@ class Clocks:
     def times(
         self, member: RegisteredNode, received_ns: int, wall: Callable[[], int] | None = None
     ) -> tuple[int, ...]:
-        """Return receipt and reply time of a renewal; empty for nodes with the same clock."""
+        """Return the receipt and reply time of a renewal; empty for nodes that share the master's clock."""
         return () if self.is_here(member) else (received_ns, (wall or time.time_ns)())
 
 

@@ -1,6 +1,6 @@
-"""Recently unregistered publishers, for subscribers that were disconnected when they closed.
+"""Departed: recently unregistered publishers, for subscribers that were disconnected at that time.
 
-Such a subscriber counts its lost messages by their last sequence numbers.
+Such a subscriber counts lost messages from the last sequence numbers of these publishers.
 """
 
 from __future__ import annotations
@@ -13,25 +13,25 @@ __all__ = ["Departed"]
 _RETENTION_S = 60.0
 _MAX_PUBLISHERS = 1000
 _MAX_PER_TOPIC = 64
-"""Limit per topic: a program that restarts repeatedly leaves a publisher behind each time."""
+"""Maximum number per topic; a program that restarts repeatedly leaves a publisher behind each time."""
 
 P = TypeVar("P")
 
 
 class Departed(Generic[P]):
-    """Publishers unregistered within the last minute, bounded in number. Has no clock.
+    """Publishers that were unregistered within the last minute, limited in number. Has no clock.
 
-    They are found by their topic, and by the patterns of their subscribers.
+    They are stored under their topic and under the patterns that matched it.
     """
 
     def __init__(self) -> None:
         self.changes = 0
-        """Number of removals, by which callers invalidate caches; additions are known to them."""
+        """Number of removals so far, by which callers detect that their caches are outdated."""
         self._by_name: dict[str, dict[int, P]] = {}
         self._names: dict[int, frozenset[str]] = {}
-        """Names by publisher id, oldest first."""
+        """Names under which each publisher is stored, by its id, oldest first."""
         self._expires_at: dict[int, float] = {}
-        """Expiry times of entries that `tick` has seen."""
+        """Expiry times of the entries that `tick` has seen, by publisher id."""
 
     def __contains__(self, publisher: int) -> bool:
         return publisher in self._names
@@ -41,7 +41,7 @@ class Departed(Generic[P]):
         return self._by_name.get(topic, {})
 
     def add(self, names: Iterable[str], publisher: int, what: P) -> None:
-        """Add an unregistered publisher. `names` are its topic and the patterns that matched it."""
+        """Add an unregistered publisher under its topic and the patterns that matched it (`names`)."""
         self._remove(publisher)
         self._names[publisher] = frozenset(names)
         for name in self._names[publisher]:

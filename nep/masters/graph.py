@@ -75,7 +75,7 @@ _MAX_WAITING = 10_000
 
 
 class Outgoing(NamedTuple):
-    """Message to send: a push to the node `to` (call is None), or the reply to `call` of a connection."""
+    """Message to send: a push to the node `to` (`call` is None), or the reply to `call` of a connection."""
 
     to: str
     answer: Reply | Push
@@ -109,7 +109,7 @@ def with_hosts(answer: Reply | Push, hosts: tuple[str, ...]) -> Reply | Push:
 
 
 class Graph:
-    """State of a master. See the module. Not thread-safe: used by the master's thread only."""
+    """State of a master. See the module docstring. Not thread-safe: used only by the master's thread."""
 
     def __init__(
         self, epoch: int, now: float, learn_s: float = 1.0, lease_s: float = LEASE_S, computer: str = ""
@@ -143,10 +143,15 @@ class Graph:
     def apply(
         self, request: Request, call: int, now: float, sender: str, *, is_foreign: bool = False
     ) -> tuple[Outgoing, ...]:
-        """Execute a request of `sender`; errors become a `Refused` reply.
+        """Execute a request and return the messages to send. Errors become a `Refused` reply.
 
-        `is_foreign`: it came over the connection `sender` from another program, which may speak for its own
-        node only; see `nep.masters.registry`.
+        Args:
+            request: The request.
+            call: Number of the request.
+            now: Current time.
+            sender: Connection of the request.
+            is_foreign: True if another program sent the request; it may speak only for its own node. See
+                `nep.masters.registry`.
         """
         out: list[Outgoing] = []
         try:
@@ -165,7 +170,7 @@ class Graph:
         return tuple(out)
 
     def tick(self, now: float) -> tuple[Outgoing, ...]:
-        """Finish learning, expire leases, adapt the renewal interval."""
+        """Finish learning, expire leases, and adapt the renewal interval; return the messages to send."""
         out: list[Outgoing] = []
         if self._waiting and now >= self._learning_until:
             waiting, self._waiting = self._waiting, []
@@ -178,23 +183,23 @@ class Graph:
 
     @property
     def learning_end(self) -> float | None:
-        """Time at which `tick` must be called for waiting requests, or None."""
+        """Time at which `tick` must be called for the waiting requests, or None if none wait."""
         return self._learning_until if self._waiting else None
 
     def silent(self, now: float) -> tuple[Outgoing, ...]:
-        """Return probes for nodes that missed a renewal.
+        """Return probes for nodes that have missed a renewal.
 
-        A probe that can't be sent proves that its node is dead.
+        If a probe can't be sent, its node is dead.
         """
         return self.probes(self._leases.overdue(now))
 
     def probes(self, node_ids: Iterable[str]) -> tuple[Outgoing, ...]:
-        """Return probes for the registered nodes among these."""
+        """Return probes for those of these nodes that are registered."""
         probe = Probe(self.epoch, self.revision)
         return tuple(Outgoing(node_id, probe) for node_id in node_ids if node_id in self._registry.members)
 
     def drop(self, node_ids: Iterable[str]) -> tuple[Outgoing, ...]:
-        """Unregister nodes that are dead or silent."""
+        """Unregister nodes that are dead or don't respond; return the messages to send."""
         out: list[Outgoing] = []
         for node_id in node_ids:
             member = self._registry.members.get(node_id)
@@ -207,9 +212,9 @@ class Graph:
         return self._viewer.view(self.epoch)
 
     def renew_fast(self, renewal: RawRenewal, now: float, sender: str) -> dict[int, int] | None:
-        """Handle a usual renewal of `sender` and return the newest message by publisher id.
+        """Handle a usual renewal of `sender`; return the newest sequence numbers by publisher id.
 
-        Return None if it must be handled by `apply`; it may have been handled in part.
+        Returns None if `apply` must handle the renewal; it may then have been handled in part.
         """
         if renewal.revision < self._registry.publishers_revision:
             return None
@@ -399,7 +404,7 @@ class Graph:
             for topic in sorted(self._registry.topics_of(request.subscriber))
             for remote in self._registry.publishers_of(topic)
         )
-        # a probe that can't be sent removes a dead publisher from the reply
+        # if a probe can't be sent, the dead publisher is removed from the reply
         out.extend(self.probes(sorted({remote.node_id for remote in found} - {member.node.id})))
         return Found(self.epoch, self.revision, found, pattern=request.subscriber.pattern)
 

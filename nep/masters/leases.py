@@ -1,7 +1,7 @@
-"""Leases: renewal schedule, late nodes and expired nodes.
+"""Leases: renewal schedule, and nodes whose renewal is late or whose lease has expired.
 
-Usual renewals, which every node sends every second, are parsed and answered without building request values
-(`RawRenewal`). Unusual ones take the general path, which reports errors.
+Usual renewals, which every node sends every second, are parsed and answered without creating request objects
+(`RawRenewal`). Others take the general path, which reports errors.
 """
 
 from __future__ import annotations
@@ -16,36 +16,36 @@ from nep.protocol.requests import RENEW_S
 __all__ = ["LEASE_S", "Leases", "RawRenewal", "encode_renewed", "is_renewal", "read_renewal"]
 
 LEASE_S = 3.0
-"""Lease of a node that renews every second; nodes with longer intervals have as much more."""
+"""Lease in seconds of a node that renews every second; longer intervals extend it accordingly."""
 _LATE_AFTER_S = 0.4
-"""Delay of a renewal after which the node is probed."""
+"""Delay of a renewal in seconds after which the node is probed."""
 _MAX_RENEWALS_PER_S = 125
-"""Maximum renewals per second of all nodes; with more nodes the interval grows."""
+"""Maximum number of renewals per second of all nodes; with more nodes the interval grows."""
 _MAX_RENEW_S = 5.0
-"""Maximum renewal interval."""
+"""Maximum renewal interval in seconds."""
 _SLOT_S = 0.1
-"""Width of a slot: renewals with longer intervals are grouped, because wake-ups cost most."""
+"""Width of a slot in seconds. Renewals with longer intervals are grouped, because wake-ups cost most."""
 
 _RENEWAL_PREFIX = b"\x83\xa2do\xa5renew"
-"""First bytes of our own renewals. Others may order the fields differently; they take the general path."""
+"""First bytes of renewals sent by nep. Other implementations may order the fields differently."""
 _SMALL_BYTES, _MAX_LISTS = 4096, 20_000
 
 
 class Leases:
-    """Leases of the nodes in `registry`, except managed ones, whose end their manager reports."""
+    """Leases of the nodes in `registry`, except managed nodes, whose manager reports their end."""
 
     def __init__(self, registry: Registry, lease_s: float) -> None:
         self._registry = registry
         self._grace_s = lease_s - RENEW_S
         self._renew_s = RENEW_S
         self._paced_revision = 0
-        """Registry revision for which the interval was computed."""
+        """Revision of the registry for which the interval was computed."""
         self._slot_size = 0
         self._slots: dict[int, int] = {}
         """Number of nodes per future slot."""
 
     def set_renew_interval(self, now: float) -> None:
-        """Compute the renewal interval; each node gets it with its next renewal."""
+        """Compute the renewal interval. Each node gets it in the reply to its next renewal."""
         self._slots = {slot: count for slot, count in self._slots.items() if slot * _SLOT_S > now}
         if self._paced_revision == self._registry.revision:
             return
@@ -64,7 +64,7 @@ class Leases:
         return member.renew_s
 
     def _free_slot(self, now: float) -> int:
-        # The latest slot, or an earlier one if it is full; at least a second from now.
+        # Uses the latest slot, or an earlier one if it is full; at least a second from now.
         last, first = round((now + self._renew_s) / _SLOT_S), int((now + RENEW_S) / _SLOT_S) + 1
         slots = range(last, min(first, last - 1), -1)
         for slot in slots:
@@ -73,15 +73,15 @@ class Leases:
         return min(slots, key=lambda slot: self._slots.get(slot, 0))
 
     def is_late(self, member: RegisteredNode, now: float) -> bool:
-        """Return True if the node missed a renewal."""
+        """Return True if the node has missed a renewal."""
         return not member.is_managed and member.renewed_at + member.renew_s <= now - _LATE_AFTER_S
 
     def overdue(self, now: float) -> list[str]:
-        """Return the nodes that missed a renewal."""
+        """Return the ids of the nodes that have missed a renewal."""
         return self._overdue(now, _LATE_AFTER_S)
 
     def expired(self, now: float) -> list[str]:
-        """Return the nodes whose lease has expired."""
+        """Return the ids of the nodes whose lease has expired."""
         return self._overdue(now, self._grace_s)
 
     def _overdue(self, now: float, by_s: float) -> list[str]:
@@ -94,7 +94,7 @@ class Leases:
 
 
 class RawRenewal(NamedTuple):
-    """Renewal as received; `publishers` and `subscribers` are only known to be lists."""
+    """Received renewal; `publishers` and `subscribers` are validated only as being lists."""
 
     call: int
     node_id: str
@@ -107,7 +107,7 @@ class RawRenewal(NamedTuple):
 
 
 def is_renewal(body: bytes) -> bool:
-    """Return True if a body looks like one of our own renewals, for `read_renewal`."""
+    """Return True if `read_renewal` can probably parse a body, because it begins like a renewal of nep."""
     return body.startswith(_RENEWAL_PREFIX)
 
 
@@ -161,7 +161,7 @@ def encode_renewed(
     times: tuple[int, ...] = (),
     clocks: Mapping[str, tuple[int, int]] | None = None,
 ) -> bytes:
-    """Return the body of a `Renewed` without changes."""
+    """Encode a `Renewed` reply without changed topics."""
     what: dict[str, object] = {"epoch": epoch, "revision": revision}
     if last_seqs:
         what["last_seqs"] = last_seqs

@@ -1,4 +1,4 @@
-"""Further addresses, besides loopback, at which a master serves other computers."""
+"""ListenAddresses: addresses besides loopback at which a master serves other computers."""
 
 from __future__ import annotations
 
@@ -20,9 +20,9 @@ _logger = logging.getLogger("nep.master")
 
 
 def check_hosts(hosts: Iterable[str], addresses: Iterable[OwnAddress]) -> tuple[str, ...]:
-    """Validate and deduplicate addresses.
+    """Validate addresses and return them without duplicates.
 
-    Raises `NepError` unless they are this computer's (`own_addresses`).
+    Raises `NepError` for an address that doesn't belong to this computer (`own_addresses`).
     """
     known = {own.host for own in addresses}
     checked = tuple(dict.fromkeys(hosts))
@@ -46,7 +46,7 @@ def check_hosts(hosts: Iterable[str], addresses: Iterable[OwnAddress]) -> tuple[
 
 
 class ListenAddresses:
-    """Bindings of the router to further addresses of this computer, updated as addresses change.
+    """Bindings of the master's socket to further addresses of this computer, updated when addresses change.
 
     Only for the master's thread.
 
@@ -71,14 +71,14 @@ class ListenAddresses:
 
     @property
     def endpoints(self) -> tuple[str, ...]:
-        """Bound endpoints besides the router's own address."""
+        """Bound endpoints, without the master's own address."""
         return tuple(endpoint_of(f"{host}:{self._port}") for host in self._bound)
 
     def serve(self, hosts: Iterable[str]) -> None:
-        """Serve at these addresses only.
+        """Bind to these addresses and no others.
 
-        Raises `NepError` for addresses that are not this computer's, and `AddressInUseError` for a port in
-        use; nothing is changed then.
+        Raises `NepError` for an address that doesn't belong to this computer, and `AddressInUseError` for a
+        port in use; nothing is changed then.
         """
         addresses = self._list_addresses()
         chosen = check_hosts(hosts, addresses)
@@ -96,7 +96,7 @@ class ListenAddresses:
             self._unbind(host)
 
     def refresh(self) -> tuple[Alert, ...]:
-        """Update the bindings to this computer's current addresses. Return alerts for lost addresses."""
+        """Bind to this computer's current addresses; return alerts for addresses that disappeared."""
         if not self.hosts:
             return ()
         addresses = self._list_addresses()
@@ -141,6 +141,6 @@ class ListenAddresses:
     def _unbind(self, host: str) -> None:
         try:
             self._router.unbind(endpoint_of(f"{host}:{self._port}"))
-        except zmq.ZMQError as error:  # the address is gone, and the binding with it
+        except zmq.ZMQError as error:  # the address has disappeared, and with it the binding
             _logger.debug("failed to unbind '%s': %s", host, error)
         self._bound.discard(host)

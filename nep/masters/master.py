@@ -1,7 +1,7 @@
 """Master: registry of publishers and subscribers. Messages never pass through it.
 
-Attachments (the gateway) run in the master's process: they start when the master is bound, close before the
-master, change the graph with `Master.submit`, and are notified of every change.
+Attachments, such as the gateway, run in the master's process: they start when the master is bound, close
+before the master, change the graph with `Master.submit`, and are notified of every change.
 """
 
 from __future__ import annotations
@@ -30,16 +30,16 @@ __all__ = ["Attachment", "Master", "is_running", "listen", "master_address", "st
 
 
 class Attachment(Protocol):
-    """Component that runs with a master. Its methods must return quickly."""
+    """Component that runs with a master, such as the gateway. Its methods must return quickly."""
 
     def start(self, master: Master) -> None:
-        """Start. The master is bound and answers only `submit`. An exception aborts the master's start."""
+        """Start the component. The master replies only to `submit` yet; an exception aborts its start."""
 
     def changed(self, view: GraphView) -> None:
-        """Handle a change of the graph. Called in the master's thread; must return at once."""
+        """Handle a change of the graph. Called in the master's thread; must return immediately."""
 
     def close(self) -> None:
-        """Close, before the master. Called once, in the thread that closes the master."""
+        """Close the component before the master. Called once, in the thread that closes the master."""
 
 
 class Master:
@@ -78,7 +78,7 @@ class Master:
         watch(self)
 
     def start(self) -> Self:
-        """Bind the address, start the attachments, serve. Return self.
+        """Bind the address, start the attachments and serve requests. Return self.
 
         Raises:
             AddressInUseError: Another program uses the address.
@@ -105,7 +105,7 @@ class Master:
         return self
 
     def close(self) -> None:
-        """Close the attachments and stop. Idempotent. Call it from any thread except the master's."""
+        """Close the attachments and stop. Idempotent. Callable from any thread except the master's."""
         with self._lock:
             server, self._server = self._server, None
         if server is None:
@@ -115,7 +115,7 @@ class Master:
         server.close()
 
     def forked(self) -> None:
-        """Detach from the master in a forked child process. See `nep.system.forks`."""
+        """Detach from the parent's master in a forked child process. See `nep.system.forks`."""
         if self._server is not None:
             give_up(*self._server.endpoints)
         self._server = None
@@ -140,7 +140,7 @@ class Master:
     def submit(self, request: Request, timeout_s: float = 2.0) -> Reply:
         """Execute a request of this process and return the reply, which may be `Refused`.
 
-        Call it from any thread except the master's.
+        Callable from any thread except the master's.
 
         Raises:
             ClosedError: The master has stopped.
@@ -152,7 +152,7 @@ class Master:
         return server.submit(request, timeout_s)
 
     def listen(self, hosts: Sequence[str]) -> None:
-        """Serve other computers at these addresses of this one; none: serve only this computer.
+        """Serve other computers at these addresses of this computer; without any, serve only this computer.
 
         Raises:
             RequestRefusedError: An address can't be bound.

@@ -1,7 +1,7 @@
-"""Subscribers with patterns, and the published topics that match each pattern.
+"""PatternIndex: subscribers with patterns, and the published topics that match each pattern.
 
-A topic is matched against every pattern when its first publisher is added, a pattern against every topic when
-its first subscriber is added; both are bounded, and the results are cached.
+A topic is matched against every pattern when its first publisher is added; a pattern is matched against every
+topic when its first subscriber is added. The numbers of both are limited, and the results are cached.
 """
 
 from __future__ import annotations
@@ -14,15 +14,15 @@ from nep.protocol.topic_pattern import matches
 __all__ = ["ALL_PATTERNS_MAX", "PATTERNS_MAX", "PatternIndex"]
 
 PATTERNS_MAX = 100
-"""Maximum number of subscribers with patterns of one node."""
+"""Maximum number of one node's subscribers with patterns."""
 ALL_PATTERNS_MAX = 1_000
-"""Maximum number of subscribers with patterns of all nodes."""
+"""Maximum number of all nodes' subscribers with patterns."""
 
 T = TypeVar("T")
 
 
 class PatternIndex(Generic[T]):
-    """Index of patterns and topics. `T` is the owner of a subscriber."""
+    """Index of patterns and the topics that match them. `T` is the owner of a subscriber."""
 
     def __init__(self) -> None:
         self._subscribers: dict[str, dict[int, T]] = {}
@@ -37,7 +37,14 @@ class PatternIndex(Generic[T]):
         return pattern in self._subscribers
 
     def add(self, pattern: str, subscriber: int, owner: T, published: Iterable[str]) -> None:
-        """Add a subscriber; `published` are the published topics."""
+        """Add a subscriber.
+
+        Args:
+            pattern: Pattern of the subscriber.
+            subscriber: Id of the subscriber.
+            owner: Owner of the subscriber.
+            published: All published topics.
+        """
         if pattern not in self._subscribers:
             self._subscribers[pattern] = {}
             self._topics[pattern] = {topic for topic in published if matches(pattern, topic)}
@@ -57,7 +64,7 @@ class PatternIndex(Generic[T]):
                 self._discard(topic, pattern)
 
     def add_topic(self, topic: str) -> None:
-        """Add a newly published topic."""
+        """Add a topic that got its first publisher."""
         if topic in self._patterns:
             return
         found = {pattern for pattern in self._subscribers if matches(pattern, topic)}
@@ -67,7 +74,7 @@ class PatternIndex(Generic[T]):
                 self._topics[pattern].add(topic)
 
     def remove_topic(self, topic: str) -> None:
-        """Remove a topic without publishers."""
+        """Remove a topic that has lost its last publisher."""
         for pattern in self._patterns.pop(topic, ()):
             self._topics[pattern].discard(topic)
 

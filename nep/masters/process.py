@@ -1,4 +1,4 @@
-"""Find a running master, and start one in a process of its own."""
+"""Functions that find a running master, or start one in a separate process."""
 
 from __future__ import annotations
 
@@ -27,18 +27,18 @@ else:
 
 _DESCRIPTORS_NEEDED = 16
 _RETRY_S = 0.5
-"""Time after which an unanswered request is sent again."""
+"""Time in seconds after which an unanswered request is sent again."""
 
 _MAX_REQUEST_S = 4.0
 
 NO_CONSOLE: int = getattr(subprocess, "CREATE_NO_WINDOW", 0)
-"""`creationflags` for subprocesses: Windows would open a window for every console program."""
+"""`creationflags` for subprocesses. Without it Windows opens a console window for each of them."""
 
 __all__ = ["NO_CONSOLE", "Owner", "is_running", "listen", "start_process", "view", "view_or_none"]
 
 
 class Owner:
-    """Process that started a master. Identified by more than its pid, which the system reuses."""
+    """Process that started a master. Identified by pid and start time, because the system reuses pids."""
 
     def __init__(self, pid: int) -> None:
         self.pid = pid
@@ -58,7 +58,7 @@ class Owner:
 
 
 def is_running(address: str | None = None, timeout_s: float = 0.5) -> bool:
-    """Return True if a master replies.
+    """Return True if a master replies at the address.
 
     Args:
         address: Address of the master. Default: `master_address`.
@@ -72,9 +72,11 @@ def is_running(address: str | None = None, timeout_s: float = 0.5) -> bool:
 
 
 def view(address: str | None = None, timeout_s: float = 2.0) -> GraphView:
-    """Return a snapshot of a master's graph, without a node.
+    """Return a snapshot of a master's graph. Doesn't need a node.
 
-    Raises `MasterUnreachable` without a reply in time, and `RequestRefusedError`.
+    Raises:
+        MasterUnreachable: No master replied within `timeout_s` seconds.
+        RequestRefusedError: The master rejected the request.
     """
     chosen = master_address(address)
     reply = _request(Look(), chosen, timeout_s)
@@ -86,7 +88,7 @@ def view(address: str | None = None, timeout_s: float = 2.0) -> GraphView:
 
 
 def view_or_none(address: str | None = None, timeout_s: float = 0.5) -> GraphView | None:
-    """Return a snapshot as `view` does, or None if no (compatible) master replies in time."""
+    """Return a snapshot as `view` does, or None if no compatible master replies in time."""
     chosen = master_address(address)
     try:
         return view(chosen, timeout_s)
@@ -95,9 +97,15 @@ def view_or_none(address: str | None = None, timeout_s: float = 0.5) -> GraphVie
 
 
 def listen(hosts: Sequence[str], address: str | None = None, timeout_s: float = 2.0) -> None:
-    """Make the master on this computer serve others at these addresses ("0.0.0.0": all); none: stop.
+    """Make the master on this computer serve other computers at these addresses.
 
     There is no password: every program that reaches such an address can read and send all messages.
+
+    Args:
+        hosts: Addresses of this computer; "0.0.0.0" for all. Without any, the master serves only this
+            computer.
+        address: Address of the master. Default: `master_address`.
+        timeout_s: Time limit in seconds.
 
     Raises:
         RequestRefusedError: The master rejected the request.
@@ -165,13 +173,13 @@ def start_process(
     command: Sequence[str] | None = None,
     timeout_s: float = 10.0,
 ) -> subprocess.Popen[bytes]:
-    """Start `nep master` in a process that outlives this one, and wait until it replies.
+    """Start `nep master` in a process that outlives this one, and wait until the master replies.
 
         process = nep.start_process(owner_pid=os.getpid())
 
     Args:
         address: Address of the master. Default: `master_address`.
-        owner_pid: Stop the master when this process has ended and no other program uses it.
+        owner_pid: The master stops when this process has ended and no other program uses the master.
         command: Command line of `nep`. Default: this Python interpreter.
         timeout_s: Time limit of the start in seconds.
 

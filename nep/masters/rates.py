@@ -1,4 +1,4 @@
-"""Rates of counters sampled at irregular intervals."""
+"""Meter: rate of a counter that is sampled at irregular intervals."""
 
 from __future__ import annotations
 
@@ -12,10 +12,10 @@ _MIN_SPAN_S = 0.5
 
 
 class Meter:
-    """Messages and bytes per second, from increasing counters.
+    """Messages and bytes per second, computed from increasing counters.
 
-    The window holds ten messages, at most ten seconds: fast topics show changes at once, slow ones don't
-    flicker.
+    The window covers ten messages, but at most ten seconds, so that fast topics show changes immediately and
+    the rates of slow topics don't flicker.
     """
 
     def __init__(self) -> None:

@@ -53,7 +53,7 @@ RECORDS_MAX = 5_000
 ALL_RECORDS_MAX = 20_000
 """Maximum number of publishers and subscribers of all nodes."""
 GUARANTEED_RECORDS = 100
-"""Number of publishers and subscribers that every node may have in any case, so that none is locked out."""
+"""Number of publishers and subscribers that every node may have even if the limit of all nodes is reached."""
 _ENDPOINTS_MAX = 32
 _PID_MAX = 2**32 - 1
 _NODE_ID = re.compile("[0-9a-f]{16}")
@@ -63,12 +63,12 @@ _ENDPOINT = re.compile(
 _NANOMSG_ENDPOINT = re.compile(r"nanomsg://[A-Za-z0-9._-]{1,253}:(\d{1,5})/(\d{1,5})", re.ASCII)
 
 _MAX_HUNG = 100
-"""Maximum number of publishers' nodes recorded that a node did not answer."""
+"""Maximum number of nodes recorded per node whose publishers it did not answer."""
 _MAX_CORES = 100_000.0
 _MAX_PROBLEM_LENGTH = 500
-"""Maximum length of a problem reported by a node."""
+"""Maximum length in characters of a problem that a node reports."""
 RATE_DECAY_S = 12.0
-"""Time after its last message in which a publisher's rate may still fall."""
+"""Time in seconds after a publisher's last message in which its rate may still fall."""
 Counts = Sequence[Mapping[str, Any]]
 """Received statistics, with the fields of `PublisherCount` or `SubscriberCount`."""
 
@@ -101,7 +101,7 @@ class RegisteredSubscriber:
 class NodeClock(NamedTuple):
     """Clock of a node: offset to the master's clock and its uncertainty (ns), and the time of the report.
 
-    The time is None for nodes with the master's clock, which can't drift.
+    The time is None for nodes that share the master's clock, which can't drift.
     """
 
     offset_ns: int
@@ -116,17 +116,17 @@ class RegisteredNode:
     Attributes:
         node: Record of the node.
         renewed_at: Time of the last renewal.
-        renew_s: Seconds from there to the next renewal, as requested of the node.
-        is_managed: True for nodes without a lease, managed by an attachment.
-        route: Connection that speaks for it; "" for attachments.
+        renew_s: Requested seconds from the last to the next renewal.
+        is_managed: True for nodes without a lease, which an attachment manages.
+        route: Connection that speaks for the node; "" for nodes of attachments.
         publishers: Publishers by id.
         subscribers: Subscribers by id.
-        hung: Ids of nodes whose publishers it did not answer.
-        cpu_ratio: CPU usage of its process.
-        heard: Publishers that it receives, cached by `Registry.sources_of`.
-        sources_version: Version of the cache.
-        far: Their nodes that are not known to be on the same computer.
-        clock: Its clock, or None if unknown.
+        hung: Ids of the nodes whose publishers this node did not answer.
+        cpu_ratio: CPU usage of its process (1.0 is one core), or None if unknown.
+        heard: Publishers that its subscribers receive, cached by `Registry.sources_of`.
+        sources_version: Version of `heard` and `far`.
+        far: Nodes of these publishers, except those known to be on the same computer.
+        clock: Clock of the node, or None if unknown.
     """
 
     node: NodeRecord
@@ -150,7 +150,7 @@ class Registry:
     def __init__(self) -> None:
         self.members: dict[str, RegisteredNode] = {}
         self.speaking: dict[str, RegisteredNode] = {}
-        """Node by the connection that speaks for it."""
+        """Node by the connection that speaks for the node."""
         self.publisher_owners: dict[int, RegisteredNode] = {}
         """Node by the id of its publisher."""
         self.subscriber_owners: dict[int, RegisteredNode] = {}
@@ -159,9 +159,9 @@ class Registry:
         self.publishers_revision = 0
         """Revision of the last change of any topic's publishers."""
         self.touched: set[str] = set()
-        """Topics changed since the last snapshot, including statistics; the snapshot clears it.
+        """Topics that changed since the last snapshot, including their statistics. Cleared by the snapshot.
 
-        Unused names are removed: a program may use a new one every second.
+        Unused names are removed, because a program may use a new name every second.
         """
         self._topic_revisions: dict[str, int] = {}
         self._publishing: dict[str, dict[int, RegisteredNode]] = {}
@@ -173,7 +173,7 @@ class Registry:
     # ---- reading
 
     def publishers_of(self, topic: str) -> tuple[RemotePublisher, ...]:
-        """Return the publishers of a topic that subscribers can connect to."""
+        """Return the publishers of a topic to which subscribers can connect."""
         found = self._publishing.get(topic, {})
         return tuple(
             self.remote(member, member.publishers[known].record)
@@ -197,7 +197,7 @@ class Registry:
         return [(member, member.subscribers[known]) for known, member in found.items()] if found else []
 
     def receivers_of(self, topic: str) -> list[tuple[RegisteredNode, RegisteredSubscriber]]:
-        """Return the subscribers that receive a topic: its own and those whose pattern matches."""
+        """Return the subscribers that receive a topic, including those whose pattern matches it."""
         found = [each for each in self.subscribers_of(topic) if not each[1].record.pattern]
         return found + [
             (member, member.subscribers[known]) for member, known in self.patterns.subscribers_of(topic)
@@ -214,7 +214,7 @@ class Registry:
         }
 
     def remote(self, member: RegisteredNode, record: PublisherRecord) -> RemotePublisher:
-        """Return a publisher as sent to subscribers."""
+        """Return a publisher in the form that is sent to subscribers."""
         return RemotePublisher(record, member.node.id, member.node.name, member.node.computer)
 
     def topic_revision(self, topic: str) -> int:
@@ -222,7 +222,7 @@ class Registry:
         return self._topic_revisions.get(topic, 0)
 
     def sources_of(self, member: RegisteredNode) -> dict[int, RegisteredPublisher]:
-        """Return all publishers, also recent ones, that the node's subscribers can (or could) connect to."""
+        """Return the publishers to which the node's subscribers can connect, also recently closed ones."""
         version = self.revision + self.departed.changes
         if member.sources_version != version:
             member.sources_version = version
@@ -243,26 +243,27 @@ class Registry:
         return member.heard
 
     def remote_nodes_of(self, member: RegisteredNode) -> tuple[RegisteredNode, ...]:
-        """Return the nodes of these publishers that are on other computers."""
+        """Return the nodes of `sources_of` that are not known to be on the same computer."""
         self.sources_of(member)
         return member.far
 
     def last_seqs(self, member: RegisteredNode) -> dict[int, int]:
-        """Return the newest message by publisher id for all publishers of `sources_of`.
+        """Return the newest sequence number of each publisher of `sources_of`, by publisher id.
 
-        Includes recently unregistered ones: the node may have been disconnected when they closed.
+        Includes recently unregistered publishers, because the node may have been disconnected when they
+        closed.
         """
         return {known: publisher.last_seq for known, publisher in self.sources_of(member).items()}
 
     # ---- changing
 
     def add_node(self, node: NodeRecord, now: float, *, is_managed: bool | None = None) -> RegisteredNode:
-        """Return the member of a node, created if needed, and renew its lease."""
+        """Register a node if needed, renew its lease, and return it."""
         member = self.members.get(node.id)
         if member is None:
             member = self.members[node.id] = RegisteredNode(node, now)
             self.revision += 1
-        elif member.node != node:  # an original program's version is known only from its messages
+        elif member.node != node:  # the version of an original program is known only after its first messages
             member.node = node
             self.revision += 1
         member.renewed_at = now
@@ -271,7 +272,7 @@ class Registry:
         return member
 
     def bind(self, member: RegisteredNode, route: str) -> None:
-        """Make a connection the one that speaks for the member."""
+        """Set the connection that speaks for a node."""
         if member.route != route:
             self._unbind(member)
             member.route = route
@@ -342,13 +343,13 @@ class Registry:
             self._discard_unused(gone.record.topic)
 
     def _discard_unused(self, topic: str) -> None:
-        # Discards data of unused topics; a new user gets the full state anyway.
+        # Discards data of unused topics; a new subscriber or publisher gets the full state anyway.
         if topic not in self._publishing and topic not in self._subscribing:
             self.touched.discard(topic)
             self._topic_revisions.pop(topic, None)
 
     def forget(self, node_id: str) -> None:
-        """Unregister a node with everything it has."""
+        """Unregister a node with all its publishers and subscribers."""
         member = self.members[node_id]
         for publisher in list(member.publishers):
             self.remove_publisher(node_id, publisher)
@@ -366,10 +367,10 @@ class Registry:
         now: float,
         cpu_ratio: float | None = None,
     ) -> bool:
-        """Store a node's statistics and renew its lease. Out-of-range numbers are clamped.
+        """Store a node's statistics and renew its lease. Numbers out of range are clamped.
 
-        The maps have the fields of `PublisherCount` and `SubscriberCount`, unvalidated. Return False if they
-        don't match the registrations or types; some of them may have been stored then.
+        The maps have the fields of `PublisherCount` and `SubscriberCount` and are not validated. Returns
+        False if they don't match the registrations or types; some of them may have been stored then.
         """
         try:
             publishers, subscribers = member.publishers, member.subscribers
@@ -420,7 +421,7 @@ class Registry:
         publisher.last_stamp_ns = None if last_stamp_ns is None else as_count(last_stamp_ns)
 
     def update_problem(self, publisher: RegisteredPublisher, problem: str) -> None:
-        """Store a publisher's problem; "" when it is solved."""
+        """Store the problem that a publisher reports; "" when it is solved."""
         publisher.problem = escaped(shortened(problem, _MAX_PROBLEM_LENGTH)) if problem else ""
         self.touched.add(publisher.record.topic)
 
@@ -437,7 +438,7 @@ class Registry:
             subscriber.received, subscriber.lost, subscriber.problem = received, lost, problem
 
     def report_missing(self, node_id: str, publisher: int, subscribers: Iterable[int]) -> None:
-        """Record that subscribers did not answer a publisher, until their next renewal."""
+        """Record that subscribers did not connect to a publisher; cleared by their next renewal."""
         reporter = self.members.get(node_id)
         known = reporter.publishers.get(publisher) if reporter else None
         if reporter is None or known is None:
@@ -492,7 +493,10 @@ def is_tcp_endpoint(endpoint: str) -> bool:
 
 
 def check_request(request: Request) -> None:
-    """Raise `WireError` for registrations that no program may make; further checks are the graph's."""
+    """Raise `WireError` if a registration is invalid on its own.
+
+    The graph checks for conflicts with other nodes.
+    """
     if not isinstance(request, Join | AddPublisher | AddSubscriber):
         return
     _check_node(request.node)

@@ -1,4 +1,4 @@
-"""ROUTER socket of the master. Only for the master's thread."""
+"""MasterRouter: ROUTER socket of the master. Only for the master's thread."""
 
 from __future__ import annotations
 
@@ -16,25 +16,25 @@ from nep.system.descriptors import check_room
 __all__ = ["MasterRouter"]
 
 REQUEST_MAX_BYTES = 4 * 2**20
-"""Maximum size of a part; a peer that sends more is disconnected."""
+"""Maximum size of a part in bytes; a peer that sends more is disconnected."""
 UNREAD_MAX_BYTES = 32 * 2**20
-"""Limit per connection of unread large bodies (4 kB and more)."""
+"""Maximum number of unread bytes per connection in large bodies (4 kB and more)."""
 _LARGE_BYTES = 4096
 _RECEIVE_QUEUE = 16
-"""Receive queue per connection; more requests wait at the sender."""
+"""Receive queue length per connection; further requests wait at the sender."""
 _DONTWAIT, _SNDMORE = int(zmq.DONTWAIT), int(zmq.SNDMORE)
 _DESCRIPTORS_NEEDED = 16
 _RECONNECT_S = 0.5
-"""Time in which a node may reconnect before it is probed."""
+"""Time in seconds in which a disconnected node may reconnect before it is probed."""
 _SRCFD = int(zmq.SRCFD)
 _EVENT = struct.Struct("=HI")
 """Monitor event of libzmq: kind of event and number of the connection."""
 
 
 class MasterRouter:
-    """ROUTER socket: receives requests, sends bodies, detects closed connections.
+    """ROUTER socket that receives requests, sends bodies and detects closed connections.
 
-    Raises `AddressInUseError` when `address` can't be bound, and `TooManyFilesError`.
+    Raises `AddressInUseError` if `address` can't be bound, and `TooManyFilesError`.
     """
 
     def __init__(self, address: str) -> None:
@@ -65,15 +65,15 @@ class MasterRouter:
         self.address = self.socket.getsockopt_string(zmq.LAST_ENDPOINT).removeprefix("tcp://")
         self._monitor = self._open_monitor()
         self._senders: dict[int, bytes] = {}
-        """Last sender by the number of its connection."""
+        """Last sender of each connection, by the number of the connection."""
         self._ended: dict[bytes, float] = {}
         """Time at which each sender's connection ended."""
         self._last_frame: zmq.Frame | None = None
         self._unread: dict[bytes, list[tuple[zmq.MessageTracker, int]]] = {}
-        """Large bodies in flight by connection."""
+        """Large bodies in flight by sender."""
 
     def receive(self) -> list[bytes]:
-        """Return the parts of a request, sender first. Raises `zmq.Again` without one."""
+        """Return the parts of a request, the sender first. Raises `zmq.Again` if there is none."""
         recv = self.socket.recv
         frames = [recv(_DONTWAIT, False)]
         while frames[-1].more:
@@ -84,7 +84,7 @@ class MasterRouter:
         return parts
 
     def peer(self) -> str:
-        """Return the address of the last request's sender, or "" if it is unknown."""
+        """Return the address from which the last request came, or "" if it is unknown."""
         try:
             return "" if self._last_frame is None else str(self._last_frame.get("Peer-Address"))
         except zmq.ZMQError:
@@ -102,7 +102,7 @@ class MasterRouter:
             self._senders[connection] = sender
 
     def ended(self, now: float) -> list[bytes]:
-        """Return the senders whose connection ended a moment ago, each once. They may have reconnected."""
+        """Return the senders whose connection has just ended, each once. They may have reconnected."""
         sent = [each for each, unread in self._unread.items() if all(one.done for one, _size in unread)]
         for route in sent:
             del self._unread[route]
@@ -120,9 +120,9 @@ class MasterRouter:
         return ended
 
     def send(self, to: bytes, body: bytes) -> bool:
-        """Send a body; return False if the node has no connection.
+        """Send a body; return False if the receiver has no connection.
 
-        Large bodies are dropped while `UNREAD_MAX_BYTES` of them are unread.
+        Large bodies are dropped while more than `UNREAD_MAX_BYTES` of them are unread.
         """
         try:
             if len(body) < _LARGE_BYTES:
@@ -150,7 +150,7 @@ class MasterRouter:
         return monitor
 
     def close(self) -> None:
-        """Close the socket after everything was sent."""
+        """Close the socket after all bodies were sent."""
         if self._monitor is not None:
             self.socket.disable_monitor()
             self._monitor.close(0)

@@ -1,4 +1,4 @@
-"""Server thread of the master: reads requests, sends replies and pushes."""
+"""MasterServer: the master's thread, which reads requests and sends replies and pushes."""
 
 from __future__ import annotations
 
@@ -45,18 +45,18 @@ __all__ = ["MasterServer", "Submission"]
 _logger = logging.getLogger("nep.master")
 _TICK_S = 0.25
 _SUSPENDED_S = 1.0
-"""Pause (suspended computer, large request) after which no node is judged in the next tick."""
+"""Pause in seconds (suspended computer, large request) after which the next tick expires no node."""
 _MAX_COLLECT_MS = 10
 _NODES_PER_MS = 50
-"""Renewals are collected for 1 ms per this number of nodes, up to `_MAX_COLLECT_MS`."""
+"""Number of nodes per millisecond for which renewals are collected, up to `_MAX_COLLECT_MS`."""
 _ADDRESS_CHECK_S = 2.0
-"""Interval of checking this computer's addresses while other computers are served."""
+"""Interval in seconds for checking this computer's addresses while other computers are served."""
 
 
 class Submission:
     """Request of the master's own process.
 
-    `done` is set with the reply, or without one when the master stops.
+    `done` is set when the reply was stored, or without a reply when the master stops.
     """
 
     def __init__(self, request: Request) -> None:
@@ -66,9 +66,9 @@ class Submission:
 
 
 class MasterServer:
-    """Server thread. `listeners` are called with every new revision of the graph.
+    """Server thread of a master. `listeners` are called with every new revision of the graph.
 
-    Raises `AddressInUseError` when `address` can't be bound.
+    Raises `AddressInUseError` if `address` can't be bound.
     """
 
     def __init__(
@@ -90,7 +90,7 @@ class MasterServer:
         self._encoder = AnswerEncoder()
         self._bad_requests = BadRequests()
         self._renewals: list[tuple[bytes, bytes, int]] = []
-        """Unanswered renewals: sender, body, and time of receipt (ns since 1970)."""
+        """Renewals without a reply yet: sender, body, and time of receipt (ns since 1970)."""
         self._notify_at = 0.0
         self._is_open = False
         self._closing = self._is_forked = False
@@ -106,11 +106,11 @@ class MasterServer:
     # ---- other threads
 
     def start(self) -> None:
-        """Start the thread. Only submissions are served until `open`."""
+        """Start the thread. Only submissions are served until `open` is called."""
         self._thread.start()
 
     def open(self) -> None:
-        """Serve requests of other programs."""
+        """Start serving requests of other programs."""
         self._is_open = True
         self._waker.wake()
 
@@ -127,7 +127,7 @@ class MasterServer:
         return (endpoint_of(self.address), *self._listening.endpoints)
 
     def forked(self) -> None:
-        """Stop without touching sockets in a forked child process. See `nep.system.forks`."""
+        """Stop in a forked child process without touching sockets. See `nep.system.forks`."""
         self._closing = self._is_forked = True
 
     def submit(self, request: Request, timeout_s: float) -> Reply:
@@ -221,7 +221,7 @@ class MasterServer:
         self._graph.apply(ReportAlerts("listening", self._listening.refresh()), 0, time.monotonic(), "")
 
     def _is_needed(self) -> bool:
-        # A node of another process than the owner's and this one is registered.
+        # True if a node is registered that belongs neither to the owner's process nor to this one.
         own_pids = {os.getpid(), None if self._owner is None else self._owner.pid}
         return any(node.pid not in own_pids for node in self._graph.nodes)
 
@@ -261,7 +261,7 @@ class MasterServer:
                 self._send(self._graph.drop(self._node_ids_at(_name_of(sender))))
 
     def _renew_safely(self, sender: bytes, body: bytes, came_ns: int) -> bytes | None:
-        # A failing renewal takes the general path, which replies.
+        # If this fails for a renewal, the general path handles it and replies.
         try:
             return self._renew_fast(sender, body, came_ns)
         except Exception as error:  # noqa: BLE001 - logged; other renewals go on
@@ -305,7 +305,7 @@ class MasterServer:
             self._bad_requests.add(*describe_sender(node_id, node_name, peer), reason, time.monotonic())
 
     def _apply(self, asked: ReceivedRequest, sender: str) -> str:
-        # An empty sender is this process. Returns the reason of a rejection, or "".
+        # An empty sender means this process. Returns the reason of a rejection, or "".
         request, outgoing = asked.request, tuple[Outgoing, ...]()
         try:
             if isinstance(request, WireError):

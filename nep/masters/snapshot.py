@@ -1,4 +1,4 @@
-"""Snapshots of the registry as frozen values, and the alerts derived from it."""
+"""Snapshots of the registry as immutable values, and the alerts derived from them."""
 
 from __future__ import annotations
 
@@ -26,16 +26,16 @@ __all__ = ["GraphViewer"]
 
 
 _MAX_NAMES = 5
-"""Maximum number of program names in a message."""
+"""Maximum number of program names in an alert."""
 
 
 class GraphViewer:
-    """Factory of snapshots of `registry`. Unchanged parts are the same objects as in the last snapshot."""
+    """Creates snapshots of `registry`. Unchanged parts are the same objects as in the previous snapshot."""
 
     def __init__(self, registry: Registry) -> None:
         self._registry = registry
         self._topics: dict[str, TopicInfo | None] = {}
-        """None for names that only occur as patterns of subscribers."""
+        """Topics of the previous snapshot; None for names that occur only as patterns of subscribers."""
         self._patterns: dict[str, PatternInfo] = {}
         self._alerts: dict[str, tuple[Alert, ...]] = {}
 
