@@ -1,4 +1,4 @@
-"""Messages: codecs between payloads and bytes, images, queues.
+"""Messages: codecs between payloads and bytes, images and queues.
 
 Independent of sockets, nodes and masters.
 """

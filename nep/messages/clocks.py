@@ -1,4 +1,4 @@
-"""Offset between the clocks of two computers, and its uncertainty."""
+"""Offset between the clocks of two computers, with its uncertainty."""
 
 from __future__ import annotations
 
@@ -18,20 +18,20 @@ __all__ = [
 ]
 
 OFFSET_MAX_NS = 2**62
-"""Maximum plausible offset of a clock: 146 years."""
+"""Maximum plausible clock offset in nanoseconds: 146 years."""
 UNCERTAINTY_MAX_NS = 10_000_000_000
-"""Maximum useful uncertainty of an offset."""
+"""Maximum uncertainty in nanoseconds with which an offset is still useful."""
 _DRIFT_DIVISOR = 20_000
-"""Reciprocal of the maximum drift between two free-running clocks: 50 µs per second."""
+"""Reciprocal of the maximum drift between two clocks that aren't synchronized: 50 µs per second."""
 
 
 def drift_ns(elapsed_ns: float) -> int:
-    """Return the maximum drift of two clocks within a time."""
+    """Return the maximum drift in nanoseconds of two clocks within `elapsed_ns`."""
     return int(max(0.0, elapsed_ns)) // _DRIFT_DIVISOR
 
 
 def is_clock(offset_ns: int, uncertainty_ns: int) -> bool:
-    """Return True for a plausible offset and uncertainty; untrusted peers may send any number."""
+    """Return True if an offset and uncertainty are plausible. Untrusted peers may send any number."""
     return abs(offset_ns) <= OFFSET_MAX_NS and 0 <= uncertainty_ns <= UNCERTAINTY_MAX_NS
 
 
@@ -50,7 +50,7 @@ class ClockDifference:
     known_at_ns: int | None = None
 
     def uncertainty_at(self, now_ns: int) -> int:
-        """Return the uncertainty at a time: it grows with the drift of the clocks."""
+        """Return the uncertainty in nanoseconds at `now_ns`. It grows with the drift of the clocks."""
         if self.known_at_ns is None:
             return self.uncertainty_ns
         return self.uncertainty_ns + drift_ns(now_ns - self.known_at_ns)
@@ -60,16 +60,19 @@ SAME_CLOCK = ClockDifference(0, 0)
 
 
 class PublisherClock:
-    """Clock of one publisher; `difference` is updated while messages refer to it."""
+    """Clock of a publisher. `difference` is updated while messages refer to this object."""
 
     __slots__ = ("difference",)
 
     def __init__(self, difference: ClockDifference | None = None) -> None:
         self.difference = difference
-        """Difference to this computer's clock, or None if it is unknown."""
+        """Difference to this computer's clock, or None if unknown."""
 
     def seconds(self) -> tuple[float, float] | None:
-        """Return the offset to add to its times and its uncertainty (±), in seconds; None if unknown."""
+        """Return (offset, uncertainty) in seconds, or None if unknown.
+
+        The offset is added to a time of the publisher; the uncertainty is ±.
+        """
         known = self.difference
         if known is None:
             return None
@@ -77,6 +80,6 @@ class PublisherClock:
 
 
 NOT_COMPARED = PublisherClock()
-"""Clock of publishers whose back end does not compare clocks. Immutable."""
+"""Clock of publishers whose back end doesn't compare clocks. Immutable."""
 OWN_CLOCK = PublisherClock(SAME_CLOCK)
 """Clock of publishers on this computer. Immutable."""

@@ -60,13 +60,13 @@ _NUMPY = orjson.OPT_SERIALIZE_NUMPY
 _modules = sys.modules
 
 NAN_WARNING_INTERVAL_S = 10.0
-"""Minimum interval between two warnings of a topic about NaN."""
+"""Minimum interval in seconds between two warnings about NaN on the same topic."""
 _logger = logging.getLogger("nep")
 _MAX_DEPTH = 100
 NULL = b"null"
-"""Searched from the end: `rfind` takes half the time of `in`, which is slow with many commas and digits."""
+"""JSON text of None. `rfind` finds it in half the time of `in`, which is slow with many commas and digits."""
 _PACKED_NAN = re.compile(rb"\xcb[\x7f\xff][\xf0-\xff]")
-"""NaN or infinity in msgpack; has false positives."""
+"""Pattern of NaN or infinity in msgpack. May also match other data."""
 
 
 @dataclass(frozen=True)
@@ -76,9 +76,9 @@ class Codec:
     Attributes:
         name: Name of the codec.
         number: Number in the message header.
-        encode: Returns the `Encoded` payload. Raises `EncodeError`.
-        decode: Returns the payload of bytes and extension. Raises `DecodeError`.
-        empty: Returns the payload that `listen` returns without a message.
+        encode: Encodes a payload as `Encoded`. Raises `EncodeError`.
+        decode: Decodes bytes and extension to a payload. Raises `DecodeError`.
+        empty: Returns the payload that `listen` returns if there is no message.
         check: Raises `EncodeError` for a payload of a wrong type, in constant time.
     """
 
@@ -99,10 +99,10 @@ def _plain_value(value: object) -> object:
 
 
 def numpy_option() -> int:
-    """Return orjson's option for numpy values, or 0 until numpy is imported.
+    """Return orjson's option for numpy values, or 0 while numpy is not imported.
 
-    With the option set, orjson imports numpy at the first value that it does not know, which takes 0.1 s:
-    a publisher would stall. Without numpy loaded there can be no numpy values.
+    With the option set, orjson imports numpy at the first value of an unknown type. That takes 0.1 s, during
+    which a publisher would stall. Without numpy loaded there can't be any numpy values.
     """
     return _NUMPY if "numpy" in _modules else 0
 
@@ -279,7 +279,7 @@ _ALIASES = {"images": IMAGE, "dictionary": JSON, "dict": JSON}
 
 
 def codec(name: str) -> Codec:
-    """Return a codec by name. Raises `DecodeError` for an unknown name."""
+    """Return the codec with a name. Raises `DecodeError` if there is none."""
     try:
         return CODECS[name]
     except KeyError:
@@ -289,12 +289,12 @@ def codec(name: str) -> Codec:
 
 
 def codec_numbered(number: int) -> Codec | None:
-    """Return a codec by its number in the header, or None if this version lacks it."""
+    """Return the codec with a number, or None if this version has none."""
     return _NUMBERED.get(number)
 
 
 def ordinary(codec: Codec) -> Callable[[Any], bytes] | None:
-    """Return a faster encoder for common payloads, or None if there is none.
+    """Return a faster encoder for common payloads of a codec, or None if there is none.
 
     It returns the same bytes as `codec.encode`; for other payloads it raises any exception.
     """
@@ -302,7 +302,7 @@ def ordinary(codec: Codec) -> Callable[[Any], bytes] | None:
 
 
 def codec_for(msg_type: str) -> Codec:
-    """Return the codec of a message type: the one of the same name, or json."""
+    """Return the codec of a message type: the codec with the same name, or json."""
     return CODECS.get(msg_type) or _ALIASES.get(msg_type, JSON)
 
 
@@ -312,7 +312,7 @@ def codec_for(msg_type: str) -> Codec:
 class JsonEncoder:
     """JSON encoder of one publisher.
 
-    `count` is the number of messages in which NaN or infinity became `null`.
+    `count` is the number of messages in which NaN or infinity was replaced by `null`.
     """
 
     def __init__(
@@ -340,7 +340,7 @@ class JsonEncoder:
         return encoded_payload
 
     def check_for_nan(self, payload: object) -> None:
-        """Check a payload whose encoding contains `NULL` for NaN and infinity; count and log them."""
+        """Check a payload whose encoding contains `NULL` for NaN and infinity; count and log the message."""
         if _may_have_nan(payload) and (where := find_nan(payload)) is not None:
             self.count += 1
             now = self._clock()

@@ -1,4 +1,4 @@
-"""Encoded: a payload as bytes."""
+"""Encoded: a payload that is already encoded."""
 
 from __future__ import annotations
 
@@ -10,13 +10,13 @@ __all__ = ["Encoded", "encoded"]
 
 
 class Encoded(NamedTuple):
-    """Encoded payload, which a publisher sends unchanged.
+    """Encoded payload. A publisher sends it unchanged.
 
         pub.publish(nep.Encoded(jpeg_bytes))
 
     Attributes:
         data: Bytes in the encoding of the topic's message type.
-        extension: Additional header fields with text keys, such as "shape" and "encoding" of an image; or
+        extension: Additional header fields with text keys, such as "shape" and "encoding" of an image, or
             None.
     """
 
@@ -27,4 +27,4 @@ class Encoded(NamedTuple):
 encoded: Callable[[tuple[bytes | memoryview, Mapping[str, object] | None]], Encoded] = partial(
     tuple.__new__, Encoded
 )
-"""Fast constructor of `Encoded`, in a third of the time; called for every message."""
+"""Fast constructor of `Encoded`; takes a third of the time. Called for every message."""

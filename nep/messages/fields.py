@@ -1,4 +1,4 @@
-"""Field paths: `pose.x`, `joints[3]`, `["a key"].b`, and `.` for the whole message."""
+"""Field paths: `pose.x`, `joints[3]`, `["a key"].b`; `.` is the whole message."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ __all__ = ["MISSING", "Path", "leaves", "parse_path", "path_text", "pick"]
 
 Path = tuple[str | int, ...]
 MISSING = object()
-"""Returned by `pick` for a missing field."""
+"""Value that `pick` returns for a missing field."""
 
 _STEP = re.compile(r"""\.?(?:\[(-?\d{1,19})\]|\["((?:[^"\\]|\\.)*)"\]|([^.\[\]"]+))""")
 _MAX_DEPTH = 40
@@ -77,7 +77,7 @@ def _format_step(step: str | int) -> str:
 
 
 def leaves(payload: object, most: int = 200) -> Iterator[str]:
-    """Iterate over the paths of at most `most` scalar values; values below the depth limit count as one."""
+    """Yield the paths of at most `most` scalar values. A value below the depth limit counts as a scalar."""
     remaining = [most]
     yield from _leaves(payload, "", remaining, _MAX_DEPTH)
 

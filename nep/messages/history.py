@@ -1,4 +1,4 @@
-"""History: newest messages of a publisher for later subscribers, bounded in number and bytes."""
+"""History: newest messages of a publisher for later subscribers, limited in number and bytes."""
 
 from __future__ import annotations
 
@@ -9,16 +9,16 @@ from typing import Generic, TypeVar
 __all__ = ["HISTORY_BYTES", "MAX_HISTORY", "History"]
 
 MAX_HISTORY = 1_000
-"""Maximum length of a history: every back end accepts this number at once for a new subscriber."""
+"""Maximum length of a history; every back end can send this many messages at once to a new subscriber."""
 HISTORY_BYTES = 64 * 2**20
 
 T = TypeVar("T")
 
 
 class History(Generic[T]):
-    """Newest messages, oldest first, bounded in number and total bytes; the newest is always kept.
+    """Newest messages, oldest first, limited in number and total bytes. The newest is always kept.
 
-    With `most` 0 it stays empty. Not thread-safe: guarded by the publisher's lock.
+    With a maximum of 0 messages it stays empty. Not thread-safe: guarded by the publisher's lock.
     """
 
     def __init__(self, max_messages: int, max_bytes: int = HISTORY_BYTES) -> None:
@@ -29,7 +29,7 @@ class History(Generic[T]):
         """Total size of the payloads."""
 
     def add(self, message: T, size_bytes: int) -> None:
-        """Append a message; evict the oldest beyond the limits."""
+        """Append a message; evict the oldest messages beyond the limits."""
         if not self._max_messages:
             return
         self._messages.append((message, size_bytes))

@@ -61,13 +61,13 @@ _TYPE_NAMES = lazy("uint8, int8, uint16, int16, int32, float32 or float64")
 
 @dataclass(frozen=True)
 class ImageFormat:
-    """Encoding of a publisher's images: `nep.ImageFormat("jpeg", quality=70, width=640)`.
+    """Format in which a publisher encodes images: `nep.ImageFormat("jpeg", quality=70, width=640)`.
 
     Encoded files and `raw_image` are sent unchanged. Raises `ValueError` for invalid values.
 
     Attributes:
-        kind: "jpeg" (`uint8` with one or three channels), "png", "raw", or "auto": JPEG for such
-            arrays, PNG for other 8-bit and 16-bit images, else raw.
+        kind: "jpeg" (`uint8` with one or three channels), "png", "raw", or "auto": JPEG for `uint8` arrays
+            with one or three channels, PNG for other 8-bit and 16-bit images, else raw.
         quality: JPEG quality, 1 to 100.
         width: Maximum width in pixels; wider images are scaled down, keeping the aspect ratio. Images of 16
             bits and more (depth, labels) are subsampled instead of interpolated.
@@ -113,7 +113,13 @@ class ImageFormat:
 
 @dataclass(frozen=True, slots=True)
 class RawLayout:
-    """Layout of raw pixels: numpy type of the numbers, channels per pixel, RGB or BGR order."""
+    """Layout of raw pixels.
+
+    Attributes:
+        numbers: numpy type of a channel's value.
+        channels: Number of channels per pixel.
+        is_red_first: True for the order RGB, False for BGR.
+    """
 
     numbers: str
     channels: int
@@ -156,7 +162,7 @@ def _channels(frame: NDArray[Any]) -> int:
 
 
 def _encode_default(frame: NDArray[Any], quality: int) -> Encoded:
-    # See the module docstring.
+    # The module docstring describes the default format.
     if frame.dtype.name == "uint8" and _channels(frame) in (1, 3):
         return _as_jpeg(frame, quality)
     return _as_png(frame) if _can_encode_png(frame) else _raw(frame)
@@ -235,7 +241,7 @@ def _shape(frame: NDArray[Any]) -> list[int]:
 
 
 def check(payload: object) -> None:
-    """Raise `EncodeError` for a value that is not an image, by its type, shape and number type."""
+    """Raise `EncodeError` if the type, shape or number type of a value is not that of an image."""
     if isinstance(payload, (bytes, bytearray, memoryview)):
         return
     try:
@@ -284,7 +290,7 @@ def _contiguous(payload: object) -> NDArray[Any]:
 def decode(data: memoryview, extension: Mapping[str, object]) -> object:
     """Decode an image to an array (height, width) or (height, width, channels) in BGR order.
 
-    Raises `DecodeError` before memory beyond the limits of `nep.messages.image_files` is allocated.
+    Raises `DecodeError`, before allocating memory, if the limits of `nep.messages.image_files` are exceeded.
     """
     try:
         layout = raw_layout(extension.get("encoding"))
@@ -299,7 +305,7 @@ def decode(data: memoryview, extension: Mapping[str, object]) -> object:
 
 
 def read_file(file: ImageFile, reduced: int = 1) -> NDArray[Any]:
-    """Decode the pixels of a file, upright; a JPEG scaled down by `reduced` (1, 2, 4, 8).
+    """Decode the pixels of a file, rotated upright. A JPEG is scaled down by `reduced` (1, 2, 4 or 8).
 
     Raises `DecodeError`.
     """
@@ -331,7 +337,7 @@ def _apply_orientation(picture: NDArray[Any], orientation: int) -> NDArray[Any]:
 
 
 def raw_layout(encoding: object) -> RawLayout | None:
-    """Return the layout of an encoding, or None if it is not raw."""
+    """Return the layout of an encoding, or None if the encoding is not one of raw pixels."""
     if not isinstance(encoding, str):
         return None
     named = _NAMED_LAYOUTS.get(encoding)
@@ -342,7 +348,7 @@ def raw_layout(encoding: object) -> RawLayout | None:
 
 
 def raw_array(data: memoryview, layout: RawLayout, shape: object) -> NDArray[Any]:
-    """Return raw bytes as an array in their own channel order, without a copy. Raises `DecodeError`."""
+    """Return raw bytes as an array in their original channel order, without a copy. Raises `DecodeError`."""
     np = _numpy()
     numbers = np.dtype(layout.numbers)
     sides = shape[:2] if isinstance(shape, list | tuple) else ()
@@ -363,7 +369,7 @@ def raw_array(data: memoryview, layout: RawLayout, shape: object) -> NDArray[Any
 
 
 def picture_info(data: bytes | memoryview) -> dict[str, object] | None:
-    """Return the extension of a JPEG or PNG file from its header, or None if `decode` would reject it."""
+    """Return the extension of a JPEG or PNG file, from its header; None if `decode` would reject the file."""
     try:
         return examine(data).extension
     except DecodeError:

@@ -17,17 +17,17 @@ from nep.i18n import _, number
 __all__ = ["MAX_BYTES", "MAX_PIXELS", "ImageFile", "check_size", "examine"]
 
 MAX_PIXELS = 120_000_000
-"""Maximum number of pixels, beyond any camera of a robot."""
+"""Maximum number of pixels; more than any camera of a robot has."""
 MAX_BYTES = 750_000_000
-"""Maximum memory for the pixels and the decoder's buffers."""
+"""Maximum memory in bytes for the pixels and the decoder's buffers."""
 _DECODER_COPIES = 2
 """Copies of the pixels that OpenCV holds while decoding (measured with 4.14, JPEG and PNG)."""
 MAX_SCANS = 100
-"""Maximum number of scans of a progressive JPEG; encoders write about ten."""
+"""Maximum number of scans in a progressive JPEG. Encoders write about ten."""
 MAX_SCANNED_PIXELS = 1_200_000_000
-"""Maximum number of pixels times scans, which limits decoding to a few seconds."""
+"""Maximum number of pixels times number of scans, which limits decoding to a few seconds."""
 MAX_SEGMENTS = 100_000
-"""Maximum number of JPEG segments or PNG chunks; encoders write them of 8 kB and more."""
+"""Maximum number of JPEG segments or PNG chunks. Encoders write them with 8 kB and more."""
 
 _JPEG = b"\xff\xd8\xff"
 _PNG = b"\x89PNG\r\n\x1a\n"
@@ -39,17 +39,17 @@ _UNSUPPORTED_FORMATS = {
 }  # fmt: skip
 _FILL_BYTES = re.compile(rb"\xff*")
 _MARKERS_WITHOUT_LENGTH = frozenset({0x01, *range(0xD0, 0xD8)})
-"""JPEG markers without a length: TEM and RST."""
+"""JPEG markers that have no length field: TEM and RST."""
 _FRAME_MARKERS = {0xC0: False, 0xC1: False, 0xC2: True}
-"""Supported JPEG frame headers, and whether they are progressive. Cameras and browsers use no others."""
+"""Supported JPEG frame headers; True if progressive. Cameras and browsers use no others."""
 _TABLE_MARKERS = frozenset({0xC4, 0xDB, 0xDD, 0xFE, *range(0xE0, 0xF0)})
 _SCAN, _APP1 = 0xDA, 0xE1
 _CHANNELS = {0: 1, 2: 3, 3: 3, 4: 4, 6: 4}
-"""Channels of a decoded PNG by its colour type."""
+"""Number of channels of a decoded PNG, by colour type."""
 _DEPTHS = {0: (1, 2, 4, 8, 16), 2: (8, 16), 3: (1, 2, 4, 8), 4: (8, 16), 6: (8, 16)}
 _REQUIRED_CHUNKS = frozenset({b"IHDR", b"PLTE", b"tRNS", b"IDAT", b"IEND"})
 _FIRST_ROTATED = 5
-"""First EXIF orientation in which rows and columns are swapped."""
+"""First EXIF orientation that swaps rows and columns."""
 
 
 @dataclass(frozen=True)
@@ -61,7 +61,7 @@ class ImageFile:
         width: Width in pixels after applying `orientation`.
         height: Height in pixels after applying `orientation`.
         channels: 1 (grey), 3, or 4 (with alpha).
-        bits: 8 or 16 per channel.
+        bits: Bits per channel, 8 or 16.
         orientation: EXIF orientation, 1 to 8.
         data: Bytes for the decoder: the file, or a PNG without its text, profiles and animation.
     """
@@ -76,12 +76,12 @@ class ImageFile:
 
     @property
     def extension(self) -> dict[str, object]:
-        """Extension of a message with this file."""
+        """Extension of a message that contains this file."""
         return {"shape": [self.height, self.width, self.channels], "encoding": self.kind}
 
 
 def examine(data: bytes | memoryview) -> ImageFile:
-    """Return the header of a file. Raises `DecodeError` if it is not a valid JPEG or PNG, or too large."""
+    """Parse the header of a file. Raises `DecodeError` if it is not a valid JPEG or PNG, or is too large."""
     file = data if isinstance(data, bytes) else memoryview(data).cast("B")
     head = bytes(file[:8])
     if head == _PNG:
@@ -100,13 +100,13 @@ def examine(data: bytes | memoryview) -> ImageFile:
 
 
 def check_size(width: int, height: int, pixel_bytes: float, size_bytes: int) -> None:
-    """Raise `DecodeError` for an image beyond the limits of pixels or memory.
+    """Raise `DecodeError` if an image exceeds the limits of pixels or memory.
 
     Args:
         width: Width in pixels.
         height: Height in pixels.
-        pixel_bytes: Memory per pixel.
-        size_bytes: Size of the received data, for the message.
+        pixel_bytes: Memory per pixel in bytes.
+        size_bytes: Size of the received data, for the error message.
     """
     if width < 1 or height < 1:
         raise DecodeError(
@@ -128,7 +128,7 @@ def check_size(width: int, height: int, pixel_bytes: float, size_bytes: int) -> 
 
 
 class _Reader:
-    """Common parts of both file readers."""
+    """Base class of both file readers."""
 
     kind: Literal["jpeg", "png"]
 
@@ -145,10 +145,10 @@ class _Reader:
 
 
 class _Jpeg(_Reader):
-    """Reader of the JPEG segments up to the first scan.
+    """Reader of JPEG segments up to the first scan.
 
-    Unusual structures are rejected, not guessed: a decoder might interpret them differently, and then the
-    checked size would not be the decoded one.
+    Unusual structures are rejected instead of interpreted: a decoder might interpret them differently, and
+    the decoded size would then differ from the checked one.
     """
 
     kind = "jpeg"
@@ -249,7 +249,7 @@ class _Frame:
 
 
 class _Png(_Reader):
-    """Reader of the PNG chunks."""
+    """Reader of PNG chunks."""
 
     kind = "png"
 
@@ -304,7 +304,7 @@ class _Png(_Reader):
 
 
 _MAX_EXIF_BYTES = 4096
-"""Number of bytes of EXIF data searched for the orientation."""
+"""Number of bytes of EXIF data that are searched for the orientation."""
 
 
 def _orientation(exif: bytes | memoryview) -> int | None:

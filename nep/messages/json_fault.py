@@ -1,4 +1,4 @@
-"""Location and reason of JSON syntax errors, for editors, the command line and files written by people."""
+"""Position and reason of JSON syntax errors, for editors, the command line and files written by people."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ _JSON_START = re.compile(r'\s*(?:[{["]|-?\d|-?(?:Infinity|NaN)\b|(?:true|false|n
 
 @dataclass(frozen=True, slots=True)
 class JsonFix:
-    """Edit that fixes a fault: replace the characters from ``start`` to ``end`` with ``text``."""
+    """Edit that fixes a syntax error: replace the characters from ``start`` to ``end`` with ``text``."""
 
     start: int
     end: int
@@ -33,10 +33,14 @@ class JsonFix:
 
 @dataclass(frozen=True, slots=True)
 class JsonFault:
-    """First position at which a text is not JSON.
+    """First syntax error in a JSON text.
 
-    ``line`` and ``column`` count from 1. ``reason`` goes into a sentence: lower case, no full stop.
-    ``is_nan``: the fault is NaN or an infinity, which Python's ``json`` writes and msgpack has.
+    Attributes:
+        line: Line number, from 1.
+        column: Column number, from 1.
+        reason: Reason for use within a sentence: lower case, no full stop.
+        fix: Edit that fixes the error, or None.
+        is_nan: True if the error is NaN or an infinity, which Python's ``json`` writes and msgpack supports.
     """
 
     line: int
@@ -47,21 +51,21 @@ class JsonFault:
 
     @property
     def sentence(self) -> str:
-        """The fault as a sentence for the window."""
+        """Description of the error as a sentence for the window."""
         return _("Line {line}, column {column}: {reason}.").format(
             line=self.line, column=self.column, reason=self.reason
         )
 
 
 def looks_like_json(text: str) -> bool:
-    """Return True if `text` starts like JSON, so that its author probably meant JSON."""
+    """Return True if `text` begins like JSON, so that it was probably meant as JSON."""
     return _JSON_START.match(text) is not None
 
 
 def find_json_fault(text: str, *, allow_nan: bool = False) -> JsonFault | None:
-    """Return the first fault of `text`, or None if nep can publish it as JSON.
+    """Return the first syntax error of `text`, or None if nep can publish it as JSON.
 
-    With `allow_nan`, NaN and Infinity are values, too.
+    With `allow_nan`, NaN and Infinity are accepted as values.
     """
     try:
         json.loads(text, parse_constant=float if allow_nan else _reject_constant, parse_float=_finite)

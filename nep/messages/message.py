@@ -1,4 +1,4 @@
-"""Message: one message of a topic, decoded at the first access to its payload."""
+"""Message received from a topic, whose payload is decoded at the first access."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ __all__ = ["NOTHING", "UNDECODED", "Message", "MessageKind", "arrived", "kind_of
 NOTHING: Mapping[str, object] = MappingProxyType({})
 UNDECODED = object()
 new_message = object.__new__
-"""Fast constructor without `__init__`, for creating messages at high rates; see `arrived`."""
+"""Fast constructor that skips `__init__`, for creating messages at high rates. See `arrived`."""
 
 
 class MessageKind(NamedTuple):
@@ -39,7 +39,10 @@ def kind_of(
     is_latched: bool = False,
     clock: PublisherClock = NOT_COMPARED,
 ) -> MessageKind:
-    """Return a `MessageKind`. An unknown codec raises only when a payload is decoded."""
+    """Return the properties shared by all messages of a publisher.
+
+    An unknown codec raises only when a payload is decoded.
+    """
     known = CODECS.get(codec)
     decode = partial(_no_codec, codec) if known is None else known.decode
     return MessageKind(topic, codec, msg_type, is_latched, decode, clock)
@@ -80,7 +83,7 @@ class Message:
     extension: Mapping[str, object]
     publisher: int | None
     seen_ns: int
-    """Time of the first access to `latency_s` by this computer's clock; not set before."""
+    """Time of the first access to `latency_s`, by this computer's clock; unset before."""
     seq: int | None
     stamp_ns: int | None
 
@@ -131,7 +134,7 @@ class Message:
 
     @property
     def payload(self) -> object:
-        """Decoded payload, cached. Raises `DecodeError` if the data is not valid in its codec."""
+        """Decoded payload; cached. Raises `DecodeError` if the data is invalid for its codec."""
         payload = self.decoded
         if payload is UNDECODED:
             payload = self.decoded = self.kind.decode(self.raw, self.extension)
@@ -139,10 +142,10 @@ class Message:
 
     @property
     def latency_s(self) -> float | None:
-        """Seconds from publication to the first access of this property, or None without a time stamp.
+        """Seconds from publication to the first access of this property; None without a time stamp.
 
-        Read it as soon as a message is received. Between computers the difference of the clocks is corrected
-        as far as it is known (`latency_uncertainty_s`), so that the value may be slightly negative.
+        Read it as soon as a message is received. Between computers the clock offset is corrected as far as it
+        is known (`latency_uncertainty_s`), so the value may be slightly negative.
         """
         if self.stamp_ns is None:
             return None
@@ -180,7 +183,10 @@ def arrived(
     publisher: int,
     extension: Mapping[str, object] = NOTHING,
 ) -> Message:
-    """Create a received message, in a back end. `data` must never change; reuse `kind` for many messages."""
+    """Create a received message. For back ends.
+
+    `data` must never change. Reuse `kind` for the messages of a publisher.
+    """
     message = new_message(Message)
     message.kind = kind
     message.raw = data

@@ -1,9 +1,9 @@
-"""Limit of nested lists and maps in a message: 64 levels, in every codec.
+"""Limit for nested lists and maps in a message: 64 levels, in every codec.
 
 Readers walk payloads recursively; a message of 2 kB with 1000 levels would raise `RecursionError` in them.
-JSON is checked before decoding: most messages have too few brackets to be deep, which takes less than 1 µs to
-detect. msgpack is checked after decoding, with the garbage collector's traversal, in a quarter of the time of
-a Python loop.
+JSON is checked before decoding; most messages have too few brackets to exceed the limit, which takes less
+than 1 µs to detect. msgpack is checked after decoding, with the traversal of the garbage collector, which
+takes a quarter of the time of a Python loop.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ _TEXT = re.compile(rb'"[^"]*"')
 
 
 def too_deep() -> str:
-    """Return the reason for an error message."""
+    """Return the reason for the error message."""
     return _("it has more than {levels} levels of lists and maps").format(levels=MAX_LEVELS)
 
 

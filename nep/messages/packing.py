@@ -31,7 +31,7 @@ def pack(value: object, default: Callable[[object], object] | None = None) -> by
 
 
 def clamp_int(value: object) -> int:
-    """Return the nearest int that msgpack can encode. Raises `TypeError` for other types."""
+    """Return the nearest int that msgpack can encode. Raises `TypeError` if the value is not an int."""
     if not isinstance(value, int):
         raise TypeError(_("a '{kind}' can't be encoded as msgpack").format(kind=type(value).__name__))
     return max(_MIN_INT, min(_MAX_INT, value))
@@ -40,7 +40,7 @@ def clamp_int(value: object) -> int:
 def pack_saturated(value: object) -> bytes:
     """Encode plain values of nodes and the master as msgpack, without failing.
 
-    Values from the network can't make it raise: ints saturate, lone surrogates become "?".
+    Values from the network can't cause an exception: ints are clamped, lone surrogates become "?".
     """
     packed: bytes = msgpack.packb(value, use_bin_type=True, unicode_errors="replace", default=clamp_int)
     return packed
@@ -84,9 +84,14 @@ def _hashable(key: object) -> object:
 
 
 def unpack_bounded(data: bytes, most_lists: int, longest: int) -> object:
-    """Decode untrusted msgpack like `unpack`, with at most `most_lists` lists and maps of length `longest`.
+    """Decode untrusted msgpack as `unpack` does, with limits. Raises `ValueError`.
 
-    A million empty lists are a megabyte to send and take seconds to build. Raises `ValueError`.
+    The limits are needed because a million empty lists take a megabyte to send, but seconds to create.
+
+    Args:
+        data: Encoded value.
+        most_lists: Maximum number of lists and maps.
+        longest: Maximum length of a list or map.
     """
     left = most_lists
 
@@ -113,7 +118,7 @@ def unpack_bounded(data: bytes, most_lists: int, longest: int) -> object:
 
 
 def unpack_first(data: bytes) -> object:
-    """Decode the first of several values. Raises `ValueError` without a complete one."""
+    """Decode the first of several values. Raises `ValueError` if it is incomplete."""
     unpacker = msgpack.Unpacker(raw=False, strict_map_key=False)
     unpacker.feed(data)
     try:

@@ -10,12 +10,12 @@ from nep.messages.message import Message
 __all__ = ["AHEAD_MOST", "MAX_BYTES", "MAX_MESSAGES", "Inbox", "Keep", "ReadAhead"]
 
 Keep = Literal["all", "latest"]
-"""Queue policy of a subscriber: all messages as long as there is room, or only the newest."""
+"""Queue policy of a subscriber: all messages while there is room, or only the newest."""
 
 MAX_MESSAGES = 10_000
 MAX_BYTES = 256 * 2**20
 _FAST_READ_S = 10e-6
-"""Time between two reads below which a reader is fast, and its batch size is doubled."""
+"""Maximum time in seconds between two reads of a fast reader, whose batch size is doubled."""
 AHEAD_MOST = 64
 
 
@@ -31,7 +31,10 @@ class Inbox:
         self._bytes = 0
 
     def put(self, message: Message) -> int:
-        """Append a message; return the number of messages dropped. Replacing the latest does not count."""
+        """Append a message; return the number of dropped messages.
+
+        With the policy "latest" a replaced message does not count.
+        """
         self.messages.append(message)
         self._bytes += message.size_bytes
         dropped = 0
@@ -83,7 +86,7 @@ class Inbox:
 class ReadAhead:
     """Adaptive number of messages that a reader reads at once.
 
-    A read without a message costs time, so only fast readers read ahead.
+    Looking for a message in vain costs time, so only fast readers read ahead.
     """
 
     def __init__(self, max_messages: int) -> None:
@@ -91,15 +94,15 @@ class ReadAhead:
         self.now = 1
         """Current number of messages per read."""
         self.span_s = _FAST_READ_S
-        """Time between two reads below which the reader counts as fast."""
+        """Maximum time in seconds between two reads for the reader to count as fast."""
 
     def more(self) -> int:
-        """Increase and return the number of messages, for a fast reader."""
+        """Increase the number of messages for a fast reader, and return it."""
         self.now = min(2 * self.now, self._most)
         self.span_s = self.now * _FAST_READ_S
         return self.now
 
     def begin(self) -> None:
-        """Reset to one message: the reader is slow, or fewer messages were available."""
+        """Reset to one message, because the reader is slow or fewer messages were available."""
         self.now = 1
         self.span_s = _FAST_READ_S

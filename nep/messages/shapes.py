@@ -31,13 +31,13 @@ __all__ = [
 ]
 
 _MIN_INT, _MAX_INT = -(1 << 63), (1 << 64) - 1
-"""Range of ints in JSON."""
+"""Minimum and maximum of ints in JSON."""
 _MAX_TEXT_LENGTH = 100
-"""Maximum length of a key or value in a message."""
+"""Maximum length in characters of a key or value in an error message."""
 
 
 class ShapeMismatch(Exception):  # noqa: N818 - internal
-    """Value that doesn't match its shape. `steps` is the path to it, innermost first."""
+    """A value doesn't match its shape. `steps` is the path to the value, innermost first."""
 
     def __init__(self, reason: str) -> None:
         self.reason = reason
@@ -45,13 +45,13 @@ class ShapeMismatch(Exception):  # noqa: N818 - internal
         super().__init__(reason)
 
     def in_field(self, name: object) -> ShapeMismatch:
-        """Add the field `name` of the enclosing value to the path, and return self."""
+        """Add the field `name` of the enclosing value to the path; return self."""
         self.steps.append(f".{escaped(shortened(str(name), _MAX_TEXT_LENGTH))}")
         return self
 
     @property
     def place(self) -> str:
-        """Path in the payload, such as "pose.position.x" or "joints[3]"; empty for the whole."""
+        """Path of the value, such as "pose.position.x" or "joints[3]"; "" for the whole payload."""
         return "".join(reversed(self.steps)).removeprefix(".")
 
     @property
@@ -62,10 +62,10 @@ class ShapeMismatch(Exception):  # noqa: N818 - internal
 
 
 class ValueShape:
-    """Reader and writer of the values of one type.
+    """Converter for the values of one type.
 
-    Created empty and filled later, because a dataclass may have fields of its own type. `read` converts a
-    JSON value, `write` converts to one; both raise `ShapeMismatch`.
+    `read` converts a JSON value to a Python value, `write` does the reverse; both raise `ShapeMismatch`. Both
+    are set after creation, because a dataclass may have fields of its own type.
     """
 
     __slots__ = ("_describe", "json_types", "name", "read", "unchanged_type", "write")
@@ -82,7 +82,7 @@ class ValueShape:
     ) -> None:
         self.name = name
         self.json_types = frozenset(json_types) if unchanged_type is None else frozenset({unchanged_type})
-        """Python types of the values in JSON; empty for any."""
+        """Python types of the value in JSON; empty for any type."""
         self.unchanged_type = unchanged_type
         """Type whose instances are read unchanged, or None."""
         self._describe = describe
@@ -94,17 +94,17 @@ class ValueShape:
 
 
 def wrong_type(value: object, expected: str) -> ShapeMismatch:
-    """Return the mismatch of a value of a wrong type."""
+    """Return the error for a value of a wrong type."""
     return ShapeMismatch(_("is a '{kind}'; give {wanted}").format(kind=type(value).__name__, wanted=expected))
 
 
 def missing_value(shape: ValueShape) -> ShapeMismatch:
-    """Return the mismatch of a missing value."""
+    """Return the error for a missing value."""
     return ShapeMismatch(_("is missing; give {wanted}").format(wanted=shape.expected))
 
 
 def short_repr(value: object) -> str:
-    """Return the shortened `repr` of a value for a message."""
+    """Return the shortened `repr` of a value, for a message."""
     return escaped(shortened(repr(value), _MAX_TEXT_LENGTH))
 
 
@@ -282,7 +282,7 @@ def _is_same(value: object, allowed: object) -> bool:
 
 
 def literal_shape(values: Sequence[object]) -> ValueShape | None:
-    """Return the shape of a Literal, or None if a value can't be represented in JSON."""
+    """Return the shape of a Literal, or None if JSON can't represent one of its values."""
     if not all(
         (each is None or isinstance(each, str | int)) and not isinstance(each, Enum) for each in values
     ):
@@ -305,7 +305,7 @@ def literal_shape(values: Sequence[object]) -> ValueShape | None:
 
 
 def enum_shape(kind: type[Enum]) -> ValueShape | None:
-    """Return the shape of an Enum, sent by value, or None if a value can't be represented in JSON."""
+    """Return the shape of an Enum, sent by value, or None if JSON can't represent one of its values."""
     members = list(kind)
     if not all(isinstance(each.value, str | int | float | None) for each in members):
         return None
@@ -334,9 +334,9 @@ def enum_shape(kind: type[Enum]) -> ValueShape | None:
 
 
 def union_shape(shapes: Sequence[ValueShape]) -> ValueShape | None:
-    """Return the shape of a Union, or None if two members are the same in JSON.
+    """Return the shape of a Union, or None if two members have the same form in JSON.
 
-    The first member that matches is read; None comes first, because null would otherwise be NaN.
+    The first matching member is used for reading. None is tried first, because null would otherwise be NaN.
     """
     json_types = [form for each in shapes for form in each.json_types]
     if len(json_types) > len(set(json_types)):

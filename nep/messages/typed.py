@@ -51,16 +51,22 @@ from nep.text import escaped, shortened
 __all__ = ["OTHER_NAME", "MessageType", "TypedReader", "message_type", "typed_codec", "value_shape"]
 
 OTHER_NAME = "nep.other_name"
-"""Key of a field's metadata: an alternative name accepted in received messages."""
+"""Key of a field's metadata for an alternative name that is accepted in received messages."""
 
 _MAX_NAME_LENGTH = 100
-"""Maximum length of a name in a message."""
+"""Maximum length in characters of a name in an error message."""
 _QUALIFIERS = frozenset({"Required", "NotRequired", "ReadOnly"})
 
 
 @dataclass(frozen=True)
 class MessageType:
-    """Declared message type: its name in the graph, its shape, and the class of its payloads."""
+    """Message type declared by a class.
+
+    Attributes:
+        name: Name of the message type in the graph.
+        shape: Shape of its payloads.
+        kind: Class of its payloads.
+    """
 
     name: str
     shape: ValueShape
@@ -71,8 +77,10 @@ class MessageType:
 def message_type(declared: type) -> MessageType:
     """Return the message type that a dataclass or TypedDict declares.
 
-    Its name is the attribute `MSG_TYPE`, or the name of the class. Raises `ValueError` for other classes, and
-    when the type of a field can't be represented in JSON.
+    Its name is the attribute `MSG_TYPE`, else the name of the class.
+
+    Raises:
+        ValueError: The class is neither, or JSON can't represent the type of a field.
     """
     is_map = _is_typed_dict(declared)
     if not is_map and not is_dataclass(declared):
@@ -96,7 +104,7 @@ def message_type(declared: type) -> MessageType:
 def value_shape(declared: type) -> ValueShape | None:
     """Return the shape of a dataclass, TypedDict or Enum for parameters, or None for other classes.
 
-    Raises `ValueError` when the type of a field can't be represented in JSON.
+    Raises `ValueError` if JSON can't represent the type of a field.
     """
     if not (is_dataclass(declared) or _is_typed_dict(declared) or issubclass(declared, Enum)):
         return None
@@ -118,7 +126,7 @@ def _whole_shape(declared: type) -> ValueShape:
 
 
 def typed_codec(declared: MessageType, base: Codec) -> Codec:
-    """Return a codec of instances of the type, based on the codec of plain values."""
+    """Return a codec for instances of the type, based on the codec for plain values."""
     write, kind = declared.shape.write, Mapping if declared.kind is dict else declared.kind
 
     def check(payload: object) -> None:
@@ -143,14 +151,14 @@ def typed_codec(declared: MessageType, base: Codec) -> Codec:
 
 
 class TypedReader:
-    """Converter of received messages to messages with payloads of a type."""
+    """Converts received messages to messages with payloads of a declared type."""
 
     def __init__(self, declared: MessageType) -> None:
         self._declared = declared
         self._kinds: tuple[MessageKind, MessageKind] | None = None
 
     def typed(self, message: Message) -> Message:
-        """Return a copy whose payload is decoded to the type at its first access. `message` may be shared."""
+        """Return a copy whose payload is decoded to the type at the first access. `message` may be shared."""
         source, kinds = message.kind, self._kinds
         if kinds is None or kinds[0] is not source:
             kinds = self._kinds = (source, source._replace(decode=self._decoder(source.decode)))
