@@ -12,7 +12,7 @@ The public names are listed in `nep.public`, which is imported at the first acce
 import importlib
 
 TYPE_CHECKING = False
-"""Replaces `typing.TYPE_CHECKING`: importing `typing` takes ten times as long as this module."""
+"""Replacement for `typing.TYPE_CHECKING`: importing `typing` takes ten times as long as this module."""
 
 if TYPE_CHECKING:
     from nep import geometry as geometry

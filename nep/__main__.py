@@ -1,4 +1,4 @@
-"""Entry point of `python -m nep`, which is the `nep` command."""
+"""Entry point of `python -m nep`, the same as the `nep` command."""
 
 from __future__ import annotations
 

@@ -72,11 +72,11 @@ __all__ = [
 
 _MAX_WORD_LENGTH = 200
 _MAX_REASON_LENGTH = 500
-"""Maximum length of a reason received from another program."""
+"""Maximum length in characters of a reason received from another program."""
 
 
 def did_you_mean(word: str, known: Sequence[str]) -> str:
-    """Return `did you mean 'zeromq'?` for a similar known word, or `known are 'a', 'b'` without one."""
+    """Return `did you mean 'zeromq'?` for a similar known word; `known are 'a', 'b'` if there is none."""
     near = nearest(word, known)
     if near is not None:
         return _("did you mean '{near}'?").format(near=near)
@@ -84,7 +84,7 @@ def did_you_mean(word: str, known: Sequence[str]) -> str:
 
 
 def nearest(word: str, known: Sequence[str]) -> str | None:
-    """Return the known word most similar to `word`, or None when no word is similar."""
+    """Return the known word most similar to `word`, or None if none is similar."""
     if len(word) > _MAX_WORD_LENGTH:  # the cost of the comparison grows with the square of the length
         return None
     return next(iter(get_close_matches(word, known, n=1)), None)
@@ -93,19 +93,21 @@ def nearest(word: str, known: Sequence[str]) -> str | None:
 class NepError(Exception):
     """Base class of all exceptions that nep raises.
 
-    try:
-        node.new_pub("position")
-    except nep.NepError as error:
-        print(error)
+        try:
+            node.new_pub("position")
+        except nep.NepError as error:
+            print(error)
+
+    The attributes of each subclass contain its details.
     """
 
 
 class WaitTimeoutError(NepError):
-    """A time limit passed before an event happened.
+    """A time limit passed before the expected event.
 
     Attributes:
-        what: The expected event, for the message.
-        timeout_s: The time limit in seconds.
+        what: Expected event, for the message.
+        timeout_s: Time limit in seconds.
     """
 
     def __init__(self, what: str, timeout_s: float) -> None:
@@ -377,11 +379,11 @@ class BackendUnavailableError(NepError):
 
 
 class PluginsMissingError(NepError):
-    """No module of the plug-in package binds the attribute: the package is empty or was not shipped.
+    """No module of the plug-in package defines the attribute: the package is empty or was not shipped.
 
     Attributes:
         package: The dotted name of the package.
-        attribute: The name that plug-ins bind.
+        attribute: The name that plug-ins define.
     """
 
     def __init__(self, package: str, attribute: str) -> None:
@@ -557,7 +559,7 @@ class RecordingError(NepError):
 
 
 class RecordingTooLargeError(RecordingError):
-    """Reading the recording would exceed a limit of size or work; `reason` names it."""
+    """Reading the recording would exceed a limit of size or work; `reason` names the limit."""
 
 
 class RecordingsUnavailableError(NepError):
@@ -573,4 +575,4 @@ class RecordingsUnavailableError(NepError):
 
 
 class WrongTypeError(TypeError, ValueError):
-    """An argument has the wrong type. A `TypeError` and, like every invalid argument, a `ValueError`."""
+    """An argument has the wrong type. Also a `ValueError`, like the errors for other invalid arguments."""

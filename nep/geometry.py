@@ -1,4 +1,4 @@
-"""Geometry messages with the fields of ROS, for typed topics (docs/types.md).
+"""Geometry messages with the same fields as in ROS, for typed topics (docs/types.md).
 
 Units are metres, radians and seconds; x points forward, y to the left and z up (REP 103).
 """
@@ -36,11 +36,11 @@ class Time:
 
     @classmethod
     def from_ns(cls, stamp_ns: int) -> Self:
-        """Return the time stamp of nanoseconds since 1970, such as `Message.stamp_ns`."""
+        """Create a time stamp from nanoseconds since 1970, such as `Message.stamp_ns`."""
         return cls(*divmod(stamp_ns, _NS))
 
     def to_ns(self) -> int:
-        """Return the nanoseconds since 1970."""
+        """Return the time stamp in nanoseconds since 1970."""
         return self.sec * _NS + self.nanosec
 
 
@@ -89,7 +89,7 @@ class Quaternion:
 
     @classmethod
     def from_euler(cls, roll: float = 0.0, pitch: float = 0.0, yaw: float = 0.0) -> Self:
-        """Return the rotation about the fixed axes x, y and z, in this order.
+        """Create a rotation about the fixed axes x, y and z, applied in this order.
 
         Args:
             roll: Rotation about x in radians.

@@ -69,7 +69,7 @@ PSEUDO = "qps"
 EDITOR_WORDS = "editor.json"
 LANG_VARIABLE = "NEP_LANG"
 MIN_SHARE = 0.9
-"""Minimum translated share of a language that users can select."""
+"""Minimum share of translated messages for a language that users can select."""
 LOCALE = Path(__file__).with_name("locale")
 
 _BLOCK_PLACEHOLDER = re.compile(r"%[A-Za-z_][A-Za-z0-9_]*")
@@ -99,7 +99,7 @@ class _ContextMessage(str):
 
 
 class _Catalogue:
-    """Catalogue of one language, with a cache of checked translations."""
+    """Translations of one language, with a cache of checked translations."""
 
     def __init__(self, language: str, found: GNUTranslations | None, facts: Mapping[str, object]) -> None:
         self.language = language
@@ -169,7 +169,7 @@ def _current_catalogue() -> _Catalogue:
 
 
 def install(wanted: str, folder: Path = LOCALE) -> _Catalogue:
-    """Set the language of this process; fall back to English if the catalogue is missing or unreadable.
+    """Set the language of this process; English if the catalogue is missing or unreadable.
 
     Args:
         wanted: Language code, such as "es" or "es_MX.UTF-8".
@@ -194,8 +194,8 @@ def install(wanted: str, folder: Path = LOCALE) -> _Catalogue:
 def begin(chosen: str = "") -> None:
     """Set the language at program start: NEP_LANG, else `chosen`, else the system's language.
 
-    The system's language is used only if its translation is complete enough to be offered. Child processes
-    inherit the language through the environment, and argparse's own messages follow it.
+    The system's language is used only if enough of it is translated (`LEAST_SHARE`). Child processes inherit
+    the language through the environment, and argparse's own messages use it, too.
     """
     install(os.environ.get(LANG_VARIABLE) or chosen or _supported_system_language())
     os.environ[LANG_VARIABLE] = language()
@@ -211,7 +211,7 @@ def _supported_system_language() -> str:
 
 
 def editor_words(folder: Path = LOCALE) -> Mapping[str, str]:
-    """Return the translations for the block editor's page by English text; empty for English."""
+    """Return the translations for the page of the block editor by English text; empty for English."""
     file = folder / language() / "LC_MESSAGES" / EDITOR_WORDS
     if language() == ENGLISH or not file.is_file():
         return {}
@@ -222,7 +222,7 @@ def editor_words(folder: Path = LOCALE) -> Mapping[str, str]:
 
 
 def offered(folder: Path = LOCALE) -> list[tuple[str, str]]:
-    """Return (code, native name) of the selectable languages; the pseudo-language only while it is in use."""
+    """Return (code, native name) of each selectable language; the pseudo-language only while it is in use."""
     found = [
         (name, str(known.get("name", name)))
         for name, known in known_languages(folder).items()
@@ -237,7 +237,7 @@ def language() -> str:
 
 
 def gettext(message: str) -> str:
-    """Translate a message to the current language. Fill its placeholders afterwards with ``format``."""
+    """Translate a message to the current language. Fill in its placeholders afterwards with ``format``."""
     return _current_catalogue().one(
         message.context if isinstance(message, _ContextMessage) else None, message
     )
@@ -247,17 +247,17 @@ _ = gettext
 
 
 def pgettext(context: str, message: str) -> str:
-    """Translate a message that has several meanings; `context` says which one is meant."""
+    """Translate a message that has several meanings. `context` names the intended meaning."""
     return _current_catalogue().one(context, message)
 
 
 def translate(context: str | None, message: str) -> str:
-    """Translate text of data files. `tools/words.py` doesn't extract messages from calls of this function."""
+    """Translate a text of a data file. `tools/words.py` doesn't extract messages from its calls."""
     return _current_catalogue().one(context, message)
 
 
 def ngettext(singular: str, plural: str, count: int) -> str:
-    """Translate a message with the plural form for `count`. Fill its placeholders afterwards."""
+    """Translate a message in the plural form for `count`. Fill in its placeholders afterwards."""
     return _current_catalogue().many(singular, plural, count)
 
 
@@ -309,7 +309,7 @@ def day_text(day: int, month: int, year: int | None = None) -> str:
 def holes(text: str) -> frozenset[str]:
     """Return the placeholders of a message: ``{name}``, ``%NAME`` of a block, ``%(name)s``.
 
-    Braces that don't form a placeholder are returned as they are.
+    If the text isn't a valid format string, its braces are returned instead of the ``{name}`` placeholders.
     """
     try:
         fields = {
@@ -324,9 +324,9 @@ def holes(text: str) -> frozenset[str]:
 
 @lru_cache(maxsize=4)
 def known_languages(folder: Path = LOCALE) -> Mapping[str, Mapping[str, object]]:
-    """Return the metadata of each language by its code: native ``name``, translated ``share``, number format.
+    """Return the metadata of each language by code: native ``name``, translated ``share``, number format.
 
-    The file is generated by ``tools/words.py compile``; the result is empty without it.
+    Read from a file that ``tools/words.py compile`` generates; empty if the file is missing.
     """
     try:
         found = json.loads((folder / "languages.json").read_text(encoding="utf-8"))
@@ -336,7 +336,7 @@ def known_languages(folder: Path = LOCALE) -> Mapping[str, Mapping[str, object]]
 
 
 def best_match(wanted: str, folder: Path = LOCALE) -> str:
-    """Return the available language for a locale name such as "es_MX.UTF-8"; English if there is none."""
+    """Return the available language for a locale name such as "es_MX.UTF-8"; English if none matches."""
     plain = re.split(r"[.@]", wanted.replace("-", "_"))[0].lower()
     if plain == PSEUDO:
         return PSEUDO
@@ -345,7 +345,7 @@ def best_match(wanted: str, folder: Path = LOCALE) -> str:
 
 
 def system_language(environ: Mapping[str, str] = os.environ, platform: str = sys.platform) -> str:
-    """Return the locale of the operating system, such as "es_MX"; English if it can't be determined."""
+    """Return the operating system's locale, such as "es_MX"; English if it can't be determined."""
     for name in ("LANGUAGE", "LC_ALL", "LC_MESSAGES", "LANG"):
         value = environ.get(name, "").partition(":")[0]
         if value:

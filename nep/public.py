@@ -1,4 +1,4 @@
-"""Public names of nep. `nep` imports this module at the first access to any of them."""
+"""Public names of nep. The package `nep` imports this module at the first access to one of them."""
 
 from nep.backends.connection import Configuration as Configuration
 from nep.backends.connection import Direct as Direct
@@ -69,10 +69,10 @@ node = Node
 """Alias of `Node`, in the spelling of the NEP paper."""
 
 server = FixedServer
-"""Alias of `FixedServer`, in the original module's spelling."""
+"""Alias of `FixedServer`: its name in the original module."""
 
 client = FixedClient
-"""Alias of `FixedClient`, in the original module's spelling."""
+"""Alias of `FixedClient`: its name in the original module."""
 
 master = Master
 """Alias of `Master`."""

@@ -1,7 +1,7 @@
-"""Sensor messages with the fields of ROS, for typed topics (docs/types.md).
+"""Sensor messages with the same fields as in ROS, for typed topics (docs/types.md).
 
-SI units. NaN stands for "not measured" where ROS defines it so; over JSON it is sent as `null`. `nep.sensor`
-is imported at its first use.
+Values are in SI units. NaN means "not measured" where ROS defines this; JSON sends it as `null`. The module
+`nep.sensor` is imported at its first use.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ def _matrix() -> list[float]:
 
 @dataclass
 class JointState:
-    """Positions, velocities and efforts of joints by name, as sensor_msgs/JointState. Lists may be empty."""
+    """Positions, velocities and efforts of joints, by name. As sensor_msgs/JointState; lists may be empty."""
 
     MSG_TYPE: ClassVar[str] = "sensor_msgs/JointState"
 
@@ -43,9 +43,9 @@ class JointState:
 
 @dataclass
 class Imu:
-    """Orientation, angular velocity and linear acceleration, as sensor_msgs/Imu.
+    """Orientation, angular velocity and linear acceleration. As sensor_msgs/Imu.
 
-    A covariance whose first element is -1 marks a value that is not measured.
+    If the first element of a covariance is -1, the value is not measured.
     """
 
     MSG_TYPE: ClassVar[str] = "sensor_msgs/Imu"
@@ -61,7 +61,7 @@ class Imu:
 
 @dataclass
 class LaserScan:
-    """Planar range scan from `angle_min` to `angle_max`, counterclockwise, as sensor_msgs/LaserScan."""
+    """Planar range scan from `angle_min` to `angle_max`, counterclockwise. As sensor_msgs/LaserScan."""
 
     MSG_TYPE: ClassVar[str] = "sensor_msgs/LaserScan"
 
@@ -79,7 +79,7 @@ class LaserScan:
 
 @dataclass
 class Range:
-    """Single range measurement, as sensor_msgs/Range."""
+    """Single range measurement. As sensor_msgs/Range."""
 
     MSG_TYPE: ClassVar[str] = "sensor_msgs/Range"
     ULTRASOUND: ClassVar[int] = 0
@@ -95,7 +95,7 @@ class Range:
 
 @dataclass
 class BatteryState:
-    """Battery state, as sensor_msgs/BatteryState.
+    """Battery state. As sensor_msgs/BatteryState.
 
     `percentage` is from 0 to 1; `current` is negative while discharging.
     """
@@ -127,7 +127,7 @@ class BatteryState:
 
 @dataclass
 class NavSatStatus:
-    """Fix status and satellite systems in use, as sensor_msgs/NavSatStatus."""
+    """Status of the position fix, and satellite systems in use. As sensor_msgs/NavSatStatus."""
 
     MSG_TYPE: ClassVar[str] = "sensor_msgs/NavSatStatus"
     STATUS_NO_FIX: ClassVar[int] = -1
@@ -145,7 +145,7 @@ class NavSatStatus:
 
 @dataclass
 class NavSatFix:
-    """Position in degrees of WGS 84, altitude in metres above its ellipsoid, as sensor_msgs/NavSatFix."""
+    """Position in degrees (WGS 84) and altitude in metres above the ellipsoid. As sensor_msgs/NavSatFix."""
 
     MSG_TYPE: ClassVar[str] = "sensor_msgs/NavSatFix"
     COVARIANCE_TYPE_UNKNOWN: ClassVar[int] = 0
@@ -164,7 +164,7 @@ class NavSatFix:
 
 @dataclass
 class Temperature:
-    """Temperature in degrees Celsius, as sensor_msgs/Temperature; a variance of 0 is unknown."""
+    """Temperature in degrees Celsius. As sensor_msgs/Temperature; a variance of 0 means unknown."""
 
     MSG_TYPE: ClassVar[str] = "sensor_msgs/Temperature"
 

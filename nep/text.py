@@ -1,4 +1,4 @@
-"""Sanitize untrusted text for names and messages.
+"""Functions that make untrusted text safe for names and messages.
 
 A *control character* has an effect instead of a glyph: it moves the cursor or clears the screen (C0, DEL,
 C1), changes the text direction, starts a new line, is invisible, or is half a surrogate pair.
@@ -15,7 +15,7 @@ from nep.i18n import _
 __all__ = ["bounded_str", "control_in", "escaped", "harmless", "quotable", "shortened"]
 
 _MAX_QUOTED_LENGTH = 200
-"""Default maximum length of a quoted value."""
+"""Default maximum length of a quoted value in characters."""
 
 _MAX_SHOWN_DEPTH = 8
 _MAX_INT_BITS = 1_000  # str() of larger ints takes quadratic time, or raises ValueError
@@ -53,7 +53,7 @@ def harmless(text: str, *, lines: bool = False) -> str:
 
     Args:
         text: The text.
-        lines: Keep newlines and tabs instead of replacing them by spaces.
+        lines: True to keep newlines and tabs; otherwise they are replaced by spaces.
     """
     if lines:
         return _CONTROL_EXCEPT_NEWLINES.sub("", text)
@@ -61,7 +61,7 @@ def harmless(text: str, *, lines: bool = False) -> str:
 
 
 def shortened(text: str, most: int) -> str:
-    """Return `text`, or its first `most` characters followed by its length."""
+    """Return `text` unchanged, or its first `most` characters followed by its length."""
     if len(text) <= most:
         return text
     return _("{beginning}… ({count} characters)").format(beginning=text[:most], count=len(text))
@@ -79,7 +79,7 @@ def bounded_str(value: object, max_length: int = _MAX_QUOTED_LENGTH) -> str:
 
 
 def quotable(value: object) -> str:
-    """Return an untrusted value as it may be quoted in a message: see `bounded_str` and `escaped`."""
+    """Return an untrusted value as text that can be quoted in a message. See `bounded_str` and `escaped`."""
     return escaped(bounded_str(value))
 
 

@@ -1,4 +1,4 @@
-"""Version of NEP Studio and nep, read by packages, checkouts and frozen programs."""
+"""Version of NEP Studio and nep, used by packages, checkouts and frozen programs."""
 
 from __future__ import annotations
 
@@ -7,4 +7,4 @@ __all__ = ["RELEASES_PAGE", "__version__"]
 __version__ = "0.1.0"
 
 RELEASES_PAGE = ""
-"""URL of the project's releases page; Studio shows no link to it while it is empty."""
+"""URL of the project's releases page. While it is empty, Studio shows no link."""
