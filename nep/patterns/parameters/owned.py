@@ -23,7 +23,7 @@ OnChange = Callable[[Mapping[str, object]], "str | None"]
 
 
 class StateTopic(Protocol):
-    """Latched topic on which a node publishes the state of its parameters."""
+    """Publisher of the latched topic with the state of a node's parameters."""
 
     def publish(self, payload: object) -> None:
         """Publish the parameters."""

@@ -32,7 +32,7 @@ class ServiceRegistry:
         transport: Transport of the node.
         backend: Back end of the node.
         wait_s: Time limit for the master in seconds.
-        new_id: Returns a new id and its secret number, which proves who registered the id.
+        new_id: Returns a new id, and the number from which the id was derived.
         wake: Wakes the spinning thread.
         closed_error: Returns the exception to raise after the node was closed.
     """
