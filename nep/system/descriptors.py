@@ -48,7 +48,7 @@ def limit() -> int | None:
 
 
 class _DescriptorCheck:
-    """Fast check for free descriptors (5 µs): tests whether the highest descriptor numbers are unused.
+    """Fast check for free descriptors (5 µs), based on the highest descriptor numbers.
 
     The system assigns the lowest free number first. Only if some of the highest numbers are in use, all open
     descriptors are counted, which takes 0.1 ms per few hundred.
