@@ -35,7 +35,7 @@ class StoredEntry:
         key: Key of the value.
         value: The value.
         since: Start of the value's age (blackboard's clock).
-        age_by: Whether the age starts at the time stamp or at the arrival.
+        age_by: Start of the age, as in `BlackboardEntry.age_by`.
         expires: Time at which the value expires (blackboard's clock).
         stamp_ns: Publisher's time stamp (ns since 1970), if any.
         publisher: Id of the publisher, if any.

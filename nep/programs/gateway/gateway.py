@@ -199,7 +199,7 @@ class Gateway:
         self._request_server.publish_members(self._programs.members())
 
     def _restore(self) -> None:
-        # Binds the ports of running programs again: they never ask twice.
+        # Binds the ports of running programs again, because programs request a port only once.
         self._programs.remove_ended()
         for line in {known.line for known in self._port_map.registrations if not known.line.is_service}:
             base = self._port_map.port_of(line)

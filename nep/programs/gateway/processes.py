@@ -1,4 +1,4 @@
-"""Information about the processes of original programs: whether they run, language, connections."""
+"""Information about the processes of original programs: start time, language, connections."""
 
 from __future__ import annotations
 

@@ -42,7 +42,7 @@ _GRAPH_TIMEOUT_S = 0.5
 
 
 class MotionGuard:
-    """Check of whether a program may publish on a topic. Thread-safe.
+    """Check that decides on which topics a program may publish. Thread-safe.
 
     Call `see` with each new graph. `refusal` is a dictionary look-up unless something has changed. Before the
     first graph no robots are known, and only the message type and RIZE's topic decide.
@@ -56,8 +56,6 @@ class MotionGuard:
     def __init__(
         self, node: Node, allowed: Collection[str] = (), *, own_nodes: Collection[str] | None = None
     ) -> None:
-        # `node` subscribes to descriptions. `allowed`: names of robots that may be moved; a topic stands for
-        # the robots that it moves. `own_nodes`: ids of the program's own nodes (default: that of `node`).
         self._node = node
         self._allowed = frozenset(allowed)
         self._own_nodes = frozenset((node.id,) if own_nodes is None else own_nodes)

@@ -58,7 +58,7 @@ def checked_origin(origin: str) -> str:
     if origin in {"null", "file://"}:
         return origin
     try:
-        parts = urlsplit(origin if origin.isascii() and origin.isprintable() else "")  # it leaves out tabs
+        parts = urlsplit(origin if origin.isascii() and origin.isprintable() else "")  # urlsplit removes tabs
         port = parts.port
     except ValueError:
         parts, port = urlsplit(""), None

@@ -126,7 +126,7 @@ class PageConnection:
         self._closing = asyncio.create_task(self._close_connection(_POLICY_VIOLATION, reason))
 
     async def _close_connection(self, code: int, reason: str) -> None:
-        # A page that reads nothing takes no close frame either.
+        # A page that does not read does not receive a close frame either.
         try:
             await asyncio.wait_for(self._connection.close(code, reason), _CLOSE_TIMEOUT_S)
         except asyncio.TimeoutError:
@@ -153,7 +153,7 @@ class PageConnection:
     async def _close_node(self) -> None:
         closed = self._thread.submit(self._node.close, _NODE_CLOSE_S)
         await asyncio.shield(asyncio.wrap_future(closed))
-        self._thread.shutdown()  # idle: it ends at once
+        self._thread.shutdown()  # returns at once: the thread is idle
 
     # ---- sending
 
@@ -175,7 +175,7 @@ class PageConnection:
             return
         feed = item.feed
         frames = await self._frames_of_message(item)
-        del item  # while a slow page blocks: its message may lie in shared memory
+        del item  # a slow page may block; release the message, which may be in shared memory
         for frame in frames:
             await self._connection.send(frame.data, text=frame.is_text)
         if frames:

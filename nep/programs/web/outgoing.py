@@ -107,7 +107,7 @@ def _json_payload(message: Message) -> bytes | None:
     try:
         orjson.loads(data)
     except orjson.JSONDecodeError:
-        return None  # NaN of the original NEP: decoded and encoded again
+        return None  # NaN of the original NEP; the caller decodes and encodes the payload
     return data
 
 

@@ -192,7 +192,7 @@ class SendQueue:
         while sum(each.size_bytes for each in self._active) > self._max_bytes:
             largest = max(self._active, key=lambda each: (len(each) > 1, each.size_bytes))
             if len(self._active) == 1 and len(largest) == 1:
-                return  # larger than the limit by itself, and the only one
+                return  # the only message, larger than the limit
             largest.drop_oldest()
             if not len(largest):
                 self._active.remove(largest)

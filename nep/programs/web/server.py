@@ -162,9 +162,9 @@ class WebServer:
 
     @property
     def refusals(self) -> tuple[Refusal, ...]:
-        """Latest refused connections and messages, the newest one last. Thread-safe.
+        """Latest rejected connections and messages, the newest one last. Thread-safe.
 
-        A repeated refusal, such as of a page that reconnects, is listed once with its last time.
+        A repeated rejection, such as of a page that reconnects, is listed once with its last time.
         """
         return self._refusals
 
@@ -247,7 +247,7 @@ class WebServer:
         for page in found:
             page.is_closing = True
             if self._loop is not None:
-                with suppress(RuntimeError):  # it has ended
+                with suppress(RuntimeError):  # the event loop is closed
                     self._loop.call_soon_threadsafe(page.start_closing, reason)
         return len(found)
 
@@ -278,7 +278,7 @@ class WebServer:
         """Close all connections with the code "going away" and stop the server. Idempotent."""
         loop, stop = self._loop, self._stop
         if loop is not None and stop is not None:
-            with suppress(RuntimeError):  # it has ended
+            with suppress(RuntimeError):  # the event loop is closed
                 loop.call_soon_threadsafe(stop.set)
         if self._thread.is_alive():
             self._thread.join(_JOIN_S)
@@ -318,7 +318,7 @@ class WebServer:
                 server.close()  # with 1001, going away
                 with suppress(asyncio.TimeoutError):
                     await asyncio.wait_for(server.wait_closed(), _END_TIMEOUT_S)
-                for connection in tuple(self._connections):  # those that do not react
+                for connection in tuple(self._connections):  # connections that did not close in time
                     if hasattr(connection, "transport"):  # connected
                         connection.transport.abort()
             guard.close()
@@ -495,7 +495,7 @@ class WebServer:
                 return
             self.counts.opened += 1
             await page.run()
-        except NepError as error:  # no more files for a node
+        except NepError as error:  # no file descriptor left for a node
             self._turn_away(connection, "limit", str(error))
             await connection.close(1013, "try again later")
         finally:
@@ -548,8 +548,8 @@ class WebServer:
 def check_installed() -> None:
     """Raise `NepError` if the libraries of the extra ``web`` are not installed."""
     try:
-        import cbor2  # noqa: F401, PLC0415 - whether it is there
-        import websockets.asyncio.server  # noqa: F401, PLC0415 - whether it is there, and new enough
+        import cbor2  # noqa: F401, PLC0415 - installed
+        import websockets.asyncio.server  # noqa: F401, PLC0415 - installed and recent enough
     except ImportError as error:
         raise NepError(
             _("the web server is not installed; install it with: pip install 'nep-studio[web]'")

@@ -128,7 +128,7 @@ class FoxglovePage(PageConnection):
             await self._context.in_thread(self._announce)
             while True:
                 await self._handle(await self._receive())
-                await give_way()  # other pages have their turn
+                await give_way()  # let other pages run
         except ws_exceptions.ConnectionClosed:
             return
         finally:
@@ -174,14 +174,14 @@ class FoxglovePage(PageConnection):
                 )
                 for message in self._updates.update(view):
                     self._send_fields(message)
-            except NepError as error:  # the master is away: nothing is known to have changed
+            except NepError as error:  # the master is down: keep the last known graph
                 _logger.debug("the page '%s' keeps its channels: %s", self.name, error)
             except Exception:
                 _logger.exception("the channels of the page '%s' could not be updated", self.name)
             with suppress(asyncio.TimeoutError):
                 await asyncio.wait_for(self._is_gone.wait(), _REFRESH_S)
 
-    # ---- what the client asks
+    # ---- requests of the client
 
     async def _handle(self, data: bytes) -> None:
         """Process one message from the client. Never raises because of the message's content."""
@@ -248,7 +248,7 @@ class FoxglovePage(PageConnection):
         ros_type = known or _ROS_TYPES.get(schema, schema)
         operation = op.operation_of({"op": "advertise", "topic": topic, "type": ros_type, "id": id_})
         if isinstance(operation, op.Advertise):
-            self._advertised[id_] = operation  # also if it is refused: the robot may be allowed later
+            self._advertised[id_] = operation  # even if it is rejected: the robot may be allowed later
             await self._topics.advertise(operation)
 
     async def _unadvertise(self, id_: object) -> None:
@@ -299,5 +299,5 @@ class FoxglovePage(PageConnection):
                 "message": bounded_str(values, _MAX_REASON_LENGTH),
             }
         )
-        # Lichtblick has no listener for failures: without the status nothing would be shown there.
+        # Lichtblick ignores failures of calls, so the reason is also sent as a status.
         self._send_status("warning", bounded_str(values, _MAX_REASON_LENGTH))

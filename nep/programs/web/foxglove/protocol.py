@@ -78,7 +78,7 @@ def parse(data: bytes) -> ClientMessage | ServiceRequest | Mapping[str, object]:
         encoding = data[begin : begin + length].decode("utf-8", "replace")
         return ServiceRequest(service_id, call_id, encoding, data[begin + length :])
     if not json_is_too_deep(data):
-        with suppress(json.JSONDecodeError):  # orjson's error is one, too
+        with suppress(json.JSONDecodeError):  # the base class of orjson's error
             fields = orjson.loads(data)
             if isinstance(fields, dict):
                 return fields

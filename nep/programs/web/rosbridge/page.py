@@ -96,7 +96,7 @@ class Page(PageConnection):
             await self._context.in_thread(self._announce)
             while True:
                 await self.handle(await self._receive())
-                await give_way()  # other pages have their turn
+                await give_way()  # let other pages run
         except ws_exceptions.ConnectionClosed:
             return
         finally:
@@ -170,7 +170,7 @@ class Page(PageConnection):
         write.get(operation.level, self._node.log.info)("%s", op.shown(operation.msg))
 
     def _reject(self, error: NepError) -> None:
-        # Logged rarely: a page can send any number of wrong operations.
+        # Logged at increasing intervals: a page can send any number of invalid operations.
         self._counts.rejected += 1
         self._rejected += 1
         if is_logged(self._rejected):

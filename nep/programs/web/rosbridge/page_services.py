@@ -67,7 +67,7 @@ class PageServices:
     async def _call(self, operation: CallService) -> None:
         try:
             values, is_success = await self._answer(operation), True
-        except Exception as error:  # noqa: BLE001 - what a server answers must not end the page
+        except Exception as error:  # noqa: BLE001 - a reply of any kind must not close the page
             values, is_success = str(error) or type(error).__name__, False
         try:
             self._send_response(operation, values, is_success)

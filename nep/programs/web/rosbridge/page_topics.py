@@ -212,7 +212,7 @@ class PageTopics:
         """End one subscription to a topic, or all of them if there is no id."""
         known = self._subscriptions.get(operation.topic)
         if known is None or not known.feed.unsubscribe(operation.id):
-            return  # as rosbridge: roslib unsubscribes again when it reconnects
+            return  # no error, as in rosbridge: roslib unsubscribes again when it reconnects
         if not known.feed.subscription_count:
             del self._subscriptions[operation.topic]
             await self._close_subscription(known)
@@ -236,7 +236,7 @@ async def read_messages(subscriber: Subscriber, feed: Feed, queue: SendQueue) ->
     """Append the messages of a subscriber to a page's queue until the task is cancelled."""
     async for message in subscriber:
         queue.add(feed, message)
-        del message  # it may lie in shared memory, which is released with the last reference
+        del message  # may be in shared memory, which is released with the last reference
 
 
 def subscribed_topic(feed: Feed) -> PageTopic:

@@ -212,7 +212,7 @@ class RosApi:
                 with self._node.parameters_of(each.id, _PARAMETER_TIMEOUT_S) as remote:
                     names += [f"{each.name}:{bounded_str(known.get('name'))}" for known in remote.list()]
             except NepError:
-                continue  # it went just now, or hangs
+                continue  # the node left meanwhile, or hangs
         return {"names": names}
 
     def get_param(self, args: Mapping[str, object]) -> Mapping[str, object]:
