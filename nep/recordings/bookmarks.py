@@ -75,7 +75,7 @@ class Bookmarks:
         place = bisect_right(self._all, at_ns, key=_at_ns)
         return self._all[place] if place < len(self._all) else None
 
-    # ---- changing them
+    # ---- changes
 
     def add(self, at_ns: int, name: str = "") -> Bookmark:
         """Add a bookmark; the time is limited to that of the recording.

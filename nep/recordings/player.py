@@ -300,7 +300,7 @@ class Playback:
             self._next = next(self._upcoming, None)
         if self._next is None or self._next.log_ns > until_ns:
             given_ns = until_ns
-        else:  # several messages of one time: a cut between them repeats some
+        else:  # several messages with the same time; a cut between them repeats some
             given_ns = due[-1].log_ns - (self._next.log_ns == due[-1].log_ns)
         self._from_ns = max(self._from_ns, given_ns + 1)
         return due

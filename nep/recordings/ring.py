@@ -169,7 +169,7 @@ class _Segments:
         return max(each.writer.end_ns for each in self._all)
 
     def select(self, seconds: float) -> list[tuple[_Segment, list[ChunkInfo]]]:
-        # `release(` must follow.
+        # Call `release` afterwards.
         with self._lock:
             since = self._newest_ns_locked() - int(seconds * 1e9)
             segments = []

@@ -207,7 +207,7 @@ class RecordingWriter:
         self._part = _Part()
         self._own_numbers: set[int] = set()
         self._unwritten: list[Sequence[Message]] = []
-        """Number of messages taken from the queue but not added to the file when writing failed."""
+        """Batches taken from the queue whose messages were not added to the file when writing failed."""
         self._message_count = self._size_bytes = 0
         self._thread = threading.Thread(target=self._run, name="recording-writer", daemon=True)
         self._thread.start()
