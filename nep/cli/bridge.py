@@ -180,7 +180,7 @@ def _show_configuration(configuration: BridgeConfiguration) -> None:
     )
 
 
-# ---- messages beside the table
+# ---- warnings above the table
 
 
 class _Notes(logging.Handler):
