@@ -59,7 +59,7 @@ FOREIGN = (
 )  # fmt: skip
 """Texts of typer and argparse, which are translated with gettext, too."""
 FORMATS = {"es": "es_419"}
-"""Locales whose number and date formats a language uses instead of its own."""
+"""Locales whose number and date formats are used for a language."""
 _MADE = dt.datetime(2026, 11, 22, tzinfo=dt.timezone.utc)
 """Fixed date for file headers, so that unchanged texts produce unchanged files."""
 _HEADER = "# All sentences of NEP Studio; made by tools/words.py (docs/translate.md)."
