@@ -1,21 +1,18 @@
 """Commands of an exported program: ``from app.blocks.commands import robot, run, wait``.
 
-They are the same functions as in Studio, for the single program of this process. ``run("Greeting")`` at the
-end of the file finds the robots, runs all scripts and stops the robots at the end, also after Ctrl+C.
+The commands are the same functions as in Studio, for the single program of this process. ``run("Greeting")``
+at the end of the file finds the robots, runs all scripts, and finally stops the robots, also after Ctrl+C.
 
-Example:
-    ::
+Example::
 
-        from app.blocks.commands import on_start, robot, run, wait
+    from app.blocks.commands import on_start, robot, run, wait
 
+    @on_start
+    def greet():
+        robot("Pepper").do("say", text="Hello")
+        wait(2)
 
-        @on_start
-        def greet():
-            robot("Pepper").do("say", text="Hello")
-            wait(2)
-
-
-        run("Greeting")
+    run("Greeting")
 """
 
 from __future__ import annotations
@@ -167,10 +164,10 @@ def run(name: str) -> None:
     """Run all scripts until they end or Ctrl+C is pressed, then stop the robots.
 
     Args:
-        name: Name of the program, shown to others.
+        name: Name of the program on the network.
 
     Raises:
-        SystemExit: A block failed; the message is a sentence for people.
+        SystemExit: A block failed; the message is an error message for the user.
     """
     prepare_streams()  # scripts may write characters that a Windows pipe can't encode
     with new_node(f"program {name}") as node:

@@ -1,8 +1,7 @@
 """Unexpected errors of Studio: logged once, shown as an alert, and isolated from the following steps.
 
 All errors go through `logging`: uncaught exceptions of any thread (`install_hooks`), exceptions caught by a
-guard
-(`log_errors`), and messages of Qt. Handlers whose output people read have a `RepeatFilter`.
+guard (`log_errors`), and messages of Qt. Handlers whose output people read have a `RepeatFilter`.
 """
 
 from __future__ import annotations
@@ -63,10 +62,8 @@ class RepeatFilter:
     """Logging filter that passes a fault when it is new and at its 10th, 100th, 1000th ... occurrence.
 
     Records count as repetitions if they have the same logger and level, and were raised at the same line or
-    have the
-    same text. The newest 500 faults are remembered; an older one counts as new. Thread-safe only under the
-    handler's
-    lock, which logging holds.
+    have the same text. The newest 500 faults are remembered; an older one counts as new. Thread-safe only
+    under the handler's lock, which logging holds.
     """
 
     def __init__(self) -> None:
@@ -124,8 +121,8 @@ class LogFile(RotatingFileHandler):
     """Log file of warnings and errors: ``studio.log`` and three older files of 1 MB each.
 
     The first line that a run writes to a file contains Studio's version, because files are continued after an
-    update.
-    Only the user can read the files. Records that can't be written (disk full or read-only) are dropped.
+    update. Only the user can read the files. Records that can't be written (disk full or read-only) are
+    dropped.
     """
 
     def __init__(self, folder: Path) -> None:

@@ -1,8 +1,7 @@
 """State of one window: the network with its topics and robots, the behaviours and their run.
 
 The window reads the state 30 times a second. No method blocks: threads post to the mailbox, and
-`Session.tick`
-applies the posted events and messages.
+`Session.tick` applies the posted events and messages.
 """
 
 from __future__ import annotations
@@ -88,8 +87,7 @@ class Session:
     """State shown by the panels. Not thread-safe: use it from the window's thread; `close` stops all threads.
 
     ``topics``, ``nodes``, ``networks``, ``images``, ``series`` and ``graph`` belong to the source that is
-    shown: the live
-    network (`live`), which stays connected, or a recording (``replay``).
+    shown: the live network (`live`), which stays connected, or a recording (``replay``).
     """
 
     replay: replay_module.Replay | None = None

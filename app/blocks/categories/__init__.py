@@ -1,5 +1,5 @@
-"""Categories of blocks: one module each, which binds ``CATEGORY``; discovered by `nep.system.plugins`.
+"""Categories of blocks. Each module binds ``CATEGORY`` and is discovered by `nep.system.plugins`.
 
-The category `robot` creates its blocks from robot descriptions; docs/blocks.md describes how to add a
+The category `robot` creates its blocks from robot descriptions. docs/blocks.md describes how to add a
 category.
 """

@@ -1,4 +1,4 @@
-"""Category Ask: questions to the person in front of Studio."""
+"""Category Ask: questions to the user of Studio."""
 
 from __future__ import annotations
 

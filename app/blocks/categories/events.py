@@ -1,4 +1,4 @@
-"""Category Events: hats that start scripts, and broadcasts."""
+"""Category Events: blocks that start scripts, and broadcasts."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Category Lists: ordered values under one name, numbered from 1."""
+"""Category Lists: ordered values in one variable, numbered from 1."""
 
 from __future__ import annotations
 

@@ -20,7 +20,7 @@ _ICONS = {
     "Sensors": "eye",
 }
 GROUPS = tuple(_ICONS)
-"""Titles of groups in display order; a description may add more."""
+"""Titles of the groups in display order; descriptions may define further groups."""
 _GROUP_TITLES = {
     "": "Movement",
     "actions": "Movement",
@@ -35,7 +35,7 @@ _NUMBERS = ("number", "integer")
 def robot_blocks(robot: Robot, known: Sequence[Robot]) -> tuple[Block, ...]:
     """Return all blocks of a robot.
 
-    `known` are all robots: the drop-down lists those of the same model.
+    ``known`` are all robots; those of the same model are offered in the drop-down.
     """
     alike = [other.name for other in known if other.model == robot.model] or [robot.name]
     blocks = [_action(robot, action, alike) for action in robot.actions]
@@ -45,7 +45,7 @@ def robot_blocks(robot: Robot, known: Sequence[Robot]) -> tuple[Block, ...]:
 
 
 def robot_groups(robot: Robot, known: Sequence[Robot]) -> tuple[Group, ...]:
-    """Return the groups under a robot's heading, sensors and events last."""
+    """Return the groups under the heading of a robot; sensors and events come last."""
     titles = {action.name: _group_title(action) for action in robot.actions}
     groups: dict[str, list[ToolboxEntry]] = {title: [] for title in GROUPS}
     for block in robot_blocks(robot, known):

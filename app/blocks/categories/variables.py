@@ -1,4 +1,4 @@
-"""Category Variables: values shared by all scripts, as Blockly variables with its field names."""
+"""Category Variables: values shared by all scripts, stored as variables of Blockly."""
 
 from __future__ import annotations
 

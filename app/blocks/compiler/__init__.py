@@ -1,4 +1,5 @@
-"""Compiler from a workspace to a program: templates filled with syntax trees, rendered as source and to run.
+"""Compiler from a workspace to a program.
 
-`compiler.compile_behaviour` is the entry point; `problems` has the sentences shown before Run.
+Templates are filled with syntax trees, from which readable source and executable code are generated.
+`compiler.compile_behaviour` is the entry point; `problems` contains the messages shown before Run.
 """

@@ -1,4 +1,4 @@
-"""Compiler: each block's template, with its holes filled by the trees of the blocks inside."""
+"""Compiler: fills the template of each block with the syntax trees of the blocks inside it."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ COMMANDS = frozenset(
         *calculation.__all__, *clock.__all__, *lists.__all__, *texts.__all__,
     }
 )  # fmt: skip
-"""Names that a program may call (`app.blocks.commands`); variables never get one of them."""
+"""Names of the functions that a program may call (`app.blocks.commands`), which no variable can have."""
 
 RESERVED = COMMANDS | {"step", "value", "number", "called", "message", "_"}
 
@@ -86,7 +86,10 @@ def _first_robot(block: Block) -> str:
 
 
 class _SkippedBlock(Exception):  # noqa: N818 (control flow, not an error)
-    """Block that can't be compiled: its problem is reported, and the block around it is skipped, too."""
+    """Raised for a block that can't be compiled.
+
+    The block is reported, and the block around it is skipped.
+    """
 
 
 def compile_behaviour(
@@ -96,12 +99,12 @@ def compile_behaviour(
     absent: Sequence[Robot] = (),
     name: str = "Behaviour",
 ) -> Program:
-    """Compile Blockly's JSON to a program. Never raises for invalid files: they give problems.
+    """Compile a workspace to a program. Invalid files cause problems in the result, not exceptions.
 
     Args:
-        workspace: Saved workspace.
-        robots: Connected robots; blocks of others are skipped.
-        absent: Disconnected robots as last known, to name their blocks.
+        workspace: Saved workspace of Blockly.
+        robots: Connected robots; blocks of other robots are skipped.
+        absent: Last known descriptions of disconnected robots, used to name their blocks.
         name: Name of the behaviour.
     """
     catalogue = Catalogue(robots, absent)
@@ -391,7 +394,7 @@ class _Compiler:
 
 
 def keywords(block: Block, expressions: Mapping[str, ast.expr]) -> dict[str, list[ast.keyword]]:
-    """Return keyword arguments; names that aren't valid identifiers are passed as ``**{"a-b": …}``."""
+    """Return keyword arguments. Names that aren't valid identifiers are passed as ``**{"a-b": …}``."""
     made: dict[str, list[ast.keyword]] = {}
     for hole, pairs in block.keywords.items():
         plain = [ast.keyword(name, expressions[at]) for at, name in pairs if _is_keyword_name(name)]
@@ -418,9 +421,9 @@ def _is_keyword_name(name: str) -> bool:
 
 
 def asked_actions(body: Sequence[ast.stmt]) -> dict[str, tuple[str, ...]] | None:
-    """Return the actions that a program requests of each robot, or None if that is not statically known.
+    """Return the actions that a program invokes on each robot; None if that isn't statically known.
 
-    It is read from the tree that runs, so a block can't request more than it declares.
+    The actions are read from the tree that is executed, so that a block can't invoke more than is reported.
     """
     found: dict[str, dict[str, None]] = {}
     for call in (node for statement in body for node in ast.walk(statement)):

@@ -1,8 +1,9 @@
 """Static detection of scripts that use the same resource of a robot at the same time.
 
-Two “when started” scripts run in parallel; if both move the base of one robot, one action replaces the other.
-Only certain conflicts are reported: actions behind a condition or a wait may be arranged to fit, and event
-scripts may interrupt on purpose. Those are reported when they happen (`app.blocks.runtime.robot_handle`).
+Two "when started" scripts run in parallel; if both move the base of a robot, one action replaces the other.
+Only certain conflicts are reported: actions after a condition or a wait may be timed correctly, and event
+scripts may interrupt other scripts on purpose. Such conflicts are reported when they occur
+(`app.blocks.runtime.robot_handle`).
 """
 
 from __future__ import annotations
@@ -26,7 +27,7 @@ _REPLACES = "replace"
 
 @dataclass(frozen=True)
 class UsedPart:
-    """Action block of a robot; ``when`` it runs, and whether it is in an endless loop."""
+    """Action block of a robot; ``endless`` is True inside a loop that never ends."""
 
     placed: Placed
     robot: str
@@ -39,8 +40,8 @@ class UsedPart:
 class Conflict:
     """Two blocks of two scripts that use the same resource of a robot at the same time.
 
-    ``put`` are the hat of the script that can be moved to the end of the other one, and the other one's hat;
-    None if both run forever.
+    ``put`` are the start block of the script that can be moved to the end of the other one, and the start
+    block of the other one; None if both run forever.
     """
 
     first: UsedPart
@@ -58,7 +59,7 @@ class ConflictFinder:
         self._workspace, self._catalogue, self._function = workspace, catalogue, function
 
     def conflicts(self) -> Iterator[Conflict]:
-        """Yield each pair of scripts once per resource of a robot that they both use."""
+        """Yield each conflict between two scripts, once for each resource of a robot."""
         scripts = [
             script for script in self._workspace.scripts if script[0].type == STARTED and script[0].enabled
         ]

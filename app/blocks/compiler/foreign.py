@@ -1,4 +1,4 @@
-"""Blocks of Blockly's standard set and of Scratch, and our equivalents."""
+"""Blocks of Blockly's standard set and of Scratch, and the equivalent blocks of Studio."""
 
 from __future__ import annotations
 
@@ -84,4 +84,4 @@ OURS: Mapping[str, str] = {
     "operator_subtract": "values_arithmetic",
     "sensing_askandwait": "asking_ask",
 }
-"""Our block type by the other program's; identical types are not listed."""
+"""Block type of Studio by the type of the other program; identical types are omitted."""

@@ -12,7 +12,7 @@ _READS, _CHANGES, _RECEIVES = "variables_get", "variables_change", "events_recei
 
 
 class LooseEnds:
-    """Collector of reads, assignments, sends and receives of all blocks that will run."""
+    """Collects the variables and broadcasts of all blocks that will run."""
 
     def __init__(self) -> None:
         self._read: dict[str, tuple[Placed, Block]] = {}  # first block that reads a variable
@@ -23,7 +23,7 @@ class LooseEnds:
         self._received: dict[str, tuple[Placed, Block]] = {}
 
     def remember(self, placed: Placed, block: Block) -> None:
-        """Add the reads, assignments, sends and receives of a block."""
+        """Record which variables a block reads or sets, and which broadcasts it sends or receives."""
         for argument in block.arguments:
             if isinstance(argument, ValueInput) and (argument.check == "List" or argument.variable == "list"):
                 inner = placed.inputs.get(argument.name, ())
@@ -45,7 +45,7 @@ class LooseEnds:
             self._set.add(id)
 
     def report(self, notes: ProblemCollector, workspace: Workspace) -> None:
-        """Report names without a counterpart."""
+        """Report variables that are read but never set, and broadcasts without a sender or receiver."""
         for id, (placed, block) in self._read.items():
             is_list = id in self._as_list
             if id not in self._set and (is_list or id not in self._changed):

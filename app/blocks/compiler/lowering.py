@@ -1,7 +1,7 @@
-"""Lowering: lists of n items, ifs with n branches and function calls are rewritten to plain blocks.
+"""Lowering: blocks with a variable number of inputs are rewritten to plain blocks.
 
-A workspace is rewritten once before compilation: each such block gets its own type, which the catalogue
-describes like any other block.
+These are lists of n items, ifs with n branches, and function calls. A workspace is rewritten once before it
+is compiled: each such block gets a separate type, which the catalogue describes like any other block.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ _HAS_RESULT = {PLAIN: False, RESULT: True}
 
 @dataclass(frozen=True)
 class Function:
-    """Function of the behaviour; ``parameters`` maps the ids of its inputs to Python names."""
+    """Function of the behaviour; ``parameters`` are the Python names of its inputs by id."""
 
     placed: Placed
     name: str
@@ -56,7 +56,7 @@ class Lowering:
         return self._by_id.get(definition.id)
 
     def called(self, placed: Placed) -> Function | None:
-        """Return the function that this block of the ``workspace`` calls, or None."""
+        """Return the function that a block of the rewritten ``workspace`` calls, or None."""
         kind = placed.type.partition(":")[0]
         found = self._called(placed) if kind in (CALL, CALL_RESULT) else None
         if found is None:

@@ -1,4 +1,4 @@
-"""Problems of a workspace, as sentences shown before Run."""
+"""Problems of a workspace, as messages shown before Run."""
 
 from __future__ import annotations
 
@@ -32,12 +32,12 @@ _PARTS = {
     "lights": lazy("the lights"),
     "light": lazy("the light"),
 }
-"""Names of our robots' resources; those of other robots are shown as described."""
+"""Display names of the resources of our robots; those of other robots are shown as described."""
 _STARTER = "events_started"
 
 
 class ProblemCollector:
-    """Collector of problems during compilation; each sentence is reported once per block."""
+    """Collects problems during compilation. Each message is reported once per block."""
 
     def __init__(self, catalogue: Catalogue, workspace: Workspace) -> None:
         self._catalogue = catalogue
@@ -49,11 +49,11 @@ class ProblemCollector:
         return tuple(sorted(self._problems.values(), key=lambda problem: _ORDER[problem.severity]))
 
     def label(self, placed: Placed, block: Block | None) -> str:
-        """Return the words that name a block in a sentence."""
+        """Return the label of a block for use in messages."""
         return label_of_unknown(placed) if block is None else label(placed, block)
 
     def check_starts(self, starts: int) -> None:
-        """Report blocks without a start; an empty workspace is fine."""
+        """Report that no block starts a script, unless the workspace is empty."""
         if starts or not self._workspace.scripts:
             return
         subject = pgettext("block", "when started")
@@ -64,7 +64,7 @@ class ProblemCollector:
         )  # fmt: skip
 
     def unattached(self, placed: Placed, block: Block) -> None:
-        """Report blocks that are not below a hat."""
+        """Report blocks that are not below a start block."""
         name = self.label(placed, block)
         if block.shape in ("value", "boolean"):
             words = _("{block} isn't used. Drag it into an empty slot of another block.")
@@ -75,7 +75,7 @@ class ProblemCollector:
         self._add("info", placed, block, name, sentence.format(block=name, start=start))
 
     def misplaced(self, placed: Placed, block: Block) -> None:
-        """Report a block in an impossible place; the editor prevents this, but a file may have it."""
+        """Report a block at an invalid position, which the editor prevents but a file may contain."""
         name = self.label(placed, block)
         sentence = _("{block} can't be used here. It is kept but skipped.")
         self._add("warning", placed, block, name, sentence.format(block=name))
@@ -92,7 +92,7 @@ class ProblemCollector:
         )  # fmt: skip
 
     def no_message(self, placed: Placed, block: Block) -> None:
-        """Report the message block in a script that no message starts."""
+        """Report a block that reads the received message in a script that isn't started by a message."""
         name = self.label(placed, block)
         self._add(
             "warning", placed, block, name,
@@ -100,7 +100,7 @@ class ProblemCollector:
         )  # fmt: skip
 
     def no_input(self, placed: Placed, block: Block) -> None:
-        """Report an input of a function outside of it, or a removed one."""
+        """Report an input of a function that is used outside of the function or was removed."""
         name = reading(placed, self._catalogue.blocks, self._workspace.variables)
         sentence = _("“{name}” only works inside its own function. It is kept but skipped.").format(name=name)
         self._add("warning", placed, block, name, sentence)
@@ -113,7 +113,7 @@ class ProblemCollector:
         )  # fmt: skip
 
     def never_set(self, placed: Placed, block: Block, id: str, name: str, *, is_list: bool) -> None:
-        """Report a variable that is read but never set: it stays 0, and is not a list."""
+        """Report a variable that is read but never set, so that its value remains 0."""
         subject = f"“{name}”"
         self._add(
             "warning", placed, block, subject, _("{name} is used but never set.").format(name=subject),
@@ -130,13 +130,13 @@ class ProblemCollector:
         )  # fmt: skip
 
     def never_sent(self, placed: Placed, block: Block, name: str) -> None:
-        """Report a script that waits for a broadcast that is never sent."""
+        """Report a script that waits for a broadcast which is never sent."""
         subject = f"“{name}”"
         sentence = _("Nothing broadcasts {name}, so this script doesn't run.").format(name=subject)
         self._add("info", placed, block, subject, sentence)
 
     def conflict(self, found: Conflict) -> None:
-        """Report two scripts that use the same resource of a robot, at the second one's block."""
+        """Report two scripts that use the same resource of a robot, at the block of the second script."""
         placed, name = found.second.placed, found.second.action.title
         part = _PARTS.get(found.part)
         words = _("“{action}” and “{other}” both move {robot} at the same time: one replaces the other.")
@@ -162,7 +162,7 @@ class ProblemCollector:
         self._add("error", placed, block, name, sentence.format(block=name, what_is_wrong=error))
 
     def absent(self, placed: Placed, block: Block | None, holder: Placed | None) -> bool:
-        """Report a block that no connected robot supports; return whether it is one."""
+        """Report a block that no connected robot supports; return False if it isn't such a block."""
         robot = placed.fields.get("ROBOT")
         name = self.label(placed, block)
         skipped = name
@@ -215,7 +215,7 @@ class ProblemCollector:
             self._add("warning", placed, None, name, sentence.format(block=name))
 
     def check_unknown(self) -> None:
-        """Report unknown blocks inside blocks that are skipped themselves."""
+        """Report unknown blocks inside of skipped blocks."""
         told = {id for id, _sentence in self._problems}
         for placed in self._enabled_blocks():
             if placed.type not in self._catalogue.blocks and placed.id not in told:
@@ -251,7 +251,7 @@ class ProblemCollector:
                 )  # fmt: skip
 
     def absent_blocks(self) -> tuple[str, ...]:
-        """Return the ids of all blocks of disconnected robots, also in scripts that can't run."""
+        """Return the ids of all blocks of disconnected robots, including those in scripts that can't run."""
         return tuple(
             placed.id
             for placed in self._workspace.all_blocks()
@@ -275,7 +275,7 @@ class ProblemCollector:
         return known is not None
 
     def missing(self, placed: Placed, block: Block) -> str | None:
-        """Report an empty gap without default and return its sentence; None if there is none."""
+        """Report an empty slot without default and return the message; None if there is none."""
         for argument in block.arguments:
             if not isinstance(argument, ValueInput):
                 continue

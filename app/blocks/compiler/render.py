@@ -1,4 +1,4 @@
-"""Rendering of one syntax tree as readable source and as instrumented code that reports its position."""
+"""Rendering of a syntax tree as readable source, and as instrumented code that reports its position."""
 
 from __future__ import annotations
 
@@ -10,11 +10,11 @@ from app.blocks.model.template import literal
 from nep.system.syntax import parse_module
 
 Marks = Mapping[ast.AST, str]
-"""Block ids by the node with which each block begins."""
+"""Block ids by the first node of each block."""
 
 
 def readable(body: Sequence[ast.stmt], marks: Marks) -> tuple[str, dict[int, str]]:
-    """Return the source for people, and the block ids of lines that begin a block."""
+    """Return readable source code, and the block ids of the lines at which a block begins."""
     parts: list[str] = []
     for before, statement in zip((None, *body[:-1]), body, strict=True):
         ast.fix_missing_locations(statement)
@@ -32,9 +32,13 @@ def readable(body: Sequence[ast.stmt], marks: Marks) -> tuple[str, dict[int, str
 def instrumented(
     body: Sequence[ast.stmt], marks: Marks, numbers: AbstractSet[str], calls: AbstractSet[str]
 ) -> str:
-    """Return the code that runs. Changes the tree, so call `readable` first.
+    """Return the code that is executed. Changes the tree, so call `readable` first.
 
-    `numbers` are the blocks that must return a number, `calls` those that call a function.
+    Args:
+        body: Syntax tree of the program.
+        marks: Block ids by node.
+        numbers: Blocks that must return a number.
+        calls: Blocks that call a function.
     """
     stepper = _Stepper(marks, numbers, calls)
     steps: list[ast.stmt] = []
@@ -61,10 +65,10 @@ def _matched_statements(
 
 
 class _Stepper(ast.NodeTransformer):
-    """Transformer that inserts ``step(id)`` before blocks and at the end of loop rounds, and wraps values.
+    """Inserts ``step(id)`` before blocks and at the end of loop bodies, and wraps values.
 
-    The step at the end of a loop shows the loop while its condition is evaluated, and lets Stop interrupt an
-    empty loop.
+    The step at the end of a loop body highlights the loop while its condition is evaluated, and lets Stop
+    interrupt an empty loop.
     """
 
     def __init__(self, marks: Marks, numbers: AbstractSet[str], calls: AbstractSet[str]) -> None:

@@ -1,6 +1,6 @@
 """Single stack of a behaviour as a program, to try it without the rest.
 
-It runs as if it were below “when started”, with the variables and functions of the behaviour.
+The stack runs as if it were below "when started", with the variables and functions of the behaviour.
 """
 
 from __future__ import annotations
@@ -15,14 +15,18 @@ from app.blocks.model.workspace import saved_blocks
 Saved = Mapping[str, object]
 _HAT = {"type": "events_started", "id": "try hat"}
 SHOW = "try value"
-"""Id of the block that writes a tried value."""
+"""Id of the block that prints a tried value."""
 
 
 @dataclass(frozen=True)
 class Stack:
-    """Stack to try: a block of the behaviour by its ``id``, or one of the toolbox by ``state``.
+    """Stack to try.
 
-    A ``value`` is written, the blocks below a ``hat`` are run, and any other block with those below it.
+    Attributes:
+        id: Id of the first block.
+        kind: "value" if the value is printed, "hat" if the blocks below are run; otherwise the block and
+            those below it are run.
+        state: Saved state of a block in the toolbox; None for a block of the behaviour.
     """
 
     id: str
@@ -59,12 +63,12 @@ class Stack:
         return made
 
     def type_in(self, behaviour: Saved) -> str:
-        """Return the type of its first block, or "" if it doesn't exist."""
+        """Return the type of the first block of the stack; "" if the block doesn't exist."""
         found = self.state if self.state is not None else self._found(behaviour)
         return str(found.get("type")) if found is not None else ""
 
     def variable_in(self, behaviour: Saved) -> str | None:
-        """Return the id of the variable whose value it is; None for anything else."""
+        """Return the id of the variable if the stack is a variable block; None for anything else."""
         found = self.state if self.state is not None else self._found(behaviour)
         if not self.is_value or found is None or found.get("type") != "variables_get":
             return None

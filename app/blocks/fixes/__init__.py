@@ -1,4 +1,4 @@
-"""Fixes behind the buttons of problems: pure functions from one workspace to the next.
+"""Fixes for problems, as pure functions from one workspace to the next.
 
-`app.blocks.compiler` finds the problems, `app.core.documents.problems` lists them with their buttons.
+`app.blocks.compiler` finds the problems; `app.core.documents.problems` lists them with their buttons.
 """

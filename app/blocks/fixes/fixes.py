@@ -1,4 +1,4 @@
-"""Fixes behind the buttons of problems: pure functions from one workspace to the next."""
+"""Fixes for problems, as pure functions from one workspace to the next."""
 
 from __future__ import annotations
 
@@ -13,17 +13,17 @@ from app.blocks.toolbox.catalogue import categories
 LIMIT_S = 10
 LEFT, TOP = 40, 40
 ASIDE = 420
-"""Horizontal distance of a new script from the others; most are not wider."""
+"""Horizontal distance of a new script from the others, most of which are not wider."""
 
 
 def fix(workspace: Mapping[str, object], action: str) -> dict[str, object] | None:
-    """Return the workspace after a problem's ``fix_action``; None for an action that isn't about blocks.
+    """Return the workspace after applying the ``fix_action`` of a problem; None for other actions.
 
     ``limit:<id>`` gives a "wait until" a time limit, ``add:<type>`` puts a block above the first script
     without a start, ``define:<id>`` creates the function that a block calls, ``begin:list:<id>`` and
     ``begin:number:<id>`` set a variable at the start of the behaviour, ``receive:<name>`` creates a script
-    that receives a broadcast, ``after:<hat>:<hat>`` moves the script of the first hat to the end of the
-    second one's.
+    that receives a broadcast, and ``after:<hat>:<hat>`` moves the script of the first start block to the end
+    of the script of the second one.
     """
     verb, _, object_ = action.partition(":")
     made: dict[str, object] = copy.deepcopy(dict(workspace))

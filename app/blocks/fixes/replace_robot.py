@@ -1,4 +1,4 @@
-"""Replacement of a disconnected robot in a behaviour by another one."""
+"""Replacement of a disconnected robot in a behaviour by another robot."""
 
 from __future__ import annotations
 
@@ -12,12 +12,12 @@ from app.robots.description.description import Robot
 
 
 def blocks_of(workspace: Mapping[str, object], robot: str) -> tuple[dict[str, object], ...]:
-    """Return all blocks that name the robot, outermost first."""
+    """Return all blocks that use the robot, outermost first."""
     return tuple(block for block in saved_blocks(workspace) if _robot_of(block) == robot)
 
 
 def asked_of(workspace: Mapping[str, object]) -> Mapping[str, frozenset[str]]:
-    """Return the types of the blocks that name each robot."""
+    """Return the types of the blocks that use each robot."""
     found: dict[str, set[str]] = {}
     for block in saved_blocks(workspace):
         robot = _robot_of(block)
@@ -27,7 +27,7 @@ def asked_of(workspace: Mapping[str, object]) -> Mapping[str, frozenset[str]]:
 
 
 def count_of(workspace: Mapping[str, object], ids: Collection[str]) -> Mapping[str, int]:
-    """Return the number of these blocks per robot."""
+    """Count the blocks with these ids for each robot."""
     wanted = frozenset(ids)
     found: dict[str, int] = {}
     for block in saved_blocks(workspace) if wanted else ():
@@ -43,16 +43,16 @@ def types_of(robot: Robot) -> frozenset[str]:
 
 
 def can_do(asked: Collection[str], model: str, robot: Robot, known: Collection[str] | None = None) -> bool:
-    """Return whether a robot supports all blocks of these types for a robot of this model.
+    """Return True if a robot supports all blocks of these types, which belong to a robot of this model.
 
-    `known` are the types of its own blocks, if already known.
+    ``known`` are the types of the robot's own blocks, if they were already determined.
     """
     known = types_of(robot) if known is None else known
     return bool(asked) and all(_translated(each, model, robot) in known for each in asked)
 
 
 def use_robot(workspace: Mapping[str, object], missing: str, model: str, robot: Robot) -> dict[str, object]:
-    """Return the workspace with all blocks of the missing robot changed to another one."""
+    """Return the workspace with all blocks of the missing robot changed to another robot."""
     made: dict[str, object] = copy.deepcopy(dict(workspace))
     for block in blocks_of(made, missing):
         block["type"] = _translated(str(block.get("type")), model, robot)

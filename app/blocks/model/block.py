@@ -1,4 +1,4 @@
-"""Block description, from which its appearance in the editor, its Python code and its texts are derived."""
+"""Description of a block, which defines its appearance in the editor, its Python code and its texts."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ _HOLE = re.compile(r"%([A-Z][A-Z0-9_]*)")
 
 @dataclass(frozen=True)
 class RobotUse:
-    """Action, sensor or event that a robot's block uses."""
+    """Action, sensor or event that a block of a robot uses."""
 
     kind: Kind
     name: str
@@ -31,10 +31,12 @@ class RobotUse:
 class Block:
     """Kind of block.
 
-    ``text`` is the text for people, with ``%NAME`` for an argument. ``python`` is a template
-    (`app.blocks.model.template`), or one template per value of the field ``variant``; for a hat it is the
-    decorator. ``constants`` are values of holes that aren't arguments, ``keywords`` are holes that take
-    keyword arguments: hole -> (argument, Python keyword).
+    Attributes:
+        text: Text on the block, with ``%NAME`` for an argument.
+        python: Template (`app.blocks.model.template`), or one template for each value of the field `variant`.
+            For an event block, the decorator.
+        constants: Values of placeholders that aren't arguments.
+        keywords: Placeholders that take keyword arguments: placeholder -> (argument, Python keyword).
     """
 
     type: str
@@ -68,7 +70,7 @@ class Block:
     english_words: str = ""  # English search words, if the language differs
 
     def argument(self, name: str) -> Argument | None:
-        """Return the argument of that name, or None."""
+        """Return the argument with this name, or None."""
         return next((argument for argument in self.arguments if argument.name == name), None)
 
     @property
@@ -77,7 +79,7 @@ class Block:
         return (self.python,) if isinstance(self.python, str) else tuple(self.python.values())
 
     def problems(self) -> tuple[str, ...]:
-        """Return the errors of the description itself; empty if it is consistent."""
+        """Return the errors of the description; empty if it is consistent."""
         known = {argument.name for argument in self.arguments} | {
             *self.constants,
             *self.trees,
@@ -97,9 +99,10 @@ class Block:
         return tuple(found)
 
     def translated(self, say: Say) -> Block:
-        """Return the block with its English texts translated by `say`; type and Python stay.
+        """Return the block with its English texts translated by ``say``; type and Python code are unchanged.
 
-        `say` is called for every text that a person reads: ``tools/words.py`` uses this to collect them.
+        ``say`` is called for every text that the user reads; ``tools/words.py`` uses that to collect the
+        texts.
         """
         words = say(f"words to find {self.type}", self.words) if self.words else ""
         return replace(
@@ -113,7 +116,7 @@ class Block:
         )
 
     def to_blockly(self) -> dict[str, object]:
-        """Return Blockly's JSON definition; statement inputs get their own lines."""
+        """Return the definition in Blockly's JSON; each statement input is on a separate line."""
         definition: dict[str, object] = {"type": self.type, "style": self.style, "tooltip": self.tooltip}
         definition.update(_messages(self))
         definition["inputsInline"] = True
@@ -128,7 +131,7 @@ class Block:
         return definition
 
     def to_toolbox(self, fields: Mapping[str, object] | None = None) -> dict[str, object]:
-        """Return the toolbox entry, with a shadow block in each gap that has a default."""
+        """Return the toolbox entry, with a shadow block in each slot that has a default."""
         entry: dict[str, object] = {"kind": "block", "type": self.type}
         if fields:
             entry["fields"] = dict(fields)

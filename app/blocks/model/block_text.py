@@ -1,4 +1,4 @@
-"""Blocks as text: "wait 2 s", "say “Touch my head.”"."""
+"""Blocks as text, such as "wait 2 s" or "say “Touch my head.”"."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ def reading(
 ) -> str:
     """Return the block with its arguments as one line of limited length.
 
-    `robot` False omits the robot's name.
+    If ``robot`` is False, the name of the robot is omitted.
     """
     block = blocks.get(placed.type)
     if block is None:
@@ -60,10 +60,7 @@ def reading(
 
 
 def label(placed: Placed, block: Block) -> str:
-    """Return the words that name a block: "wait until", "is below", "turn"; those before its first slot.
-
-    In Japanese, where the verb comes last, slots are shown as "…".
-    """
+    """Return the label of a block: its text before the first slot, such as "wait until"."""
     if block.robot is not None and block.robot.kind == "action":
         return block.robot.title
     pieces = _PLACE.split(block.text)  # words, argument, words, argument, …, words
@@ -85,7 +82,7 @@ def label(placed: Placed, block: Block) -> str:
 
 
 def label_of_type(block_type: str) -> str:
-    """Return a text for a block without description: ``robot_nao_do_wave`` is "wave"."""
+    """Derive a label from the type of a block without description: ``robot_nao_do_wave`` is "wave"."""
     for verb in ("_do_", "_get_", "_when_"):
         if block_type.startswith("robot_") and verb in block_type:
             return block_type.partition(verb)[2].replace("_", " ")
@@ -93,7 +90,7 @@ def label_of_type(block_type: str) -> str:
 
 
 def label_of_unknown(placed: Placed) -> str:
-    """Return the text of a block without description, as on the editor's grey block."""
+    """Return the label of a block without description, as on the grey block in the editor."""
     if placed.type.startswith("robot_"):
         return label_of_type(placed.type)
     words = re.sub(r"[_\s]+", " ", placed.type).strip()

@@ -1,4 +1,4 @@
-"""Category of the toolbox: a plug-in is one module of `app.blocks.categories` that binds ``CATEGORY``."""
+"""Category of the toolbox. A plug-in is a module of `app.blocks.categories` that binds ``CATEGORY``."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ class ToolboxEntry:
 
 @dataclass(frozen=True)
 class Group:
-    """Part of the toolbox under a robot's heading, such as "Speech"."""
+    """Part of the toolbox under the heading of a robot, such as "Speech"."""
 
     title: str
     icon: str
@@ -32,9 +32,12 @@ class Group:
 class Category:
     """Category of blocks.
 
-    ``order`` is its position in the toolbox, ``button`` text and key of a button above its blocks. ``make``
-    returns the blocks of a robot (all known robots are passed, whose names fill the drop-down of the same
-    model), ``groups`` their groups under the robot's heading.
+    Attributes:
+        order: Position in the toolbox.
+        button: Text and key of a button above the blocks.
+        make: Returns the blocks of a robot. The second argument are all known robots; those of the same model
+            are offered in the drop-down.
+        groups: Returns the groups under the heading of a robot; arguments as for `make`.
     """
 
     name: str
@@ -51,7 +54,7 @@ class Category:
     groups: Callable[[Robot, Sequence[Robot]], tuple[Group, ...]] | None = None
 
     def translated(self, say: Say) -> Category:
-        """Return the category with its English texts translated by `say`, see `Block.translated`."""
+        """Return the category with its English texts translated by ``say``; see `Block.translated`."""
         button = None if self.button is None else (say(None, self.button[0]), self.button[1])
         return replace(
             self,

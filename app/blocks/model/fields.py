@@ -1,6 +1,6 @@
-"""Arguments of blocks: gaps for other blocks, and fields with a value.
+"""Arguments of blocks: slots for other blocks, and fields with a value.
 
-A field reads its saved value (`read`) and returns a plain value, or raises with the reason in words.
+A field converts its saved value (`Field.read`) to a plain value, or raises an exception with the reason.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from typing import Literal
 from nep.i18n import _
 
 Say = Callable[[str | None, str], str]
-"""(context, English) -> translation, see `app.blocks.model.block.Block.translated`."""
+"""Translates (context, English text); see `app.blocks.model.block.Block.translated`."""
 Check = Literal["Number", "String", "Boolean", "List"]
 
 _HEX_COLOUR = re.compile(r"#[0-9a-fA-F]{6}")
@@ -23,39 +23,41 @@ _TOPIC_LIMIT = 200
 
 
 class FieldError(ValueError):
-    """Field value that its block can't use; the message is the end of a sentence."""
+    """Raised for a field value that the block can't use. The message completes a sentence."""
 
 
 @dataclass(frozen=True)
 class Argument:
-    """Argument in a block's text; ``name`` is Blockly's name of the field or input."""
+    """Argument in the text of a block; ``name`` is the name of Blockly's field or input."""
 
     name: str
 
     @property
     def silent(self) -> bool:
-        """True if it is only displayed and not part of the Python code."""
+        """True if the argument is only displayed and not part of the Python code."""
         return False
 
     def to_blockly(self) -> dict[str, object]:
-        """Return its entry in Blockly's ``args``."""
+        """Return the entry of the argument in Blockly's ``args``."""
         raise NotImplementedError
 
     def fillings(self) -> dict[str, object]:
-        """Return the initial content of its gaps in the toolbox, by the gaps' names."""
+        """Return the initial content of the argument's slots in the toolbox, by name of the slot."""
         return {}
 
     def translated(self, say: Say) -> Argument:  # noqa: ARG002 (most have no words)
-        """Return the argument with translated texts and initial values; names and values stay."""
+        """Return the argument with texts and initial values translated; names and values are unchanged."""
         return self
 
 
 @dataclass(frozen=True)
 class ValueInput(Argument):
-    """Gap for a value block; ``default`` is the value of its shadow block, None leaves it empty.
+    """Slot for a value block.
 
-    ``only`` is a field and a value: the gap exists only while the field has that value. ``variable`` is the
-    name of a variable that the toolbox puts into the gap.
+    Attributes:
+        default: Value of the shadow block; None leaves the slot empty.
+        only: Field and value; the slot exists only while the field has this value.
+        variable: Name of a variable that the toolbox puts into the slot.
     """
 
     check: Check | None = None
@@ -74,11 +76,11 @@ class ValueInput(Argument):
         return entry
 
     def is_there(self, fields: Mapping[str, object]) -> bool:
-        """Return whether the gap exists with these saved fields."""
+        """Return True if the slot exists with these saved fields."""
         return self.only is None or str(fields.get(self.only[0], self.only[1])) == self.only[1]
 
     def translated(self, say: Say) -> Argument:
-        """Return the gap with its initial content translated."""
+        """Return the slot with its initial content translated."""
         variable = None if self.variable is None else say("variable", self.variable)
         default = say("example", self.default) if isinstance(self.default, str) else self.default
         return replace(self, variable=variable, default=default)
@@ -92,7 +94,7 @@ class ValueInput(Argument):
         return {} if shadow is None else {self.name: {"shadow": shadow}}
 
     def shadow(self) -> dict[str, object] | None:
-        """Return the shadow block that fills the empty gap."""
+        """Return the shadow block that fills the slot while it is empty."""
         if self.default is None or isinstance(self.default, bool):
             return None
         if isinstance(self.default, str):
@@ -102,7 +104,7 @@ class ValueInput(Argument):
 
 @dataclass(frozen=True)
 class StatementInput(Argument):
-    """Gap for statements."""
+    """Slot for statements."""
 
     def to_blockly(self) -> dict[str, object]:
         """Return a statement input."""
@@ -111,16 +113,16 @@ class StatementInput(Argument):
 
 @dataclass(frozen=True)
 class Field(Argument):
-    """Value in the block itself."""
+    """Argument whose value is entered in the block."""
 
     def read(self, saved: object) -> object:
-        """Return the plain value of a saved one. Raises FieldError if it is invalid."""
+        """Convert a saved value to a plain value. Raises FieldError if the value is invalid."""
         raise NotImplementedError
 
 
 @dataclass(frozen=True)
 class NumberField(Field):
-    """Number typed into the block."""
+    """Number entered in the block."""
 
     value: float = 0
     minimum: float | None = None
@@ -136,7 +138,7 @@ class NumberField(Field):
         return entry
 
     def read(self, saved: object) -> object:
-        """Return a finite number within the limits; text that contains one is accepted."""
+        """Return a finite number within the limits; text that represents a number is accepted."""
         number = _number(self.value if saved is None else saved)
         if self.minimum is not None and number < self.minimum:
             raise FieldError(_("needs a number of at least {minimum:g}").format(minimum=self.minimum))
@@ -147,7 +149,7 @@ class NumberField(Field):
 
 @dataclass(frozen=True)
 class TextField(Field):
-    """Text typed into the block."""
+    """Text entered in the block."""
 
     value: str = ""
 
@@ -168,14 +170,14 @@ class TextField(Field):
 class ChoiceField(Field):
     """Drop-down. ``options`` are (text, value) pairs; Blockly stores the values as text.
 
-    ``source`` is where the editor finds more options ("robots:<model>"); then any text is valid.
+    ``source`` tells the editor where to find further options ("robots:<model>"); then any text is valid.
     """
 
     options: tuple[tuple[str, object], ...] = ()
     source: str | None = None
 
     def to_blockly(self) -> dict[str, object]:
-        """Return our drop-down, which keeps a value that is not among its options."""
+        """Return our drop-down field, which preserves a value that is not among the options."""
         entry: dict[str, object] = {
             "type": "field_choice",
             "name": self.name,
@@ -186,7 +188,7 @@ class ChoiceField(Field):
         return entry
 
     def read(self, saved: object) -> object:
-        """Return the chosen value. Raises FieldError if it is not an option."""
+        """Return the selected value. Raises FieldError if the value is not an option."""
         if saved is None and self.options:
             return self.options[0][1]
         for _words, value in self.options:
@@ -197,19 +199,19 @@ class ChoiceField(Field):
         raise FieldError(_("has no option “{saved}”").format(saved=saved))
 
     def translated(self, say: Say) -> Argument:
-        """Return the field with translated options, except names of robots."""
+        """Return the field with translated options; names of robots are not translated."""
         if self.source is not None:
             return self
         return replace(self, options=tuple((say("choice", words), value) for words, value in self.options))
 
     def words(self, value: object) -> str:
-        """Return the text of a value."""
+        """Return the text of the option with this value."""
         return next((words for words, option in self.options if option == value), str(value))
 
 
 @dataclass(frozen=True)
 class TopicField(Field):
-    """Name of a topic, typed or chosen from the live ones."""
+    """Name of a topic, entered or selected from the existing ones."""
 
     value: str = "/blackboard"
 
@@ -231,7 +233,7 @@ class TopicField(Field):
 
 @dataclass(frozen=True)
 class BroadcastField(Field):
-    """Name of a broadcast within one behaviour, chosen or typed."""
+    """Name of a broadcast within one behaviour, selected or entered."""
 
     value: str = "start"
 
@@ -253,13 +255,13 @@ class BroadcastField(Field):
 
 @dataclass(frozen=True)
 class PathField(Field):
-    """Path of a field in a topic's messages, such as ``faces.0.name``, typed or chosen."""
+    """Path of a field in the messages of a topic, such as ``faces.0.name``, entered or selected."""
 
     value: str = "value"
     topic: str = "TOPIC"
 
     def to_blockly(self) -> dict[str, object]:
-        """Return our topic field in its second role: it suggests fields of the topic in ``of``."""
+        """Return our topic field, which suggests fields of the topic in ``of``."""
         return {"type": "field_topic", "name": self.name, "value": self.value, "of": self.topic}
 
     def read(self, saved: object) -> object:
@@ -269,16 +271,16 @@ class PathField(Field):
 
 @dataclass(frozen=True)
 class ColourField(Field):
-    """Colour, "#rrggbb"."""
+    """Colour in the form "#rrggbb"."""
 
     value: str = "#37b6ff"
 
     def to_blockly(self) -> dict[str, object]:
-        """Return our colour chip."""
+        """Return our colour field."""
         return {"type": "field_colour_chip", "name": self.name, "value": self.value}
 
     def read(self, saved: object) -> object:
-        """Return a number sign and six digits."""
+        """Return the colour as "#" and six hexadecimal digits. Raises FieldError if it is invalid."""
         colour = self.value if saved is None else str(saved)
         if not _HEX_COLOUR.fullmatch(colour):
             raise FieldError(_("needs a colour"))
@@ -300,7 +302,7 @@ class VariableField(Field):
         return replace(self, value=say("variable", self.value))
 
     def read(self, saved: object) -> object:
-        """Return the variable's id; Blockly saves ``{"id": …}``, older files a name."""
+        """Return the id of the variable. Blockly saves ``{"id": …}``, older files contain a name."""
         if isinstance(saved, Mapping):
             saved = saved.get("id", saved.get("name"))
         if not isinstance(saved, str) or not saved:
@@ -314,15 +316,15 @@ class LiveField(Field):
 
     @property
     def silent(self) -> bool:
-        """True: it is not part of the Python code."""
+        """True: the display is not part of the Python code."""
         return True
 
     def to_blockly(self) -> dict[str, object]:
-        """Return our live field."""
+        """Return our field that displays a live value."""
         return {"type": "field_live", "name": self.name}
 
     def read(self, saved: object) -> object:  # noqa: ARG002 (saved values are ignored)
-        """Return None."""
+        """Return None, because nothing is saved."""
         return None
 
 
@@ -345,7 +347,7 @@ def _number(saved: object) -> int | float:
 
 
 def robot_field(model: str, names: Sequence[str]) -> ChoiceField:
-    """Return the drop-down of all robots of a model, with which a robot's block starts."""
+    """Return the drop-down of all robots of a model, which is the first field of each robot block."""
     return _robot_field(model, tuple(names))
 
 

@@ -1,6 +1,6 @@
-"""Arguments that people add and remove on the block itself: items of a list, inputs of a function.
+"""Arguments that the user adds and removes on the block: items of a list, inputs of a function.
 
-They are saved in the block's ``extraState`` by the editor; files may contain anything there.
+The editor saves them in ``extraState`` of the block; in a file, that may contain anything.
 """
 
 from __future__ import annotations
@@ -19,13 +19,13 @@ MAX_NAME_LENGTH = 60
 
 @dataclass(frozen=True)
 class Items(Argument):
-    """Gaps in a row, ``<name>0``, ``<name>1``, …; the hole gets one list of their values."""
+    """Row of slots ``<name>0``, ``<name>1``, …, whose values fill the placeholder as one list."""
 
     count: int = 3
     texts: tuple[str, ...] = ()  # initial texts in the toolbox
 
     def fillings(self) -> dict[str, object]:
-        """Return a text in each gap."""
+        """Return a text block for each slot."""
         return {
             f"{self.name}{number}": {"shadow": {"type": "values_text", "fields": {"TEXT": words}}}
             for number, words in enumerate(self.texts)
@@ -36,11 +36,11 @@ class Items(Argument):
         return replace(self, texts=tuple(say("example", words) for words in self.texts))
 
     def to_blockly(self) -> dict[str, object]:
-        """Return a placeholder, where the editor's mutator inserts the gaps."""
+        """Return a placeholder at which the editor's mutator inserts the slots."""
         return {"type": "input_dummy", "name": self.name}
 
     def gaps(self, extra: Mapping[str, object]) -> tuple[ValueInput, ...]:
-        """Return the gaps of a block."""
+        """Return the slots of a block with this saved state."""
         count = extra.get("items")
         sound = isinstance(count, int) and not isinstance(count, bool)
         many = min(max(int(count), 0), MAX_ITEMS) if sound and isinstance(count, int) else self.count
@@ -49,13 +49,16 @@ class Items(Argument):
 
 @dataclass(frozen=True)
 class ListInput(ValueInput):
-    """Gap for a list; in the toolbox it contains a list block with these texts, which can be extended."""
+    """Slot for a list.
+
+    In the toolbox, the slot contains a list block with these texts, which can be extended.
+    """
 
     check: Check | None = "List"
     texts: tuple[str, ...] = ()
 
     def fillings(self) -> dict[str, object]:
-        """Return a real block instead of a shadow, because its own gaps accept values."""
+        """Return a list block that is not a shadow block, because values can be put into its slots."""
         items = Items("ITEM", len(self.texts), self.texts)
         held = {"type": "lists_create", "extraState": {"items": items.count}, "inputs": items.fillings()}
         return {self.name: {"block": held}}
@@ -67,21 +70,21 @@ class ListInput(ValueInput):
 
 @dataclass(frozen=True)
 class Branches:
-    """Further branches of an *if*: the number of “else if”, and whether there is an “else”."""
+    """Further branches of an "if": the number of "else if", and ``has_else``, True if there is an "else"."""
 
     else_ifs: int = 0
     has_else: bool = False
 
     @classmethod
     def of(cls, extra: Mapping[str, object], *, has_else: bool) -> Branches:
-        """Read a block's saved state; the default is no “else if”, and an “else” as its type has."""
+        """Parse the saved state of a block; by default no "else if", and an "else" as given by the type."""
         count, told = extra.get("elseIfs"), extra.get("else")
         sound = isinstance(count, int) and not isinstance(count, bool)
         many = min(max(int(count), 0), MAX_ELSE_IFS) if sound and isinstance(count, int) else 0
         return cls(many, told if isinstance(told, bool) else has_else)
 
     def arguments(self) -> tuple[Argument, ...]:
-        """Return the gaps of these branches in order."""
+        """Return the slots of these branches in order."""
         found: list[Argument] = []
         for number in range(1, self.else_ifs + 1):
             found += [ValueInput(f"CONDITION{number}", "Boolean"), StatementInput(f"BODY{number}")]
@@ -90,14 +93,14 @@ class Branches:
 
 @dataclass(frozen=True)
 class FunctionInput:
-    """Input of a function: a constant id, and a name that people change."""
+    """Input of a function: an id that never changes, and a name that the user can change."""
 
     id: str
     name: str
 
 
 def inputs_of(extra: Mapping[str, object]) -> tuple[FunctionInput, ...]:
-    """Return the saved inputs of a definition or call, without duplicate ids."""
+    """Return the saved inputs of a function definition or call; duplicate ids are dropped."""
     saved = extra.get("inputs")
     found: dict[str, FunctionInput] = {}
     for each in saved if isinstance(saved, list) else ():
@@ -109,34 +112,34 @@ def inputs_of(extra: Mapping[str, object]) -> tuple[FunctionInput, ...]:
 
 @dataclass(frozen=True)
 class Inputs(Argument):
-    """Inputs of a function: names on its definition, gaps ``IN_<id>`` on its calls."""
+    """Inputs of a function: names on its definition, slots ``IN_<id>`` on its calls."""
 
     @property
     def silent(self) -> bool:
-        """True: the compiler turns them into parameters and arguments."""
+        """True: the compiler converts them to parameters and arguments."""
         return True
 
     def to_blockly(self) -> dict[str, object]:
-        """Return a placeholder, where the editor's mutator inserts names or gaps."""
+        """Return a placeholder at which the editor's mutator inserts names or slots."""
         return {"type": "input_dummy", "name": self.name}
 
     def gaps(self, inputs: tuple[FunctionInput, ...]) -> tuple[tuple[FunctionInput, ValueInput], ...]:
-        """Return the gap of each input on a call."""
+        """Return each input of a call with its slot."""
         return tuple((each, ValueInput(f"IN_{each.id}")) for each in inputs)
 
 
 @dataclass(frozen=True)
 class InputField(VariableField):
-    """Input of the surrounding function; the compiler resolves its name."""
+    """Input of the surrounding function. The compiler resolves the name."""
 
     value: str = "input"
 
     def to_blockly(self) -> dict[str, object]:
-        """Return our field that shows the input's name."""
+        """Return our field that displays the name of the input."""
         return {"type": "field_function_input", "name": self.name}
 
 
 def name_of(placed: Placed) -> str:
-    """Return the function name of a definition or call."""
+    """Return the name of the function that a block defines or calls."""
     saved = placed.fields.get("NAME", placed.extra.get("name"))
     return " ".join(str(saved or "function").split())[:MAX_NAME_LENGTH] or "function"

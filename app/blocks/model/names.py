@@ -1,4 +1,4 @@
-"""Unique Python names derived from texts of people."""
+"""Unique Python names, derived from texts of the user."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ _GAPS = re.compile(r"\W+")
 
 
 class Unique:
-    """Generator of unique texts: duplicates get a number, from 2 on."""
+    """Generator of unique texts: duplicates get a number, starting with 2."""
 
     def __init__(self, before_number: str, taken: Iterable[str] = ()) -> None:
         self._before_number = before_number
@@ -20,7 +20,7 @@ class Unique:
         self._next: dict[str, int] = {}  # next number to try: 4000 scripts may share a name
 
     def of(self, text: str) -> str:
-        """Return the text, or the text with the first free number."""
+        """Return the text, with the first unused number appended if the text was already used."""
         made, number = text, self._next.get(text, 2)
         while made in self._taken:
             made, number = f"{text}{self._before_number}{number}", number + 1
@@ -36,7 +36,10 @@ class Names:
         self._unique = Unique("_", {*taken, *keyword.kwlist, *keyword.softkwlist, *dir(builtins)})
 
     def new(self, words: str, otherwise: str) -> str:
-        """Return a name similar to `words`, such as ``when_started_2``, or `otherwise` if nothing remains."""
+        """Return a name similar to ``words``, such as ``when_started_2``.
+
+        ``otherwise`` if no letter remains.
+        """
         # Python normalizes names to NFKC: different names must stay different.
         plain = _GAPS.sub("_", unicodedata.normalize("NFKC", words)).strip("_")[:60]
         if not plain.isidentifier():

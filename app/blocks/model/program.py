@@ -13,9 +13,15 @@ Severity = Literal["error", "warning", "info"]
 class Problem:
     """Problem shown before Run.
 
-    ``sentence`` contains ``subject``, which is shown bold. ``category`` is the style of the block's colour,
-    ``icon`` its icon. ``fix`` is a button's text, ``fix_action`` its effect (`app.blocks.fixes.fixes`, or
-    ``connect:<robot>``). An error means that the program would stop with this sentence at that block.
+    An error means that the program would stop with this message at this block.
+
+    Attributes:
+        sentence: Message.
+        subject: Part of `sentence` that is shown in bold.
+        category: Style of the block's colour.
+        icon: Icon of the block.
+        fix: Text of the button.
+        fix_action: Action of the button (`app.blocks.fixes.fixes`, or ``connect:<robot>``).
     """
 
     severity: Severity
@@ -30,9 +36,12 @@ class Problem:
 
 @dataclass(frozen=True)
 class Variable:
-    """Variable of a behaviour: the editor's ``id``, its ``name``, and its name in ``python``.
+    """Variable of a behaviour.
 
-    ``python`` is empty if no script that can start uses it.
+    Attributes:
+        id: Id in the editor.
+        name: Name given by the user.
+        python: Name in the program; empty if no script that can start uses the variable.
     """
 
     id: str
@@ -44,12 +53,18 @@ class Variable:
 class Program:
     """Compiled behaviour.
 
-    ``source`` is for people and runs as a file; ``lines`` maps its lines to blocks. ``runnable`` is the same
-    tree with a ``step`` before each block. ``robots`` are the connected robots that its blocks name, and
-    those that it moves by publishing on their topics (``moves``); ``sensors`` and ``events`` are (robot,
-    name). ``actions`` are the actions requested of each robot, None if that is not statically known.
-    ``readings`` are the blocks as text ("wait 2 s"), ``labels`` the words that name them ("wait").
-    ``variables`` are shared by its scripts.
+    Attributes:
+        source: Readable code, which can also be run as a file.
+        lines: Block ids by line of `source`.
+        runnable: The same code with a ``step`` before each block.
+        robots: Connected robots that the blocks use, or that the program moves by publishing on their topics.
+        moves: Robots that the program moves by publishing on their topics.
+        sensors: Used sensors as (robot, name).
+        events: Used events as (robot, name).
+        actions: Actions invoked on each robot; None if that isn't statically known.
+        readings: Blocks as text, such as "wait 2 s".
+        labels: Labels of blocks, such as "wait".
+        variables: Variables, which are shared by all scripts.
     """
 
     name: str
@@ -78,7 +93,7 @@ class Program:
         return tuple(problem for problem in self.problems if problem.severity == "error")
 
     def to_json(self) -> dict[str, object]:
-        """Return the JSON form of what a child process needs to run it."""
+        """Return the parts of the program that a child process needs, as a JSON object."""
         kept = asdict(self)
         for name in ("source", "lines", "problems", "absent", "actions"):
             del kept[name]

@@ -1,4 +1,4 @@
-"""Conversion of texts and parameters of a robot description to parts of a block."""
+"""Conversion of the texts and parameters in a robot description to parts of a block."""
 
 from __future__ import annotations
 
@@ -24,9 +24,11 @@ _NUMBERS = ("number", "integer", "angle")
 
 
 class TextParts:
-    """Text of a description with the names of block arguments in it.
+    """Text of a description in which parameters are replaced by names of block arguments.
 
-    ``arguments`` maps parameters to argument names, ``shown`` are the parameters in the text.
+    Attributes:
+        arguments: Argument name of each parameter.
+        shown: Parameters that occur in the text.
     """
 
     def __init__(self, text: str, parameters: Sequence[str]) -> None:
@@ -54,14 +56,14 @@ class TextParts:
 def type_of(model: str, verb: str, name: str, *, plain: bool = False) -> str:
     """Return a block type such as ``robot_pepper_do_say``.
 
-    A `plain` one, ``robot_pepper_changes``, belongs to no action, sensor or event.
+    With ``plain``, the type belongs to no action, sensor or event: ``robot_pepper_changes``.
     """
     middle = "" if plain else f"{verb}_"
     return f"robot_{_word(model)}_{middle}{_word(name)}"
 
 
 def input_of(parameter: Parameter, name: str) -> Argument:
-    """Return the gap or field for an action's parameter."""
+    """Return the slot or field for a parameter of an action."""
     default = parameter.default
     if parameter.kind in _NUMBERS:
         number = default if isinstance(default, (int, float)) else (parameter.minimum or 0)
@@ -76,7 +78,7 @@ def input_of(parameter: Parameter, name: str) -> Argument:
 
 
 def field_of(parameter: Parameter | None, name: str) -> Field:
-    """Return the field for a parameter with known values, or for an event's filter."""
+    """Return the field for a parameter with a fixed set of values, or for the filter of an event."""
     if parameter is None:
         return TextField(name)
     default = parameter.default
@@ -100,7 +102,7 @@ def field_of(parameter: Parameter | None, name: str) -> Field:
 
 
 def about(parameter: Parameter) -> str:
-    """Return the limits and unit of a parameter as text."""
+    """Format the limits and the unit of a parameter."""
     unit = f" {pretty_unit(parameter.unit)}" if parameter.unit else ""
     low = None if parameter.minimum is None else pretty_number(parameter.minimum)
     high = None if parameter.maximum is None else pretty_number(parameter.maximum)

@@ -1,4 +1,4 @@
-"""Search words for robot blocks, independent of each robot's names."""
+"""Search words for robot blocks, independent of the names that a description uses."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ _PART = re.compile(r"[A-Z]?[a-z]+|[A-Z]+(?![a-z])")
 
 
 class _Ability(NamedTuple):
-    """Kind of action or sensor: name parts that identify it, and its search words."""
+    """Kind of action or sensor: the parts of names that identify it, and its search words."""
 
     names: frozenset[str]
     words: str
@@ -271,7 +271,7 @@ _ABILITY_OF_RESOURCE: Mapping[str, str] = {
     "camera": "photo",
     "audio": "sound",
 }
-"""Ability by the resource of an action whose name is not recognized."""
+"""Ability by resource, for actions whose names are not recognized."""
 
 CHANGES = plazy("words to find “when … changes”", "sensor, change, new value, whenever, event, update")
 PASSES = plazy(
@@ -290,7 +290,7 @@ class SearchWords(NamedTuple):
 def words_of_action(names: Iterable[str], uses: Iterable[str] = ()) -> SearchWords:
     """Return the search words of an action.
 
-    `names` are its name, title and types, `uses` its resources.
+    ``names`` are its name, title and types; ``uses`` are its resources.
     """
     parts = _parts(names)
     found = _among(_ACTION_ABILITIES, parts) or [
@@ -306,7 +306,7 @@ def words_of_sensor(names: Iterable[str]) -> SearchWords:
 
 
 def in_both(english: str) -> SearchWords:
-    """Return these words in the current language and in English."""
+    """Return search words in the current language and in English."""
     return SearchWords(gettext(english), "" if language() == ENGLISH else str(english))
 
 

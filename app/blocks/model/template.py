@@ -1,7 +1,7 @@
-"""Python templates: text with ``%HOLES``, parsed once and filled with syntax trees.
+"""Python templates: text with ``%PLACEHOLDERS``, parsed once and filled with syntax trees.
 
-Templates are written in categories, by us. Values from files only go into holes as trees (`literal`), never
-as text, so no text of a file can become code.
+Templates are part of Studio, in its categories. Values from files are inserted as trees (`literal`), never as
+text, so that no text in a file can become code.
 
 ``%NAME`` in an expression takes an expression, ``%NAME`` alone on a line takes statements, ``**%NAME`` takes
 keyword arguments.
@@ -24,10 +24,10 @@ Node = TypeVar("Node", bound=ast.AST)
 
 
 def literal(value: object) -> ast.expr:
-    """Return the expression for a plain value (None, bool, int, float, str, lists and dicts of them).
+    """Return the expression for a plain value (None, bool, int, float, str, and lists and dicts of them).
 
     Raises:
-        ValueError: The value has another type, or is not finite.
+        ValueError: The value has another type or is not finite.
     """
     if isinstance(value, str) or value is None or isinstance(value, bool):
         return ast.Constant(value)
@@ -50,7 +50,7 @@ def statements(
     bodies: Mapping[str, Sequence[ast.stmt]] | None = None,
     keywords: Mapping[str, Sequence[ast.keyword]] | None = None,
 ) -> list[ast.stmt]:
-    """Return the statements of a template with its holes filled. Raises KeyError for an unfilled hole."""
+    """Return the filled statements of a template. Raises KeyError if a placeholder has no value."""
     filled: list[ast.stmt] = []
     filler = _Filler(expressions, bodies or {}, keywords or {})
     for statement in _parsed(text).body:
@@ -64,7 +64,7 @@ def expression(
     expressions: Mapping[str, ast.expr],
     keywords: Mapping[str, Sequence[ast.keyword]] | None = None,
 ) -> ast.expr:
-    """Return the expression of a template with its holes filled."""
+    """Return the filled expression of a template."""
     (statement,) = statements(text, expressions, None, keywords)
     if isinstance(statement, ast.Expr):
         return statement.value
@@ -72,7 +72,7 @@ def expression(
 
 
 def holes(text: str) -> frozenset[str]:
-    """Return the names of a template's holes."""
+    """Return the names of the placeholders in a template."""
     return frozenset(_HOLE.findall(text))
 
 

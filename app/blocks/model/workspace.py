@@ -1,6 +1,6 @@
 """Workspace: Blockly's JSON parsed into typed blocks.
 
-Files may contain anything: invalid parts are dropped, nothing raises.
+Files may contain anything. Invalid parts are dropped; no function raises.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ _DISABLED_BY_PERSON = "MANUALLY_DISABLED"
 
 @dataclass(frozen=True)
 class Placed:
-    """Placed block: its saved fields, and the blocks in its inputs (statements follow each other)."""
+    """Block in a workspace, with its saved fields and the blocks in its inputs; statements are in order."""
 
     id: str
     type: str
@@ -32,16 +32,19 @@ class Placed:
     too_deep: bool = False  # inner blocks were dropped because of deep nesting
 
     def field_id(self, name: str) -> str:
-        """Return the saved text of a field, or ""."""
+        """Return the saved text of a field, or the id if the field refers to a variable.
+
+        "" if there is none.
+        """
         saved = self.fields.get(name)
         return saved if isinstance(saved, str) else ""
 
 
 @dataclass(frozen=True)
 class Workspace:
-    """Scripts (chains of blocks) and variables (id -> name).
+    """Scripts (sequences of blocks), and names of variables by id.
 
-    ``nameless`` are the ids of used variables without a name in the file; they get a placeholder.
+    ``nameless`` are the ids of used variables that have no name in the file; their names are placeholders.
     """
 
     scripts: tuple[tuple[Placed, ...], ...]
@@ -76,7 +79,7 @@ def saved_blocks(saved: Mapping[str, object]) -> Iterator[dict[str, object]]:
 
 
 def parse_workspace(saved: Mapping[str, object]) -> Workspace:
-    """Parse Blockly's JSON, whatever it contains."""
+    """Parse Blockly's JSON. Never raises."""
     blocks = saved.get("blocks")
     tops = blocks.get("blocks") if isinstance(blocks, Mapping) else None
     ids = Unique("~")
@@ -158,7 +161,10 @@ def _pauses(saved: Mapping[str, object]) -> bool:
 
 
 def is_enabled(saved: Mapping[str, object]) -> bool:
-    """Return whether the block is enabled by the person; other reasons (an absent robot) are ignored."""
+    """Return False if the user has disabled the block.
+
+    Other reasons, such as a missing robot, don't count.
+    """
     if saved.get("enabled") is False:
         return False
     return _DISABLED_BY_PERSON not in _list(saved.get("disabledReasons"))

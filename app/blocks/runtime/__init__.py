@@ -1,4 +1,5 @@
-"""Execution of a program in its own process: scripts that take turns, robots, topics, values.
+"""Execution of a program in a separate process: scripts that take turns, robots, topics, values.
 
-`child` is the process, `scheduler` decides which script runs, and only `network` has sockets.
+`child` is the main module of the process, `scheduler` decides which script runs, and only `network` uses
+sockets.
 """

@@ -1,7 +1,7 @@
-"""Broadcasts: messages of a program to itself that start the scripts receiving their name.
+"""Broadcasts: messages within a program, which start the scripts that receive them.
 
-A script that still runs when its broadcast comes again is restarted, as in Scratch. All this is done by the
-script that has the turn (`app.blocks.runtime.scheduler`), so no lock is needed.
+A script that is still running when its broadcast is sent again is restarted, as in Scratch. All this is done
+by the script whose turn it is (`app.blocks.runtime.scheduler`), so that no lock is needed.
 """
 
 from __future__ import annotations
@@ -13,21 +13,21 @@ from app.blocks.runtime.scheduler import EndScript, Scheduler, Script
 
 
 class Delivery:
-    """Broadcast on its way to one script; `done` when the script has run for it, or never will."""
+    """Broadcast to one script; `done` is True when the script has run, or will not run for this broadcast."""
 
     def __init__(self, over: Callable[[], None]) -> None:
         self.done = False
         self._on_end = over
 
     def end(self) -> None:
-        """Mark as done: the script has run, or another broadcast replaced this one."""
+        """Mark the delivery as done: the script has run, or another broadcast replaced this one."""
         if not self.done:
             self.done = True
             self._on_end()
 
 
 class Receiver:
-    """Script that receives a broadcast, with its pending delivery."""
+    """Script that receives a broadcast, and its pending delivery."""
 
     def __init__(self, name: str, script: Callable[[], None]) -> None:
         self.name, self.script = name, script
@@ -54,14 +54,14 @@ class Receiver:
 
 
 class Broadcasts:
-    """Receivers of one program."""
+    """All scripts of one program that receive broadcasts."""
 
     def __init__(self, scheduler: Scheduler, began: Callable[[], None], over: Callable[[], None]) -> None:
         self._scheduler, self._on_begin, self._on_end = scheduler, began, over
         self.receivers: list[Receiver] = []
 
     def send(self, name: str) -> tuple[Delivery, ...]:
-        """Start or restart every script that receives the name; return the deliveries."""
+        """Start or restart every script that receives this broadcast; return the deliveries."""
         return tuple(self._deliver(each) for each in self.receivers if each.name == name)
 
     def _deliver(self, receiver: Receiver) -> Delivery:

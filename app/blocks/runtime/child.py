@@ -1,13 +1,15 @@
-"""Process of a program: ``python -m app.blocks.runtime.child``. It exchanges JSON lines with the runner.
+"""Process of a program: ``python -m app.blocks.runtime.child``. Exchanges JSON lines with the runner.
 
 Input, one object per line: ``{"do": "start", "program": …, "robots": [descriptions], "owners": {robot: node
 id}, "master": …, "name": …, "paused": bool, "pace_s": seconds}``, then ``{"do": "pause" | "go" | "step" |
-"stop"}``, ``{"do": "pace", "pace_s": seconds}`` (slow motion), ``{"do": "variable", "python": name, "value":
-…}`` (set a variable), ``{"do": "breakpoints", "blocks": [ids]}``, ``{"do": "answer", "question": number,
-"text": …}``, or ``{"do": "robots", "owners": …, "guarded": {topic: [robots]}}`` when robots connected or
-restarted. Output: ``{"is": "ready" | "running" | "paused" | "error" | "warning" | "print" | "variables" |
-"ask" | "ended", …}``; question 0 of "ask" means that no question is open. When the input ends, the program
-ends and its robots are stopped.
+"stop"}``, ``{"do": "pace", "pace_s": seconds}`` (delay before each block), ``{"do": "variable", "python":
+name, "value": …}`` (set a variable), ``{"do": "breakpoints", "blocks": [ids]}``, ``{"do": "answer",
+"question": number, "text": …}``, or ``{"do": "robots", "owners": …, "guarded": {topic: [robots]}}`` when
+robots connect or restart.
+
+Output: ``{"is": "ready" | "running" | "paused" | "error" | "warning" | "print" | "variables" | "ask" |
+"ended", …}``; question 0 of "ask" means that no question is open. When the input is closed, the program ends
+and its robots are stopped.
 """
 
 from __future__ import annotations
@@ -42,7 +44,7 @@ from nep.system.crash_trace import say_where_it_crashes
 
 SAMPLE_S = 1 / 30
 VARIABLES_EVERY = 3
-"""Samples between two reads of the variables: ten reads a second."""
+"""Number of samples between two reads of the variables, which are read ten times a second."""
 STOP_ANSWER_S = 1.0
 FLUSH_S = 0.03
 MAX_LINE_LENGTH = 2000
@@ -51,7 +53,7 @@ LINES_PER_SAMPLE = 50
 
 
 class Out:
-    """Output lines to the runner. Printed lines are bounded: long lines are cut, excess lines dropped."""
+    """Writes lines to the runner. Printed text is limited: long lines are truncated, excess lines dropped."""
 
     def __init__(self, stream: TextIO) -> None:
         self._stream = stream
@@ -59,7 +61,7 @@ class Out:
         self._printed: queue.Queue[str] = queue.Queue(LINES_PER_SAMPLE)
         self._left = MAX_LINES
         self.told: Callable[[str], object] = lambda _line: None
-        """Callback for each line that the program prints."""
+        """Called with each line that the program prints."""
         self._dropped = 0
 
     def send(self, kind: str, **content: object) -> None:
@@ -82,7 +84,7 @@ class Out:
             self.told(line[:MAX_LINE_LENGTH])
 
     def send_printed(self) -> None:
-        """Send the queued lines."""
+        """Send the queued lines, as far as their number allows."""
         while self._left > 0:
             try:
                 self.send("print", text=self._printed.get_nowait())
@@ -104,13 +106,13 @@ class Out:
 
 
 class Printed(io.TextIOBase):
-    """Replacement of stdout that sends printed lines to the runner."""
+    """Replacement for ``sys.stdout`` that sends printed lines to the runner."""
 
     def __init__(self, out: Out) -> None:
         self._out = out
 
     def write(self, text: str) -> int:
-        """Queue one line without its line end."""
+        """Queue one line without its line break."""
         if text.strip("\n"):
             self._out.print(text.strip("\n"))
         return len(text)
@@ -148,7 +150,7 @@ class Run:
             self._runtime.scheduler.pause()
 
     def orders(self) -> dict[str, Callable[[], None]]:
-        """Return the commands that the runner can send without arguments."""
+        """Return the functions for commands that have no arguments, by name."""
         scheduler = self._runtime.scheduler
         return {
             "pause": self.pause,
@@ -176,19 +178,19 @@ class Run:
             self._out.send("ask", question=question.id, text=question.text, choices=question.choices)
 
     def answer(self, order: Mapping[str, object]) -> None:
-        """Deliver a person's answer to a question."""
+        """Pass the user's answer to the question."""
         question, words = order.get("question"), order.get("text")
         if isinstance(question, int) and isinstance(words, str):
             self._runtime.questions.answered(question, words)
 
     def set_pace(self, order: Mapping[str, object]) -> None:
-        """Set the slow motion; 0 is full speed."""
+        """Set the delay before each block in seconds; 0 for full speed."""
         pace_s = order.get("pace_s")
         if isinstance(pace_s, (int, float)):
             self._runtime.scheduler.set_pace(pace_s)
 
     def know(self, order: Mapping[str, object]) -> None:
-        """Update connected robots and the topics that move them."""
+        """Update the connected robots and the topics that move them."""
         topics = order.get("guarded")
         if isinstance(topics, Mapping):
             self._guard.know({str(topic): tuple(map(str, names)) for topic, names in topics.items()})
@@ -196,13 +198,13 @@ class Run:
             self._network.know(_table(order.get("owners")))
 
     def stop(self) -> None:
-        """End the scripts and return from `run` at once: the runner waits for the robots' answers."""
+        """Stop the scripts and return from `run` immediately; the runner waits for the robots' replies."""
         self._stop_answer_s = 0.0
         self._runtime.scheduler.stop()
         self._runtime.finished.set()
 
     def run(self) -> bool:
-        """Run until the end and stop the robots; return whether no block failed."""
+        """Run until the program ends and stop the robots; return True if no block failed."""
         with nep.node(f"program {self._program.name}"[:100], master=self._master) as node:
             self._out.told = partial(node.log.info, "%s")
             silent = self._run_on(node)
@@ -270,7 +272,7 @@ class Run:
             self._breakpoints = frozenset(map(str, blocks))
 
     def put(self, order: Mapping[str, object]) -> None:
-        """Set a variable on behalf of a person."""
+        """Set a variable to a value entered by the user."""
         value = order.get("value")
         if isinstance(value, (str, int, float)):
             self._variables.put(str(order.get("python")), value)
@@ -322,7 +324,7 @@ def orders(stream: TextIO) -> Iterator[Mapping[str, object]]:
 
 
 def main(stdin: TextIO | None = None, stdout: TextIO | None = None) -> int:
-    """Run one program; return 0 if it ended well, 1 if not."""
+    """Run one program; return 0 if no block failed, else 1."""
     out = Out(stdout or sys.stdout)
     incoming = orders(stdin or sys.stdin)
     sys.stdout = Printed(out)

@@ -1,4 +1,4 @@
-"""Errors of a running program as sentences for people."""
+"""Errors of a running program, with messages for the user."""
 
 from __future__ import annotations
 
@@ -18,9 +18,9 @@ _ANOTHER = lazy("something else")
 
 
 class BehaviourError(AppError):
-    """Error at a block. ``block`` is its id once it is known.
+    """Error at a block. ``block`` is the id of the block, if known.
 
-    ``unknown`` is True if only a value is missing so far.
+    ``unknown`` is True if the error is only that a value is not known yet.
     """
 
     def __init__(self, sentence: str, block: str | None = None, *, unknown: bool = False) -> None:
@@ -30,7 +30,7 @@ class BehaviourError(AppError):
 
 
 def explain(error: Exception, label: str, block: str | None) -> BehaviourError:
-    """Convert an exception in a block to a sentence; `label` names the block."""
+    """Convert an exception in a block to an error with a message for the user; ``label`` names the block."""
     if isinstance(error, BehaviourError):
         error.block = error.block or block
         return error
@@ -55,7 +55,7 @@ def explain(error: Exception, label: str, block: str | None) -> BehaviourError:
 
 
 def kind(value: object) -> str:
-    """Return the type of a value in words: "a text"."""
+    """Return the type of a value as words: "a text"."""
     return _(_KINDS.get(type(value).__name__, _ANOTHER))
 
 

@@ -1,4 +1,4 @@
-"""Discovery of robots in the graph by message type, never by a topic's name."""
+"""Discovery of robots in the graph by message type, independent of topic names."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ MAX_REPORTED = 8
 
 
 class Subscription(Protocol):
-    """Subscriber as needed here."""
+    """Part of the interface of nep's subscriber that is used here."""
 
     def receive(self, timeout_s: float | None = None) -> Message | None:
         """Return the next message, or None."""
@@ -43,22 +43,22 @@ class Subscription(Protocol):
 
 
 class GraphNode(Protocol):
-    """Node as needed here."""
+    """Part of the interface of nep's node that is used here."""
 
     def graph(self, timeout_s: float = 2.0) -> GraphView:
-        """Return the graph."""
+        """Return the current graph."""
         ...
 
     def new_sub(self, topic: str, msg_type: str = "json") -> Subscription:
-        """Return a subscriber."""
+        """Open a subscriber."""
         ...
 
 
 @dataclass(frozen=True)
 class FoundRobots:
-    """Robots found, by name; ``owners`` are their programs.
+    """Robots that were found. ``owners`` are their programs by name of the robot.
 
-    ``claims`` are sentences about claims of programs that were rejected.
+    ``claims`` are messages about programs whose claim to a name was rejected.
     """
 
     robots: tuple[Robot, ...] = ()
@@ -68,7 +68,7 @@ class FoundRobots:
 
 @dataclass
 class _Topic:
-    """Description topic: its owner, and the messages received there."""
+    """Topic of a description: its owner, and the messages received on it."""
 
     subscription: Subscription
     owner: Identity
@@ -88,17 +88,17 @@ def find_robots(
     clock: Callable[[], float] = time.monotonic,
     wait: Callable[[float], object] | None = None,
 ) -> FoundRobots:
-    """Return the robots that announce themselves on their own topics, each by the first program that did.
+    """Find the robots that announce themselves; each name belongs to the first program that announced it.
 
-    RIZE robots announce nothing: those of `known` count as present if their command topic has a subscriber.
+    Robots of RIZE announce nothing: those in ``known`` are found if their command topic has a subscriber.
 
     Args:
         node: Node for the graph and subscriptions.
         timeout_s: Maximum wait.
-        wanted: Names to wait for; else the robots present at once are returned.
-        known: Robots known from before.
-        clock: Monotonic clock.
-        wait: Sleep function.
+        wanted: Names to wait for; without any, the currently connected robots are returned.
+        known: Robots known before.
+        clock: Returns monotonic seconds.
+        wait: Sleeps for a number of seconds.
     """
     wait = wait or threading.Event().wait
     until = clock() + timeout_s

@@ -1,4 +1,4 @@
-"""Protection of the final robot stop from Ctrl+C, so that its result is always shown."""
+"""Protection of the final stop of the robots against Ctrl+C, so that its result is always shown."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ __all__ = ["without_interrupts"]
 
 @contextmanager
 def without_interrupts() -> Iterator[None]:
-    """Ignore Ctrl+C in the block, which must end by itself."""
+    """Return a context that ignores Ctrl+C; its body must end without it."""
     if threading.current_thread() is not threading.main_thread():
         yield  # signals are handled in the main thread only
         return

@@ -13,7 +13,7 @@ STATES = ("accepted", "running", *LAST_STATES)
 
 @dataclass
 class RobotCall:
-    """Command to a robot and its answers; written by the network's thread, read by a script."""
+    """Command to a robot and its replies. Written by the network's thread, read by a script."""
 
     id: str
     robot: str
@@ -29,15 +29,18 @@ class RobotCall:
 
     @property
     def done(self) -> bool:
-        """True after the robot's final answer."""
+        """True after the robot's final reply."""
         return self.state in LAST_STATES
 
 
 class ProgramLink(Protocol):
-    """Robots and topics as a program uses them. Callbacks run in the network's thread."""
+    """Robots and topics as used by a program. Callbacks are called in the network's thread."""
 
     def listen(self, poke: Callable[[], None], stopped_outside: Callable[[str], None]) -> None:
-        """Call `poke` for each answer and message, `stopped_outside` when another program stops a robot."""
+        """Set the callbacks.
+
+        ``poke`` is called for each reply and message, ``stopped_outside`` when another program stops a robot.
+        """
         ...
 
     def invoke(self, robot: str, action: str, input: Mapping[str, object]) -> RobotCall:
@@ -49,11 +52,11 @@ class ProgramLink(Protocol):
         ...
 
     def sensor(self, robot: str, name: str) -> object:
-        """Return a sensor's newest value; None until it is known."""
+        """Return the newest value of a sensor; None until one is received."""
         ...
 
     def newest(self, topic: str) -> object:
-        """Return the newest message of a topic; None until there is one."""
+        """Return the newest message of a topic; None until one is received."""
         ...
 
     def publish(self, topic: str, payload: object) -> None:
@@ -65,7 +68,7 @@ class ProgramLink(Protocol):
         ...
 
     def on_event(self, robot: str, name: str, callback: Callable[[object], None]) -> None:
-        """Call `callback` with the data of each such event."""
+        """Call ``callback`` with the data of each event with this name."""
         ...
 
     def on_message(self, topic: str, callback: Callable[[object], None]) -> None:

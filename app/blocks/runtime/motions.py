@@ -1,7 +1,7 @@
-"""Motions that continue after their command has ended (a speed): paused and resumed with the program.
+"""Motions that continue after their command has ended (a speed), which are paused with the program.
 
-Slow motion also pauses them while the script that started them stays at a block, because the robot would
-drive too far.
+With a delay between blocks, motions are also paused while the script that started them waits at a block;
+otherwise the robot would drive too far.
 """
 
 from __future__ import annotations
@@ -25,11 +25,13 @@ class _Motion:
 
 
 class Motions:
-    """Tracker of continuing motions. Thread-safe: `rest` and `go_on` run in another thread than the answers.
+    """Tracks continuing motions.
+
+    Thread-safe: `rest` and `go_on` are called in another thread than the replies.
 
     Args:
-        stop: Ends everything a robot does.
-        stand: Ends only a robot's motion.
+        stop: Ends everything that a robot does.
+        stand: Ends only the motion of a robot.
         invoke: Sends a command again.
     """
 
@@ -48,7 +50,7 @@ class Motions:
         self._acting_for = threading.local()
 
     def note_command(self, call: RobotCall, robot: Robot, input: Mapping[str, object]) -> None:
-        """Note a new command: its resources no longer belong to an earlier motion."""
+        """Record a new command: the resources it uses no longer belong to an earlier motion."""
         action = robot.action(call.action)
         if action is None:
             return
@@ -63,12 +65,12 @@ class Motions:
                 self._unanswered[call.id] = motion
 
     def is_motion(self, call: RobotCall) -> bool:
-        """Return whether an unanswered command starts a motion."""
+        """Return True if a command without a final reply starts a motion."""
         with self._lock:
             return call.id in self._unanswered
 
     def ended(self, call: RobotCall) -> None:
-        """Note the final answer of a command."""
+        """Record the final reply to a command."""
         with self._lock:
             motion = self._unanswered.pop(call.id, None)
             if motion is None:
@@ -84,7 +86,7 @@ class Motions:
             self._stand(motion.robot)
 
     def stop_all(self) -> tuple[str, ...]:
-        """Stop all motions because the program is paused; return the names of the stopped robots."""
+        """Stop all motions, because the program is paused; return the names of the stopped robots."""
         with self._lock:
             self._paused = True
             moving = {motion.robot.name: motion.robot for motion in self._motions.values()}
@@ -93,7 +95,7 @@ class Motions:
         return tuple(moving)
 
     def go_on(self) -> None:
-        """Resume all motions because the program continues."""
+        """Resume all motions, because the program continues."""
         with self._lock:
             if not self._paused:
                 return
@@ -103,7 +105,7 @@ class Motions:
 
     @contextmanager
     def slow(self) -> Iterator[None]:
-        """Stop the calling script's motions while it stays at a block in slow motion."""
+        """Return a context in which the motions of the calling script are stopped, for a delay at a block."""
         script = self._script()
         with self._lock:
             moving = {

@@ -26,7 +26,7 @@ from nep.system.log_rarely import SurvivedErrors
 from nep.text import bounded_str
 
 LOOKUP_INTERVAL_S = 0.2
-"""Minimum interval of graph queries for unknown publishers."""
+"""Minimum interval of graph queries that look up unknown publishers."""
 MAX_UNKNOWN = 32
 
 Callback = Callable[[object], None]
@@ -34,7 +34,7 @@ _log = logging.getLogger(__name__)
 
 
 class ProgramPublisher(Protocol):
-    """Publisher as needed here."""
+    """Part of the interface of nep's publisher that is used here."""
 
     def publish(self, payload: object) -> None:
         """Publish one message."""
@@ -42,20 +42,20 @@ class ProgramPublisher(Protocol):
 
 
 class ProgramNode(Protocol):
-    """Node as needed here."""
+    """Part of the interface of nep's node that is used here."""
 
     def new_pub(self, topic: str, msg_type: str = "json", *, batch: bool) -> ProgramPublisher:
-        """Return a publisher; without `batch` messages are sent at once."""
+        """Open a publisher. Without ``batch``, each message is sent immediately."""
         ...
 
     def new_sub(
         self, topic: str, msg_type: str = "json", *, sink: Callable[[Sequence[Message]], None]
     ) -> object:
-        """Return a subscriber whose messages go to `sink`, in the node's thread."""
+        """Open a subscriber that passes messages to ``sink`` in the node's thread."""
         ...
 
     def graph(self, timeout_s: float = 2.0) -> GraphView:
-        """Return the graph."""
+        """Return the current graph."""
         ...
 
 
@@ -68,29 +68,35 @@ def payload_of(message: Message) -> object:
 
 
 def value_of(payload: object) -> object:
-    """Return the value in a property's ``{"value": …}``, else the whole payload."""
+    """Return the value in ``{"value": …}``, the payload of a property.
+
+    Any other payload is returned unchanged.
+    """
     if isinstance(payload, Mapping) and set(payload) == {"value"}:
         return payload["value"]
     return payload
 
 
 def new_id(kind: str) -> str:
-    """Return a unique id with its kind as prefix."""
+    """Return a unique id that starts with ``kind``."""
     return f"{kind}-{uuid.uuid4().hex[:12]}"
 
 
 class Network:
-    """Link of a program. All needed publishers and subscribers exist when the constructor returns.
+    """Link of a program to its robots and topics.
+
+    The publishers and subscribers are opened by the constructor.
 
     Args:
         node: Node of the program.
-        program: Program id of its commands.
+        program: Program id in its commands.
         robots: Robots of the program.
         sensors: Used sensors as (robot, name).
         events: Used events as (robot, name).
-        publishes: Topics to publish on; others are created at first use.
-        listens: Topics to subscribe to; others are created at first use.
-        owners: Node ids by robot name (default: the first node that announced it): only their answers count.
+        publishes: Topics to publish on; others are opened at first use.
+        listens: Topics to subscribe to; others are opened at first use.
+        owners: Node ids by robot name. Replies of other nodes are ignored. By default, the first node that
+            announced the robot.
     """
 
     def __init__(
@@ -107,7 +113,7 @@ class Network:
     ) -> None:
         self._node = node
         self.guard = PublishGuard({}, ())
-        """Guard of topics on which the program may not publish."""
+        """Guard of the topics on which the program may not publish."""
         self._owners = dict(owners or {})
         self._senders = Senders()
         self._view = GraphView(0, 0)
@@ -166,7 +172,7 @@ class Network:
                 self._node.new_sub(topic, type_, sink=self._answers)
 
     def close(self) -> None:
-        """Stop the heartbeat; the node belongs to the caller."""
+        """Stop the heartbeat. The node is not closed, because it belongs to the caller."""
         self._closed.set()
         self._lookup_requested.set()
         self._alive.close()
@@ -174,18 +180,18 @@ class Network:
             self._lookup_thread.join(timeout=3.0)
 
     def know(self, owners: Mapping[str, str]) -> None:
-        """Update the nodes of robots that were restarted."""
+        """Update the node ids of restarted robots."""
         with self._answers_lock:
             self._owners |= owners
 
     # ---- Link
 
     def listen(self, poke: Callable[[], None], stopped_outside: Callable[[str], None]) -> None:
-        """Set the callbacks for answers and messages, and for stops by other programs."""
+        """Set the callbacks for replies and messages, and for stops by other programs."""
         self._poke, self._stopped_outside = poke, stopped_outside
 
     def invoke(self, robot: str, action: str, input: Mapping[str, object]) -> RobotCall:
-        """Send a command; the call is updated as answers arrive."""
+        """Send a command; the returned call is updated as replies arrive."""
         described = self._robots[robot]
         call = RobotCall(new_id("cmd"), robot, action)
         with self._lock:
@@ -198,26 +204,26 @@ class Network:
         return call
 
     def cancel(self, call: RobotCall) -> None:
-        """Cancel a command; RIZE robots don't support it."""
+        """Cancel a command; not supported by robots of RIZE."""
         described = self._robots[call.robot]
         if described.dialect != "rize":
             self._send(described, self._command(call.id, "cancel", call.action))
 
     def sensor(self, robot: str, name: str) -> object:
-        """Return the newest value, of a property's ``{"value": …}`` or the object itself."""
+        """Return the newest value of a sensor; None until one is received."""
         topic = self._topic(robot, name)
         self._subscribe(topic)
         message = self._newest.get(topic)
         return None if message is None else value_of(payload_of(message))
 
     def newest(self, topic: str) -> object:
-        """Return the newest message, decoded on demand."""
+        """Return the newest message of a topic, decoded on demand; None until one is received."""
         self._subscribe(topic)
         message = self._newest.get(topic)
         return None if message is None else payload_of(message)
 
     def publish(self, topic: str, payload: object) -> None:
-        """Publish a message as JSON. Raises BehaviourError if it would move a robot without permission."""
+        """Publish a message as JSON. Raises BehaviourError if that would move a robot without permission."""
         self.guard.check(topic)
         self._publisher(topic).publish(payload)
 
@@ -237,16 +243,16 @@ class Network:
 
     # ---- stopping
 
-    def hold_robots(self) -> None:
-        """Stop robots left in motion (a speed) until `go_on`, because the program is paused."""
+    def stop_all(self) -> None:
+        """Stop robots that are in motion (a speed) until `go_on`, because the program is paused."""
         self._motions.stop_all()
 
     def go_on(self) -> None:
-        """Resume the motions."""
+        """Resume the motions that `rest` stopped."""
         self._motions.go_on()
 
     def slow(self) -> AbstractContextManager[None]:
-        """Stop the calling script's motions while it stays at a block in slow motion."""
+        """Return a context in which the motions of the calling script are stopped, for a delay at a block."""
         return self._motions.slow()
 
     def _stand(self, robot: Robot) -> None:
@@ -267,7 +273,9 @@ class Network:
         self._send(robot, self._command(id, "stop", robot.safe_stop.action))
 
     def stop_robots(self, timeout_s: float) -> tuple[str, ...]:
-        """Stop all robots and wait; return the names of those not confirmed (RIZE robots never are).
+        """Stop all robots and wait.
+
+        Return the names of robots that did not confirm (robots of RIZE never do).
 
         `stop_words` returns the reason for each.
         """
@@ -287,7 +295,10 @@ class Network:
             return tuple(dict.fromkeys(name for name, _ in waiting.values()))
 
     def stop_words(self, name: str) -> str:
-        """Return why a robot's stop is not confirmed, in its own words if it answered; without full stop."""
+        """Return why the stop of a robot is not confirmed, in the robot's words if it replied.
+
+        Without full stop.
+        """
         return self._stop_errors.get(name) or _("{robot} did not reply").format(robot=name)
 
     def _stop_nodes(self, robot: Robot) -> set[str]:

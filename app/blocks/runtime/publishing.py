@@ -1,4 +1,4 @@
-"""Protection of topics that move robots: which robots a program's publishing would move."""
+"""Protection of topics that move robots: determines which robots a program would move by publishing."""
 
 from __future__ import annotations
 
@@ -12,24 +12,24 @@ from nep.programs.robots.moving import MovingTopics, RobotControls
 
 
 def moved_by(topic: str, robots: Iterable[Robot]) -> tuple[str, ...]:
-    """Return the names of these robots that a message may move, or whose world it changes."""
+    """Return the names of the robots that a message on this topic may move, or whose world it changes."""
     return MovingTopics(map(controls_of, robots)).robots_on(topic)
 
 
 def guarded(robots: Iterable[Robot]) -> dict[str, tuple[str, ...]]:
-    """Return the topics that move these robots, with their names."""
+    """Return the topics that move these robots, each with the names of the robots."""
     return MovingTopics(map(controls_of, robots)).topics
 
 
 class PublishGuard:
-    """Guard of a running program: denies publishing that would move a robot without permission."""
+    """Guard of a running program that prevents publishing from moving a robot without permission."""
 
     def __init__(self, topics: Mapping[str, Collection[str]], allowed: Collection[str]) -> None:
         self._allowed = frozenset(allowed)
         self.know(topics)
 
     def know(self, topics: Mapping[str, Collection[str]]) -> None:
-        """Update the connected robots."""
+        """Update the topics that move connected robots."""
         moved: dict[str, set[str]] = {}
         for topic, names in topics.items():
             for name in names:
@@ -37,7 +37,7 @@ class PublishGuard:
         self._moving = MovingTopics(RobotControls(name, frozenset(each)) for name, each in moved.items())
 
     def check(self, topic: str) -> None:
-        """Raise BehaviourError if a message on this topic would move a robot that is not allowed."""
+        """Raise BehaviourError if a message on this topic would move a robot that is not allowed to move."""
         names = [name for name in self._moving.robots_on(topic) if name not in self._allowed]
         if names:
             who = listed(names)

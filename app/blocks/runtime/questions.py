@@ -1,4 +1,4 @@
-"""Questions of a program to the person in front of it, shown one at a time in order."""
+"""Questions of a program to the user, shown one at a time in the order in which they are asked."""
 
 from __future__ import annotations
 
@@ -22,21 +22,21 @@ _NUMBER = re.compile(r"-?(?:0|[1-9]\d{0,14})(?:[.,]\d{1,9})?", re.ASCII)
 
 @dataclass
 class ProgramQuestion:
-    """Question; ``answer`` is None until it is answered."""
+    """Question to the user; ``answer`` is None until the user has answered."""
 
     id: int
     text: str
     answer: str | None = None
     choices: tuple[str, ...] = ()
-    """Possible answers; without any, the answer is typed."""
+    """Possible answers; if empty, the user types the answer."""
 
 
 Asked = Callable[[ProgramQuestion | None], None]
-"""Callback with the question to show now, or None."""
+"""Called with the question to be shown, or None."""
 
 
 class Questions:
-    """Queue of questions. Scripts ask; answers come from another thread."""
+    """Queue of questions. Scripts ask; answers arrive in another thread."""
 
     def __init__(self, scheduler: Scheduler, asked: Asked | None) -> None:
         self._scheduler, self._asked = scheduler, asked
@@ -46,15 +46,19 @@ class Questions:
         self.answer: object = ""
 
     def ask(self, words: object) -> None:
-        """Ask and wait for the answer. Raises BehaviourError outside of Studio."""
+        """Ask a question and wait for the answer, which is stored in ``answer``.
+
+        Raises BehaviourError outside of Studio.
+        """
         if self._asked is None:
             raise BehaviourError(_("No one can answer: the behaviour runs outside Studio."))
         self.answer = as_value(self._answer_to(text(words)))
 
     def ask_with_choices(self, words: object, choices: object) -> None:
-        """Ask with a button for each item of a list; the answer is the chosen item, or an empty text for Esc.
+        """Ask a question with a button for each item of a list, and wait for the answer.
 
-        Raises BehaviourError outside of Studio, and for an empty or too long list.
+        The answer is the selected item, or an empty text after Esc. Raises BehaviourError outside of Studio,
+        and for a list that is empty or too long.
         """
         if self._asked is None:
             raise BehaviourError(_("No one can answer: the behaviour runs outside Studio."))
@@ -88,7 +92,7 @@ class Questions:
 
 
 def offers(choices: object) -> dict[str, object]:
-    """Return the items by their button texts, without empty and duplicate ones."""
+    """Return the items of a list by their texts on the buttons, without empty and duplicate texts."""
     if not isinstance(choices, list):
         raise BehaviourError(
             _("A question with choices needs a list of them, not {value}.").format(value=kind(choices))
@@ -111,7 +115,7 @@ def offers(choices: object) -> dict[str, object]:
 def as_value(words: str) -> str | int | float:
     """Convert an answer: a typed number becomes a number, so that it can be compared.
 
-    007 stays a text, and so does a number with more digits than a float keeps exactly.
+    "007" remains a text, as does a number with more digits than a float can represent.
     """
     plain = words.strip()
     if not _NUMBER.fullmatch(plain):

@@ -1,7 +1,7 @@
-"""Robot as a program uses it: actions, sensors and event scripts.
+"""Robot as used by a program: actions, sensors and event scripts.
 
-A pause cancels a running action; the rest of it is done when the program continues. `StatusText` describes
-the current activity: a robot's action for a block, else the block itself.
+A pause cancels a running action; the remaining part is executed when the program continues. `StatusText`
+describes the current activity: the action of a robot, or else the block.
 """
 
 from __future__ import annotations
@@ -29,23 +29,24 @@ FIRST_VALUE_S = 2.0
 MAX_S = 60.0
 MARGIN_S = 2.0
 COMMAND_CHECK_S = 0.25
-"""Interval at which a pending command is checked: whether its robot is silent, whether it has started."""
+"""Interval of checks of a pending command: is the robot silent, has the action started."""
 BEATS_MISSED, MIN_SILENCE_S = 4, 2.0
 HOLD_S = 3.0
-"""Time a robot has to end an action canceled by a pause; the kit answers within about a second."""
+"""Time limit for a robot to end an action cancelled by a pause; robots built with the kit reply within 1 s.
+"""
 MAX_KEPT_COMMANDS = 64
-"""Number of remembered commands: a robot answers a replaced one soon after."""
+"""Number of stored commands; a robot reports soon that a command was replaced."""
 REPLACES = "replace"
 _PLACE = re.compile(r"%([A-Za-z_][A-Za-z0-9_]*)")
 
 Decorator = Callable[[Callable[..., None]], Callable[..., None]]
 
 LEFT = "to_go"
-"""Feedback field with the remaining amount, in the unit of one of the action's parameters."""
+"""Feedback field with the remaining amount, in the unit of one parameter of the action."""
 
 
 class StatusText:
-    """Sentences about the current activity for the run bar. Written by scripts, read by another thread."""
+    """Texts about the current activity for the run bar. Written by scripts, read by another thread."""
 
     def __init__(self, block: Callable[[], str | None], readings: Mapping[str, str]) -> None:
         self._block, self._readings = block, readings
@@ -53,19 +54,19 @@ class StatusText:
         self._warned: dict[str | None, str] = {}
 
     def set_text(self, sentence: str) -> None:
-        """Set what a robot does for the calling script's block; "" when it is done."""
+        """Set the activity of a robot for the block of the calling script; "" when it has ended."""
         _set_or_remove(self._told, self._block(), sentence)
 
     def warn(self, sentence: str) -> None:
-        """Set a warning while the calling script is paused; "" when it continues."""
+        """Set a warning while the calling script is paused; "" when the script continues."""
         _set_or_remove(self._warned, self._block(), sentence)
 
     def says(self, blocks: Sequence[str]) -> str:
-        """Return the sentence for the run bar: a robot's activity, else the first block as text."""
+        """Return the text for the run bar: the activity of a robot, or else the first block."""
         return _first(self._told, blocks) or self.reading(blocks[0] if blocks else None)
 
     def warns(self, blocks: Sequence[str]) -> str:
-        """Return the warning of one of these blocks, or ""."""
+        """Return the warning at one of these blocks, or ""."""
         return _first(self._warned, blocks)
 
     def reading(self, block: str | None) -> str:
@@ -86,7 +87,7 @@ def _first(sentences: Mapping[str | None, str], blocks: Sequence[str]) -> str:
 
 @dataclass(frozen=True, slots=True)
 class Replacement:
-    """Command that was replaced by another script's; ``count`` is how often in this run."""
+    """Command that another script's command replaced; ``count`` is the number of times in this run."""
 
     block: str
     sentence: str
@@ -102,9 +103,9 @@ class _Command:
 
 
 class Replacements:
-    """Detector of scripts that replace each other's actions.
+    """Detects scripts that replace each other's actions.
 
-    The script whose action was replaced continues with its next block (docs/blocks.md), and the person is
+    The script whose action was replaced continues with its next block (docs/blocks.md), and the user is
     informed. Written by one script at a time, read by another thread.
     """
 
@@ -115,14 +116,14 @@ class Replacements:
         self._news: dict[tuple[str, str], Replacement] = {}
 
     def note_command(self, call: RobotCall, action: Action, block: str | None) -> None:
-        """Note a command of the calling script in this block."""
+        """Record a command of the calling script at this block."""
         self._commands.append(_Command(call, action, block, threading.get_ident()))
 
     def ended(self, call: RobotCall, *, names_robot: bool) -> None:
-        """Note that the robot ended this command early, without a pause or stop.
+        """Record that the robot ended this command early, without a pause or stop.
 
-        It is reported only if a later command of another script replaced it. With ``names_robot`` the
-        sentence names the robot, because there are several.
+        This is reported only if a later command of another script replaced the command. With ``names_robot``,
+        the message contains the name of the robot, because there are several.
         """
         loser = next((each for each in self._commands if each.call is call), None)
         if loser is None or loser.block is None:
@@ -141,7 +142,7 @@ class Replacements:
             self._news[pair] = Replacement(loser.block, said, count)
 
     def take_news(self) -> tuple[Replacement, ...]:
-        """Return the replacements since the last call, repeated ones once with their count."""
+        """Return the replacements since the last call; repeated ones are combined with their count."""
         with self._lock:
             news, self._news = tuple(self._news.values()), {}
         return news
@@ -156,7 +157,7 @@ def _takes_place(winner: _Command, loser: _Command) -> bool:
 
 
 class ProgramContext(Protocol):
-    """Running program as needed by a robot's handle."""
+    """Running program as used by `RobotHandle`."""
 
     scheduler: Scheduler
     saying: StatusText
@@ -164,7 +165,7 @@ class ProgramContext(Protocol):
 
     @property
     def robot_count(self) -> int:
-        """Number of robots of the program."""
+        """Number of robots that the program uses."""
         ...
 
     def described(self, name: str) -> Robot:
@@ -172,55 +173,55 @@ class ProgramContext(Protocol):
         ...
 
     def linked(self) -> ProgramLink:
-        """Return the network."""
+        """Return the network link of the program."""
         ...
 
     def write(self, value: object) -> None:
-        """Write a line to the console."""
+        """Write a line to the Console."""
         ...
 
     def on_event(self, robot: str, event: str, filters: Mapping[str, object]) -> Decorator:
-        """Decorate a script that starts at a robot's event."""
+        """Return a decorator for scripts that start at an event of a robot."""
         ...
 
     def on_change(self, robot: str, sensor: str) -> Decorator:
-        """Decorate a script that starts when a sensor changes."""
+        """Return a decorator for scripts that start when the value of a sensor changes."""
         ...
 
     def on_pass(self, robot: str, sensor: str, side: str, limit: float) -> Decorator:
-        """Decorate a script that starts when a sensor passes a limit."""
+        """Return a decorator for scripts that start when a sensor passes a limit."""
         ...
 
 
 class RobotHandle:
-    """Handle of a robot, returned by ``robot("Pepper")``."""
+    """Robot in a program, returned by ``robot("Pepper")``."""
 
     def __init__(self, name: str, runtime: ProgramContext) -> None:
         self._name = name
         self._runtime = runtime
 
     def do(self, action: str, /, **input: object) -> None:
-        """Run an action and wait until it is done.
+        """Run an action and wait until it has ended.
 
         Args:
             action: Name of the action.
-            input: Its parameters.
+            input: Parameters of the action.
 
         Raises:
-            BehaviourError: The robot can't do it; the message is a sentence for people.
+            BehaviourError: The robot can't execute the action; contains a message for the user.
         """
         self._invoke(action, input)
 
     def ask(self, action: str, field: str, /, **input: object) -> object:
-        """Run an action that returns a result, and return one field of it.
+        """Run an action that returns a result, and return one field of the result.
 
         Args:
             action: Name of the action.
-            field: Name of the result's field.
+            field: Name of the field.
             input: Parameters of the action.
 
         Raises:
-            BehaviourError: The robot can't do it; the message is a sentence for people.
+            BehaviourError: The robot can't execute the action; contains a message for the user.
         """
         return self._invoke(action, input).output.get(field)
 

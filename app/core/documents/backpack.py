@@ -1,8 +1,8 @@
 """Backpack: blocks that are available in every file, every running Studio and after a restart.
 
 Stored in one JSON file next to the settings and shared by all instances: each change is applied to the
-current
-content under a lock, so that instances don't overwrite each other's changes. Unknown content is preserved.
+current content under a lock, so that instances don't overwrite each other's changes. Unknown content is
+preserved.
 """
 
 from __future__ import annotations

@@ -1,8 +1,7 @@
 """Journal of unsaved work against a crash: every edit is written in the background.
 
 Each open behaviour has one file in ``journal/`` of Studio's folder. The file contains the id of the process
-that
-writes it, so that a second instance doesn't offer the work of the first one.
+that writes it, so that a second instance doesn't offer the work of the first one.
 """
 
 from __future__ import annotations

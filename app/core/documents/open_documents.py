@@ -184,8 +184,7 @@ class Documents:
         """Return the block and toolbox definitions for the editor, shared by all tabs.
 
         They contain the connected robots and all robots used in any open behaviour, so that hidden tabs keep
-        their
-        blocks.
+        their blocks.
         """
         absent = {robot.name: robot for document in self._open for robot in document.absent}
         return editor_definitions(self._robots, tuple(absent.values()), self._topics)

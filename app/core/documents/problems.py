@@ -47,8 +47,7 @@ def listed(
     """Return the lines of the problem list.
 
     All blocks of a missing robot are one line with the number of disabled blocks. The fixes of that line are
-    connected
-    robots with the same actions, and a virtual robot of the same model.
+    connected robots with the same actions, and a virtual robot of the same model.
 
     Args:
         absent: Ids of the disabled blocks (`Program.absent`).

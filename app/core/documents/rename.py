@@ -55,8 +55,7 @@ def rename_file(old: Path, new: Path) -> None:
     """Rename a file. If DocumentError is raised, the file keeps its old name.
 
     An existing file is never overwritten: the new name is reserved first by creating an empty file
-    exclusively. (Hard
-    links are no alternative, because file systems of USB drives don't support them.)
+    exclusively. (Hard links are no alternative, because file systems of USB drives don't support them.)
     """
     try:
         if not old.is_file():

@@ -1,8 +1,7 @@
 """Earlier versions of behaviour files, copied before Studio overwrites a file.
 
 The file name of a copy consists of the original file name, the time of overwriting, and a hash of the
-original
-path. The modification time of the copy is that of the original.
+original path. The modification time of the copy is that of the original.
 """
 
 from __future__ import annotations
@@ -68,9 +67,8 @@ def keep_earlier(
     """Copy the current content of a file; None if the file is missing or empty.
 
     The copies are in ``folder`` (default: ``earlier`` in Studio's data folder), at most 300 in total and 30
-    for each
-    file. Content that was already copied isn't copied again. Raises DocumentError if the file can't be
-    copied.
+    for each file. Content that was already copied isn't copied again. Raises DocumentError if the file can't
+    be copied.
     """
     where = _folder(folder)
     if not path.is_file() or not path.stat().st_size:

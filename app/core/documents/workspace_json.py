@@ -1,8 +1,7 @@
 """JSON of a workspace as passed between the editor's page, a document and its journal.
 
 The JSON is passed as text. Code that needs the blocks (compiler, file) parses it on demand, once and in its
-own
-thread.
+own thread.
 """
 
 from __future__ import annotations

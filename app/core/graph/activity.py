@@ -19,8 +19,7 @@ class QuietNodes:
     """Finds nodes without traffic by their counters. Not thread-safe: use it from the window's thread.
 
     Nodes without counters are never quiet: those of a network without statistics, and original programs that
-    only
-    subscribe.
+    only subscribe.
     """
 
     def __init__(self) -> None:

@@ -2,8 +2,7 @@
 
 The library (graphlay) places nodes in layers with few crossings and routes lines around nodes. Positions are
 computed once; later updates compute routes only. All lengths are pixels at 100 % zoom, x to the right and y
-down;
-positions are centres of boxes.
+down; positions are centres of boxes.
 """
 
 from __future__ import annotations
@@ -97,8 +96,7 @@ def arrange(
     """Compute the layout of ``graph``; nodes with a position in ``before`` keep it.
 
     Everything is placed again without ``before``, or if more nodes appeared than remained. Takes seconds for
-    hundreds
-    of nodes, so call it in `LayoutThread`.
+    hundreds of nodes, so call it in `LayoutThread`.
     """
     sizes = sizes if sizes is not None else LayoutSizes()
     ways, left_out = _routes_to_draw(graph)

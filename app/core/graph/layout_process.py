@@ -1,8 +1,7 @@
 """Layout of large graphs in a child process, because the library holds the GIL while it works.
 
 `LayoutThread` starts this module. Standard input contains the pickled arguments of `arrange`, standard output
-its
-pickled result; pickle is safe here, because parent and child are the same program.
+its pickled result; pickle is safe here, because parent and child are the same program.
 """
 
 from __future__ import annotations

@@ -32,10 +32,8 @@ def step(
     """Return the selection after an arrow key was pressed.
 
     Right goes from a node to an outgoing line and on to its target; left goes against the direction of the
-    lines. Up
-    and down go to the next line of the same node, or to the next node above or below. The selection is
-    unchanged if
-    nothing follows, and None in an empty graph.
+    lines. Up and down go to the next line of the same node, or to the next node above or below. The selection
+    is unchanged if nothing follows, and None in an empty graph.
     """
     if chosen is None or not _exists(graph, layout, chosen):
         first = min(layout.places, key=lambda key: (layout.places[key], key), default=None)

@@ -17,8 +17,7 @@ class MessageHistory:
     """Recent messages, numbered from 0, oldest first. The number of a message never changes.
 
     The newest message is stored whatever its size. Messages are stored encoded, as copies that no publisher
-    can
-    modify.
+    can modify.
     """
 
     def __init__(self, most_bytes: int = MAX_BYTES, most_messages: int = MAX_MESSAGES) -> None:

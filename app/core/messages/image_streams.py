@@ -1,8 +1,7 @@
 """Image streams: one thread decodes the newest image of each visible topic.
 
 Older pending images are never decoded, so that under overload an image is late by one decoding and not by a
-queue.
-Images are decoded no larger than they are shown (`ImageStream.want`).
+queue. Images are decoded no larger than they are shown (`ImageStream.want`).
 """
 
 from __future__ import annotations
@@ -27,8 +26,7 @@ class Rate:
     """Image rate by arrival time over the last two seconds.
 
     The window ends slightly before the current time, so that images that arrived but are not painted yet are
-    not
-    counted: the rates of arriving and shown images then refer to the same images.
+    not counted: the rates of arriving and shown images then refer to the same images.
     """
 
     def __init__(self) -> None:

@@ -1,10 +1,8 @@
 """Large JSON, decoded only where it is opened.
 
 A text of 10 MB is scanned once for brackets, commas and colons (with numpy, which releases the GIL). Objects
-and
-arrays then are `LazyObject` and `LazyList`, whose values are decoded at each access. Decoding everything at
-once
-would block all threads of the program for a tenth of a second.
+and arrays then are `LazyObject` and `LazyList`, whose values are decoded at each access. Decoding everything
+at once would block all threads of the program for a tenth of a second.
 """
 
 from __future__ import annotations

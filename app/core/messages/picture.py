@@ -23,8 +23,7 @@ PNG_NUMBERS = ("uint8", "uint16")
 COMPARED_FIRST = 4096
 AVERAGED = ("uint8", "uint16")
 """Types that are reduced in size by averaging. Other types may contain NaN and are reduced by taking every
-nth
-pixel.
+nth pixel.
 """
 
 
@@ -34,8 +33,7 @@ class Picture:
 
     Attributes:
         bgra: Contiguous uint8 array (rows, columns, 4) in the layout of QImage.Format_RGB32. Smaller than the
-            image if
-            decoded for a small view; then `whole` is False.
+            image if decoded for a small view; then `whole` is False.
         numbers: Values of an image with one channel (grey, depth), else None.
         message: Message that was decoded.
     """
@@ -79,8 +77,7 @@ def decode(
     Args:
         received_s: Arrival time of the message.
         fit: Displayed width and height in screen pixels. An image at least twice as large is decoded at a
-            reduced
-            size. None means full resolution.
+            reduced size. None means full resolution.
         look: Display style.
     """
     import cv2  # noqa: PLC0415  150 MB: loaded with the first image, not at the start

@@ -1,8 +1,7 @@
 """JSONPath queries (RFC 9535) on decoded messages, with bounded run time.
 
 Each visited value is counted, so that an expensive query (``$..*..*..*``) stops and returns the values found
-so
-far. Regular expressions are disabled, because their run time can't be bounded.
+so far. Regular expressions are disabled, because their run time can't be bounded.
 """
 
 from __future__ import annotations

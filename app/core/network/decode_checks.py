@@ -2,8 +2,7 @@
 
 Every message of a watched topic is decoded as long as that takes at most 7 % of the time; up to 1 s of unused
 time is saved for bursts. Half of the time is reserved for topics with earlier errors, so that their error
-count is
-exact. Messages beyond these limits are counted as unchecked.
+count is exact. Messages beyond these limits are counted as unchecked.
 """
 
 from __future__ import annotations

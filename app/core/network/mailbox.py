@@ -1,10 +1,8 @@
 """Bounded mailbox from background threads to the window.
 
 Threads post; the window drains once per tick. Each topic has a ring buffer that holds the newest messages and
-counts
-dropped ones. Events (a new graph, a robot's reply, the end of a program) are rare and must not be lost, so
-their
-queue is long; events beyond its limit are counted.
+counts dropped ones. Events (a new graph, a robot's reply, the end of a program) are rare and must not be
+lost, so their queue is long; events beyond its limit are counted.
 """
 
 from __future__ import annotations

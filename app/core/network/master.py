@@ -31,8 +31,7 @@ START_TIMEOUT_S = 50.0
 """Time limit for a started master to reply while its process is alive.
 
 The first start after an installation, from a slow disk and with a virus scanner, takes longer than the usual
-ten
-seconds.
+ten seconds.
 """
 END_TIMEOUT_S = 2.0
 

@@ -163,8 +163,8 @@ def fits(words: Iterable[str]) -> Callable[[str, str], bool]:
     """Return a predicate (name, details) that is True for topics that match every word, ignoring case.
 
     A word with ``*`` or ``?`` is a pattern for the whole name (``*`` also matches slashes). A word that
-    starts with
-    ``!`` excludes the topics that match the rest. Any other word may occur anywhere in the details.
+    starts with ``!`` excludes the topics that match the rest. Any other word may occur anywhere in the
+    details.
     """
     wanted: list[tuple[bool, re.Pattern[str] | str]] = []
     for word in words:

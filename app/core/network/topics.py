@@ -51,8 +51,7 @@ class Topic:
         bandwidth_Bps: Bytes per second, as reported by the publishers.
         age_s: Seconds since the time stamp of the newest message.
         silent_s: Seconds without a message although the topic has subscribers; None without subscribers,
-            because some
-            publishers send only to subscribers.
+            because some publishers send only to subscribers.
         lost: Number of lost messages.
         loss_ratio: Share of lost messages among all that subscribers should have received.
         gone_s: Seconds since the topic vanished; None while it exists.
@@ -169,8 +168,7 @@ class Topics:
         """Apply a new graph; ``now`` is monotonic seconds.
 
         If no node or topic changed, only the statistics are updated; those of more than `AT_ONCE` topics in
-        parts, by
-        `age`.
+        parts, by `age`.
         """
         seen = (view.epoch, view.revision)
         self._clocks = self._clocks_in(view)

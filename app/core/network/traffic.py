@@ -46,8 +46,7 @@ class Traffic:
         lost_30s: Messages that any subscriber lost within the last 30 s.
         sent_30s: Messages sent on watched topics within the last 30 s.
         shown_30s: Those of `sent_30s` that were passed to panels. The others were dropped, because they
-            arrived faster
-            than the window can show them.
+            arrived faster than the window can show them.
     """
 
     def __init__(self, topics: Topics) -> None:

@@ -103,8 +103,7 @@ class WebPages:
     """Web server of Studio and its settings. Not thread-safe: use it from the window's thread.
 
     A running server applies changes immediately; only a change of `host` or `port` restarts it. The settings
-    are not
-    saved.
+    are not saved.
 
     Attributes:
         host: Address of this computer to which other computers connect, or "".

@@ -49,8 +49,7 @@ class OtherSource(LiveSource):
         """Return the graph, with the codec with which each topic is read.
 
         The revision increases with every change of nodes or topics. Back ends that build a new graph for each
-        query don't
-        count revisions themselves.
+        query don't count revisions themselves.
         """
         with _converted_errors():
             view = node.graph(timeout_s=POLL_S)

@@ -36,8 +36,7 @@ class RecordingChoice:
 
     Attributes:
         mode: "all", "chosen" for the topics in `topics`, or "pattern" for topics that match one of `patterns`
-            (any if
-            empty) and none of `left_out`.
+            (any if empty) and none of `left_out`.
         ends_min: Maximum duration in minutes; None for no limit.
         ends_gb: Maximum size in GB (10^9 bytes); None for no limit.
     """

@@ -1,8 +1,7 @@
 """Client of the recorder process: start, stop, save the flight recorder, report problems.
 
 The process runs `nep.recordings.child`. It is not slowed down by a busy window, and finishes a recording even
-after
-Studio has exited. Background threads write commands and read replies, so that the window never blocks.
+after Studio has exited. Background threads write commands and read replies, so that the window never blocks.
 """
 
 from __future__ import annotations

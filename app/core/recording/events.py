@@ -30,8 +30,7 @@ class RecordedEvents:
     """Publisher of run and alarm events for the recorder. Not thread-safe: use it from the window's thread.
 
     Active runs and alarms are sent again by `repeat`: once to a recording that starts later, and every second
-    to the
-    flight recorder, so that each saved part contains them. Otherwise only changes are sent.
+    to the flight recorder, so that each saved part contains them. Otherwise only changes are sent.
     """
 
     def __init__(self, say: Say, *, clock_ns: Callable[[], int] = time.time_ns) -> None:

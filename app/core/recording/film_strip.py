@@ -29,8 +29,7 @@ class FilmStripLook:
 
     Attributes:
         pictures: Images at the centres of equal time intervals, of the topic with most images. None where no
-            image can
-            be read; empty if the recording has no images.
+            image can be read; empty if the recording has no images.
         counts: Number of messages of all topics in equal time intervals.
         by_topic: The same for each topic.
         message_bytes: Average message size by topic, as far as known.
@@ -136,8 +135,7 @@ def part_of(
     """Return the part of a recording in a time range (inclusive), limited to topics that match the patterns.
 
     Without patterns, all topics are included. ``topics`` of the result is empty if none matches. Raises
-    `BadTopicError`
-    for an invalid pattern.
+    `BadTopicError` for an invalid pattern.
     """
     topics = None
     if wanted or unwanted:

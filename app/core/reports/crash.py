@@ -1,8 +1,7 @@
 """Crash records: which part of Studio crashed, how, and its output.
 
 The code that detects a crash logs it. A log record with the ``extra`` of `crash_extra` is also stored as a
-crash
-report (`app.core.reports.crash_reports.CrashLog`).
+crash report (`app.core.reports.crash_reports.CrashLog`).
 """
 
 from __future__ import annotations

@@ -1,8 +1,7 @@
 """Missing dependencies: Python packages, and system libraries that Qt needs on Linux.
 
 Wheels of PySide6 contain no system libraries, and Python's error names only the first missing one. This
-module
-imports nothing that the extra ``studio`` installs.
+module imports nothing that the extra ``studio`` installs.
 """
 
 from __future__ import annotations
@@ -140,8 +139,7 @@ def missing_libraries(
     """Return all missing libraries after a failed import; None if the error has another cause.
 
     Python's error names one library; the others are found by loading each library that Qt may need. If a
-    library can't
-    be loaded because of a missing dependency, the dependency is returned.
+    library can't be loaded because of a missing dependency, the dependency is returned.
     """
     named = _named_in(str(error))
     if not named:

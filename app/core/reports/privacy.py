@@ -15,8 +15,7 @@ HARMLESS = frozenset({
 """Settings whose values are included in a report.
 
 Of all other settings only the names are included, so that future settings, such as keys of networks and
-access
-codes, stay private until they are added here.
+access codes, stay private until they are added here.
 """
 LEFT_OUT = "(left out)"
 _END = r"""(?=[\\/'":;,)\]}>\s]|\.(?=\s|$)|%2F|%5C|$)"""

@@ -1,8 +1,7 @@
 """Detection of crashes of Studio: each run creates a marker, and the next start checks remaining markers.
 
 Each run (each window) has a marker file locked by its process, and a trace file for crashes in native code.
-Both are
-deleted when the run ends normally.
+Both are deleted when the run ends normally.
 """
 
 from __future__ import annotations

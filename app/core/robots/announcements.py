@@ -1,10 +1,8 @@
 """Announcements of robots: the program that announced a name first owns it.
 
 Announcements of other programs under the same name are ignored and reported as claims. The program of a robot
-is
-replaced only after the master has removed its announcement. Robots of RIZE announce nothing; nodes that
-subscribe to
-``robot_action`` count as such robots.
+is replaced only after the master has removed its announcement. Robots of RIZE announce nothing; nodes that
+subscribe to ``robot_action`` count as such robots.
 """
 
 from __future__ import annotations
@@ -51,10 +49,8 @@ class _Announced:
     """Description topic, its owner, and the newest description of each publisher.
 
     ``place`` is the number of topics that the same node announced before this one. ``owners`` are the nodes
-    that owned
-    the topic, newest first. Their descriptions are stored while they aren't listed: a latched message arrives
-    only once,
-    and a suspended program resumes over the same connection.
+    that owned the topic, newest first. Their descriptions are stored while they aren't listed: a latched
+    message arrives only once, and a suspended program resumes over the same connection.
     """
 
     watch: Watch | None = None

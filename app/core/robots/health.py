@@ -63,8 +63,7 @@ class Health:
         """Raise alerts about topics with undecodable messages, including their exact number.
 
         `check` resolves the alert after a second without undecodable messages, so that a topic with both
-        kinds of messages
-        has one continuous alert.
+        kinds of messages has one continuous alert.
         """
         for topic, checked in found.items():
             bad = self._bad.get(topic)

@@ -164,8 +164,8 @@ class Launcher:
         """Start a virtual robot with this name and model, unless one with this name is listed.
 
         Robots of other Studios count too. The request stays valid for some seconds, in which `follow` starts
-        the robot as
-        soon as it is known that none is listed. If Studio started the master itself, no robot can be listed.
+        the robot as soon as it is known that none is listed. If Studio started the master itself, no robot
+        can be listed.
         """
         now = self._clock()
         self.wanted[name] = model
@@ -310,8 +310,7 @@ class VirtualProcesses:
         """Return True if a program is a virtual robot started by a Studio of this user.
 
         That is this process, a process that it started (or the child of one, as in a frozen build), or a
-        process of the
-        same user on this computer that runs a module of `VIRTUAL_ROBOTS`.
+        process of the same user on this computer that runs a module of `VIRTUAL_ROBOTS`.
         """
         if identity.pid is None or identity.host != platform.node():
             return False

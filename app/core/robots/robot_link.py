@@ -200,10 +200,8 @@ def excess_away(links: Iterable[RobotLink], in_use: Collection[str]) -> Sequence
     """Return the robots to remove from the list: disconnected ones beyond `MAX_AWAY`.
 
     The limit is needed because any program can invent new names. Robots that never replied come first, then
-    those
-    disconnected longest. Robots ``in_use``, robots that ever confirmed a Stop, and robots whose Stop is
-    pending or
-    failed are neither counted nor returned.
+    those disconnected longest. Robots ``in_use``, robots that ever confirmed a Stop, and robots whose Stop is
+    pending or failed are neither counted nor returned.
     """
     away = [
         link

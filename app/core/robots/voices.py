@@ -100,8 +100,7 @@ class RobotVoices:
     """Plays the speech and sounds of virtual robots on `speaker`, if that is set.
 
     Robots speak one after the other; interrupted speech stops immediately. Not thread-safe: use it from the
-    window's
-    thread.
+    window's thread.
     """
 
     def __init__(

@@ -16,8 +16,7 @@ class BlockErrors:
     """Error messages by block id (``by_block``).
 
     An error that prevented the start is removed when the blocks no longer have it. An error that stopped a
-    program is
-    removed when its block, or a block inside it, differs from the run.
+    program is removed when its block, or a block inside it, differs from the run.
     """
 
     def __init__(self) -> None:

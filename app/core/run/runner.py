@@ -59,12 +59,10 @@ class RunnerEvent:
         kind: Kind of event.
         run: Number of the run.
         blocks: Blocks that are running (running), at which the program is held (paused; the next one first),
-            or that
-            failed (error).
+            or that failed (error).
         says: Description of what is running, or of the next block (paused).
         text: Printed line; warning for the user (paused); error message (error); reason of a failure (ended);
-            question
-            (ask).
+            question (ask).
         ok: True if the program ended without a failed block.
         silent: Robots that did not reply to the program's own Stop at its end.
         values: Variables that changed.

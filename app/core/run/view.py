@@ -26,8 +26,7 @@ class RunState:
 
     Attributes:
         state: "ready", "running", "paused", "stopping", "proven" or "unanswered"; "ready" with a `report`
-            after a Stop
-            without robots.
+            after a Stop without robots.
         doubts: Why robots that did not reply may be moving (`MovedRobots`).
         warning: Shown before a paused program resumes.
         begun: True if the scripts run and receive events; the process starts some tenths of a second earlier.
@@ -136,8 +135,7 @@ def view_of(
         now: Monotonic seconds.
         coming: Names of the robots that are starting.
         elsewhere: True if the run belongs to a behaviour in another tab; then the title names that behaviour,
-            and Run
-            applies to the current one.
+            and Run applies to the current one.
         slow: True if blocks run with a delay.
     """
     view = replace(_view(run, connected, coming, now), slow=slow)
@@ -408,8 +406,7 @@ def unanswered_words(report: StopReport, doubts: Sequence[str] = ()) -> tuple[st
     """Return title, detail, compact text and button label for robots that have not confirmed a Stop.
 
     A report of a robot itself ("Arm may still move: the brake is stuck") comes first, unchanged. ``doubts``
-    are the
-    reasons why robots may be moving (`RunState`).
+    are the reasons why robots may be moving (`RunState`).
     """
     still = report.still
     names = listed(report.silent)

@@ -50,8 +50,7 @@ def prepare(folder: Path, environ: MutableMapping[str, str], *, is_root: bool) -
     """Create the folder with a home folder in it; set both and a free master port in ``environ``.
 
     Result files of an earlier test are removed, nothing else. The web engine can't use its sandbox as root;
-    the test
-    loads only Studio's own page and then disables the sandbox. Raises UnwritableFolderError.
+    the test loads only Studio's own page and then disables the sandbox. Raises UnwritableFolderError.
     """
     folder = Path(os.path.abspath(folder))  # noqa: PTH100 - links are not resolved, so that the name stays as given
     try:

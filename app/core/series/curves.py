@@ -107,9 +107,8 @@ class Curves:
         """Add the curves of a typed text; ``[*]`` adds one for each element of the newest message.
 
         ``also`` are topics that are valid although they don't exist at the moment. Raises `CurveError`, which
-        says how to
-        fix the text; then nothing is added. Whether a field exists is only known after a message of its
-        topic.
+        says how to fix the text; then nothing is added. Whether a field exists is only known after a message
+        of its topic.
         """
         source = parse(text, [*self._known_topics(), *also])
         sources: Sequence[Source] = [source]

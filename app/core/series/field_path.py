@@ -1,10 +1,8 @@
 """Field paths to values in messages: ``pose.x[2]``, ``joints[*].position``.
 
 A path is parsed once. A key that is not a plain word is a JSON string in brackets, as in ``people["first
-name"]``;
-``[*]`` stands for every element of an array. In a message that is neither object nor array, the value is
-called
-``value``.
+name"]``; ``[*]`` stands for every element of an array. In a message that is neither object nor array, the
+value is called ``value``.
 """
 
 from __future__ import annotations

@@ -1,10 +1,8 @@
 """Samples of one series over time, bounded, with gaps and a multi-resolution pyramid.
 
 All values are finite; if a value is missing, the next sample is marked as following a gap. Minimum, maximum
-and sum
-are stored for every 16, 128 and 1024 samples, so that drawing a million samples costs no more than some
-thousands.
-Samples are appended; late ones are inserted in order.
+and sum are stored for every 16, 128 and 1024 samples, so that drawing a million samples costs no more than
+some thousands. Samples are appended; late ones are inserted in order.
 """
 
 from __future__ import annotations
@@ -356,8 +354,7 @@ class Samples:
         """Return the polyline for a range on ``columns`` pixels.
 
         Contains all samples, or the minimum and maximum in each pixel, and one sample on each side of the
-        range, so that the
-        line reaches the edges.
+        range, so that the line reaches the edges.
         """
         first, end = self.places(begin_s, end_s)
         points = end - first

@@ -63,11 +63,9 @@ def write_atomically(
     Args:
         path: File; its folder is created if necessary.
         data: Bytes, or an iterable of parts, so that a large file need not fit into memory. An exception of
-            the
-            iterable cancels the write.
+            the iterable cancels the write.
         durable: True to flush the data to disk before the old file is replaced, so that one of both survives
-            a power
-            failure. Otherwise the file survives only a crash of this process.
+            a power failure. Otherwise the file survives only a crash of this process.
         private: True to make the file, and a folder that is created, accessible only to their owner.
     """
     if isinstance(data, bytes) and not data:

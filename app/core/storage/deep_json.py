@@ -1,10 +1,8 @@
 """JSON with deep nesting, as for a long stack of blocks, where Blockly nests each block in the previous one.
 
 Python's json supports about 1000 levels, which is a stack of 480 blocks. Values with deeper nesting are
-processed in
-a thread with a larger stack, up to `LEVELS` (less in early releases of Python 3.12). Beyond that,
-RecursionError is
-raised as usual.
+processed in a thread with a larger stack, up to `LEVELS` (less in early releases of Python 3.12). Beyond
+that, RecursionError is raised as usual.
 """
 
 from __future__ import annotations
@@ -50,7 +48,7 @@ def same(one: object, other: object) -> bool:
 
 
 def start_deep(thread: threading.Thread) -> None:
-    """Start a thread with a stack for deep values."""
+    """Start a thread whose stack is large enough for values with deep nesting."""
     with _one_at_a_time:
         size = threading.stack_size(STACK_BYTES)
         try:
@@ -60,9 +58,9 @@ def start_deep(thread: threading.Thread) -> None:
 
 
 def deeply(work: Callable[[], T]) -> T:
-    """Return the result of ``work``, with a larger stack if necessary.
+    """Return the result of ``work``, called in a thread with a larger stack if necessary.
 
-    It may run twice, so it must be pure.
+    ``work`` may be called twice, so it must not have side effects.
     """
     try:
         return work()

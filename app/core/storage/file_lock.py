@@ -45,7 +45,7 @@ else:
 
 
 HELD = frozenset({errno.EACCES, errno.EAGAIN, errno.EWOULDBLOCK, errno.EDEADLK})
-"""Error numbers of a held lock; all others mean that the file system has no locks."""
+"""Error numbers that mean that another process holds the lock; others mean that locks aren't supported."""
 
 
 def _acquire(file: IO[bytes], until: float) -> bool:
@@ -70,7 +70,7 @@ def _open_lock_file(path: Path) -> IO[bytes]:
 
 
 class FileLock:
-    """Lock held until it is released, or this process ends."""
+    """Lock that is held until it is released or this process ends."""
 
     def __init__(self, path: Path) -> None:
         # The lock file is `<name>.lock` beside `path`.
@@ -78,9 +78,9 @@ class FileLock:
         self._file: IO[bytes] | None = None
 
     def acquire(self) -> bool:
-        """Try to acquire the lock; return False when another process has it.
+        """Try to acquire the lock; return False if another process holds it.
 
-        True also without lock support.
+        Returns True on file systems without locks.
         """
         if self._file is not None:
             return True
@@ -107,10 +107,10 @@ class FileLock:
 
 @contextmanager
 def locked(path: Path, within_s: float = 1.0) -> Iterator[bool]:
-    """Hold the lock of ``path`` (the file ``<name>.lock``); yield whether it was acquired in time.
+    """Hold the lock of ``path`` (the file ``<name>.lock``); yield True if it was acquired in time.
 
-    Without lock support (a network disk, a read-only folder) the body runs at once without the lock. The lock
-    of a process that dies is released at once.
+    On file systems without locks (a network disk, a read-only folder), the body runs immediately without a
+    lock. The lock of a process that crashes is released immediately.
     """
     until = time.monotonic() + within_s
     try:

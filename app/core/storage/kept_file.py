@@ -1,4 +1,4 @@
-"""Files with data of the user: damaged ones are renamed, never lost."""
+"""Files with data of the user. A damaged file is renamed, so that its content isn't lost."""
 
 from __future__ import annotations
 
@@ -20,9 +20,10 @@ T = TypeVar("T")
 class KeptFile(Generic[T]):
     """Result of reading such a file.
 
-    ``value`` is None when the file is missing or unreadable. ``problem`` is a sentence about a file that was
-    not, or only partly, readable; otherwise "". With ``is_newer`` it was written by a newer Studio and must
-    not be overwritten.
+    Attributes:
+        value: Content; None if the file is missing or can't be read.
+        problem: Message about a file that could not be read, or only partly; otherwise "".
+        is_newer: True if the file was written by a newer Studio and must not be overwritten.
     """
 
     value: T | None = None
@@ -33,10 +34,11 @@ class KeptFile(Generic[T]):
 def read_kept(
     path: Path, parse: Callable[[bytes], tuple[T, str]], newer: type[NepError], most_bytes: int
 ) -> KeptFile[T]:
-    """Read a file of limited size; the readable part of a damaged one is used.
+    """Read a file of limited size; from a damaged file, the readable part is used.
 
     ``parse`` returns the value, and a problem or "". It raises `NepError` for an unreadable file, and
-    ``newer`` for that of a newer Studio. A damaged file is kept: "alarms.json" as "alarms.damaged.json".
+    ``newer`` for a file written by a newer Studio. A damaged file is renamed, such as from "alarms.json" to
+    "alarms.damaged.json".
     """
     try:
         data = read_whole(path, most_bytes)

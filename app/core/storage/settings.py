@@ -20,11 +20,13 @@ from nep.system.replace_file import replace_file
 
 FORMAT = 1
 """Format version; increased when older versions can't read newer settings. New keys need no new version.
-States of layouts (`app.ui.shell.docking.workbench.STATE_VERSION`) are included."""
+
+The states of layouts (`app.ui.shell.docking.workbench.STATE_VERSION`) are part of the format.
+"""
 _OWN_NAME = f"settings.format-{FORMAT}.json"
 RECENT_LIMIT = 12
 _LATEST_S = 1e12
-"""Latest valid time: a damaged file may have one that the calendar doesn't support."""
+"""Latest valid time. A damaged file may contain a time that the calendar doesn't support."""
 T = TypeVar("T")
 
 
@@ -55,12 +57,12 @@ def state_home() -> Path:
 
 
 def kept_folder() -> Path:
-    """Return the folder of behaviours that were closed without a file."""
+    """Return the folder of behaviours whose tabs were closed without saving them to a file."""
     return home() / "kept"
 
 
 def kept_language(folder: Path | None = None) -> str:
-    """Return the chosen language or "", before translations are loaded. Creates and moves no file."""
+    """Read the chosen language, or "", before translations are loaded. Creates and moves no file."""
     place = folder if folder is not None else home()
     values = _values_in(place / "settings.json")
     if _format_of(values) > FORMAT:
@@ -80,7 +82,7 @@ def _values_in(path: Path) -> dict[str, object]:
 
 @dataclass(frozen=True, slots=True)
 class RecentFile:
-    """Recently opened or saved file, and the time (epoch seconds)."""
+    """Recently opened or saved file; ``there`` is False if the file is missing."""
 
     path: Path
     name: str
@@ -89,7 +91,7 @@ class RecentFile:
 
 
 class ListSettings(Protocol):
-    """Part of the settings for storing lists."""
+    """Part of the interface of `Settings` for storing lists."""
 
     def get(self, key: str, default: list[T]) -> list[T]:
         """Return a stored list."""
@@ -99,10 +101,10 @@ class ListSettings(Protocol):
 
 
 class Settings:
-    """Settings by name. A damaged file is renamed (``settings.damaged.json``), never lost.
+    """Settings by name. A damaged file is renamed to ``settings.damaged.json``.
 
-    The file of a newer Studio with an unknown format is unchanged: its readable values are used, and changes
-    are stored beside it, in ``settings.format-1.json``.
+    A file written by a newer Studio in an unknown format is not changed: its readable values are used, and
+    changes are stored next to it in ``settings.format-1.json``.
     """
 
     def __init__(self, folder: Path | None = None, clock: Callable[[], float] = time.time) -> None:
@@ -110,18 +112,18 @@ class Settings:
         self.path = (folder if folder is not None else home()) / "settings.json"
         self.damaged: Path | None = None
         self.notice = ""
-        """Sentence for the user about the file that was found, once; or ""."""
+        """Message for the user about the file that was found, or ""."""
         self.are_new = False
-        """True if there were no settings: the first start of Studio."""
+        """True if no settings existed, which means that Studio was started for the first time."""
         self.not_kept: str | None = None
-        """Sentence why the last write failed; None when it succeeded."""
+        """Reason why the last write failed; None if it succeeded."""
         self._unwritten: dict[str, object] = {}
         self._clock = clock
         make_private(self.path.parent, "settings*.json")
         self._values: dict[str, object] = self._read()
 
     def get(self, key: str, default: T) -> T:
-        """Return the value of ``key``; ``default`` when it is missing or of another type."""
+        """Return the value of ``key``; ``default`` if the value is missing or has another type."""
         value = self._values.get(key, default)
         if default is None or isinstance(value, type(default)):
             return value  # type: ignore[return-value]  # checked on the line above
@@ -130,9 +132,9 @@ class Settings:
     def set(self, key: str, value: object) -> None:
         """Set a value (any JSON) and write the file. Raises SettingsError.
 
-        Raises TypeError or ValueError if it can't be JSON; then nothing changes. Values that another instance
-        has written meanwhile stay, except this key. A value that could not be written is kept in memory, and
-        written with the next one.
+        Raises TypeError or ValueError if the value can't be converted to JSON; then nothing changes. Values
+        of other keys that another instance has written meanwhile are preserved. A value that could not be
+        written stays in memory and is written together with the next one.
         """
         if key in self._values and self._values[key] == value and self.not_kept is None:
             return
@@ -153,7 +155,7 @@ class Settings:
 
     @property
     def recent_known(self) -> list[RecentFile]:
-        """Recent files, newest first, with missing ones marked."""
+        """Recent files, newest first, including missing ones."""
         found = []
         entries: list[object] = self.get("recent", [])
         for entry in entries:
@@ -167,14 +169,14 @@ class Settings:
         return found
 
     def add_recent(self, path: Path, name: str | None = None) -> None:
-        """Put ``path`` first among the recent files. Raises SettingsError."""
+        """Move or add ``path`` to the top of the recent files. Raises SettingsError."""
         path = path.resolve()
         self._values = self._merged_values()
         kept = [file for file in self.recent_known if file.path != path]
         self.set_recent([RecentFile(path, name or path.stem, self._clock()), *kept])
 
     def rename_recent(self, old: Path, new: Path) -> None:
-        """Rename a recent file in place. Raises SettingsError."""
+        """Rename a recent file without changing its position. Raises SettingsError."""
         old, new = old.resolve(), new.resolve()
         self._values = self._merged_values()
         kept = [file for file in self.recent_known if file.path != new]
@@ -182,7 +184,7 @@ class Settings:
         self.set_recent(named)
 
     def set_recent(self, files: Sequence[RecentFile]) -> None:
-        """Set the recent files, newest first. Raises SettingsError."""
+        """Replace the recent files, newest first. Raises SettingsError."""
         recent = [
             {"path": str(file.path), "name": file.name, "opened_s": file.opened_s}
             for file in files[:RECENT_LIMIT]

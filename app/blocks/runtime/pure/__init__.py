@@ -1,4 +1,4 @@
-"""Pure functions that programs call, one module per category.
+"""Pure functions that programs call, one module for each category.
 
-The ``__all__`` of each module are names available to programs.
+The names in ``__all__`` of each module are available to programs.
 """

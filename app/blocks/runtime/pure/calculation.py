@@ -37,7 +37,7 @@ def absolute(value: object) -> int | float:
 
 
 def sign(value: object) -> int:
-    """Return 1, 0 or -1."""
+    """Return the sign of a number: 1, 0 or -1."""
     found = number(value, lazy("“sign”"))
     return (found > 0) - (found < 0)
 
@@ -86,17 +86,17 @@ def logarithm(value: object) -> int | float:
 
 
 def e_to_the(power: object) -> float:
-    """Return e to this power."""
+    """Return e to the power of a number."""
     return math.exp(number(power, lazy("“e to the power”")))
 
 
 def ten_to_the(power: object) -> int | float:
-    """Return 10 to this power."""
+    """Return 10 to the power of a number."""
     return _rounded_result(math.pow(10, number(power, lazy("“10 to the power”"))), places=None)
 
 
 def rounded_to(value: object, places: object) -> int | float:
-    """Round to this number of decimal places, halves up; negative places round to tens and more."""
+    """Round to a number of decimal places, halves up; negative places round to tens, hundreds and so on."""
     found = number(value, lazy("“round”"))
     wanted = number(places, lazy("“decimal places”"))
     digits = max(-_MAX_PLACES, min(_MAX_PLACES, round(wanted)))
@@ -118,7 +118,7 @@ def larger(one: object, other: object) -> int | float:
 
 
 def limited(value: object, low: object, high: object) -> int | float:
-    """Clamp the number to the limits, which may be swapped."""
+    """Limit a number to a range, whose ends may be swapped."""
     found, first, last = (number(each, lazy("“limit”")) for each in (value, low, high))
     return max(min(first, last), min(max(first, last), found))
 
@@ -135,39 +135,39 @@ def mapped(value: object, low: object, high: object, new_low: object, new_high: 
 
 
 def is_even(value: object) -> bool:
-    """Return whether it is an even whole number."""
+    """Return True for an even whole number."""
     return is_whole(value) and int(number(value, lazy("“even”"))) % 2 == 0
 
 
 def is_odd(value: object) -> bool:
-    """Return whether it is an odd whole number."""
+    """Return True for an odd whole number."""
     return is_whole(value) and int(number(value, lazy("“odd”"))) % 2 == 1
 
 
 def is_whole(value: object) -> bool:
-    """Return whether it has no fraction."""
+    """Return True for a number without a fractional part."""
     found = number(value, lazy("“is”"))
     return isinstance(found, int) or found.is_integer()
 
 
 def is_positive(value: object) -> bool:
-    """Return whether it is above 0."""
+    """Return True for a number greater than 0."""
     return number(value, lazy("“positive”")) > 0
 
 
 def is_negative(value: object) -> bool:
-    """Return whether it is below 0."""
+    """Return True for a number less than 0."""
     return number(value, lazy("“negative”")) < 0
 
 
 def is_divisible(value: object, by: object) -> bool:
-    """Return whether the remainder is 0, in decimal arithmetic: 0.3 is divisible by 0.1."""
+    """Return True if the remainder is 0, in decimal arithmetic: 0.3 is divisible by 0.1."""
     found, divisor = (number(each, lazy("“is divisible by”")) for each in (value, by))
     return Fraction(str(found)) % Fraction(str(divisor)) == 0
 
 
 def counting(first: object, last: object, step: object) -> Iterator[int | float]:
-    """Return the numbers from first to last, up or down; the sign of the step is ignored."""
+    """Yield the numbers from first to last, up or down; the sign of the step is ignored."""
     what = lazy("“count”")
     begin, end, wide = (number(each, what) for each in (first, last, step))
     if wide == 0:

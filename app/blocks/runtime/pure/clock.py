@@ -38,7 +38,7 @@ def part_of_moment(moment: datetime, part: str) -> object:
 
 
 def seconds_since(moment: object) -> float:
-    """Return the seconds since a time of today, a date, or both; negative for the future."""
+    """Return the seconds since a time of today, a date, or both; negative if it is in the future."""
     return round((_now() - read_moment(text(moment), _now())).total_seconds(), 3)
 
 

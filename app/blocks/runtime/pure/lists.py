@@ -1,7 +1,7 @@
 """Functions of the category "Lists".
 
-Items are numbered from 1. A list holds at most `MAX_ITEMS` items, including those of nested lists; inserted
-lists are copied, so no list contains itself.
+Items are numbered from 1. A list holds at most `MAX_ITEMS` items, including those of nested lists. Inserted
+lists are copied, so that no list contains itself.
 """
 
 from __future__ import annotations
@@ -44,7 +44,7 @@ def set_item(of: object, where: object, value: object) -> None:
 
 
 def insert_item(of: object, where: object, value: object) -> None:
-    """Insert a value before the item at a position, or at the end (also for the next free number)."""
+    """Insert a value before the item at a position, or at the end (also for the number after the last)."""
     items = _mutable_list(of)
     if where == LAST or (where != FIRST and where == len(items) + 1):
         place = len(items)
@@ -68,7 +68,7 @@ def remove_item(of: object, where: object) -> object:
 
 
 def contains(where: object, value: object) -> bool:
-    """Return whether a list has an equal item, or a text contains this text."""
+    """Return True if a list has an equal item, or a text contains this text."""
     if isinstance(where, str):
         return text(value) in where
     return any(_same(each, value) for each in _as_list(where))
@@ -98,7 +98,7 @@ def join_items(of: object, between: object) -> str:
 
 
 def split_text(words: object, at: object) -> list[object]:
-    """Split a text at a separator; into single characters if it is empty."""
+    """Split a text at a separator; into single characters if the separator is empty."""
     whole, joint = text(words), text(at)
     pieces = whole.split(joint) if joint else letters(whole)
     if len(pieces) > MAX_ITEMS:
@@ -107,13 +107,13 @@ def split_text(words: object, at: object) -> list[object]:
 
 
 def part_of_list(of: object, first: object, last: object) -> list[object]:
-    """Return the items from one number to another, both included; positions beyond the ends are ignored."""
+    """Return the items from one number to another, inclusive; numbers outside of the list are ignored."""
     begin, end = (math.floor(number(each, lazy("“items”"))) for each in (first, last))
     return _copied_list(_as_list(of)[max(begin, 1) - 1 : max(end, 0)])
 
 
 def is_empty_list(of: object) -> bool:
-    """Return whether the list is empty."""
+    """Return True if the list is empty."""
     return not _as_list(of)
 
 

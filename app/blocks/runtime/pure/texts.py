@@ -1,6 +1,7 @@
 """Functions of the category "Text and answers".
 
-Characters are counted from 1 as people see them (`values.letters`). All values are converted to text first.
+Characters are counted from 1 as the user sees them (`values.letters`). All values are converted to text
+first.
 """
 
 from __future__ import annotations
@@ -50,43 +51,43 @@ def letter(of: object, where: object) -> str:
 
 
 def part_of_text(of: object, first: object, last: object) -> str:
-    """Return the characters from one number to another, both included.
+    """Return the characters from one number to another, inclusive.
 
-    Positions beyond the ends are ignored.
+    Numbers outside of the text are ignored.
     """
     begin, end = (math.floor(number(each, lazy("“letters”"))) for each in (first, last))
     return "".join(letters(text(of))[max(begin, 1) - 1 : max(end, 0)])
 
 
 def position_in_text(of: object, piece: object) -> int:
-    """Return the position of a substring, or 0."""
+    """Return the position of the first occurrence of a text, or 0."""
     whole, wanted = text(of), text(piece)
     found = whole.find(wanted) if wanted else -1
     return 0 if found < 0 else len(letters(whole[:found])) + 1
 
 
 def has_in_it(of: object, piece: object) -> bool:
-    """Return whether the text contains this text."""
+    """Return True if a text contains another text."""
     return text(piece) in text(of)
 
 
 def starts_with(of: object, piece: object) -> bool:
-    """Return whether the text starts with this text."""
+    """Return True if a text starts with another text."""
     return text(of).startswith(text(piece))
 
 
 def ends_with(of: object, piece: object) -> bool:
-    """Return whether the text ends with this text."""
+    """Return True if a text ends with another text."""
     return text(of).endswith(text(piece))
 
 
 def same_words(one: object, other: object) -> bool:
-    """Return whether both texts are equal, ignoring case and surrounding spaces."""
+    """Return True if both texts are equal, ignoring case and surrounding white space."""
     return _folded(one) == _folded(other)
 
 
 def is_empty(value: object) -> bool:
-    """Return whether the text is empty or only spaces."""
+    """Return True if the text is empty or consists of white space only."""
     return not text(value).strip()
 
 
@@ -123,7 +124,7 @@ def replaced(of: object, old: object, new: object) -> str:
 
 
 def has_number(value: object) -> bool:
-    """Return whether the text contains a number."""
+    """Return True if the text contains a number."""
     return _written(value) is not None
 
 

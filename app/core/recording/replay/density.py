@@ -104,8 +104,7 @@ def losses_of(recording: Recording) -> dict[str, tuple[LossMark, ...]]:
     """Return the times at which the recorder's loss count of each topic increased.
 
     Messages that arrived late were counted as lost before. They are subtracted from the newest earlier marks,
-    so that
-    the sum of all marks is the final number of lost messages.
+    so that the sum of all marks is the final number of lost messages.
     """
     found: dict[str, list[LossMark]] = {}
     before: dict[str, int] = {}

@@ -45,8 +45,7 @@ class Replay:
 
     Attributes:
         topics: As ``nodes``, ``networks``, ``images``, ``series``, ``console`` and ``graph``, the counterpart
-            of the
-            live network's attribute in a session. A recording has no nodes and no other networks.
+            of the live network's attribute in a session. A recording has no nodes and no other networks.
         chosen: Topic whose messages `step` steps through.
     """
 

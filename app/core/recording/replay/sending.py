@@ -1,8 +1,7 @@
 """Publishing of recorded topics on the live network, if the user has chosen and armed them.
 
 Bytes and types are as recorded; the name of the topic may differ. Late messages are dropped and counted,
-never sent
-in a burst; messages skipped by a seek are not sent.
+never sent in a burst; messages skipped by a seek are not sent.
 """
 
 from __future__ import annotations

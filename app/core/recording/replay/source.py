@@ -1,8 +1,7 @@
 """Replay thread, which reads a recording and delivers the messages of watched topics at their times.
 
 The window queues commands and collects results; neither blocks on the disk. This module uses no node:
-messages
-are delivered to the panels only.
+messages are delivered to the panels only.
 """
 
 from __future__ import annotations
@@ -154,8 +153,7 @@ class ReplaySource:
         """Queue a change of the playback.
 
         A pending change of the same kind at the end of the queue is replaced, so that dragging the playhead
-        seeks only to
-        the newest position.
+        seeks only to the newest position.
         """
         with self._changed:
             if self._changes and self._changes[-1][0] == kind:

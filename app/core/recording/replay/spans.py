@@ -1,9 +1,8 @@
 """Spans in a recording: runs of behaviours, and alarms. Read-only.
 
 The spans are stored in the recorder's channels, where Studio writes them (`app.core.recording.events`;
-repeatedly in
-the flight recorder), and in the changes of the graph's alerts. Files of other programs and damaged files may
-contain anything there.
+repeatedly in the flight recorder), and in the changes of the graph's alerts. Files of other programs and
+damaged files may contain anything there.
 """
 
 from __future__ import annotations

@@ -13,8 +13,7 @@ class BridgedCommands:
     """Reports robots that received commands from bridges. Not thread-safe: use it from the window's thread.
 
     A bridge announces itself on `BRIDGES_TOPIC`. The master counts its messages on the command topic of a
-    robot, so that
-    it isn't necessary to subscribe to that topic.
+    robot, so that it isn't necessary to subscribe to that topic.
     """
 
     def __init__(self, on_moved: OnMoved) -> None:

@@ -2,8 +2,7 @@
 
 The window's thread asks the user (`MotionGate.permits`). Any thread checks immediately before each message
 (`MotionGate.refusal`), so that a robot that connects in the meantime is not moved. `nep.programs.robots`
-decides
-which topics move robots.
+decides which topics move robots.
 """
 
 from __future__ import annotations
@@ -90,8 +89,7 @@ class MotionGate:
     """Decides which messages may be published on topics that move robots.
 
     Use it from the window's thread. Only `refusal` and `refusal_now` are thread-safe; they use the state at
-    the time of
-    the last `follow`.
+    the time of the last `follow`.
     """
 
     def __init__(self, permission: MotionPermission, robots: GatedRobots) -> None:
@@ -114,8 +112,7 @@ class MotionGate:
         """Return True if a message may be published now.
 
         If not, the user is asked, and ``go_on`` is called if the answer is yes. ``reason`` tells the user
-        which part of
-        Studio wants to publish.
+        which part of Studio wants to publish.
         """
         known = {robot.name: robot for robot in self._robots.movable}
         names = self.moved_by(topic, msg_type)

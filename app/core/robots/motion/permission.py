@@ -1,11 +1,9 @@
 """Motion permission: the user is asked once for each real robot before it first moves.
 
 Virtual robots need no permission if Studio knows their programs (`app.core.robots.launcher`). All ways to
-make a
-robot act are checked here: forms, palette, keys and programs, including programs that publish on a robot's
-topics.
-Stop is not. A permission is valid for the robot's current program; *always* for its name, model, program and
-computer.
+make a robot act are checked here: forms, palette, keys and programs, including programs that publish on a
+robot's topics. Stop is not. A permission is valid for the robot's current program; *always* for its name,
+model, program and computer.
 """
 
 from __future__ import annotations

@@ -1,11 +1,9 @@
 """Robots that received a command and have not been proven to stand still since.
 
 `MovedRobots` decides which robots a Stop must report. A robot is recorded before any message that moves it is
-sent. It is
-removed when its own program confirms a Stop, when its own final reply ends the motion, or when the user
-confirms that
-it has stopped. Being suspended, crashing, leaving the graph and returning as another program do not remove it
-(docs/adr/0030-moved-robots.md).
+sent. It is removed when its own program confirms a Stop, when its own final reply ends the motion, or when
+the user confirms that it has stopped. Being suspended, crashing, leaving the graph and returning as another
+program do not remove it (docs/adr/0030-moved-robots.md).
 """
 
 from __future__ import annotations
@@ -176,8 +174,7 @@ class MovedRobots:
         """Record commands that newly listed programs may have received.
 
         A program can receive a command before the graph lists it. Call this once for each graph. A graph is
-        older than the
-        call, so commands since the last but one graph count.
+        older than the call, so commands since the last but one graph count.
 
         Args:
             newcomers: New programs of each robot in `sent_to`.

@@ -1,8 +1,7 @@
 """Targets of a Stop: robots that are connected, may move, were connected, or are not listed. No sockets.
 
 Unlisted are robots beyond the limit of the list and robots with an invalid description. They are reached on
-the
-command topics that the graph lists.
+the command topics that the graph lists.
 """
 
 from __future__ import annotations

@@ -20,8 +20,7 @@ class RobotStop:
     Attributes:
         answered: True if the robot's own program confirmed that the robot has stopped.
         can_confirm: False for robots that never reply to a Stop (RIZE), and for programs that only subscribe
-            to a
-            robot's commands.
+            to a robot's commands.
         error: Why the robot has not stopped (with `refused`) or why the Stop could not be sent.
         refused: True if the robot's program reported that the robot has not stopped.
         program: Name of another program that serves the robot's commands.

@@ -24,12 +24,10 @@ class StopRequest:
 
     Attributes:
         serving: Reply of each program that serves the robot, by node; None while pending. Empty until the
-            programs are
-            known.
+            programs are known.
         unknown: Replies of publishers that the graph does not list yet.
         foreign: Replies of programs that do not serve the robot. As those in `unknown`, they are decoded only
-            once
-            their sender is known.
+            once their sender is known.
         delivered: Topics on which the command was sent while the robot was connected.
         delivered_s: Time of the first of these.
     """
@@ -92,8 +90,7 @@ class StopRequest:
         """Apply a message of a program that must reply; return True if it changed the result.
 
         A refusal may be followed by a confirmation; any other reply is final. ``words`` formats the robot's
-        error as a
-        sentence.
+        error as a sentence.
         """
         reply = answer_in(message)
         state = None if reply is None else reply.get("state")

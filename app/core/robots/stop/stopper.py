@@ -1,8 +1,7 @@
 """Proven Stop: each robot receives the command, and its own program confirms it or the robot is reported.
 
 Publishers are opened in advance, because connecting at the moment of a Stop may take too long. A connection
-that
-failed is retried, and its robot is reported until then.
+that failed is retried, and its robot is reported until then.
 """
 
 from __future__ import annotations
@@ -182,8 +181,7 @@ class RobotStopper:
         """Send a Stop without waiting for replies.
 
         ``ends`` is the key of a program (`app.robots.identity`) whose further commands robots reject. Robots
-        that don't
-        support that (RIZE) need another Stop after the program has ended.
+        that don't support that (RIZE) need another Stop after the program has ended.
         """
         for line in self._chosen(names):
             self._send(line, _id(), ends)
@@ -205,8 +203,7 @@ class RobotStopper:
             on_answer: Called in this thread with each reply, and at the end for each robot without one.
             ends: As in `send_stop`.
             on_late: Called in the node's thread or in that of `see` when a robot replies after the timeout,
-                or confirms
-                only then that it has stopped.
+                or confirms only then that it has stopped.
             is_for_all: True to send the Stop also to robots whose reply is not awaited.
 
         Returns:

@@ -1,8 +1,7 @@
 """Message text that the user edits: JSON with placeholders, checked while typing.
 
 A placeholder is a name in braces in place of a value, outside of strings: ``{"yaw": {yaw}}``. Two are filled
-in
-automatically for each message: ``{new id}`` is a unique string, ``{now}`` the time in seconds since 1970.
+in automatically for each message: ``{new id}`` is a unique string, ``{now}`` the time in seconds since 1970.
 """
 
 from __future__ import annotations

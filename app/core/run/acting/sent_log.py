@@ -82,8 +82,7 @@ class SentLog:
         """Add and number an entry; ``sent`` is the number of messages or calls that were sent.
 
         If the entry repeats the newest one, only its count increases. Large texts and the means to repeat
-        them are not
-        stored.
+        them are not stored.
         """
         self.revision += 1
         if sent > 0:
