@@ -136,7 +136,7 @@ class MasterRouter:
             tracker = cast("zmq.MessageTracker", self._send(body, _DONTWAIT, False, True))
             self._unread[to] = [*unread, (tracker, len(body))]
         except zmq.Again:
-            pass  # a slow reader: its next renewal reports what it missed
+            pass  # a slow reader: the reply to its next renewal contains what was dropped
         except zmq.ZMQError as error:
             return error.errno != zmq.EHOSTUNREACH
         return True

@@ -32,7 +32,7 @@ _HELLO_QUEUE = 8
 
 
 class PollableSub:
-    """SUB socket with a descriptor for polling. `recv` returns None instead of raising if it is empty."""
+    """SUB socket with a descriptor for polling. `recv` returns None if no message is available."""
 
     def __init__(self, codec: str) -> None:
         nng = library()

@@ -141,7 +141,7 @@ class RosMaster:
         return found[0], found[1]
 
     def has_forgotten(self, name: str, timeout_s: float) -> bool:
-        """Return True if the master replies but doesn't know the node, because it was restarted."""
+        """Return True if the master replies but doesn't know the node, for example after a restart."""
         try:
             _call(self.uri, timeout_s, "lookupNode", _CALLER, name)
         except _RefusedError:

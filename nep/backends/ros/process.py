@@ -224,7 +224,7 @@ class RosProcess:
             message.body = body
             try:
                 publisher.publish(message)
-            except self.rospy.ROSException:  # shut down just now
+            except self.rospy.ROSException:  # already shut down
                 raise RosShutdownError from None
         return dropped
 

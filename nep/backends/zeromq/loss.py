@@ -76,7 +76,7 @@ class TrackedPublisher:
         self.reconnect_s = min(MAX_RECONNECT_S, 2 * self.reconnect_s) if is_retry else MIN_RECONNECT_S
         self.reconnect_at = time.monotonic() + self.reconnect_s
         self.is_connected = self.has_echoed = False
-        self.form = self.shared_form = 0  # so that the next message passes `HeardPublishers.arrived`
+        self.form = self.shared_form = 0  # the next message takes the careful path, which sets `is_connected`
         self.endpoint = ""
 
 

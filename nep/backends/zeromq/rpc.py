@@ -209,7 +209,7 @@ class RpcClient:
             self._flush_locked()
             events = self._events()
             if events & zmq.POLLOUT and not call.is_sent:
-                self._flush_locked()  # it connected just now, and this was the only signal
+                self._flush_locked()  # it has just connected, and this was the only signal
                 events = self._events()
         if events & zmq.POLLIN:
             self._after_use()
