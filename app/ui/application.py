@@ -227,8 +227,7 @@ def offer_first_steps(window: MainWindow, *, asked: bool) -> None:
     """Offer the first steps on the very first start.
 
     Skipped if ``asked`` names files to open, or unsaved work is offered. The first start is recorded
-    immediately,
-    so that it counts even after a crash.
+    immediately, so that it counts even after a crash.
     """
     if not window.session.settings.are_new:
         return

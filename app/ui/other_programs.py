@@ -20,8 +20,7 @@ def outside(environ: MutableMapping[str, str], *, is_frozen: bool) -> Iterator[N
     """Temporarily restore the environment that was in place before the frozen Studio changed it.
 
     The loader of a frozen Studio sets the library path to its bundled libraries. Another program that
-    inherits
-    this path would load those instead of its own and may fail to start.
+    inherits this path would load those instead of its own and may fail to start.
     """
     kept = {
         name: value

@@ -14,8 +14,7 @@ class HeldKeys:
     """Holds key presses between a command that focuses a field and the page's reply.
 
     Commands and keys reach the page by different channels, and keys are faster: letters typed immediately
-    after
-    *Find a block* would arrive while the page is still busy, and go to its canvas.
+    after *Find a block* would arrive while the page is still busy, and go to its canvas.
     """
 
     def __init__(self, keyboard: Callable[[], QObject | None]) -> None:

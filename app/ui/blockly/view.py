@@ -32,8 +32,7 @@ class BlocklyView(BlocklyHost):
     """Editor of behaviours, which shows one at a time, each in its own tab.
 
     All methods may be called at any time, also before the page is loaded. Before the first `show_tab` there
-    is
-    one behaviour, with the key "".
+    is one behaviour, with the key "".
     """
 
     changed = Signal(str, object)  # key of a tab and its newest program (WorkspaceJson), 150 ms after an edit
@@ -138,8 +137,7 @@ class BlocklyView(BlocklyHost):
         """Fetch pending edits of the shown tab, then call `done` with the newest program.
 
         `done` is called exactly once, even if the page is not loaded or dies. Other tabs have no pending
-        edits: they
-        were flushed when another tab was shown.
+        edits: they were flushed when another tab was shown.
         """
         if not self._up:
             done(self._tabs.shown.program)

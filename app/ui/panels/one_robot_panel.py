@@ -18,9 +18,8 @@ class OneRobotPanel(PanelWidget):
     """Panel of one robot: the one that the user chose, else the first.
 
     A robot that disconnects stays visible until another one is available. The base class calls
-    `fleet_changed`
-    when robots connect, disconnect or are chosen, `show_robot` when another robot has to be shown, and
-    `refresh_robot` on every refresh.
+    `fleet_changed` when robots connect, disconnect or are chosen, `show_robot` when another robot has to be
+    shown, and `refresh_robot` on every refresh.
     """
 
     def __init__(self, context: PanelContext, title: str) -> None:

@@ -1,4 +1,4 @@
-"""Image view of a stream: fitted or zoomed, rotated, with boxes and the value of the pixel under the mouse."""
+"""Image view of a stream: fitted or zoomed, rotated, with boxes and the value of the hovered pixel."""
 
 from __future__ import annotations
 

@@ -19,8 +19,7 @@ class ZoomablePicture(PictureView):
     """Image view in which wheel, pinch and double click zoom, and dragging and arrow keys move the image.
 
     Emits `place_changed` after user input, and `key_pressed` with the name of a key in ``keys`` such as
-    "Ctrl+C".
-    These keys take precedence over the window's shortcuts while the image has the focus.
+    "Ctrl+C". These keys take precedence over the window's shortcuts while the image has the focus.
     """
 
     place_changed = Signal()

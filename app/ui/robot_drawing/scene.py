@@ -94,8 +94,7 @@ class RobotDrawing:
         """Return the part at a point in px, or None.
 
         Examples are ``head``, ``left_hand``, ``body``, ``Turtle/body`` and the name of an object. Parts that
-        can be
-        touched precede things, and things precede others behind them.
+        can be touched precede things, and things precede others behind them.
         """
         stage = Stage(area, state.room)
         unit = stage.unit(point)

@@ -1,4 +1,7 @@
-"""Opens, saves, closes and recovers behaviours. All of it can be undone, so there are no questions."""
+"""Opens, saves, closes and recovers behaviours.
+
+All actions can be undone, therefore none asks for confirmation.
+"""
 
 from __future__ import annotations
 
@@ -27,7 +30,7 @@ RECORDING, LAYOUT = OTHERS = (".mcap", ".nep-layout")
 
 @runtime_checkable
 class SupportsFlush(Protocol):
-    """A panel that may hold an edit that isn't in the document yet."""
+    """Panel that may hold an edit that isn't in the document yet."""
 
     def flush(self, done: Callable[[], None]) -> None:
         """Call ``done`` once the newest edit is in the document."""
@@ -35,14 +38,14 @@ class SupportsFlush(Protocol):
 
 @runtime_checkable
 class SupportsShowCurrent(Protocol):
-    """A panel that shows the current behaviour."""
+    """Panel that shows the current behaviour."""
 
     def show_current(self) -> None:
         """Show the current behaviour immediately."""
 
 
 class Closed:
-    """A closed tab: text for the toast, and the previous version of its file if it was overwritten."""
+    """Closed tab: text for the toast, and the previous version of its file if that was overwritten."""
 
     def __init__(self, document: Document, words: str = "", earlier: Earlier | None = None) -> None:
         self.words, self.earlier = words, earlier
@@ -51,7 +54,7 @@ class Closed:
 
 
 class DocumentController:
-    """Files of the open behaviours.
+    """Implements the file operations on open behaviours.
 
     ``say`` shows a toast; ``shown`` is called when another behaviour is shown.
     """
@@ -65,14 +68,14 @@ class DocumentController:
         editor: Callable[[], object],
         clock: Callable[[], float] = time.time,
     ) -> None:
-        # editor returns the behaviour panel, or None before it exists.
+        # `editor` returns the behaviour panel, or None before it exists.
         self._session, self.asks, self._say, self._shown = session, asks, say, shown
         self._documents = session.documents
         self._editor, self._clock = editor, clock
         self.open_recording: Callable[[Path], object] = lambda _path: None
-        """Opens a recording that was dropped or passed at start."""
+        """Opens a recording that was dropped on the window or passed at startup."""
         self.open_layout: Callable[[Path], object] = lambda _path: None
-        """Opens a layout file that was dropped or passed at start."""
+        """Opens a layout file that was dropped on the window or passed at startup."""
 
     def new(self) -> None:
         """Create an empty behaviour in a new tab."""
@@ -85,7 +88,7 @@ class DocumentController:
         self.asks.open(str(path.parent if path is not None else Path.home()), self.open)
 
     def open(self, path: Path) -> None:
-        """Open a behaviour file in a tab; errors become alerts."""
+        """Open a behaviour file in a tab. Errors become alerts."""
 
         def opened() -> None:
             self._documents.open(path)
@@ -94,9 +97,9 @@ class DocumentController:
         self.with_newest(lambda: self._show(opened))
 
     def open_all(self, paths: Sequence[Path]) -> None:
-        """Open files from the command line, a drop, or a later start.
+        """Open files from the command line, a drop, or a later start of Studio.
 
-        Files of unknown types are listed in one alert; the others open.
+        Files of unknown types are listed in one alert; the others are opened.
         """
         self._session.alerts.resolve("strange")
         strange = [path for path in paths if path.suffix.lower() not in {SUFFIX, *OTHERS}]
@@ -114,7 +117,7 @@ class DocumentController:
         self.with_newest(lambda: self._show(lambda: self._documents.example(path)))
 
     def copy(self, path: Path, name: str) -> None:
-        """Open an earlier version as a new behaviour with this name, without writing a file."""
+        """Open an earlier version as a new behaviour with this name. No file is written."""
 
         def opened() -> None:
             self._documents.copy(path, name)
@@ -123,11 +126,11 @@ class DocumentController:
         self.with_newest(lambda: self._show(opened))
 
     def recover(self, left: Sequence[Unsaved]) -> None:
-        """Recover unsaved behaviours after a crash, each in its tab, and show the last used one."""
+        """Open behaviours that were not saved before a crash, each in its tab, and show the last used one."""
         self.with_newest(lambda: self._show(lambda: self._session.tabs.recover(left)))
 
     def close(self, *documents: Document) -> None:
-        """Close tabs: stop their programs and save unsaved work to its file or to Recent.
+        """Close tabs: stop their programs, and save unsaved work to its file or to Recent.
 
         Overwritten files can be restored.
         """
@@ -149,7 +152,7 @@ class DocumentController:
         self.with_newest(closed)
 
     def reopen(self) -> None:
-        """Reopen the tab closed last."""
+        """Reopen the tab that was closed last."""
 
         def reopened() -> None:
             if self._documents.reopen() is None:
@@ -165,11 +168,11 @@ class DocumentController:
             editor.show_current()
 
     def duplicate(self, document: Document) -> None:
-        """Open a new behaviour with the same blocks."""
+        """Open a copy of a behaviour as a new one."""
         self.with_newest(lambda: self._show(lambda: self._documents.duplicate(document)))
 
     def rename(self, document: Document, name: str) -> bool:
-        """Rename a behaviour and its file, with undo; return False on failure."""
+        """Rename a behaviour and its file, with undo. Return False on failure."""
         before, old = document.name, document.path
         if name.strip() == before:
             return True
@@ -194,14 +197,14 @@ class DocumentController:
         self._session.tabs.save()
 
     def save(self) -> None:
-        """Save, or ask where if the behaviour has no file yet."""
+        """Save the behaviour, or ask for a file if it has none."""
         if self._session.document.path is None:
             self.save_as()
         else:
             self.with_newest(lambda: self._save(None))
 
     def save_as(self) -> None:
-        """Ask where, then save."""
+        """Ask for a file, then save the behaviour to it."""
         document = self._session.document
         own = document.path
         folder = own.parent if own is not None and own.parent != kept_folder() else Path.home()
@@ -209,7 +212,7 @@ class DocumentController:
         self.asks.save(suggestion, lambda path: self.with_newest(lambda: self._save(path)))
 
     def fix(self, action: str) -> bool:
-        """Apply a problem's fix to the blocks; return False if the action isn't a fix."""
+        """Apply the fix of a problem to the blocks. Return False if the action isn't a fix."""
         document = self._session.document
         if deep_json.deeply(lambda: fix(document.workspace, action)) is None:
             return False
@@ -278,7 +281,7 @@ class DocumentController:
         self._shown()
 
     def _keep(self, document: Document) -> Closed | None:
-        # Returns None and shows an alert if saving fails.
+        # Returns None and raises an alert if saving fails.
         if not document.dirty:
             return Closed(document)
         name, path = document.name, document.path
@@ -298,7 +301,7 @@ class DocumentController:
         return Closed(document, words.format(name=name), earlier)
 
     def _tell_closed(self, closed: Sequence[Closed]) -> None:
-        # Shows a toast with undo for the work that was saved.
+        # Shows a toast that names the saved behaviours and offers undo.
         if not closed:
             return
         words = closed[0].words
@@ -312,7 +315,7 @@ class DocumentController:
             self._say(words)
 
     def _take_back(self, closed: Sequence[Closed]) -> None:
-        # Restores the files and reopens the tabs with unsaved work.
+        # Restores the files, and reopens the tabs with unsaved work.
         for each in closed:
             if each.earlier is None:
                 continue
@@ -341,23 +344,23 @@ class DocumentController:
 
 
 class AlertText(NamedTuple):
-    """Text of an alert: the problem and what to do."""
+    """Text of an alert: description of the problem, and what to do."""
 
     title: str
     detail: str
 
 
 def words_of(error: Exception) -> AlertText:
-    """Return the alert text for a file error."""
+    """Return the text of the alert for a file error."""
     if not isinstance(error, DocumentError):
         return AlertText(_sentence(str(error)), "")
-    named = error.path is not None and error.reason.startswith(error.path.name)  # not capitalised
+    named = error.path is not None and error.reason.startswith(error.path.name)  # the name is not capitalised
     title = f"{error.reason}." if named else _sentence(error.reason)
     return AlertText(title, _sentence(error.advice))
 
 
 def strange_words(paths: Sequence[Path]) -> AlertText:
-    """Return the alert text for files of unknown types."""
+    """Return the text of the alert for files of unknown types."""
     names = [path.name or str(path) for path in paths]
     words, others = _("{file} is not a behaviour"), len(names) - 1
     if others:
@@ -378,13 +381,16 @@ class FlushBeforeClose(QObject):
     """
 
     def __init__(self, parent: QObject, editor: Callable[[], object], close: Callable[[], object]) -> None:
-        # close is called once if ready() had to wait.
+        # `close` is called once if `ready` had to wait.
         super().__init__(parent)
         self._editor, self._close = editor, close
         self._asked = self._ready = self._waits = False
 
     def ready(self) -> bool:
-        """Return whether the window may close now; otherwise it is closed when it may."""
+        """Return True if the window may close now.
+
+        Otherwise it will be closed as soon as the edit has arrived.
+        """
         if not self._asked:
             self._asked, self._ready = True, False
             editor = self._editor()

@@ -1,4 +1,4 @@
-"""Focus ring, 2 px wide and 2 px outside the control, shown only for keyboard use.
+"""Focus ring, 2 px wide and 2 px outside the control, which is shown only for keyboard use.
 
 Style sheets can't draw an outline outside a widget, so an overlay follows the focused widget. QFocusFrame is
 unsuitable: it becomes a child of the surrounding scroll area and is deleted with it, and its margin is one
@@ -38,17 +38,17 @@ _LEADING = frozenset(
         _Key.Key_PageDown, _Key.Key_Left, _Key.Key_Right, _Key.Key_Up, _Key.Key_Down,
     }
 )  # fmt: skip
-"""Keys that move the focus. Typing or Ctrl+S doesn't imply keyboard navigation."""
+"""Keys that move the focus. Typing or Ctrl+S doesn't count as keyboard navigation."""
 
 
 class FocusRing(QWidget):
-    """One ring for a window and its floating panels; ``focusRadius`` sets the corners.
+    """Focus ring for a window and its floating panels. The property ``focusRadius`` sets its corners.
 
-    Keyboard use is detected by the last focus-moving key or mouse button: Qt's focus reason is also Tab when
-    a focused widget is hidden.
+    Keyboard use is detected by the last key that moves the focus, or mouse button: Qt's focus reason is also
+    Tab when a focused widget is hidden.
 
-    Widgets with the property ``ownFocus`` (and tables and trees) draw their own focus; ``focusInset`` is the
-    margin between a widget's edge and its painted shape.
+    Widgets with the property ``ownFocus`` (and tables and trees) draw their focus themselves; ``focusInset``
+    is the margin between a widget's edge and its painted shape.
     """
 
     def __init__(self, theme: Theme, window: QWidget) -> None:
@@ -71,7 +71,7 @@ class FocusRing(QWidget):
 
     @property
     def target(self) -> QWidget | None:
-        """Widget with the ring, or None."""
+        """Widget that has the ring, or None."""
         return self._target
 
     def _window_changed(self, window: QWindow | None) -> None:
@@ -96,14 +96,14 @@ class FocusRing(QWidget):
         if not ours or widget is window or widget.property("ownFocus"):
             return False
         parent = widget.parentWidget()
-        if parent is not None and parent.inherits("QWebEngineView"):  # the page draws its own focus
+        if parent is not None and parent.inherits("QWebEngineView"):  # the page draws its focus itself
             return False
         own = QAbstractItemView | QAbstractScrollArea | QMainWindow | QMenu | QMenuBar
         return not isinstance(widget, own)
 
     def _follow(self, target: QWidget | None) -> None:
         for widget in self._chain:
-            if isValid(widget):  # the focus also changes because a widget is being deleted
+            if isValid(widget):  # the focus also changes when a widget is deleted
                 widget.removeEventFilter(self)
         self._chain = []
         self._target = target
@@ -125,7 +125,7 @@ class FocusRing(QWidget):
                 self._follow(None)
             elif kind == QEvent.Type.KeyPress and _leads(cast("QKeyEvent", event)) and not keyboard_leads():
                 set_keyboard_leads(True)
-                QTimer.singleShot(0, self, self._ring_here)  # after the key may have moved the focus
+                QTimer.singleShot(0, self, self._ring_here)  # after the key had a chance to move the focus
         elif kind == QEvent.Type.Show and watched is self._home:
             self._window_changed(self._home.windowHandle())
         elif kind in _MOVES:

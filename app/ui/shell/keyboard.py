@@ -1,4 +1,4 @@
-"""Keyboard focus of panels: the focused panel and navigation between panels."""
+"""Keyboard focus of panels: tracking the focused panel, and navigation between panels."""
 
 from __future__ import annotations
 
@@ -13,10 +13,10 @@ from app.ui.widgets.keyboard import tab_stops
 
 
 class PanelFocus(QObject):
-    """Moves the focus between panels of the current workbench and marks the focused panel's title."""
+    """Moves the focus between panels of the current workbench, and highlights the focused panel's title."""
 
     def __init__(self, bench: Callable[[], Workbench | None], parent: QObject) -> None:
-        # bench returns the current workbench, or None.
+        # `bench` returns the current workbench, or None.
         super().__init__(parent)
         self._bench = bench
         application = QApplication.instance()
@@ -34,7 +34,7 @@ class PanelFocus(QObject):
         bench.focus_panel(docks[(place + step) % len(docks)])
 
     def number(self, number: int) -> None:
-        """Focus the n-th open panel, counted from 1."""
+        """Focus the open panel with this number, counted from 1."""
         bench = self._bench()
         names = bench.open_names() if bench is not None else ()
         if bench is not None and 0 < number <= len(names):
@@ -47,9 +47,9 @@ class PanelFocus(QObject):
             bench.focus_panel(dock)
 
     def skip_hidden(self, window: QWidget, *, forward: bool) -> bool:
-        """Move the focus by Tab past widgets that aren't really visible; return False if not needed.
+        """Move the focus by Tab past widgets that aren't really visible. Return False if there are none.
 
-        These are widgets behind another tab, and Qt's own tab bars, which titles replace.
+        Such widgets are behind another tab, or are Qt's tab bars, which titles replace.
         """
         focus = QApplication.focusWidget()
         if focus is None:
@@ -70,7 +70,7 @@ class PanelFocus(QObject):
         return any(dock.isAncestorOf(widget) and not dock.front for dock in docks)
 
     def dock(self) -> Dock | None:
-        """Return the panel that has the focus, or None."""
+        """Return the dock that has the focus, or None."""
         focus, bench = QApplication.focusWidget(), self._bench()
         if bench is None or focus is None:
             return None

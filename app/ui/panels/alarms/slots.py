@@ -95,8 +95,7 @@ class SlotField(QLineEdit):
 
     Args:
         take: Receives the text and returns False if it is invalid. The field then stays open, outlined in
-            red,
-            with the sentence `rejection`.
+            red, with the sentence `rejection`.
         row: Parent widget, because the field is taller than the `slot`.
     """
 

@@ -29,8 +29,7 @@ class BackpackKeeper:
     """Executes the page's requests about the backpack.
 
     A request is a JSON object with the operation in ``do``: put (with ``blocks``, ``count``, ``notes``),
-    remove
-    (with ``id``), empty or look. Every change can be undone from its toast.
+    remove (with ``id``), empty or look. Every change can be undone from its toast.
     """
 
     def __init__(self, context: PanelContext, backpack: Backpack, editor: Shows) -> None:

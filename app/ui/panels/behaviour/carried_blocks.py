@@ -84,8 +84,7 @@ class CarriedBlocks:
     """Highlights the tab under blocks that are dragged out of the page, and drops the blocks there.
 
     A tab opens after the mouse has hovered over it for a while, and the drag continues on its page. A drop on
-    "+"
-    creates a behaviour; a drop elsewhere returns the blocks. Near an end of the tab bar the tabs scroll.
+    "+" creates a behaviour; a drop elsewhere returns the blocks. Near an end of the tab bar the tabs scroll.
 
     Args:
         flush: Fetches pending edits, then calls back.

@@ -34,8 +34,7 @@ def live_words(fleet: RobotLookup, sensors: Iterable[tuple[str, str]]) -> tuple[
     """Return the texts for sensor blocks, and the keys of stale ones.
 
     Keys are ``<robot>/<sensor>`` or ``<robot>/<sensor>/<field>``. Values are stale while the robot is silent;
-    a
-    disconnected robot has none.
+    a disconnected robot has none.
     """
     words: dict[str, str] = {}
     old: set[str] = set()

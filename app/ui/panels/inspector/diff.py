@@ -67,10 +67,8 @@ def parts_of(
     """Return the first `count` children of a value, and the total number of children.
 
     A child consists of key, value, base value and mark. Removed children follow the present ones, with their
-    old
-    values. All children of an added value are added, all of a removed one removed (`mark` is the parent's).
-    With
-    `changes_only` the first `MAX_CHILDREN` are compared.
+    old values. All children of an added value are added, all of a removed one removed (`mark` is the
+    parent's). With `changes_only` the first `MAX_CHILDREN` are compared.
     """
     if mark in {"added", "removed"} or not is_container(base) or _kind(base) != _kind(value):
         whole: Mark = "removed" if mark == "removed" else "added"

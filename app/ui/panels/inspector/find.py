@@ -83,8 +83,7 @@ class FindBar(QWidget):
     """Find bar with the field, the number of matches and arrows. Emits `found` with the path of a match.
 
     Matches belong to one message. Call `forget` when the message changes; the next step then searches again
-    and
-    continues at the same position.
+    and continues at the same position.
 
     Args:
         source: Returns the message shown, and the index of a large message.

@@ -31,8 +31,7 @@ def message_facts(
     """Format the properties of a message, such as ``seq 18 204   412 B   latency 0.6 ms``.
 
     Unknown properties are omitted. The latency of messages from other computers is corrected by the clock
-    offset
-    and shown with its uncertainty (``3.2 ms ± 0.4 ms``).
+    offset and shown with its uncertainty (``3.2 ms ± 0.4 ms``).
 
     Args:
         message: Message with the properties measured on arrival.

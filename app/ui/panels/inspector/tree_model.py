@@ -167,8 +167,8 @@ class TreeModel(QAbstractItemModel):
         """Update the tree to the next message; `now` is the change time of changed values (monotonic, s).
 
         A message that is not a container becomes one row called ``value``. No value of the first message
-        counts as
-        changed. With a `base`, every node gets its difference, and `changes_only` omits equal nodes.
+        counts as changed. With a `base`, every node gets its difference, and `changes_only` omits equal
+        nodes.
         """
         first = not self._root.children
         shown = _as_container(value)

@@ -143,8 +143,7 @@ class PlotCanvas(pg.GraphicsView):  # type: ignore[misc]
     """Canvas of curves and cursors. Emits signals for mouse actions.
 
     `begin_s` and `end_s` are the visible range in the time base of all series; `anchor_s` is the origin of
-    the
-    axis.
+    the axis.
     """
 
     zoomed = Signal(float, float)  # factor, time at the mouse in s

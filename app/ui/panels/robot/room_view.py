@@ -52,8 +52,7 @@ class RoomView(QWidget):
     """Drawing of a room. Heads and hands react to presses; robots and things can be dragged over the floor.
 
     A click on a robot with a bumper presses it. Keys: Tab selects the next item, arrows move it, Space
-    presses a
-    bumper or touches a head while held, H, L and R touch head and hands, Delete removes a thing.
+    presses a bumper or touches a head while held, H, L and R touch head and hands, Delete removes a thing.
     """
 
     touched = Signal(str, str, bool)  # robot ("" for the main one), part, True if pressed

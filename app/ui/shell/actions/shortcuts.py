@@ -217,8 +217,7 @@ class Shortcuts(QObject):
         """Restore the default keys of a command and remove them from commands that have taken them.
 
         Each such command gets its own default key back unless that is taken, so that no command is left
-        without a
-        key after a swap.
+        without a key after a swap.
         """
         self._own.pop(name, None)
         for key in self.default(name):

@@ -88,7 +88,7 @@ class StatusFacts:
         return "circle-dashed", words.format(robot=name, count=count), "off"
 
     def saved(self) -> Fact:
-        """Return when the behaviour was saved, or that it has unsaved changes and whether they are backed up."""
+        """Return when the behaviour was saved, or that it has unsaved changes and if they are backed up."""
         document = self._session.document
         if document.dirty and document.journal_error is not None:
             return "circle-x", _("Not saved · no backup"), "error"

@@ -20,7 +20,7 @@ START = "start"  # value of `Shell.showing` for the start page
 
 
 class Shell(Protocol):
-    """The window as commands, menus and the palette use it."""
+    """Window as seen by commands, menus and the palette."""
 
     theme: Theme
     state: WindowState
@@ -30,7 +30,7 @@ class Shell(Protocol):
 
     @property
     def examples(self) -> Sequence[Example]:
-        """Examples of the start page."""
+        """Examples on the start page."""
 
     @property
     def menu_bar(self) -> QMenuBar:
@@ -38,7 +38,7 @@ class Shell(Protocol):
 
     @property
     def surface(self) -> QWidget:
-        """Parent of sheets and menus, in which shortcuts work."""
+        """Parent widget of sheets and menus, in which shortcuts work."""
 
     @property
     def showing(self) -> str:
@@ -53,39 +53,39 @@ class Shell(Protocol):
         """Function that shows a toast."""
 
     def complain(self, sentence: str) -> None:
-        """Log a problem in the Console that needs no action."""
+        """Log a problem that needs no action in the Console."""
 
     def editor(self) -> object:
-        """Return the panel of behaviours, or None before it was first shown."""
+        """Return the panel of behaviours, or None before it is first shown."""
 
     @property
     def left(self) -> str:
-        """Layout to return to from the start page, or ""."""
+        """Name of the layout to return to from the start page, or ""."""
 
     def show_start(self) -> None:
         """Show the start page."""
 
     def show_examples(self) -> None:
-        """Show all examples on the start page and focus the first."""
+        """Show all examples on the start page and focus the first one."""
 
     def show_recent(self) -> None:
         """Show the recent files on the start page."""
 
     def show_layout(self, name: str) -> Workbench:
-        """Show a layout in its last state."""
+        """Show a layout in its last state and return its workbench."""
 
     def open_panel(self, name: str) -> Dock | None:
         """Show a panel; return None if the name is unknown."""
 
     def open_topic(self, topic: str) -> None:
-        """Show a topic in the open panel that suits it best."""
+        """Show a topic in the open panel that fits its type best."""
 
     def close(self) -> bool:
-        """Close the window; return whether it was closed."""
+        """Close the window. Return False if it stays open."""
 
     @property
     def can_restart(self) -> bool:
-        """True if Studio can restart itself with all open documents."""
+        """True if Studio can restart and reopen all documents."""
 
     def restart(self) -> str:
-        """Close the window and restart Studio; return why that is impossible, or ""."""
+        """Close the window and restart Studio. Return the reason if that is impossible, or ""."""

@@ -1,6 +1,7 @@
-"""Table of all commands for menus, palette, shortcuts, tooltips and buttons.
+"""Table of all commands, for menus, palette, shortcuts, tooltips and buttons.
 
-Panels, alerts and problems run a command by its id: ``help.doctor``, or ``inspect:/faces`` with an argument.
+Panels, alerts and problems run a command by its id, such as ``help.doctor``, or with an argument, such as
+``inspect:/faces``.
 """
 
 from __future__ import annotations
@@ -57,7 +58,7 @@ class Handlers:
     acting: ActingCommands
 
 
-# Reasons for unavailable commands, shown in the palette.
+# Reasons why commands are unavailable, shown in the palette.
 
 
 def _no_run(do: Handlers) -> str:
@@ -157,7 +158,7 @@ def _go_to_panel(number: int) -> C:
 
 
 def _edit(what: Edit, text: str, key: str, icon: str, *, above: bool = False) -> C:
-    # A menu entry only: its key is handled by the focused widget.
+    # A menu entry only; the focused widget handles its key.
     return C(
         f"edit.{what}",
         text,
@@ -173,7 +174,7 @@ def _edit(what: Edit, text: str, key: str, icon: str, *, above: bool = False) ->
 
 
 def releases(page: str) -> tuple[C, ...]:
-    """Return the command for the page of releases; none if the project has no such page."""
+    """Return the command for the web page of releases; empty if the project has no such page."""
     if not page:
         return ()
     return (
@@ -361,7 +362,7 @@ COMMANDS: tuple[C, ...] = (
 def _about(
     id: str, parse: Callable[[str], A], run: Callable[[Handlers, A], object]
 ) -> ArgumentCommand[Handlers]:
-    # run returns False if the argument refers to nothing.
+    # `run` returns False if the argument refers to nothing.
     return ArgumentCommand(id, lambda do, text: run(do, parse(text)) is not False)
 
 
@@ -409,6 +410,6 @@ ARGUMENT_COMMANDS: tuple[ArgumentCommand[Handlers], ...] = (
     _about("robot.virtual", str, lambda do, missing: do.robots.start_for(missing)),
     *map(
         _fix_blocks, ("limit", "define", "add", "after", "begin", "receive")
-    ),  # buttons of problems (`app.blocks.fixes.fixes`)
+    ),  # for buttons of problems (`app.blocks.fixes.fixes`)
 )
-"""Commands run as ``id:argument``; tabs are identified by their document's key."""
+"""Commands that are run as ``id:argument``; a tab is identified by the key of its document."""

@@ -24,22 +24,25 @@ MAX_NAME_LENGTH = 60
 
 @runtime_checkable
 class SupportsVariables(Protocol):
-    """A panel in which variables can be edited."""
+    """Panel in which variables can be edited."""
 
     def edit_variable(self, edit: Mapping[str, object]) -> None:
-        """Create, rename, delete or watch a variable, as one undoable edit."""
+        """Create, rename, delete or watch a variable as one undoable edit."""
 
 
 class VariableCommands:
-    """Asks for names and confirms with toasts; the block editor makes the edits."""
+    """Implements the commands for variables.
+
+    Names are asked for and results are shown in toasts here; the block editor makes the edits.
+    """
 
     def __init__(self, shell: Shell, session: Session, files: DocumentController) -> None:
         self._shell, self._session, self._files = shell, session, files
         self._sheet: name_sheet.NameSheet | None = None
-        self._used_before: dict[str, str] = {}  # block found last, by variable
+        self._used_before: dict[str, str] = {}  # id of the block found last, by variable
 
     def new(self, *, is_list: bool) -> None:
-        """Ask for the name of a new variable or list, then create it."""
+        """Ask for a name, then create a variable or list."""
         question = _("New list") if is_list else _("New variable")
         verb = _("Create")
 
@@ -50,12 +53,12 @@ class VariableCommands:
         self._with_newest(asked)
 
     def _free_name(self, *, is_list: bool) -> str:
-        # Suggests a name that needs no typing: "count", else "count 2", "count 3".
+        # Suggests a name so that none has to be typed: "count", "count 2", "count 3".
         first = pgettext("variable", "list") if is_list else pgettext("variable", "count")
         return next(n for n in chain([first], (f"{first} {n}" for n in count(2))) if not self.refusal(n))
 
     def ask_other_name(self, id: str) -> None:
-        """Ask for a new name of a variable, or for one of an unnamed variable."""
+        """Ask for a new name of a variable, or for the first name of an unnamed variable."""
 
         def asked() -> None:
             workspace = self._workspace()
@@ -74,7 +77,7 @@ class VariableCommands:
         self._with_newest(asked)
 
     def delete(self, id: str) -> None:
-        """Delete a variable and the blocks that use it, with undo."""
+        """Delete a variable and the blocks that use it; the toast offers to undo it."""
 
         def delete() -> None:
             workspace = self._workspace()
@@ -94,7 +97,7 @@ class VariableCommands:
         self._with_newest(delete)
 
     def watch(self, id: str) -> None:
-        """Toggle the display of the variable's value next to the blocks."""
+        """Show or hide the variable's value next to the blocks."""
         self._edit({"do": "watch", "id": id})
 
     def find(self, id: str) -> None:
@@ -111,7 +114,7 @@ class VariableCommands:
         self._with_newest(show)
 
     def put(self, id: str) -> None:
-        """Ask for a new value while the program runs."""
+        """Ask for a new value of a variable while the program runs."""
         runs = self._session.runs
         name = self._workspace().variables.get(id)
         now = runs.values.get(id)
@@ -132,7 +135,7 @@ class VariableCommands:
         )
 
     def refusal(self, name: str, own: str = "") -> str:
-        """Return why a name is invalid, or ""; ``own`` is the id of the variable to be renamed."""
+        """Return the reason why a name is invalid, or "". ``own`` is the id of the variable to rename."""
         if not name:
             return _("A variable needs a name.")
         if len(name) > MAX_NAME_LENGTH:
@@ -161,7 +164,7 @@ class VariableCommands:
 
 
 def uses_of(workspace: Workspace, id: str) -> list[str]:
-    """Return the ids of blocks that set, change or read a variable, in page order."""
+    """Return the ids of the blocks that set, change or read a variable, in page order."""
     found: list[str] = []
     waiting: list[Placed] = [placed for script in reversed(workspace.scripts) for placed in reversed(script)]
     while waiting:
@@ -177,7 +180,7 @@ def _names(field: object, id: str) -> bool:
 
 
 def separators_refusal(words: str) -> str:
-    """Return why a number with several separators is invalid as a value; "" for other text."""
+    """Return the reason why a number with several separators is not a valid value; "" for other text."""
     try:
         parse_number(words)
     except TypedNumberError as error:
@@ -186,7 +189,7 @@ def separators_refusal(words: str) -> str:
 
 
 def value_of(words: str) -> str | float | bool:
-    """Parse a typed value: a number, yes or no (also "true" and "false"), otherwise text."""
+    """Parse a typed value: a number, yes or no (or "true" and "false"), else text."""
     plain = words.strip()
     said = plain.casefold()
     if said in ("true", _("yes").casefold()):

@@ -1,6 +1,6 @@
 """Commands for the window: palette, sheets, layouts, theme, text size, help.
 
-Sheets are created on first use so that they don't delay the start.
+Sheets are created on first use so that they don't delay the startup.
 """
 
 from __future__ import annotations
@@ -64,7 +64,7 @@ MAX_NAMED = 4
 
 @runtime_checkable
 class SupportsRobotChoice(Protocol):
-    """A panel that can show one of several robots."""
+    """Panel that can show one of several robots."""
 
     def choose(self, name: str) -> None:
         """Select the robot of this name."""
@@ -72,31 +72,31 @@ class SupportsRobotChoice(Protocol):
 
 @runtime_checkable
 class AnswersWhy(Protocol):
-    """The panel of the connection doctor."""
+    """Panel of the connection doctor."""
 
     def begin_for(self, asker: PanelWidget | None) -> None:
-        """Set the panel whose missing data is diagnosed; None for a general check."""
+        """Set the panel whose missing data is to be diagnosed; None for a general check."""
 
 
 @runtime_checkable
 class SupportsAlarms(Protocol):
-    """The panel of alarms."""
+    """Panel of alarms."""
 
     def begin(self) -> None:
-        """Start a new alarm."""
+        """Start to create an alarm."""
 
     def edit(self, rule_id: str, slot: str) -> None:
-        """Show an alarm and open one of its fields, if any."""
+        """Show an alarm and open one of its slots, unless `slot` is ""."""
 
 
 def read_value(text: str) -> tuple[str, str]:
-    """Parse "/odom pose.x" into topic and field path; topics contain no spaces."""
+    """Parse "/odom pose.x" to topic and field path. Topics contain no spaces."""
     topic, _blank, path = text.partition(" ")
     return topic, path
 
 
 class ViewCommands:
-    """Commands for the window's content and sheets; `use` must be called before any command."""
+    """Implements the commands for the window's contents and sheets. Call `use` before any command."""
 
     def __init__(self, shell: Shell, session: Session, files: DocumentController, keys: Shortcuts) -> None:
         self._shell, self._session, self._files = shell, session, files
@@ -109,7 +109,7 @@ class ViewCommands:
         self._guide: guide.GuideSheet | None = None
 
     def use(self, actions: Actions, entries: PaletteEntries) -> None:
-        """Keep keys and check marks of the actions up to date and fill the palette with the entries."""
+        """Set the actions to keep up to date, and the entries of the palette."""
         self._actions, self._entries = actions, entries
         self.shortcuts.changed.connect(self.show_keys)
         self._shell.theme.changed.connect(self._mark_theme)
@@ -119,14 +119,14 @@ class ViewCommands:
     def show_keys(self) -> None:
         """Update the keys of all actions.
 
-        Find has its key only in the Behaviour layout; other panels use the key themselves.
+        Find has its key only in the Behaviour layout; in other layouts, panels use the key themselves.
         """
         here = self._shell.showing == "behaviour" and self._shell.bench is not None
         of = self.shortcuts.of
         self._actions.set_keys(lambda name: of(name) if here or name != "blocks.find" else ())
 
     def press(self, key: str) -> bool:
-        """Run the command that has a key; return False if none has."""
+        """Run the command that has a key. Return False if there is none."""
         holder = self.shortcuts.holder(key)
         return bool(holder) and self._actions.run(holder)
 
@@ -143,7 +143,7 @@ class ViewCommands:
         self._palette.open()
 
     def do(self, entry: Entry) -> None:
-        """Activate an entry of the palette."""
+        """Run an entry of the palette."""
         kind, name, shell = entry.kind, entry.name, self._shell
         if kind == "command":
             self._actions.run(name)
@@ -179,7 +179,7 @@ class ViewCommands:
             self._mark_topic(topic)
 
     def new_alarm(self, about: AlarmCondition | None = None) -> None:
-        """Create an alarm with this condition and open it for editing."""
+        """Create an alarm with a condition and open it for editing."""
         dock = self._shell.open_panel("alarms")
         if dock is None or not isinstance(dock.panel, SupportsAlarms):
             return
@@ -187,13 +187,16 @@ class ViewCommands:
             dock.panel.begin()
             return
         rule = self._session.alarms.new(about)
-        waits = about.kind in NUMBER_KINDS  # until its limit is entered
+        waits = about.kind in NUMBER_KINDS  # the limit has to be entered first
         if waits:
             self._session.alarms.put(replace(rule, is_on=False))
         dock.panel.edit(rule.id, "limit" if waits else "")
 
     def alarm_on_value(self, about: tuple[str, str]) -> None:
-        """Create an alarm on a value of a topic; for a number the limit has to be entered."""
+        """Create an alarm on a value of a topic.
+
+        If the value is a number, the user has to enter the limit.
+        """
         topic, path = about
         known = self._session.topics.get(topic)
         newest = known.newest if known is not None else None
@@ -206,7 +209,7 @@ class ViewCommands:
         self.new_alarm(AlarmCondition(kind, topic, path or ".", limit))
 
     def _mark_topic(self, name: str) -> None:
-        # Also selects the topic in the topics panel if that is open.
+        # If the topics panel is open, the topic is selected there too.
         bench = self._shell.bench
         if bench is not None and "topics" in bench.open_names():
             bench.docks["topics"].panel.show_topic(name)
@@ -246,16 +249,16 @@ class ViewCommands:
             self._shell.show_toast(why_not)
 
     def _voice_words(self) -> str:
-        # Includes the result of real speech: an engine can be installed without a voice.
+        # Includes whether speech actually works: an engine can be installed without a voice.
         return voice_words(self._session.voices.problem, has_engine=has_voice_engine())
 
     def start_page(self) -> None:
-        """Show the start page, now and at the next start."""
+        """Show the start page, now and after the next start."""
         self._shell.show_start()
         self._shell.state.keep_layout(START)
 
     def leave_start_page(self) -> None:
-        """Return from the start page to the work."""
+        """Leave the start page and show the previous layout."""
         if self._shell.showing == START and self._shell.left:
             self.show_layout(self._shell.left)
 
@@ -265,7 +268,7 @@ class ViewCommands:
         self._actions.choose(f"layout.{layout}")
 
     def show_built_in_layout(self, layout: str) -> None:
-        """Show the built-in arrangement of a layout, replacing a custom one."""
+        """Show the built-in arrangement of a layout in place of a custom one."""
         self._shell.saved_layouts.use(self._shell.show_layout(layout), layout, "")
         self._actions.choose(f"layout.{layout}")
 
@@ -278,7 +281,7 @@ class ViewCommands:
             self._actions.choose(f"layout.{own.base}")
 
     def reset_layout(self) -> None:
-        """Restore the default arrangement of the panels."""
+        """Restore the default arrangement of the current layout's panels."""
         if self._shell.bench is not None:
             self._shell.bench.arrange()
 
@@ -288,7 +291,7 @@ class ViewCommands:
         return self._name_sheet
 
     def keep_layout(self) -> None:
-        """Ask for a name and save the current layout."""
+        """Ask for a name and save the current arrangement as a custom layout."""
         shell = self._shell
         arrangements, bench, base = shell.saved_layouts, shell.bench, shell.showing
         if bench is None:
@@ -306,7 +309,7 @@ class ViewCommands:
         self._ask_name().ask(_("Save layout as"), _("Keep"), arrangements.refusal, keep)
 
     def rename_layout(self) -> None:
-        """Ask for a new name of the current custom layout."""
+        """Ask for a new name for the current custom layout."""
         arrangements = self._shell.saved_layouts
         old = arrangements.own(self._shell.showing)
         if old:
@@ -319,7 +322,7 @@ class ViewCommands:
             )
 
     def delete_layout(self) -> None:
-        """Delete the current custom layout, with undo."""
+        """Delete the current custom layout; the toast offers to undo it."""
         arrangements, shell = self._shell.saved_layouts, self._shell
         name = arrangements.own(shell.showing)
         if name:
@@ -332,7 +335,7 @@ class ViewCommands:
             shell.show_toast(words.format(name=name), _("Undo"), undo)
 
     def export_layout(self) -> None:
-        """Export the current layout to a file."""
+        """Ask for a file and export the current layout to it."""
         shell = self._shell
         bench, base = shell.bench, shell.showing
         if bench is None:
@@ -353,11 +356,11 @@ class ViewCommands:
         self._files.asks.save_as(_("Save layout to a file"), suggestion, [kind], save)
 
     def ask_layout(self) -> None:
-        """Ask for a layout file and open it."""
+        """Ask for a layout file and import it."""
         self._files.asks.open_layout(str(Path.home()), self.open_layout)
 
     def open_layout(self, path: Path) -> None:
-        """Import a layout file and show it; errors are shown as a toast."""
+        """Import a layout file and show the layout. Errors are shown in a toast."""
         shell = self._shell
         try:
             found = read_layout(read_whole(path, MAX_BYTES), path.stem, shell.panels)
@@ -400,17 +403,17 @@ class ViewCommands:
         self._actions["theme.contrast"].setChecked(theme.high_contrast)
 
     def set_theme(self, mode: Mode) -> None:
-        """Set the colour theme: light, dark or that of the system."""
+        """Set the colour theme: light, dark or the system's."""
         self._shell.theme.set_mode(mode)
         self._shell.state.keep_theme(self._shell.theme)
 
     def choose_motion(self) -> None:
-        """Set reduced motion from the state of its action."""
+        """Turn reduced motion on or off, to match the state of its action."""
         self._shell.theme.set_motion(_wish(self._actions["theme.motion"]))
         self._shell.state.keep_theme(self._shell.theme)
 
     def choose_contrast(self) -> None:
-        """Set high contrast from the state of its action."""
+        """Turn high contrast on or off, to match the state of its action."""
         self._shell.theme.set_contrast(_wish(self._actions["theme.contrast"]))
         self._shell.state.keep_theme(self._shell.theme)
 
@@ -426,7 +429,7 @@ class ViewCommands:
         self._shell.panel_focus.give(self._shell.open_panel("first_steps"))
 
     def open_guide(self) -> None:
-        """Open the guide at its last page."""
+        """Open the guide at the page that was shown last."""
         if self._guide is None:
             shell = self._shell
             self._guide = guide.GuideSheet(shell.theme, shell.surface, self._guide_pages)
@@ -441,13 +444,13 @@ class ViewCommands:
         self._shell.show_examples()
 
     def point_at(self, command: str) -> bool:
-        """Highlight the button of a command; return False if none is visible."""
+        """Highlight the button of a command. Return False if no such button is visible."""
         if self._ring is None:
             self._ring = HintRing(self._shell.theme, self._shell.surface)
         return self._ring.point_at(command)
 
     def open_doctor(self, asker: PanelWidget | None = None, topic: str = "") -> None:
-        """Run the connection doctor, first for the topic that ``asker`` doesn't receive."""
+        """Run the connection doctor, first for the topic whose messages ``asker`` doesn't receive."""
         self._session.doctor.miss(topic)
         if self._shell.bench is None:
             self.show_layout("developer")
@@ -456,7 +459,7 @@ class ViewCommands:
             dock.panel.begin_for(asker)
 
     def show_log(self) -> None:
-        """Open the folder of log files, creating it if it is missing."""
+        """Open the folder of log files, creating it if necessary."""
         folder = log_folder()
         try:
             folder.mkdir(0o700, parents=True, exist_ok=True)

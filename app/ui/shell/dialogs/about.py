@@ -1,4 +1,4 @@
-"""About sheet: versions, licences and system, with a button to copy them."""
+"""About sheet: versions, licences and system information, with a button to copy them."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ WIDE = 460
 
 
 def versions() -> tuple[tuple[str, str], ...]:
-    """Return names and versions of Studio, its libraries and the system.
+    """Return the names and versions of Studio, its libraries and the system.
 
     Names of programs aren't translated.
     """
@@ -39,12 +39,12 @@ def versions() -> tuple[tuple[str, str], ...]:
 
 
 class AboutSheet(Overlay):
-    """About sheet, deleted when closed."""
+    """Sheet with versions and licences; deleted when it is closed."""
 
     top = 96
 
     def __init__(self, theme: Theme, window: QWidget, say: Callable[[str], object]) -> None:
-        # say confirms that the versions were copied.
+        # `say` confirms that the versions were copied.
         super().__init__(theme, window, TITLE)
         self._say = say
         column = QVBoxLayout(self)

@@ -1,4 +1,4 @@
-"""Command palette (Ctrl+K): finds commands, panels, topics, robots, layouts and recent files."""
+"""Command palette (Ctrl+K) to search commands, panels, topics, robots, layouts and recent files."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ MAX_RESULTS, MAX_RESULTS_EMPTY, MAX_LAST_SHOWN, MAX_LAST_SAVED = 40, 8, 5, 12
 
 
 class _Field(QLineEdit):
-    """Frameless search field with an icon at the left and Esc at the right."""
+    """Frameless search field with an icon at the left and "Esc" at the right."""
 
     def __init__(self, theme: Theme) -> None:
         super().__init__()
@@ -60,7 +60,7 @@ class _Field(QLineEdit):
 
 
 class _Foot(QWidget):
-    """Hints for the keys, and the number of matches."""
+    """Footer with hints about keys and the number of matches."""
 
     KEYS = (
         (("↑", "↓"), lazy("choose")),
@@ -101,9 +101,9 @@ class _Foot(QWidget):
 
 
 class Palette(Overlay):
-    """Palette, 640 px wide and 128 px from the top.
+    """Command palette, 640 px wide and 128 px below the window's top.
 
-    ``run`` activates an entry; ``rebind`` asks for a new key of a command.
+    ``run`` runs an entry; ``rebind`` asks for a new key for a command.
     """
 
     top = TOP
@@ -116,7 +116,7 @@ class Palette(Overlay):
         run: Callable[[Entry], object],
         rebind: Callable[[str], object],
     ) -> None:
-        # offers is called at each opening.
+        # `offers` returns the entries and is called whenever the palette opens.
         super().__init__(theme, window, _("Command palette"))
         self._offers, self._run, self._rebind = offers, run, rebind
         self._finder = Finder(())
@@ -147,7 +147,7 @@ class Palette(Overlay):
         return self.field
 
     def open(self) -> None:
-        """Open with all entries, the last used ones first; close if already open."""
+        """Open the palette with all entries, the last used ones first; close it if it is open."""
         if self.isVisible():
             self.shut()
             return
@@ -189,7 +189,7 @@ class Palette(Overlay):
         self.place()
 
     def _for_nothing_typed(self) -> list[Line]:
-        # Last used entries, then the first ones of each kind.
+        # The last used entries, then the first ones of each kind.
         entries = self._finder.entries
         known = {entry.id: entry for entry in entries if entry.id in self.last}
         last = [known[id] for id in self.last if id in known][:MAX_LAST_SHOWN]
@@ -208,7 +208,7 @@ class Palette(Overlay):
         return lines
 
     def _update_status(self) -> None:
-        # The focus stays in the field, so the selected row is announced to screen readers.
+        # The focus stays in the field; therefore the selected row is announced to screen readers.
         entry = self.rows.entry
         if entry is not None and self.isVisible():
             paint.announce(self.field, str(self.rows.currentIndex().data(Qt.ItemDataRole.AccessibleTextRole)))
@@ -228,7 +228,7 @@ class Palette(Overlay):
         return super().eventFilter(watched, event)
 
     def do_it(self) -> None:
-        """Run the selected entry, unless it is unavailable."""
+        """Run the selected entry if it is available."""
         entry = self.rows.entry
         if entry is None:
             return
@@ -241,7 +241,7 @@ class Palette(Overlay):
         self._run(entry)
 
     def rebind(self) -> None:
-        """Ask for a new key of the selected command."""
+        """Ask for a new key for the selected command."""
         entry = self.rows.entry
         if entry is not None and entry.kind == "command":
             self.shut()

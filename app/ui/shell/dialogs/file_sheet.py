@@ -1,6 +1,6 @@
-"""File sheet over the window: places at the left, the folder's content, the name below.
+"""Sheet to choose a file or folder: places at the left, contents of the folder, name below.
 
-Stop stays accessible, and the sheet stays open when it is pressed so that no input is lost.
+Stop stays accessible. The sheet stays open when Stop is pressed, so that no input is lost.
 """
 
 from __future__ import annotations
@@ -54,7 +54,9 @@ NAME, CHANGED, SIZE = range(3)
 class FileQuestion:
     """Kind of file to choose: a file with one of the ``endings``, or a folder.
 
-    ``empty`` is shown for a folder without matching files; ``kinds`` are the formats for saving.
+    Attributes:
+        empty: Text for a folder without matching files.
+        kinds: Formats for saving.
     """
 
     heading: str
@@ -78,7 +80,7 @@ FOLDER = FileQuestion(lazy("Choose a folder"), lazy("Use this folder"), "", endi
 
 @dataclass(frozen=True)
 class FolderPlace:
-    """A folder with a well-known name such as "Documents"."""
+    """Folder with a well-known name such as "Documents"."""
 
     name: str
     icon: str
@@ -86,7 +88,7 @@ class FolderPlace:
 
 
 def known_places(studio: Path, recent: Iterable[Path]) -> tuple[FolderPlace, ...]:
-    """Return the person's existing standard folders, Studio's folder, and those of recent files."""
+    """Return the user's standard folders as far as they exist, Studio's folder, and those of recent files."""
     kinds = QStandardPaths.StandardLocation
     found = [
         FolderPlace(_("Home"), "house", Path.home()),
@@ -108,7 +110,7 @@ def _standard(kind: QStandardPaths.StandardLocation) -> Path:
 
 
 class _Row(QTreeWidgetItem):
-    """A file or folder; folders come first in every sort order."""
+    """Row of a file or folder. Folders come first in every sort order."""
 
     def __init__(self, theme: Theme, entry: FolderEntry, now: dt.datetime, icon: str) -> None:
         then = dt.datetime.fromtimestamp(entry.changed_s, tz=now.tzinfo)
@@ -137,13 +139,16 @@ class _Row(QTreeWidgetItem):
 
 
 class FileSheet(Overlay):
-    """Asks for a file to open or save and passes it to ``take``, which isn't called on cancel."""
+    """Sheet to choose a file to open or save.
+
+    The path is passed to ``take``, which isn't called on cancel.
+    """
 
     top = 56
     lies_over_others = True
 
     def __init__(self, theme: Theme, window: QWidget, places: Callable[[], Sequence[FolderPlace]]) -> None:
-        # places is called at each opening.
+        # `places` is called whenever the sheet opens.
         super().__init__(theme, window, _("Files"))
         self._scrim.pressed.disconnect(self.shut)  # a click outside must not discard a typed name
         self._places = places
@@ -244,15 +249,15 @@ class FileSheet(Overlay):
         column.addLayout(middle, 1)
 
     def ask_open(self, folder: Path, take: Callable[[Path], object], question: FileQuestion = OPEN) -> None:
-        """Ask for a file to open, by default a behaviour."""
+        """Ask for a file to open, a behaviour unless `question` says otherwise."""
         self._ask(question, folder, take)
 
     def ask_picture(self, folder: Path, take: Callable[[Path], object]) -> None:
-        """Ask for an image."""
+        """Ask for an image file."""
         self._ask(PICTURE, folder, take)
 
     def ask_folder(self, folder: Path, take: Callable[[Path], object]) -> None:
-        """Ask for a folder: the one selected in the list, otherwise the current one."""
+        """Ask for a folder: the one selected in the list, else the current one."""
         self._ask(FOLDER, folder, take)
 
     def ask_save(self, suggestion: Path, take: Callable[[Path], object]) -> None:
@@ -266,7 +271,7 @@ class FileSheet(Overlay):
         kinds: Sequence[FileKind],
         take: Callable[[Path, FileKind], object],
     ) -> None:
-        """Ask where, under which name and in which format to save another kind of file."""
+        """Ask for place, name and format to save another kind of file."""
         endings = tuple(dict.fromkeys(each.ending for each in kinds))
         question = FileQuestion(
             title, SAVE.verb, SAVE.empty, endings=endings, icon="image", saves=True, kinds=tuple(kinds)
@@ -292,7 +297,7 @@ class FileSheet(Overlay):
         return self.question.kinds[max(0, self.kind.currentIndex())]
 
     def _kind_chosen(self) -> None:
-        # Drops an ending that was typed, because it would override the chosen format.
+        # Removes a typed file extension, because it would override the chosen format.
         name = self.name.text()
         typed = next((each for each in self.question.endings if name.lower().endswith(each)), "")
         self.name.setText(name[: len(name) - len(typed)])
@@ -312,7 +317,7 @@ class FileSheet(Overlay):
 
     @property
     def saves(self) -> bool:
-        """True if a name is asked for."""
+        """True if the sheet asks for a name."""
         return self.question.saves
 
     @property
@@ -327,7 +332,7 @@ class FileSheet(Overlay):
         return QSize(min(room.width(), round(scaled(WIDTH))), min(room.height(), round(scaled(HEIGHT))))
 
     def _focus_changed(self, _old: QWidget | None, _new: QWidget | None) -> None:
-        # Overrides the closing on focus loss: the sheet stays open while Stop is pressed.
+        # Unlike other sheets, this one stays open when it loses the focus, as by a press of Stop.
         ...
 
     def _show_places(self) -> None:
@@ -344,7 +349,7 @@ class FileSheet(Overlay):
         self.places.setFixedWidth(round(self.theme.scaled(PLACES_WIDTH)))
 
     def go_to(self, folder: Path) -> None:
-        """Show a folder; on an error show the reason and stay in the current one."""
+        """Show a folder. On an error, show the reason and stay in the current folder."""
         try:
             found = entries_of(folder, self.question.endings)
         except OSError as error:
@@ -391,7 +396,7 @@ class FileSheet(Overlay):
         self._judge()
 
     def _opened(self, item: QTreeWidgetItem) -> None:
-        # Return or double click: enter a folder, open a file or copy its name.
+        # Return or double click enters a folder, opens a file, or copies its name.
         if isinstance(item, _Row) and item.entry.is_folder:
             self.go_to(item.entry.path)
         elif isinstance(item, _Row) and not self.saves:
@@ -405,7 +410,7 @@ class FileSheet(Overlay):
         self.folder_name.setFocus(Qt.FocusReason.OtherFocusReason)
 
     def _show_folder_field(self, shown: bool) -> None:
-        # The field takes the place of the "New folder" button.
+        # The text field replaces the "New folder" button.
         self.folder_name.setMinimumWidth(round(self.theme.scaled(FOLDER_NAME_WIDTH)))
         for widget in (self.folder_name, self.make_folder):
             paint.show_when(widget, shown and self._makes_folders)
@@ -447,7 +452,7 @@ class FileSheet(Overlay):
         return self.folder / f"{name}{ending}" if name and not name_refusal(name) else None
 
     def _judge(self) -> None:
-        # Shows the consequence of the button, such as overwriting, and sets its text.
+        # Shows the effect of the button, such as overwriting a file, and sets its text.
         target = self.target
         taken = self.saves and target is not None and target.exists()
         paint.show_when(self.keep_both, taken)
@@ -523,7 +528,7 @@ class FileSheet(Overlay):
             self.go_to(self.folder)
 
     def eventFilter(self, watched: QObject, event: QEvent) -> bool:
-        """Go to the parent folder on Backspace in the list."""
+        """Open the parent folder on Backspace in the list."""
         if (
             watched is self.list
             and event.type() == QEvent.Type.KeyPress

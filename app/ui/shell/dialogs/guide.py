@@ -1,4 +1,4 @@
-"""Guide: searchable help pages in the person's language.
+"""Guide with searchable help pages in the user's language.
 
 The pages are Markdown in ``resources/guide``, with a folder per language. ``{key:run.stop}`` is replaced with
 the current keys of a command. ``![words](name)`` includes an image: ``light/name.png`` or ``dark/name.png``
@@ -50,7 +50,7 @@ from nep.i18n import ENGLISH, _, ngettext
 WIDE, HIGH, LIST_WIDTH = 920, 640, 220
 LINE_PERCENT = 115.0
 PICTURE_RATIO = 1.5
-"""Pixels of the image file per pixel of the window at 100 %, for sharpness on high-DPI screens."""
+"""Image file pixels per window pixel at 100 %; more than 1, so that images are sharp on high-DPI screens."""
 _PICTURE = re.compile(r"!\[([^\]]*)\]\(([a-z-]+)\)")
 _KEY = re.compile(r"\{key:([a-z_.]+)\}")
 _MARKS = re.compile(r"[*#|`_-]+")
@@ -58,32 +58,33 @@ _MARKS = re.compile(r"[*#|`_-]+")
 
 @dataclass(frozen=True)
 class GuidePage:
-    """A page: title, Markdown, and folders of its images in order of preference."""
+    """Page of the guide: title, Markdown text, and folders of its images in order of preference."""
 
     title: str
     text: str
     folders: tuple[Path, ...] = ()
 
     def has(self, words: str) -> bool:
-        """Return whether the page or its alternative texts contain all of these words in any order."""
+        """Return True if the page, with the alternative texts of images, contains all of these words."""
         said = _MARKS.sub(" ", _PICTURE.sub(r"\1", self.text)).casefold()
         return all(word in said for word in words.casefold().split())
 
     @property
     def pictures(self) -> tuple[tuple[str, str], ...]:
-        """Name and alternative text of each image."""
+        """Name and alternative text of each image on the page."""
         return tuple((name, words) for words, name in _PICTURE.findall(self.text))
 
     def picture(self, name: str, *, dark: bool) -> Path | None:
-        """Return the file of an image in the light or dark variant, or None."""
+        """Return the file of an image in its light or dark variant, or None."""
         files = (folder / ("dark" if dark else "light") / f"{name}.png" for folder in self.folders)
         return next((file for file in files if file.is_file()), None)
 
 
 def read_pages(folder: Path, language: str, key_of: Callable[[str], str]) -> tuple[GuidePage, ...]:
-    """Return the pages in file order, in this language or in English where a translation is missing.
+    """Return the pages in file order, in this language, or in English where a translation is missing.
 
-    ``key_of`` returns the first key of a command, or "".
+    Args:
+        key_of: Returns the first key of a command, or "".
     """
     made = []
     own = folder / language.split("-", maxsplit=1)[0].split("_", maxsplit=1)[0]
@@ -97,7 +98,7 @@ def read_pages(folder: Path, language: str, key_of: Callable[[str], str]) -> tup
 
 
 class PageView(QTextBrowser):
-    """Shows a page with images scaled to the available width."""
+    """View of a page, with images scaled to the available width."""
 
     def __init__(self, theme: Theme) -> None:
         super().__init__()
@@ -113,7 +114,7 @@ class PageView(QTextBrowser):
         self._again.timeout.connect(self._fit_pictures)
 
     def show_page(self, page: GuidePage) -> None:
-        """Show a page from its start."""
+        """Show a page, scrolled to its top."""
         self._page = page
         self.setMarkdown(page.text)
         self.setAccessibleDescription(" ".join(words for _name, words in page.pictures))
@@ -173,12 +174,15 @@ class PageView(QTextBrowser):
 
 
 class GuideSheet(Overlay):
-    """List of pages with a search field at the left, the page at the right; remembers its page."""
+    """Sheet with the pages and a search field at the left, and the current page at the right.
+
+    The sheet opens at the page that was shown last.
+    """
 
     top = 64
 
     def __init__(self, theme: Theme, window: QWidget, pages: Callable[[], Sequence[GuidePage]]) -> None:
-        # pages is called at each opening, because keys may have changed.
+        # `pages` is called whenever the sheet opens, because keys may have changed.
         super().__init__(theme, window, _("Guide"))
         self._read = pages
         self._pages: tuple[GuidePage, ...] = ()
@@ -276,7 +280,7 @@ class GuideSheet(Overlay):
             self.page.verticalScrollBar().setValue(0)
 
     def _set_text(self, document: QTextDocument) -> None:
-        # Paragraph spacing, and semibold instead of italic emphasis.
+        # Sets paragraph spacing, and makes emphasis semibold instead of italic.
         cursor = QTextCursor(document)
         block = document.begin()
         while block.isValid():
@@ -287,7 +291,8 @@ class GuideSheet(Overlay):
                 picture = "\ufffc" in block.text()
                 look.setBottomMargin(self.theme.scaled(4 if block.textList() is not None else 10))
                 look.setTopMargin(self.theme.scaled(12 if heading > 1 else 6 if picture else 0))
-                percent = 100.0 if picture else LINE_PERCENT  # above an image it would look like a gap
+                # above an image the larger line height would look like a gap
+                percent = 100.0 if picture else LINE_PERCENT
                 look.setLineHeight(percent, QTextBlockFormat.LineHeightTypes.ProportionalHeight.value)
                 cursor.setBlockFormat(look)
             for part in [each.fragment() for each in cast("Iterable[QTextBlock.iterator]", block)]:
@@ -301,7 +306,7 @@ class GuideSheet(Overlay):
             block = block.next()
 
     def eventFilter(self, watched: QObject, event: QEvent) -> bool:
-        """Move the focus from the list to the field on "/", and back on Down."""
+        """Move the focus from the list to the search field on "/", and back on Down."""
         if event.type() == QEvent.Type.KeyPress and isinstance(event, QKeyEvent):
             if watched is self.list and event.text() == "/":
                 self.search.setFocus(Qt.FocusReason.ShortcutFocusReason)
@@ -312,7 +317,7 @@ class GuideSheet(Overlay):
         return super().eventFilter(watched, event)
 
     def _line(self, table: QTextTable) -> None:
-        # Row lines, cell padding and full width.
+        # Sets row lines, cell padding and full width of tables.
         look = table.format().toTableFormat()
         look.setBorderStyle(QTextFrameFormat.BorderStyle.BorderStyle_Solid)
         look.setBorderBrush(self.theme.colour("border"))

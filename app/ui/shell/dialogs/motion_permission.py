@@ -1,4 +1,4 @@
-"""Card that asks once for each real robot if it may move; Stop stays accessible."""
+"""Card that asks once for each real robot whether it may move. Stop stays accessible."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ TILE, EDGE, BETWEEN = 40, 20, 10
 
 
 class _Tile(QWidget):
-    """Icon for motion."""
+    """Decorative icon of the card."""
 
     def __init__(self, theme: Theme) -> None:
         super().__init__()
@@ -40,15 +40,15 @@ class _Tile(QWidget):
 
 
 class MotionQuestion(QWidget):
-    """Shows the pending question of `MotionPermission`; Escape means "Not now".
+    """Card with the pending question of `MotionPermission`. Escape answers "Not now".
 
-    "Not now" has the initial focus, so that an Enter meant for something else moves nothing.
+    "Not now" has the initial focus, so that an Enter that was meant for something else moves nothing.
     """
 
     def __init__(
         self, theme: Theme, window: QWidget, moving: MotionPermission, complain: Callable[[str], object]
     ) -> None:
-        # complain gets a message when "always" can't be saved.
+        # `complain` is called with a message if "always" can't be saved.
         super().__init__(window)
         self._theme, self._moving = theme, moving
         self._seen = moving.revision
@@ -94,7 +94,7 @@ class MotionQuestion(QWidget):
         column.addLayout(foot)
 
     def refresh(self) -> None:
-        """Show the pending question, or hide the card."""
+        """Show the pending question, or hide the card if there is none."""
         if self._moving.revision == self._seen:
             return
         self._seen = self._moving.revision
@@ -115,7 +115,7 @@ class MotionQuestion(QWidget):
         self.setAccessibleDescription(question.sentence)
         if not self.isVisible():
             self._before = QApplication.focusWidget()
-        self.show()  # before measuring: showing applies fonts and margins of the style sheet
+        self.show()  # before measuring: showing the card applies fonts and margins of the style sheet
         self._place()
         self.raise_()
         self.not_now.setFocus(Qt.FocusReason.PopupFocusReason)
@@ -152,7 +152,7 @@ class MotionQuestion(QWidget):
         self.move((window.width() - wide) // 2, min(top, max(8, window.height() - self.height() - 8)))
 
     def _name_always(self, wide: int) -> None:
-        # The name is on the switch only where it fits; the title always has it.
+        # The robot's name is on the switch only if it fits there; the title always contains it.
         self.always.setText(self._always_for)
         buttons = self.not_now.sizeHint().width() + self.let.sizeHint().width()
         if self.always.sizeHint().width() > wide - 2 * EDGE - 2 * BETWEEN - buttons:

@@ -1,4 +1,4 @@
-"""Sheet that asks for a name: a field, a button, and a reason if the name is invalid."""
+"""Sheet that asks for a name, with the reason if the typed name is invalid."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ WIDE = 420
 
 
 class NameSheet(Overlay):
-    """Name sheet; `ask` opens it for a question."""
+    """Sheet with a text field and a button; `ask` opens it."""
 
     top = 128
 
@@ -99,7 +99,7 @@ class NameSheet(Overlay):
             paint.announce(self.wrong, sentence)
 
     def _typed(self, text: str) -> None:
-        # An empty field shows no error until the button is pressed.
+        # No error is shown for an empty field until the button is pressed.
         name = text.strip()
         sentence = self._refusal(name) if name else ""
         self._complain(sentence)

@@ -1,4 +1,4 @@
-"""Sheet that lets other computers connect: address, consequences, and the address to type on them."""
+"""Sheet to let other computers connect: address, consequences, and the address to type on them."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ WARNING = lazy(
 
 
 class NetworkAccessSheet(Overlay):
-    """Sheet of the command "Let other computers connect" and of the status bar."""
+    """Sheet of the command "Let other computers connect", also opened from the status bar."""
 
     top = 128
 
@@ -79,7 +79,7 @@ class NetworkAccessSheet(Overlay):
         return QSize(wide, min(room.height(), high))
 
     def open(self) -> None:
-        """Open with the current settings."""
+        """Open the sheet with the current settings."""
         self._show()
         super().open()
 

@@ -1,4 +1,4 @@
-"""Sheet of other networks to monitor: a switch, the address and the state of each."""
+"""Sheet to monitor other networks: for each a switch, an address and its state."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ INTRODUCTION = lazy(
 
 
 class OtherNetworksSheet(Overlay):
-    """Sheet whose changes apply at once and persist; without confirmation."""
+    """Sheet whose changes are applied and saved at once, without confirmation."""
 
     top = 96
 
@@ -73,12 +73,12 @@ class OtherNetworksSheet(Overlay):
         wide = min(room.width(), max(round(self.theme.scaled(WIDTH)), least))
         inner = wide - 2 - 2 * SIDE - SCROLL_BAR
         high = self.introduction.heightForWidth(inner)
-        # measured per row: their layout items are updated late after a change of text
+        # measured per row, because layout items are updated late after a change of text
         high += sum(row.height_for(inner) + 1 + 2 * GAP for row in self.rows)
         return QSize(wide, min(room.height(), high + self._head.sizeHint().height() + 14 + 10 + 16 + 4))
 
     def open(self) -> None:
-        """Open and update the states until it is closed."""
+        """Open the sheet; the states are updated until it is closed."""
         for row in self.rows:
             row.show_choice()
         self.show_states()
@@ -86,7 +86,7 @@ class OtherNetworksSheet(Overlay):
         super().open()
 
     def shut(self) -> None:
-        """Apply typed addresses and close."""
+        """Apply typed addresses and close the sheet."""
         for row in self.rows:
             row.apply()
         super().shut()
@@ -98,7 +98,7 @@ class OtherNetworksSheet(Overlay):
 
 
 class NetworkRow(QWidget):
-    """Switch with a network's name, its address and its state; `changed` when its height may differ."""
+    """Row of a network: switch, address and state. `changed` is emitted when its height may differ."""
 
     changed = Signal()
 
@@ -128,7 +128,7 @@ class NetworkRow(QWidget):
         self.address.editingFinished.connect(self.apply)
 
     def height_for(self, width: int) -> int:
-        """Return the height in px for a width."""
+        """Return the height in px that is needed for a width."""
         self._lines.invalidate()
         return self._lines.totalHeightForWidth(width)
 
@@ -141,7 +141,7 @@ class NetworkRow(QWidget):
         self._complain("")
 
     def show_state(self) -> None:
-        """Show the state: connected, searching or the error; while off, the meaning of the address."""
+        """Show the state: connected, searching or the error. While off, explain the address."""
         words = self._wrong or state_words(self._network)
         role = "error" if self._wrong else "warn" if self._network.state == "lost" else "textSecondary"
         set_role(self.state, role)
@@ -158,7 +158,7 @@ class NetworkRow(QWidget):
             self._do(lambda: self._networks.leave(self._network.kind.name))
 
     def apply(self) -> None:
-        """Apply a changed address if the network is on."""
+        """Apply a changed address if the network is switched on."""
         network = self._network
         if network.is_chosen and self.address.text().strip() != network.address:
             self._do(lambda: self._networks.choose(network.kind.name, self.address.text()))
@@ -182,7 +182,7 @@ class NetworkRow(QWidget):
 
 
 class AddressField(QLineEdit):
-    """Address field; Return applies the address and keeps the focus."""
+    """Text field for an address. Return applies the address and keeps the focus."""
 
     def __init__(self, theme: Theme, name: str, example: str, take: Callable[[], object]) -> None:
         super().__init__()
@@ -208,7 +208,7 @@ class AddressField(QLineEdit):
 
 
 def state_words(network: OtherNetwork) -> str:
-    """Return a sentence about the state of a network; while off, the meaning of its address."""
+    """Describe the state of a network in a sentence. While the network is off, explain its address."""
     if network.state == "lost":
         return f"{network.sentence[:1].upper()}{network.sentence[1:]}."
     if network.state == "looking":

@@ -1,4 +1,4 @@
-"""Overlay: a sheet with a shadow over the window, and a scrim that leaves every Stop accessible."""
+"""Base class of sheets over the window, with a scrim that leaves every Stop button accessible."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ SHADOW_PX = 28
 SHADOW_DOWN = 10
 EDGE = 16
 BELOW_STOP = 5
-STOP_INSET = 4  # px that the button leaves around its body for the focus ring
+STOP_INSET = 4  # margin in px of the button around its body, for the focus ring
 
 
 def stops_in(window: QWidget) -> list[StopButton]:
@@ -37,9 +37,9 @@ def stops_in(window: QWidget) -> list[StopButton]:
 
 
 class StopPlaces(QObject):
-    """Emits `changed` when a Stop of a window is shown, hidden, moved or resized, also with its parents.
+    """Emits `changed` when a Stop button of a window is shown, hidden, moved or resized, also by its parents.
 
-    Needed since a change of text size lays out the bars several times, after all widgets were notified.
+    Needed because a change of text size lays out the bars several times after all widgets were notified.
     """
 
     changed = Signal()
@@ -51,7 +51,7 @@ class StopPlaces(QObject):
         self._watched: list[QWidget] = []
 
     def watch(self) -> None:
-        """Watch all Stop buttons, including hidden ones, until `rest` is called."""
+        """Watch all Stop buttons, also hidden ones, until `rest` is called."""
         self.rest()
         for stop in self._window.findChildren(StopButton):
             widget: QWidget | None = stop
@@ -61,7 +61,7 @@ class StopPlaces(QObject):
                 widget = widget.parentWidget()
 
     def rest(self) -> None:
-        """Stop watching."""
+        """Stop to watch the buttons."""
         watched, self._watched = self._watched, []
         for widget in watched:
             if isValid(widget):
@@ -74,7 +74,10 @@ class StopPlaces(QObject):
 
 
 class Scrim(QWidget):
-    """Darkens a window except for its Stop buttons, which stay clickable; emits `pressed` elsewhere."""
+    """Dims a window except for its Stop buttons, which can be clicked.
+
+    Emits `pressed` for clicks elsewhere.
+    """
 
     pressed = Signal()
 
@@ -86,7 +89,7 @@ class Scrim(QWidget):
         self.hide()
 
     def cover(self) -> None:
-        """Cover the whole window with a hole for each visible Stop."""
+        """Cover the whole window, with a hole for each visible Stop button."""
         window = self.parentWidget()
         if window is None:
             return
@@ -100,7 +103,7 @@ class Scrim(QWidget):
         self.update()
 
     def set_strength(self, strength: float) -> None:
-        """Set the opacity of the scrim, from 0 to 1."""
+        """Set the opacity of the scrim (0 to 1)."""
         self.strength = strength
         self.update()
 
@@ -118,7 +121,7 @@ class Scrim(QWidget):
         painter.end()
 
     def _paint_shadow(self, painter: QPainter, over: QRectF) -> None:
-        # Painted as many thin boxes: QGraphicsDropShadowEffect would repaint the surface on every key.
+        # Painted as many thin boxes, because QGraphicsDropShadowEffect would repaint the sheet on every key.
         steps = SHADOW_PX // 2
         shade = self._theme.colour("shadow")
         shade.setAlphaF(min(1.0, shade.alphaF() * self.strength * 2.2 / steps))
@@ -130,20 +133,20 @@ class Scrim(QWidget):
 
 
 class Overlay(QWidget):
-    """Sheet over a window: takes the focus; Esc or a click outside closes it and restores the focus.
+    """Sheet over a window. It takes the focus; Esc or a click outside closes it and restores the focus.
 
-    Subclasses define the size in `wanted_size` and the initially focused widget in `first`.
+    Subclasses define the size in `wanted_size`, and the widget that gets the focus in `first`.
     """
 
     closed = Signal()
     top = EDGE
     docks_right = False
-    """True if it is docked at the right edge of the window; toasts then appear left of it."""
+    """True for sheets that are docked at the right edge of the window; toasts then appear left of them."""
     lies_over_others = False
-    """True for sheets opened from another one, which stays open below and gets the focus back."""
+    """True for sheets opened from another sheet, which stays open below and gets the focus back."""
 
     def __init__(self, theme: Theme, window: QWidget, name: str) -> None:
-        # name is read by screen readers; open() shows the overlay.
+        # `name` is read by screen readers. `open` shows the sheet.
         super().__init__(window)
         self.theme = theme
         self.setAccessibleName(name)
@@ -163,15 +166,15 @@ class Overlay(QWidget):
         self.hide()
 
     def wanted_size(self, room: QSize) -> QSize:
-        """Return the size for a window with this available space."""
+        """Return the size of the sheet for the space available in the window."""
         return self.sizeHint().boundedTo(room)
 
     def first(self) -> QWidget:
-        """Return the widget that gets the focus first."""
+        """Return the widget that gets the focus when the sheet opens."""
         return self
 
     def open(self) -> None:
-        """Open the sheet, without animation under reduced motion."""
+        """Open the sheet, without animation if motion is reduced."""
         if self.isVisible():
             return
         self._before = QApplication.focusWidget()
@@ -197,7 +200,7 @@ class Overlay(QWidget):
             application.focusChanged.connect(self._focus_changed)
 
     def head(self, heading: QWidget) -> QHBoxLayout:
-        """Return the top row: a heading and a close button."""
+        """Return a layout with the heading and a close button, for the top of the sheet."""
         close = IconButton(self.theme, "x", _("Close"), "Esc")
         close.clicked.connect(self.shut)
         row = QHBoxLayout()
@@ -225,12 +228,12 @@ class Overlay(QWidget):
         self.closed.emit()
 
     def window_below(self) -> QWidget:
-        """Return the window below the sheet."""
+        """Return the window that the sheet covers."""
         parent = self.parentWidget()
         return parent if parent is not None else self
 
     def place(self) -> None:
-        """Centre the sheet `top` px below the window's upper edge, or lower if a Stop would be covered."""
+        """Centre the sheet `top` px below the window's upper edge, or lower if it would cover Stop."""
         window = self.window_below()
         place = self._placed(self.top)
         stops = [QRect(stop.mapTo(window, QPoint()), stop.size()) for stop in stops_in(window)]
@@ -267,7 +270,7 @@ class Overlay(QWidget):
         event.accept()  # keys must not reach the window below
 
     def focusNextPrevChild(self, forward: bool) -> bool:
-        """Keep the focus inside the sheet."""
+        """Keep the focus within the sheet."""
         focus = QApplication.focusWidget()
         step: QWidget = focus if focus is not None and self.isAncestorOf(focus) else self
         stop = next(tab_stops(self, step, forward=forward), None)

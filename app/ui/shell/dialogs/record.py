@@ -1,4 +1,4 @@
-"""Sheet "Record": topics to record, progress, and the flight recorder."""
+"""Sheet "Record": topics to record, progress of the recording, and the flight recorder."""
 
 from __future__ import annotations
 
@@ -50,18 +50,18 @@ if TYPE_CHECKING:
     from nep.recordings.recorder import TopicSelection
 
 WIDE, HIGH, SIDE = 640, 812, 20
-BESIDE_FROM = 1280  # px at 100 % text; wider windows show it over one column, without a scrim
+BESIDE_FROM = 1280  # px at 100 % text; in wider windows the sheet covers one column, without a scrim
 BELOW_BARS = 88
 REFRESH_MS = 300
 ROWS_HIGH = 170
 LABEL_WIDE, NUMBER_WIDE, BAR_WIDE = 80, 84, 120
 LONG_S = 2 * 86_400.0
-"""Above this the remaining recording time of the disk isn't shown."""
+"""Remaining time in s above which the disk's remaining recording time isn't shown."""
 _GB = 1e9
 
 
 class RecordMeter(QWidget):
-    """A figure with a title above and a note below; blank if unknown."""
+    """Number with a title above and a note below; blank if unknown."""
 
     def __init__(self, name: str) -> None:
         super().__init__()
@@ -75,7 +75,7 @@ class RecordMeter(QWidget):
         column.addWidget(self.note)
 
     def set_value(self, value: str, note: str = "", role: str = "textSecondary") -> None:
-        """Set figure and note."""
+        """Set the number and the note."""
         self.value.setText(value)
         self.note.setText(note)
         set_role(self.note, role)
@@ -83,7 +83,10 @@ class RecordMeter(QWidget):
 
 
 class RecordSheet(Overlay):
-    """Settings of the next recording, which persist, and of the flight recorder, which apply at once."""
+    """Sheet with the settings of the next recording, which are saved, and the flight recorder.
+
+    Settings of the flight recorder are applied at once.
+    """
 
     def __init__(
         self,
@@ -93,7 +96,7 @@ class RecordSheet(Overlay):
         keep: Callable[[], None],
         say: ShowToast,
     ) -> None:
-        # keep saves the flight recorder.
+        # `keep` saves the contents of the flight recorder.
         super().__init__(theme, window, _("Record"))
         self._session, self._recordings, self._say = session, session.recordings, say
         self._seen: object = None
@@ -305,11 +308,11 @@ class RecordSheet(Overlay):
             self._scrim.setVisible(not self._is_beside())
 
     def _focus_changed(self, old: QWidget | None, new: QWidget | None) -> None:
-        if not self._is_beside():  # otherwise a person works in the window while the sheet shows the progress
+        if not self._is_beside():  # otherwise the user works in the window while the sheet shows the progress
             super()._focus_changed(old, new)
 
     def open(self) -> None:
-        """Open and update the progress until it is closed."""
+        """Open the sheet; the progress is updated until it is closed."""
         self._show_choice()
         self.show_state()
         self._timer.start()
@@ -354,7 +357,7 @@ class RecordSheet(Overlay):
 
     @property
     def choice(self) -> RecordingChoice:
-        """Selection of the current recording, or that of the next one."""
+        """Topics and limits of the current recording, or of the next one."""
         recordings = self._recordings
         return recordings.recorded if recordings.is_recording else recordings.choice
 
@@ -396,7 +399,7 @@ class RecordSheet(Overlay):
         self.patterns.set_wrong(bool(problem))
 
     def show_state(self) -> None:
-        """Show the progress."""
+        """Show the progress of the recording."""
         recordings = self._recordings
         going = recordings.is_recording
         self.record.set_word(_("Stop recording") if going else _("Record"))
@@ -449,7 +452,7 @@ class RecordSheet(Overlay):
         self.disk.set_value(size_words(free), full, "warn" if free < LOW_DISK_BYTES else "textSecondary")
 
     def _show_end(self, end: tuple[float, float] | None) -> None:
-        # Only for a recording with limits whose rate is known.
+        # Only for a recording with limits and a known data rate.
         for each in (self._end_line, self.at_end):
             each.setVisible(end is not None)
         if end is not None:
@@ -457,7 +460,7 @@ class RecordSheet(Overlay):
             self.at_end.set_value(size_words(size_bytes), _("at {time}").format(time=length_words(at_s)))
 
     def _ends_problem(self, sentence: str) -> None:
-        # Error of a limit, otherwise their meaning.
+        # Explains the limits, or what is wrong with them.
         both = bool(self.ends_min.text() and self.ends_gb.text())
         none = not (self.ends_min.text() or self.ends_gb.text())
         usual = _("whichever comes first") if both else _("when you stop it") if none else ""
@@ -513,7 +516,7 @@ class RecordSheet(Overlay):
         self.show_state()
 
     def _toggle(self, topic: str) -> None:
-        # Adds or removes the topic of a clicked row.
+        # Adds or removes the topic whose row was clicked.
         recordings = self._recordings
         if recordings.is_recording or recordings.choice.mode != "chosen":
             return

@@ -1,4 +1,7 @@
-"""Sheet "Report a problem": the content of the file, what it omits, and a description. Sends nothing."""
+"""Sheet "Report a problem": preview of the report file, parts that it leaves out, and a description.
+
+Nothing is uploaded.
+"""
 
 from __future__ import annotations
 
@@ -56,7 +59,10 @@ def documents_folder() -> Path:
 
 
 class ReportSheet(Overlay):
-    """Sheet of the command and of the banner after a crash; keeps typed text until the report is written."""
+    """Sheet to write a report file, opened by a command or by the banner after a crash.
+
+    Typed text is kept until the report is written.
+    """
 
     top = 72
 
@@ -68,14 +74,14 @@ class ReportSheet(Overlay):
         say: Callable[[str], object],
         clock: Callable[[], float],
     ) -> None:
-        # say announces a finished report if the sheet is closed; clock returns epoch seconds.
+        # `say` announces a finished report if the sheet is closed; `clock` returns seconds since 1970.
         super().__init__(theme, window, _("Report a problem"))
         self._asks, self._say, self._clock = asks, say, clock
         self._parts: ReportParts | None = None
         self._behaviours: Behaviours = tuple
         self._writer: ReportWriter | None = None
         self.written: Path | None = None
-        """The last report written."""
+        """Path of the last report, or None."""
         self.introduction = label(_(INTRODUCTION), "body", role="textSecondary", wrap=True)
         self.happened = LongText(theme, _("What happened?"))
         self.list = QVBoxLayout()
@@ -147,7 +153,9 @@ class ReportSheet(Overlay):
     def show_for(self, parts: ReportParts, names: Sequence[str], behaviours: Behaviours) -> None:
         """Open the sheet.
 
-        ``names`` are the open behaviours; ``behaviours`` returns their contents if they are included.
+        Args:
+            names: Names of the open behaviours.
+            behaviours: Returns the contents of the behaviours, called if the user includes them.
         """
         self._parts, self._behaviours = parts, behaviours
         while (item := self.list.takeAt(0)) is not None:
@@ -182,7 +190,7 @@ class ReportSheet(Overlay):
         return QSize(wide, min(room.height(), high))
 
     def _set_status(self, words: str, role: str = "textSecondary", path: Path | None = None) -> None:
-        # With a path the button to show the file appears.
+        # If there is a path, the button to show the file appears.
         self.written = path
         set_role(self.state, role)
         self.state.setText(words)
@@ -237,7 +245,7 @@ class ReportSheet(Overlay):
 
 
 class _Line(QWidget):
-    """A line about included or omitted content."""
+    """Line about a part that is included in the report or left out."""
 
     def __init__(self, theme: Theme, words: str, icon: str) -> None:
         super().__init__()

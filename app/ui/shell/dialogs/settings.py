@@ -1,4 +1,4 @@
-"""Sheet of settings: language, theme, text, contrast, motion, robots, shortcuts, folder for images."""
+"""Sheet with the settings: language, theme, text, contrast, motion, robots, shortcuts, image folder."""
 
 from __future__ import annotations
 
@@ -29,11 +29,11 @@ MODE_WORDS = {
 PREFERENCE_WORDS = {"system": lazy("Match system"), "on": lazy("On"), "off": lazy("Off")}
 TEXT_SIZES = ("100", "125", "150", "175", "200")
 MAX_SEGMENTS = 3
-"""Up to this number languages are shown side by side, otherwise as a drop-down list."""
+"""Maximum number of languages shown side by side; more are shown in a drop-down list."""
 
 
 class SettingsSheet(Overlay):
-    """Settings sheet: changes persist and apply at once, except for the language."""
+    """Sheet with the settings. Changes are applied and saved at once; the language needs a restart."""
 
     top = 72
 
@@ -48,8 +48,9 @@ class SettingsSheet(Overlay):
         *,
         restart: Callable[[], object] | None = None,
     ) -> None:
-        # voice describes the speech output and is called at each opening. restart restarts Studio with all
-        # open documents; None if that is impossible.
+        # `voice` describes the speech output and is called whenever the sheet opens. `restart` restarts
+        # Studio and
+        # reopens all documents; None if that is impossible.
         super().__init__(theme, window, _("Settings"))
         self._state, self._settings, self._files, self._voice = state, settings, files, voice
         self.language = self._language_input()
@@ -157,7 +158,7 @@ class SettingsSheet(Overlay):
         return QSize(min(room.width(), wide), min(room.height(), high))
 
     def open(self) -> None:
-        """Open with the current settings."""
+        """Open the sheet with the current settings."""
         self.voice.setText(self._voice())
         self._show()
         super().open()
@@ -183,7 +184,7 @@ class SettingsSheet(Overlay):
         self._state.keep_theme(self.theme)
 
     def _chosen_language(self) -> str:
-        # The language chosen here if available, otherwise the current one.
+        # The language that was chosen here if it is available, else the current one.
         chosen = self._settings.get("language", "")
         return chosen if chosen in dict(i18n.offered()) else i18n.language()
 
@@ -208,6 +209,6 @@ class SettingsSheet(Overlay):
         self._files.choose_folder(before, self.keep_folder)
 
     def keep_folder(self, folder: Path) -> None:
-        """Set the folder for images."""
+        """Set and save the folder for images."""
         self._state.keep(snapshots.CHOSEN, str(folder))
         self._show()

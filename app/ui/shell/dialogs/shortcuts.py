@@ -1,4 +1,4 @@
-"""Sheet of all shortcuts: search, change, swap and reset keys."""
+"""Sheet with all shortcuts, to search, change, swap and reset keys."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ HINT = lazy("Press Enter or click to change a shortcut. Press Delete to remove i
 
 
 class ShortcutSheet(Overlay):
-    """Table of shortcuts. While recording, every key except F12 and Esc becomes the new shortcut."""
+    """Table of shortcuts. While it records a new shortcut, it accepts every key except F12 and Esc."""
 
     top = 72
 
@@ -42,7 +42,7 @@ class ShortcutSheet(Overlay):
         super().__init__(theme, window, _("Keyboard shortcuts"))
         self._shortcuts = shortcuts
         self._waiting = ""
-        self._offer: tuple[str, str] | None = None  # a command, and a key held by another one
+        self._offer: tuple[str, str] | None = None  # command, and the key that another command holds
         self.field = SearchField(theme, _("Find a command or key"))
         self.rows = EntryList(theme, _("Keyboard shortcuts"))
         self.said = label(_(HINT), "body", role="textSecondary", wrap=True)
@@ -87,14 +87,14 @@ class ShortcutSheet(Overlay):
         return QSize(min(room.width(), round(scaled(WIDE))), min(room.height(), round(scaled(HIGH))))
 
     def open(self) -> None:
-        """Open with all shortcuts."""
+        """Open the sheet with all shortcuts."""
         self.field.clear()
         self._stop_waiting()
         self._show()
         super().open()
 
     def open_for(self, name: str) -> None:
-        """Open with one command selected and record its new key."""
+        """Open the sheet, select a command and record its new key."""
         self.open()
         self._show(f"command:{name}")
         self.record()
@@ -143,7 +143,7 @@ class ShortcutSheet(Overlay):
             paint.announce(self.field, str(self.rows.currentIndex().data(Qt.ItemDataRole.AccessibleTextRole)))
 
     def record(self) -> None:
-        """Record a new key for the selected command."""
+        """Start to record a new key for the selected command."""
         entry = self.rows.entry
         if entry is None:
             return
@@ -175,7 +175,7 @@ class ShortcutSheet(Overlay):
             return super().eventFilter(watched, event)
         if event.type() == QEvent.Type.ShortcutOverride and self._waiting:
             pressed = cast("QKeyEvent", event)
-            if pressed.key() != Qt.Key.Key_F12:  # F12 is Stop even while recording
+            if pressed.key() != Qt.Key.Key_F12:  # F12 triggers Stop even while a key is recorded
                 event.accept()
                 return True
         if event.type() == QEvent.Type.KeyPress:

@@ -24,7 +24,7 @@ LAYOUT = FileQuestion(
 
 
 class StudioDialogs:
-    """Asks for files and folders with a `FileSheet`."""
+    """Asks for files and folders in a `FileSheet`."""
 
     def __init__(self, theme: Theme, window: QWidget, settings: Settings) -> None:
         self._theme, self._window, self._settings = theme, window, settings
@@ -35,7 +35,7 @@ class StudioDialogs:
         self._made().ask_open(Path(folder or Path.home()), take)
 
     def save(self, suggestion: str, take: Callable[[Path], None]) -> None:
-        """Ask where to save a behaviour."""
+        """Ask for place and name to save a behaviour."""
         self._made().ask_save(Path(suggestion), take)
 
     def save_as(
@@ -45,19 +45,19 @@ class StudioDialogs:
         kinds: Sequence[FileKind],
         take: Callable[[Path, FileKind], None],
     ) -> None:
-        """Ask where and in which format to save another kind of file."""
+        """Ask for place, name and format to save another kind of file."""
         self._made().ask_save_as(title, suggestion, kinds, take)
 
     def open_picture(self, folder: str, take: Callable[[Path], None]) -> None:
-        """Ask for an image."""
+        """Ask for an image file."""
         self._made().ask_picture(Path(folder or pictures_folder()), take)
 
     def open_recording(self, folder: str, take: Callable[[Path], None]) -> None:
-        """Ask for a recording."""
+        """Ask for a recording to open."""
         self._made().ask_open(_nearest(folder), take, RECORDING)
 
     def open_layout(self, folder: str, take: Callable[[Path], None]) -> None:
-        """Ask for a layout file."""
+        """Ask for a layout file to import."""
         self._made().ask_open(_nearest(folder), take, LAYOUT)
 
     def choose_folder(self, folder: str, take: Callable[[Path], None]) -> None:
@@ -75,6 +75,6 @@ class StudioDialogs:
 
 
 def _nearest(folder: str) -> Path:
-    # The nearest existing ancestor if the folder is missing.
+    # Nearest existing ancestor of a missing folder.
     wanted = Path(folder)
     return next((each for each in (wanted, *wanted.parents) if each.is_dir()), Path.home())

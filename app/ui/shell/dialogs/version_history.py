@@ -1,4 +1,4 @@
-"""Sheet of a behaviour's earlier versions with their differences; a version opens as a copy."""
+"""Sheet with the earlier versions of a behaviour and their differences. A version can be opened as a copy."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ SAVE_FIRST = lazy(
 
 
 def difference_words(found: Difference) -> str:
-    """Return a text such as "14 blocks; since then 3 added, 1 removed"."""
+    """Format a difference, such as "14 blocks; since then 3 added, 1 removed"."""
     counts = (
         (found.added, ngettext("{count} added", "{count} added", found.added)),
         (found.removed, ngettext("{count} removed", "{count} removed", found.removed)),
@@ -52,7 +52,10 @@ def difference_words(found: Difference) -> str:
 
 
 class VersionHistorySheet(Overlay):
-    """Version history of one behaviour; reads a version at a time so that the window stays responsive."""
+    """Sheet with the version history of one behaviour.
+
+    Versions are read one at a time, so that the window stays responsive.
+    """
 
     top = 72
 
@@ -63,7 +66,7 @@ class VersionHistorySheet(Overlay):
         open_copy: Callable[[Path, str], object],
         save: Callable[[], object],
     ) -> None:
-        # open_copy gets the file of a version and a name for the copy.
+        # `open_copy` gets the file of a version and a name for the copy.
         super().__init__(theme, window, _("Earlier versions"))
         self._open_copy, self._save = open_copy, save
         self._now: Mapping[str, object] = {}
@@ -109,9 +112,10 @@ class VersionHistorySheet(Overlay):
         now: dt.datetime | None = None,
         title: str = "",
     ) -> None:
-        """Show the versions of a file, compared with the behaviour's current blocks.
+        """Show the versions of a file, compared with the current blocks of the behaviour.
 
-        ``title`` is the name with its folder, used if another open behaviour has the same name.
+        Args:
+            title: Name with folder, used if another open behaviour has the same name.
         """
         self._name, self._now = name, workspace
         moment = now if now is not None else dt.datetime.now().astimezone()
@@ -187,7 +191,7 @@ class VersionHistorySheet(Overlay):
         return super().eventFilter(watched, event)
 
     def open_chosen(self) -> None:
-        """Open the selected version as a copy, unless it can't be read."""
+        """Open the selected version as a copy, unless it is unreadable."""
         entry = self.rows.entry
         if entry is None or entry.reason:
             return

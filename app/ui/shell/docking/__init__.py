@@ -1,4 +1,4 @@
-"""Docks of a layout: frames, positions and sizes.
+"""Docks of a layout: their frames, positions and sizes.
 
-`Workbench` shows one layout; `saved_layouts` saves a person's changes for the next start.
+`Workbench` shows one layout; `saved_layouts` saves the user's changes for the next start.
 """

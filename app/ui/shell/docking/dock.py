@@ -1,4 +1,4 @@
-"""Dock with a title and frame around a panel, and a menu to float and close it."""
+"""Dock: a panel with a title bar and a frame, which can be floated and closed."""
 
 from __future__ import annotations
 
@@ -31,16 +31,16 @@ from nep.i18n import _
 
 MIN_BODY_SIZE = QSize(160, 60)
 SUSPEND_DELAY_S = 2.0
-"""Delay before a hidden panel unsubscribes, so that quick tab changes don't resubscribe."""
+"""Time in s after which a hidden panel is suspended, so that quick tab changes don't resubscribe."""
 CAUGHT_ERRORS = (Exception, SystemExit)
-"""Exceptions of panels that are caught; a plug-in's panel may call `sys.exit`."""
+"""Exceptions of panels that are caught. A plug-in's panel may call `sys.exit`."""
 MAX_SENTENCE_LENGTH = 400
 
 _log = logging.getLogger(__name__)
 
 
 class _Corner(QWidget):
-    """Rounds a lower corner of a panel on top of the panel's own painting."""
+    """Rounds a lower corner of a panel by painting over it."""
 
     def __init__(self, theme: Theme, parent: QWidget, right: bool) -> None:
         super().__init__(parent)
@@ -65,7 +65,7 @@ class _Corner(QWidget):
 
 
 class DockBody(QWidget):
-    """Lower part of the frame, around the panel or its replacement."""
+    """Lower part of the frame, which contains the panel or an error message."""
 
     def __init__(self, theme: Theme, panel: PanelWidget) -> None:
         super().__init__()
@@ -80,7 +80,7 @@ class DockBody(QWidget):
         self._corners = (_Corner(theme, self, False), _Corner(theme, self, True))
 
     def minimumSizeHint(self) -> QSize:
-        # Content scrolls inside the panel, so that its size is up to the person.
+        # The panel scrolls its contents, so the user can resize it freely.
         return MIN_BODY_SIZE
 
     def resizeEvent(self, _event: object) -> None:
@@ -91,7 +91,7 @@ class DockBody(QWidget):
         right.raise_()
 
     def fail(self, sentence: str, again: Callable[[], object]) -> None:
-        """Show an error in place of the panel, with a button to retry."""
+        """Show an error in place of the panel, with a button to try again."""
         if self._failure is None:
             self._failure = EmptyState(self._theme, "circle-x", _("This panel stopped"), sentence)
             self._stack.addWidget(self._failure)
@@ -100,7 +100,7 @@ class DockBody(QWidget):
         self._stack.setCurrentWidget(self._failure)
 
     def show_panel(self) -> None:
-        """Show the panel again."""
+        """Show the panel instead of the error."""
         self._stack.setCurrentIndex(0)
 
     def paintEvent(self, _event: QPaintEvent) -> None:
@@ -114,9 +114,9 @@ class DockBody(QWidget):
 
 
 class FailedPanel(PanelWidget):
-    """Placeholder for a panel whose creation failed; keeps the state to be restored.
+    """Placeholder for a panel whose creation failed. Keeps the state to restore.
 
-    Its first refresh raises the original error; later ones try to create the panel again.
+    The first refresh raises the original error; later ones try to create the panel again.
     """
 
     def __init__(self, context: PanelContext, description: Panel, error: BaseException) -> None:
@@ -125,7 +125,7 @@ class FailedPanel(PanelWidget):
         self._error: BaseException | None = error
         self._state: Mapping[str, object] = {}
         self.take: Callable[[PanelWidget], object] = lambda _panel: None
-        """Called with the panel once its creation succeeds."""
+        """Called with the panel when its creation succeeds."""
 
     def refresh(self) -> None:
         error, self._error = self._error, None
@@ -143,7 +143,10 @@ class FailedPanel(PanelWidget):
 
 
 class Dock(QDockWidget):
-    """A panel in a workbench that can be moved, floated, closed and tabbed; `failed` panels are skipped."""
+    """Panel in a workbench that can be moved, floated, closed and tabbed.
+
+    A `failed` panel is not refreshed.
+    """
 
     another_wanted = Signal(str)
     closed = Signal(str)
@@ -151,7 +154,7 @@ class Dock(QDockWidget):
     def __init__(
         self, theme: Theme, description: Panel, panel: PanelWidget, density: Density, number: int = 1
     ) -> None:
-        # number distinguishes docks of the same kind; key is the unique name in a workbench.
+        # `number` distinguishes docks of the same kind; `key` is the unique name in a workbench.
         super().__init__(numbered(_(description.title), number))
         self.description, self.panel = description, panel
         self.number, self.key = number, key_of(description.name, number)
@@ -176,7 +179,7 @@ class Dock(QDockWidget):
         self.setWidget(body)
 
     def replace(self, panel: PanelWidget) -> None:
-        """Replace a placeholder by its panel."""
+        """Replace the placeholder by the panel."""
         old = (self.title, self.body)
         self._hold(panel)
         for each in old:
@@ -191,13 +194,13 @@ class Dock(QDockWidget):
         self.front = visible
 
     def shown(self) -> bool:
-        """Return whether the panel is visible: open, in front, and in a window on the screen."""
+        """Return True if the panel is visible: open, in front, and in a window on the screen."""
         return self.front and self.isVisible() and on_screen(self.window())
 
     def follow(self, now: float) -> str | None:
-        """Suspend a panel after two seconds hidden, or resume a visible one; called with every tick.
+        """Suspend a panel that was hidden for two seconds, or resume a visible one; called on every tick.
 
-        ``now`` is monotonic seconds. Return the error message if the panel has just failed.
+        ``now`` is monotonic time in s. Return the error message if the panel has just failed.
         """
         if self.failed:
             return None
@@ -207,13 +210,13 @@ class Dock(QDockWidget):
         return self._try(self.panel.suspend) if now - self._seen_s >= SUSPEND_DELAY_S else None
 
     def refresh(self) -> str | None:
-        """Refresh the panel if it is visible; return the error message if it has just failed."""
+        """Refresh the panel if it is visible. Return the error message if the panel has just failed."""
         if self.failed or not self.shown():
             return None
         return self._try(self.panel.refresh)
 
     def badge(self) -> tuple[str, str] | None:
-        """Return the badge of its tab while it is behind another panel."""
+        """Return the badge for the panel's tab while another panel covers it."""
         if self.front or self.failed:
             return None
         found: list[tuple[str, str] | None] = []
@@ -236,15 +239,15 @@ class Dock(QDockWidget):
         return None
 
     def try_again(self) -> None:
-        """Show a failed panel again, starting with the next refresh; otherwise do nothing."""
+        """Show a failed panel again, beginning with the next refresh. Has no effect on other panels."""
         if self.failed:
             self.failed = False
             self.body.show_panel()
 
     def saved_state(self) -> dict[str, object]:
-        """Return the panel's state for the next start, or {} if that fails.
+        """Return the panel's state for the next start, or {} if the panel raises an error.
 
-        It must be valid JSON, because settings are saved as a whole.
+        The state must be valid JSON, because settings are saved as a whole.
         """
         try:
             found = self.panel.save_state()
@@ -255,21 +258,21 @@ class Dock(QDockWidget):
         return found
 
     def give_back(self, state: Mapping[str, object]) -> None:
-        """Restore the panel's state; an error is logged so that the layout is still restored."""
+        """Restore the panel's state. An error is logged, so that the rest of the layout is restored."""
         try:
             self.panel.restore_state(state)
         except CAUGHT_ERRORS:
             _log.exception("restoring panel '%s' failed", self.description.name)
 
     def shut(self) -> None:
-        """Dispose of the panel when the window closes; an error is logged."""
+        """Close the panel before the window closes; an error is logged."""
         try:
             self.panel.dispose()
         except CAUGHT_ERRORS:
             _log.exception("closing panel '%s' failed", self.description.name)
 
     def keyPressEvent(self, event: QKeyEvent) -> None:
-        """Focus the panel's filter on ``/``, leave a field on Esc; also while floating."""
+        """Focus the panel's filter on ``/``, and leave a field on Esc. Also works while the dock floats."""
         if event.text() == "/" and self.panel.focus_filter():
             event.accept()
         elif event.key() == Qt.Key.Key_Escape:
@@ -280,12 +283,12 @@ class Dock(QDockWidget):
             super().keyPressEvent(event)
 
     def menu(self) -> Menu:
-        """Return a menu of the panel's actions, followed by float and close."""
+        """Return a menu with the panel's actions, then float and close."""
         menu = Menu(self._theme, self)
         own: list[QAction] = []
         try:
             own.extend(self.panel.more_actions())
-        except CAUGHT_ERRORS:  # it can still be closed
+        except CAUGHT_ERRORS:  # the dock can still be closed
             _log.exception("reading the actions of panel '%s' failed", self.description.name)
         menu.addActions(own)
         if own:
@@ -306,7 +309,7 @@ class Dock(QDockWidget):
             return about
         stops = tab_stops(self.panel, self.panel)
         first = next(stops, self.panel)
-        if isinstance(first, QScrollArea):  # the first item inside is a better start than the whole area
+        if isinstance(first, QScrollArea):  # the first item inside is a better target than the whole area
             inside = next(stops, None)
             return inside if inside is not None and first.isAncestorOf(inside) else first
         return first
@@ -324,7 +327,7 @@ class Dock(QDockWidget):
             self.closed.emit(self.key)
 
     def _let_go(self) -> None:
-        # Clear the focus first: Qt would pass it on as by Tab, and the editor then opens a category.
+        # Clears the focus first: otherwise Qt would move it as by Tab, and the editor would open a category.
         focus = QApplication.focusWidget()
         if focus is not None and self.isAncestorOf(focus):
             focus.clearFocus()
@@ -344,7 +347,7 @@ def key_of(name: str, number: int) -> str:
 
 
 def kind_of(key: str) -> tuple[str, int]:
-    """Split a key from `key_of` into name and number; other text is a name with number 1."""
+    """Split a key into name and number. Text in another format is a name with the number 1."""
     name, _sign, number = key.rpartition("#")
     if name and number.isascii() and number.isdigit() and key_of(name, int(number[:9])) == key:
         return name, int(number)
@@ -352,7 +355,7 @@ def kind_of(key: str) -> tuple[str, int]:
 
 
 def make_dock(description: Panel, context: PanelContext, density: Density, number: int = 1) -> Dock:
-    """Return a dock with a new panel, or with a `FailedPanel` if the panel can't be created."""
+    """Return a dock with a new panel, or with a `FailedPanel` if creating the panel failed."""
     try:
         return Dock(context.theme, description, description.make(context), density, number)
     except CAUGHT_ERRORS as error:
@@ -364,12 +367,12 @@ def make_dock(description: Panel, context: PanelContext, density: Density, numbe
 
 
 def on_screen(window: QWidget) -> bool:
-    """Return False for a window that is minimised, on another desktop, or (where known) fully covered."""
+    """Return False if a window is minimised, on another desktop, or (where known) completely covered."""
     return not window.isMinimized() and window.windowHandle().isExposed()
 
 
 def fitting(docks: Mapping[str, Dock], names: Iterable[str], kinds: set[str]) -> Dock | None:
-    """Return the first panel that accepts one of the kinds, preferring specific over general panels."""
+    """Return the first dock whose panel accepts one of the kinds. Specific panels precede general ones."""
     there = [docks[name] for name in names]
     for wanted in (kinds, {ANY_TYPE}):
         for dock in there:

@@ -1,4 +1,4 @@
-"""Title of a dock: name or tabs, subtitle, chips, the panel's buttons and the menu."""
+"""Title bar of a dock: name or tabs, subtitle, chips, the panel's buttons and the menu."""
 
 from __future__ import annotations
 
@@ -18,13 +18,14 @@ from nep.i18n import _
 
 ICON, GAP = 16, 7
 BADGE = 18
-MIN_NAME_WIDTH = 56  # px at 100 %; with less room the front panel is shown as an icon, too
+MIN_NAME_WIDTH = 56  # px at 100 %; if there is less room, the front panel is shown as an icon too
 
 
 class TitleTab(PaintedButton):
-    """Tab of a panel in a shared place; a click brings the panel to the front.
+    """Tab of a panel that shares its place with others; a click brings the panel to the front.
 
-    Narrow titles show only its icon, with the name as tooltip. ``badge`` is a count and its status.
+    In a narrow title bar only its icon is shown, with the name as tooltip. ``badge`` is a count and its
+    status.
     """
 
     shortens = True
@@ -38,14 +39,14 @@ class TitleTab(PaintedButton):
         self.setSizePolicy(QSizePolicy.Policy.Preferred, QSizePolicy.Policy.Preferred)
 
     def set_bare(self, bare: bool) -> None:
-        """Show only the icon, or the name again."""
+        """Show only the icon if `bare`, else the name too."""
         if bare != self._bare:
             self._bare = bare
             self.updateGeometry()
             self.update()
 
     def show_badge(self, badge: tuple[str, str] | None) -> None:
-        """Show a count of pending items and the worst status, or no badge for None."""
+        """Show the number of new items with the most severe status; None hides the badge."""
         if badge != self.badge:
             self.badge = badge
             self.setAccessibleDescription(badge[0] if badge else "")
@@ -64,7 +65,7 @@ class TitleTab(PaintedButton):
         return max(self._theme.scaled(BADGE), paint.width_of(self._theme.font("caption"), words) + 10)
 
     def bare_width(self) -> int:
-        """Return the width in px with only the icon."""
+        """Return the width in px with the icon only."""
         return round(self._theme.scaled(ICON) + 16 + self._badge_room())
 
     def sizeHint(self) -> QSize:
@@ -90,7 +91,7 @@ class TitleTab(PaintedButton):
             side = theme.scaled(ICON)
             square = QRectF(0, 0, side, side)
             square.moveCenter(room.center())
-            if room.width() >= side or not self.badge:  # the badge is preferred over a clipped icon
+            if room.width() >= side or not self.badge:  # a badge is preferred over a clipped icon
                 paint_icon(painter, square, self._icon, ink)
         else:
             paint.words(painter, room, self.text(), theme.font("title"), ink, paint.CENTRE)
@@ -99,7 +100,7 @@ class TitleTab(PaintedButton):
 
     def _paint_badge(self, painter: QPainter, rect: QRectF, words: str, status: str) -> None:
         theme, high, wide = self._theme, self._theme.scaled(BADGE), self._badge_width()
-        left = max(rect.left() + 1, rect.right() - wide - 8)  # the badge stays whole when squeezed
+        left = max(rect.left() + 1, rect.right() - wide - 8)  # the badge is never clipped
         place = QRectF(left, rect.center().y() - high / 2, min(wide, rect.width() - 2), high)
         look = theme.status(status)
         paint.box(painter, place, high / 2, theme.colour(look.tint or "sunken"), theme.colour(look.colour))
@@ -107,14 +108,14 @@ class TitleTab(PaintedButton):
 
 
 class DockTitle(QWidget):
-    """Title of a dock; paints the upper part of the panel's frame."""
+    """Title bar of a dock. Also paints the upper part of the panel's frame."""
 
     menu_wanted = Signal(object)
 
     def __init__(self, theme: Theme, panel: PanelWidget, density: Density) -> None:
         super().__init__()
         self._theme, self._panel, self._density = theme, panel, density
-        self._least = theme.size("panelTitle", density)  # cached for layouts, which read it often
+        self._least = theme.size("panelTitle", density)  # cached, because layouts read it often
         self._whole = panel.replaces_title()
         self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Fixed)
         self.name = ElidedLabel("titleLarge" if density == "comfortable" else "title", "textSecondary", 120)
@@ -125,14 +126,14 @@ class DockTitle(QWidget):
         column = QVBoxLayout(self)
         column.setContentsMargins(0, 0, 0, 0)
         column.setSpacing(0)
-        self._shared = QWidget()  # a separate row for panel tabs if the panel has tabs of its own
+        self._shared = QWidget()  # row for panel tabs above the title of a panel that has tabs itself
         self._shared_row = QHBoxLayout(self._shared)
         self._shared_row.setContentsMargins(5, 1, 6, 1)
         self._shared_row.setSpacing(8)
         self._shared_row.addStretch(1)
         self._shared.hide()
         column.addWidget(self._shared)
-        own = QWidget()  # a widget: the size of a nested layout is updated late
+        own = QWidget()  # a widget, because the size of a nested layout is updated late
         own.installEventFilter(self)
         self._row = QHBoxLayout(own)
         column.addWidget(own, 1)
@@ -173,10 +174,10 @@ class DockTitle(QWidget):
         return max(self._least, self._shared_row.sizeHint().height())
 
     def minimumSizeHint(self) -> QSize:
-        return QSize(80, self._height())  # doesn't call sizeHint: this is called as often
+        return QSize(80, self._height())  # doesn't call sizeHint, because this is called often
 
     def show_title(self) -> None:
-        """Update the name and subtitle from the panel."""
+        """Update name and subtitle to those of the panel."""
         self.name.setText(self._panel.title())
         self._subtitle.setText(self._panel.subtitle())
         paint.show_when(self._subtitle, bool(self._panel.subtitle()) and self._whole is None)
@@ -185,11 +186,11 @@ class DockTitle(QWidget):
                 tab.setText(self._panel.title())
 
     def set_active(self, active: bool) -> None:
-        """Darken the name while the panel has the focus."""
+        """Darken the name while the panel has the focus (`active`)."""
         set_role(self.name, "text" if active else "textSecondary")
 
     def set_tabs(self, names: Sequence[tuple[str, str, bool, Callable[[], object]]]) -> None:
-        """Set the tabs of a shared place: (name, icon, is this panel, callback to bring it to the front)."""
+        """Set the tabs of a shared place, each as (name, icon, True for this panel, callback to show it)."""
         row = self._tab_row
         for old in self._tabs:
             row.removeWidget(old)
@@ -212,13 +213,14 @@ class DockTitle(QWidget):
 
     @property
     def _tab_row(self) -> QHBoxLayout:
-        # Panel tabs are never in the same row as a panel's own tabs.
+        # Panel tabs are never in one row with the tabs of a panel itself.
         return self._row if self._whole is None else self._shared_row
 
     def fit_tabs(self) -> None:
-        """Shorten the row to its width: first the chips, then the tabs of hidden panels become icons.
+        """Fit the row to its width: first shorten the chips, then show tabs of hidden panels as icons.
 
-        As a last step the front panel becomes an icon, too. Chips with an unspecific icon keep their text.
+        As a last step, the front panel is shown as an icon too. Chips with an unspecific icon keep their
+        text.
         """
         chips = [chip for chip in self._others() if isinstance(chip, Chip) and chip.status != "off"]
         if not self._tabs:
@@ -246,7 +248,7 @@ class DockTitle(QWidget):
         return [each for each in widgets if each and not each.isHidden() and each not in self._tabs]
 
     def _room_for_tabs(self) -> int:
-        # In px, with the full text of all chips.
+        # Width in px with the full text of all chips.
         row, others = self._tab_row, self._others()
         margins, taken = row.contentsMargins(), 0
         for each in others:
@@ -259,7 +261,7 @@ class DockTitle(QWidget):
         return self.width() - margins.left() - margins.right() - taken - gaps
 
     def show_badges(self, badges: Sequence[tuple[str, str] | None]) -> None:
-        """Set the badges of the panels in this place, one for each tab."""
+        """Set the badges of the panels in this place, one per tab."""
         for tab, badge in zip(self._tabs, badges, strict=False):
             if badge != tab.badge:
                 tab.show_badge(badge)
@@ -270,7 +272,7 @@ class DockTitle(QWidget):
         self.fit_tabs()
 
     def eventFilter(self, watched: QObject, event: QEvent) -> bool:
-        """Fit the tabs again after a chip or button has changed its size."""
+        """Fit the tabs again when a chip or button changes its size."""
         if event.type() is QEvent.Type.LayoutRequest and watched is not self:
             self.fit_tabs()
         return super().eventFilter(watched, event)

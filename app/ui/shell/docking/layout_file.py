@@ -1,4 +1,4 @@
-"""Layout file for exchange: name, base layout and arrangement of panels."""
+"""Layout file for sharing: name, base layout and arrangement of the panels."""
 
 from __future__ import annotations
 
@@ -21,12 +21,12 @@ MAX_BYTES = 1_000_000
 
 
 class LayoutFileError(AppError):
-    """Reason why a file can't be used as a layout, without a full stop."""
+    """Raised if a file can't be used as a layout. The message is a phrase without a full stop."""
 
 
 @dataclass(frozen=True, slots=True)
 class LayoutFile:
-    """Content of a layout file; ``unknown`` lists its panels that this installation lacks."""
+    """Contents of a layout file; ``unknown`` lists its panels that aren't installed here."""
 
     name: str
     base: str
@@ -35,7 +35,7 @@ class LayoutFile:
 
 
 def layout_bytes(name: str, base: str, saved: Mapping[str, object]) -> bytes:
-    """Return the file content for an arrangement from `Workbench.save`."""
+    """Return the contents of a file for an arrangement returned by `Workbench.save`."""
     plain = {
         "format": FORMAT,
         "version": VERSION,
@@ -49,7 +49,7 @@ def layout_bytes(name: str, base: str, saved: Mapping[str, object]) -> bytes:
 
 
 def _sum(saved: Mapping[str, object]) -> str:
-    # Checksum, because Qt doesn't validate its part of the state and may crash if it is damaged.
+    # A checksum is needed because Qt doesn't validate its part of the state and may crash if it is damaged.
     plain = orjson.dumps(dict(saved), option=orjson.OPT_SORT_KEYS | orjson.OPT_NON_STR_KEYS)
     return hashlib.sha256(plain).hexdigest()
 
@@ -97,7 +97,7 @@ def read_layout(data: bytes, stem: str, panels: Collection[str]) -> LayoutFile:
 
 
 def _name(told: object, stem: str) -> str:
-    # Shortened to a single line for menus.
+    # Shortened to one line for menus.
     for each in (told, stem):
         letters = (
             letter if letter.isprintable() else " " for letter in (each if isinstance(each, str) else "")

@@ -1,4 +1,4 @@
-"""Built-in layouts: Behaviour for building and running, Developer for programmers."""
+"""Built-in layouts: Behaviour to build and run behaviours, Developer for programmers."""
 
 from __future__ import annotations
 
@@ -11,10 +11,11 @@ from nep.i18n import lazy
 
 @dataclass(frozen=True)
 class DockColumn:
-    """Column of panels: (names that share a place, height). ``width`` 0 takes the remaining space.
+    """Column of panels.
 
-    The width grows with the text up to the share ``most`` of the window's width; in a large window it is
-    ``share`` of it.
+    Each row has the names of the panels that share a place, and a height. A ``width`` of 0 takes the
+    remaining space. The width grows with the text size up to the share ``most`` of the window's width; in a
+    large window it is ``share`` of it.
     """
 
     width: int
@@ -36,16 +37,16 @@ class Fold:
     below_height: int = 0
 
     def wanted(self, width: float, height: float) -> bool:
-        """Return whether a workbench of this size in px at 100 % text is too small."""
+        """Return True if the panels are folded in a workbench of this size (px at 100 % text)."""
         return width < self.below_width or height < self.below_height
 
 
 @dataclass(frozen=True)
 class Layout:
-    """Default arrangement of a layout: columns from the left, with ``folds`` for little space.
+    """Default arrangement of a layout: columns from the left, and ``folds`` for small windows.
 
     Attributes:
-        title: Marked with `lazy`.
+        title: Title, wrapped in `lazy`.
         homes: Panel next to which another one opens as a tab; others open next to the last panel.
         brings: Panel that opens together with another one, and isn't open by default.
         taller: Minimum height of the place of a panel while it is open.
@@ -147,5 +148,5 @@ LAYOUTS: tuple[Layout, ...] = (BEHAVIOUR, DEVELOPER)
 
 
 def layout_named(name: str) -> Layout:
-    """Return the layout with this name, or the first one."""
+    """Return the layout with this name, or the first one if there is none."""
     return next((layout for layout in LAYOUTS if layout.name == name), LAYOUTS[0])

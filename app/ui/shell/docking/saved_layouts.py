@@ -1,7 +1,7 @@
-"""Saved layouts: the last state of Behaviour and Developer, and custom layouts.
+"""Saved layouts: the last states of Behaviour and Developer, and custom layouts.
 
-A custom layout arranges the panels of Behaviour or Developer, its base. Like the built-in ones it keeps its
-last state. Saved entries that no longer fit are skipped with a line in the Console.
+A custom layout arranges the panels of Behaviour or Developer, its base. Like the built-in ones, it keeps its
+last state. Saved entries that no longer fit are skipped and reported in the Console.
 """
 
 from __future__ import annotations
@@ -20,17 +20,17 @@ MAX_LENGTH = 40
 
 @dataclass(frozen=True, slots=True)
 class OwnLayout:
-    """Custom layout, and the built-in layout that it is based on."""
+    """Custom layout, with the built-in layout that it is based on."""
 
     name: str
     base: str
 
 
 class SavedLayouts:
-    """Current arrangement of each workbench and the saved states of all layouts."""
+    """Current arrangement of each workbench, and saved states of all layouts."""
 
     def __init__(self, state: WindowState, complain: Callable[[str], object]) -> None:
-        # complain gets a sentence about damaged entries.
+        # `complain` is called with a sentence about damaged entries.
         self._state, self._complain = state, complain
         self._current: dict[str, str] = {}
 
@@ -48,7 +48,7 @@ class SavedLayouts:
         return next((own for own in self.all() if own.name == name), None)
 
     def own(self, base: str) -> str:
-        """Return the custom layout that a workbench shows, or "" for the built-in one."""
+        """Return the name of the custom layout that a workbench shows, or "" for the built-in one."""
         chosen = self._current.get(base)
         if chosen is None:
             chosen = self._current[base] = self._state.chosen(base)
@@ -56,7 +56,7 @@ class SavedLayouts:
         return chosen if found is not None and found.base == base else ""
 
     def refusal(self, name: str, but: str = "") -> str:
-        """Return why a name is invalid as a sentence, or ""."""
+        """Return the reason why a name is invalid, as a sentence, or ""."""
         name = name.strip()
         if not name:
             return _("A layout needs a name.")
@@ -84,12 +84,12 @@ class SavedLayouts:
             self._complain(words.format(name=own or _(layout_named(base).title)))
 
     def keep(self, bench: Workbench, base: str) -> None:
-        """Save the arrangement of a workbench under the current layout's name."""
+        """Save the arrangement of a workbench under the name of its current layout."""
         own = self.own(base)
         self._state.keep_layouts({OWN_PREFIX + own if own else base: {**bench.save(), "base": base}})
 
     def use(self, bench: Workbench, base: str, own: str) -> None:
-        """Show another layout ("" for the built-in one) after saving the current one."""
+        """Save the current layout, then show another one ("" for the built-in one)."""
         if own == self.own(base):
             return
         self.keep(bench, base)
@@ -97,16 +97,16 @@ class SavedLayouts:
         self.bring_back(bench, base)
 
     def keep_as(self, bench: Workbench, base: str, name: str) -> bool:
-        """Save the current arrangement as a new custom layout and show it; the old one keeps its state.
+        """Save the current arrangement as a new custom layout and show that. The old layout keeps its state.
 
-        Return False if it couldn't be written and is lost when Studio ends.
+        Return False if the layout couldn't be saved and will be lost when Studio ends.
         """
         kept = self._state.keep_layouts({OWN_PREFIX + name.strip(): {**bench.save(), "base": base}})
         self._choose(base, name.strip())
         return kept
 
     def fits(self, bench: Workbench, base: str, saved: Mapping[str, object]) -> bool:
-        """Return whether an imported arrangement can be shown, by trying it before anything is saved."""
+        """Return True if an imported arrangement can be restored; tries that before anything is saved."""
         self.keep(bench, base)
         try:
             return bench.restore(saved)
@@ -117,7 +117,7 @@ class SavedLayouts:
             self.bring_back(bench, base)
 
     def take_in(self, name: str, base: str, saved: Mapping[str, object]) -> tuple[str, bool]:
-        """Save an imported arrangement; return its name and whether it was written.
+        """Save an imported arrangement. Return its name, and False if it couldn't be saved.
 
         A number is appended if the name is taken or invalid.
         """
@@ -140,9 +140,10 @@ class SavedLayouts:
             self._choose(found.base, new.strip())
 
     def delete(self, bench: Workbench | None, name: str) -> tuple[bool, Callable[[], None]]:
-        """Delete a custom layout; return whether that was saved, and a function that restores it.
+        """Delete a custom layout; its workbench then shows the built-in layout.
 
-        Its workbench shows the built-in layout afterwards.
+        Returns:
+            True if the deletion was saved, and a function that restores the layout.
         """
         found = self.named(name)
         if found is None:

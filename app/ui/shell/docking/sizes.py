@@ -1,8 +1,8 @@
-"""Default sizes of panels until a person moves the separators.
+"""Default sizes of panels, which apply until the user moves a separator.
 
 A column keeps its width, and the last panel of a column (before panels that open later) its height; the
 others share the additional space of a larger window. In a small window all shrink in proportion. Columns grow
-with the text up to the limit of the layout.
+with the text size up to the limit of the layout.
 """
 
 from __future__ import annotations
@@ -18,9 +18,10 @@ MIN_SIZE_PX = 120
 
 
 def shares(wanted: Sequence[int], room: int, *, keep: Sequence[bool]) -> list[int]:
-    """Return sizes that fill ``room``: fixed ones for ``keep``, the others in proportion.
+    """Return sizes that fill ``room``.
 
-    If less than `MIN_SIZE_PX` each were left for the others, all sizes are proportional with this minimum.
+    Sizes whose ``keep`` is True are unchanged, the others are scaled in proportion. If less than
+    `MIN_SIZE_PX` each were left for the others, all sizes are scaled with this minimum.
     """
     whole = max(1, sum(wanted))
     least = sum(size if kept else MIN_SIZE_PX for size, kept in zip(wanted, keep, strict=True))
@@ -48,8 +49,10 @@ def fit(
 ) -> None:
     """Resize all columns and panels to the layout's proportions in the available space.
 
-    ``scale`` is the text size; panels in ``folded`` are in another column. ``below`` px at the bottom belong
-    to a panel of full width.
+    Args:
+        scale: Text size.
+        folded: Panels that are in another column.
+        below: Height in px at the bottom that belongs to a panel of full width.
     """
     columns = []
     before: list[QDockWidget] = []
@@ -101,7 +104,7 @@ def shrink_above(
     *,
     below: int,
 ) -> None:
-    """Shrink the columns of an area to the space above ``below`` px, with unchanged proportions."""
+    """Shrink the columns of an area to leave ``below`` px free at the bottom; proportions are kept."""
     columns: dict[int, list[QDockWidget]] = {}
     for dock in docks:
         is_seen = not dock.isFloating() and not dock.visibleRegion().isEmpty()

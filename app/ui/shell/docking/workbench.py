@@ -1,4 +1,4 @@
-"""Workbench: the docks of one layout; saves and restores their arrangement."""
+"""Workbench that holds the docks of one layout, and saves and restores their arrangement."""
 
 from __future__ import annotations
 
@@ -22,15 +22,15 @@ DOWN = Qt.Orientation.Vertical
 AREA = Qt.DockWidgetArea.LeftDockWidgetArea
 BELOW = Qt.DockWidgetArea.BottomDockWidgetArea
 MAX_BELOW_SHARE = 0.42
-"""Share of the window's height."""
+"""Maximum height of panels below all others, as a share of the window's height."""
 STATE_VERSION = 1  # when it changes, app.core.storage.settings.FORMAT must change, too
 MAX_OF_A_KIND = 8
 
 
 class Workbench(QMainWindow):
-    """Docks of one layout by key; panels are created when first opened.
+    """Docks of one layout, by key. Panels are created when they are first opened.
 
-    Closed panels are kept. Additional panels of a kind are deleted when closed, so that they use no
+    Closed panels are kept, except for additional panels of a kind, which are deleted to release their
     resources.
     """
 
@@ -49,15 +49,15 @@ class Workbench(QMainWindow):
         self._ahead: dict[str, Dock] = {}  # created in advance
         self._floating: list[Dock] = []
         self._sharing: dict[Dock, list[Dock]] = {}  # panels of a shared place in tab order
-        self._folded: tuple[Fold, ...] = ()  # folds that are active because of a small window or large text
+        self._folded: tuple[Fold, ...] = ()  # active folds, because of a small window or large text
         self._wide = QByteArray()  # state before folding
         self._arranged = False
         self._moved = False  # the user has moved a separator
-        self._used: list[str] = []  # panels by last focus, latest last
+        self._used: list[str] = []  # panels by last focus, latest at the end
         self._halves: tuple[Dock, Dock] | None = None  # two docks to be resized to equal sizes
         self._heights: dict[str, int] = {}  # last heights of closed panels below all others
-        self._set_aside: dict[str, Mapping[str, object]] = {}  # states of panels deleted by a reset
-        self._reopened: Dock | None = None  # its height is to be restored
+        self._set_aside: dict[str, Mapping[str, object]] = {}  # states of panels that a reset deleted
+        self._reopened: Dock | None = None  # dock whose height is to be restored
         self.setWindowFlags(Qt.WindowType.Widget)
         self.setProperty("density", layout.density)
         # the style caches the separator width from before the property was set
@@ -80,14 +80,14 @@ class Workbench(QMainWindow):
         theme.changed.connect(self._text_changed)
 
     def make_ahead(self, name: str) -> None:
-        """Create a panel before it is opened, to avoid a delay; it is suspended until visible."""
+        """Create a panel before it is opened, to avoid a delay then. It is suspended until visible."""
         description = self._panels.get(name)
         if description is not None and name not in self.docks and name not in self._ahead:
             self._ahead[name] = made = make_dock(description, self._context, self._layout.density)
             made.follow(0.0)
 
     def arrange(self) -> None:
-        """Restore the default arrangement, discarding a person's changes."""
+        """Restore the default arrangement and discard the user's changes."""
         for old in list(self.docks.values()):
             old.setFloating(False)
             self.removeDockWidget(old)
@@ -116,7 +116,7 @@ class Workbench(QMainWindow):
         self._adapt()
 
     def _put(self, names: Sequence[str], above: Dock | None, left: Dock | None) -> Dock | None:
-        # names share a place below "above" or right of "left".
+        # `names` share a place below "above" or right of "left".
         first: Dock | None = None
         for name in names:
             dock = self._dock(name)
@@ -137,7 +137,7 @@ class Workbench(QMainWindow):
         return first
 
     def _size(self) -> None:
-        # Does nothing if the user has moved a separator.
+        # Has no effect if the user has moved a separator.
         halves, self._halves = self._halves, None
         if halves is not None:
             way = ACROSS if halves[0].y() == halves[1].y() else DOWN
@@ -192,9 +192,9 @@ class Workbench(QMainWindow):
         return dock
 
     def open(self, name: str) -> Dock | None:
-        """Show a panel in front at its last position; return None if the name is unknown.
+        """Show a panel in front at its last position. Return None if the name is unknown.
 
-        When opened for the first time it opens its associated panel, too.
+        When opened for the first time, the panel opens its associated panel too.
         """
         brought = self._layout.brings.get(name, "")
         if brought and name not in self.docks and brought not in self.docks:
@@ -205,7 +205,8 @@ class Workbench(QMainWindow):
         if dock.parent() is not self or self.dockWidgetArea(dock) == Qt.DockWidgetArea.NoDockWidgetArea:
             join(self, self._layout, self.docks, dock)
             self._size_timer.start(0)
-        if dock.isHidden() and name in self._layout.below:  # Qt gives it half of its previous height
+        # otherwise Qt gives the dock half of its previous height
+        if dock.isHidden() and name in self._layout.below:
             self._reopened = dock
             self._size_timer.start(0)
         dock.try_again()
@@ -215,11 +216,11 @@ class Workbench(QMainWindow):
         return dock
 
     def open_latest(self, name: str) -> Dock | None:
-        """Show the last used open panel of a kind, or the first one."""
+        """Show the last used open panel of a kind, or else the first one."""
         return self.open(next((key for key in self.by_use() if kind_of(key)[0] == name), name))
 
     def open_another(self, key: str) -> Dock | None:
-        """Open an additional panel of a kind next to an existing one; return None at the limit."""
+        """Open an additional panel of a kind next to an existing one. Return None if the maximum is open."""
         name = kind_of(key)[0]
         free = (number for number in range(1, MAX_OF_A_KIND + 1) if not self._is_open(key_of(name, number)))
         number = next(free, 0)
@@ -246,7 +247,7 @@ class Workbench(QMainWindow):
         return key in self.docks and not self.docks[key].isHidden()
 
     def source_changed(self) -> None:
-        """Notify all panels, including closed ones, that another source is shown."""
+        """Notify all panels, also closed ones, that the source has changed."""
         for dock in (*self.docks.values(), *self._ahead.values()):
             dock.panel.source_changed()
 
@@ -261,7 +262,7 @@ class Workbench(QMainWindow):
         return tuple(sorted(opened, key=lambda key: -self._used.index(key) if key in self._used else 1))
 
     def _closed(self, key: str) -> None:
-        # An additional panel is deleted, unless it is reopened immediately.
+        # An additional panel is deleted unless it is reopened immediately.
         dock = self.docks.get(key)
         if dock is not None and key in self._layout.below and not dock.isFloating():
             self._heights[key] = dock.height()
@@ -331,7 +332,7 @@ class Workbench(QMainWindow):
         self._size_timer.start(0)
 
     def _adapt(self) -> None:
-        # Folds and unfolds panels by the available space.
+        # Folds or unfolds panels depending on the available space.
         scale = self._theme.scaled(1)
         room = self.width() / scale, self.height() / scale
         wanted = tuple(fold for fold in self._layout.folds if fold.wanted(*room) and self._can(fold))
@@ -358,7 +359,7 @@ class Workbench(QMainWindow):
         return all(dock is not None and not dock.isFloating() for dock in docks)
 
     def _fold(self, fold: Fold) -> None:
-        # Moves the panels with those that share their places; the target stays in front.
+        # Moves the panels with those that share their places; the target panel stays in front.
         into = self.docks[fold.into]
         for name in fold.panels:
             dock = self.docks[name]
@@ -377,7 +378,7 @@ class Workbench(QMainWindow):
         }
 
     def _unfold(self) -> None:
-        # Restores the state before folding: splitting a dock off a tab would create a new tab.
+        # Restores the state before folding, because splitting a dock off a tab would create a new tab.
         self._folded = ()
         opened = self.open_names()
         if not self.restoreState(self._wide, STATE_VERSION):
@@ -403,7 +404,10 @@ class Workbench(QMainWindow):
         self._floating = []
 
     def follow(self, now: float) -> None:
-        """Suspend hidden panels and resume visible ones; called with every tick, even while hidden."""
+        """Suspend hidden panels and resume visible ones.
+
+        Called on every tick, even while the workbench is hidden.
+        """
         for name, dock in list(self.docks.items()):
             self._tell_failure(name, dock.follow(now))
 
@@ -412,11 +416,11 @@ class Workbench(QMainWindow):
         return [dock.panel for dock in self.docks.values() if dock.shown()]
 
     def shows_pictures(self) -> bool:
-        """Return whether an image panel is visible, which is refreshed at twice the rate."""
+        """Return True if a panel with images is visible, which is refreshed at twice the rate."""
         return any(dock.panel.shows_pictures and dock.shown() for dock in self.docks.values())
 
     def refresh(self, *, pictures: bool = False) -> None:
-        """Refresh all visible panels, or only image panels with ``pictures``."""
+        """Refresh all visible panels, or with ``pictures`` only those with images."""
         for name, dock in list(self.docks.items()):
             if pictures and not dock.panel.shows_pictures:
                 continue
@@ -429,7 +433,7 @@ class Workbench(QMainWindow):
             self.panel_failed.emit(name, sentence)
 
     def focus_home(self) -> None:
-        """Focus the main panel of the layout: the first open one."""
+        """Focus the main panel of the layout, which is the first open one."""
         dock = next((dock for dock in self.docks.values() if not dock.isHidden()), None)
         if dock is not None:
             dock.first_stop().setFocus(Qt.FocusReason.OtherFocusReason)
@@ -443,7 +447,7 @@ class Workbench(QMainWindow):
         dock.first_stop().setFocus(Qt.FocusReason.ShortcutFocusReason)
 
     def save(self) -> dict[str, object]:
-        """Return the arrangement for `restore`."""
+        """Return the arrangement in the format of `restore`."""
         return {
             "open": [
                 name for name, dock in self.docks.items() if not dock.isHidden() or dock in self._floating
@@ -456,7 +460,7 @@ class Workbench(QMainWindow):
         }
 
     def restore(self, saved: Mapping[str, object]) -> bool:
-        """Restore an arrangement from `save`; return False and show the default if it doesn't fit."""
+        """Restore an arrangement returned by `save`. If it doesn't fit, show the default and return False."""
         self.arrange()
         names, panels = saved.get("open"), saved.get("panels")
         if not isinstance(names, list):
@@ -474,7 +478,7 @@ class Workbench(QMainWindow):
             kept = panels.get(name) if isinstance(panels, Mapping) else None
             if isinstance(kept, Mapping):
                 dock.give_back(kept)
-        self._adapt()  # size of the window or text may have changed
+        self._adapt()  # the size of window or text may have changed
         self._tabs_soon()
         return True
 
@@ -486,7 +490,7 @@ class Workbench(QMainWindow):
         return tuple(fold for fold in self._layout.folds if fold.panels[0] in names)
 
     def shut(self) -> None:
-        """Dispose of all panels when the window closes."""
+        """Close all panels before the window closes."""
         for dock in (*self.docks.values(), *self._ahead.values()):
             dock.shut()
 
@@ -500,7 +504,7 @@ def _raiser(dock: Dock) -> Callable[[], object]:
 
 
 def join(bench: QMainWindow, layout: Layout, docks: Mapping[str, Dock], dock: Dock) -> None:
-    """Place a panel: below the row above its own, as a tab of its home, or next to the last panel."""
+    """Place a new panel: below the row above its own, as a tab of its home, or next to the last panel."""
     name = dock.description.name
     placed = {
         other.key: other
@@ -525,7 +529,7 @@ def join(bench: QMainWindow, layout: Layout, docks: Mapping[str, Dock], dock: Do
 def put_beside(
     bench: QMainWindow, layout: Layout, docks: Mapping[str, Dock], dock: Dock, other: Dock | None
 ) -> None:
-    """Give a panel half the place of another one, split along its longer side, even if that has tabs."""
+    """Give a panel half the place of another one, split along the longer side, even if that has tabs."""
     if other is None or other.isHidden() or other.isFloating():
         join(bench, layout, docks, dock)
         return
@@ -551,7 +555,7 @@ def put_beside(
 
 
 def _above(layout: Layout, name: str) -> str:
-    # The panel in the row above one that opens later.
+    # Panel in the row above that of a panel which opens later.
     if name in layout.later:
         for column in layout.columns:
             for (names, _), (below, _) in zip(column.rows, column.rows[1:], strict=False):
@@ -566,7 +570,7 @@ def state_text(state: QByteArray) -> str:
 
 
 def state_of(text: object) -> QByteArray:
-    """Decode a state from `state_text`; empty if the text is invalid."""
+    """Decode a state encoded by `state_text`; empty if the text is invalid."""
     if not isinstance(text, str):
         return QByteArray()
     try:

@@ -1,4 +1,4 @@
-"""Sheet "Web pages and tablets": permissions, QR code, connected pages, and rejections.
+"""Sheet "Web pages and tablets": permissions, QR code, connected pages, and rejected requests.
 
 The server and its settings are in `app.core.network.web_pages`.
 """

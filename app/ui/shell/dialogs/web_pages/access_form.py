@@ -1,4 +1,4 @@
-"""Access to the web server: address, token, the network that it is open to, and the QR code."""
+"""Form for access to the web server: address, token, network on which it is reachable, and QR code."""
 
 from __future__ import annotations
 
@@ -23,9 +23,9 @@ _VISIBLE_CHARS = 4
 
 
 class OpenTo(QWidget):
-    """Choice of this computer or one of its addresses.
+    """Choice of the address on which the server is reachable.
 
-    Emits `chosen` with the address, or "" for this computer.
+    Emits `chosen` with one of this computer's addresses, or "" for this computer only.
     """
 
     chosen = Signal(str)
@@ -39,7 +39,7 @@ class OpenTo(QWidget):
         self._hosts: tuple[str, ...] = ()
 
     def offer(self, addresses: Sequence[OwnAddress], value: str) -> None:
-        """Offer this computer and its addresses, with ``value`` selected."""
+        """Set the available addresses, with ``value`` selected."""
         if value and value not in {own.host for own in addresses}:  # the computer no longer has this address
             addresses = (*addresses, OwnAddress(value, ""))
         options: list[tuple[str, str, str | None]] = [("", _("This computer"), None)]
@@ -64,7 +64,7 @@ class OpenTo(QWidget):
 
     @property
     def value(self) -> str:
-        """Selected address."""
+        """Selected address, or "" for this computer only."""
         return "" if self._choice is None else self._choice.value
 
     def set_value(self, value: str) -> None:
@@ -74,12 +74,12 @@ class OpenTo(QWidget):
 
     @property
     def choice(self) -> QWidget | None:
-        """Widget that gets the focus."""
+        """Widget of the choice that gets the focus."""
         return self._choice
 
 
 class AccessForm(QWidget):
-    """First part of the form: emits signals for requested changes; `show_state` shows the current state."""
+    """First part of the form. Signals request changes; `show_state` shows the current state."""
 
     copy_address = Signal()
     copy_token = Signal()
@@ -144,7 +144,7 @@ class AccessForm(QWidget):
         self.qr_words.setFixedWidth(round(self._theme.scaled(SIDE)))
 
     def show_state(self, *, is_foxglove: bool) -> None:
-        """Show the server's address, its token, and its reach."""
+        """Show the server's address, its token, and the computers that can reach it."""
         web = self._web
         self.address.show_text(web.url)
         self._show_token()

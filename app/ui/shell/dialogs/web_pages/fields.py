@@ -1,4 +1,4 @@
-"""Read-only fields for an address or a token, with buttons inside the frame."""
+"""Read-only fields for an address or a token, with buttons inside their frame."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ _PADDING, _BUTTON = 10, 26
 
 
 class _ReadOnlyLine(QLineEdit):
-    """Read-only field: without a selection, Ctrl+C copies the full text, even if parts of it are masked."""
+    """Read-only line edit. If nothing is selected, Ctrl+C copies the full text, even if parts are masked."""
 
     copy_wanted = Signal()
     focused = Signal()
@@ -37,12 +37,12 @@ class _ReadOnlyLine(QLineEdit):
 
 
 class CopyField(QWidget):
-    """Text to read and copy; emits `copy_wanted` for its button and Ctrl+C."""
+    """Field with a text to copy; emits `copy_wanted` for its button and Ctrl+C."""
 
     copy_wanted = Signal()
 
     def __init__(self, theme: Theme, name: str, copy_words: str, *buttons: IconButton) -> None:
-        # copy_words is the button's name; buttons are placed before it.
+        # `copy_words` is the name of the copy button; `buttons` are placed before it.
         super().__init__()
         self._theme = theme
         self.line = _ReadOnlyLine()
@@ -70,7 +70,7 @@ class CopyField(QWidget):
         return self.line.text()
 
     def show_text(self, text: str, *, can_copy: bool = True) -> None:
-        """Set the text, scrolled to its start."""
+        """Set the text and scroll to its start."""
         if text != self.line.text():
             self.line.setText(text)
             self.line.setCursorPosition(0)
@@ -97,18 +97,18 @@ class CopyField(QWidget):
 
 
 class RoleIcon(QWidget):
-    """Icon in the colour of a role; decorates a text with the same meaning."""
+    """Icon in the colour of a role, next to a text with the same meaning."""
 
     def __init__(
         self, theme: Theme, icon: str, role: str = "textSecondary", side: int = 16, *, is_at_top: bool = False
     ) -> None:
-        # is_at_top aligns it with the first of several lines.
+        # `is_at_top` aligns the icon with the first of several lines.
         super().__init__()
         self._is_at_top = is_at_top
         self._theme, self._icon, self._role, self._side = theme, icon, role, side
 
     def set(self, icon: str, role: str) -> None:
-        """Set icon and role."""
+        """Set the icon and the colour role."""
         if (icon, role) != (self._icon, self._role):
             self._icon, self._role = icon, role
             self.update()

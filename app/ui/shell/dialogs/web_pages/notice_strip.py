@@ -1,4 +1,4 @@
-"""Latest rejection or slow page, with a button for the fix and one to dismiss it."""
+"""Strip with the latest rejected request or slow page, with buttons to fix and to dismiss it."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ _BUTTONS = {
 
 
 class NoticeStrip(AlertBox):
-    """Shows one notice; emits `helped` for its button and `dismissed` for its cross."""
+    """Strip with one notice; emits `helped` for its button and `dismissed` for its close button."""
 
     helped = Signal()
     dismissed = Signal()

@@ -1,4 +1,4 @@
-"""Qt model of connected pages and their topics, updated in place."""
+"""Qt model of connected pages and their topics, which is updated in place."""
 
 from __future__ import annotations
 
@@ -37,9 +37,9 @@ class PageRow:
 
 
 class PageTreeModel(QAbstractItemModel):
-    """Pages with their topics as children; indexes stay valid while other rows come and go.
+    """Tree model of pages with their topics as children. Indexes stay valid while other rows come and go.
 
-    It has a single column: with several, Qt would query the size of each cell of thousands of topics.
+    There is a single column: with several, Qt would query the size of each cell of thousands of topics.
     """
 
     def __init__(self, parent: QObject | None = None) -> None:
@@ -84,7 +84,7 @@ class PageTreeModel(QAbstractItemModel):
         return _("Page and topics") if is_title and section == 0 else None
 
     def page_row(self, index: Index) -> PageRow | None:
-        """Return the row of a page, or of the page that a topic belongs to."""
+        """Return the row of a page, or of the page to which a topic belongs."""
         if not index.isValid():
             return None
         page_id = index.internalId() - 1
@@ -93,12 +93,12 @@ class PageTreeModel(QAbstractItemModel):
         return self._rows[index.row()] if index.row() < len(self._rows) else None
 
     def topic(self, index: Index) -> PageTopic | None:
-        """Return the topic of an index, or None for a page."""
+        """Return the topic of an index, or None if it is a page."""
         row = self._by_id.get(index.internalId() - 1) if index.isValid() else None
         return row.topics[index.row()] if row is not None and index.row() < len(row.topics) else None
 
     def show_pages(self, listed: Sequence[ListedPage]) -> None:
-        """Replace the pages, which are sorted by id."""
+        """Update the model to a list of pages, sorted by id."""
         wanted = {each.page.id: each for each in listed}
         for place in reversed(range(len(self._rows))):
             if self._rows[place].id not in wanted:
@@ -150,7 +150,7 @@ class PageTreeModel(QAbstractItemModel):
                 self.beginInsertRows(parent, place, place)
                 before.insert(place, each)
                 self.endInsertRows()
-        if len(before) > len(topics):  # remaining topics were reordered
+        if len(before) > len(topics):  # the remaining topics are in another order
             self.beginRemoveRows(parent, len(topics), len(before) - 1)
             del before[len(topics) :]
             self.endRemoveRows()

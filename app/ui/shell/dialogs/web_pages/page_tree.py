@@ -1,4 +1,4 @@
-"""Tree view of connected pages: a row per page with a disconnect button, and a row per topic."""
+"""Tree view of connected pages, with a row per page and a disconnect button, and a row per topic."""
 
 from __future__ import annotations
 
@@ -65,7 +65,7 @@ _GONE_ROLE = "textDisabled"
 
 
 class _PageHeader(QHeaderView):
-    """Titles of the columns that `PageTree` positions."""
+    """Header with titles for the columns that `PageTree` positions."""
 
     def __init__(self, theme: Theme, tree: PageTree) -> None:
         super().__init__(Qt.Orientation.Horizontal, tree)
@@ -111,7 +111,7 @@ class _RowHeights(QStyledItemDelegate):
 
 
 class PageTree(QTreeView):
-    """Tree of pages; emits `disconnect_wanted` with a page's id, and `copied` with the copied text."""
+    """Tree of pages; emits `disconnect_wanted` with the id of a page, and `copied` with the copied text."""
 
     disconnect_wanted = Signal(int)
     copied = Signal(str)
@@ -144,18 +144,18 @@ class PageTree(QTreeView):
         theme.changed.connect(self._measure)
 
     def current_page(self) -> ListedPage | None:
-        """Return the page of the current row."""
+        """Return the page of the current row, or of the current topic."""
         row = self._pages.page_row(self.currentIndex())
         return None if row is None else row.listed
 
     def disconnect_current(self) -> None:
-        """Request to disconnect the page of the current row."""
+        """Emit `disconnect_wanted` for the page of the current row."""
         listed = self.current_page()
         if listed is not None and listed.gone_s is None:
             self.disconnect_wanted.emit(listed.page.id)
 
     def copy_current(self) -> None:
-        """Copy the name of the current topic, or the address of the current page."""
+        """Copy the name of the current topic or the address of the current page."""
         topic, listed = self._pages.topic(self.currentIndex()), self.current_page()
         if topic is not None:
             self.copied.emit(topic.topic)
@@ -171,7 +171,7 @@ class PageTree(QTreeView):
         elif event.key() in {Qt.Key.Key_Return, Qt.Key.Key_Enter, Qt.Key.Key_Space}:
             self._toggle(self.currentIndex())
         elif event.key() == Qt.Key.Key_Escape:
-            event.ignore()  # the parent closes the sheet
+            event.ignore()  # the parent widget closes the sheet
         else:
             super().keyPressEvent(event)
 
@@ -217,7 +217,7 @@ class PageTree(QTreeView):
         self._measure()
 
     def dataChanged(self, first: Index, last: Index, _roles: Sequence[int] = ()) -> None:
-        # Skips QTreeView's size query for each changed cell, which takes 300 ms for 5000 topics; rows have a
+        # Skips QTreeView's size query for each changed cell, which takes 300 ms for 5000 topics. Rows have a
         # fixed height.
         rect = self.visualRect(first).united(self.visualRect(last))
         if not rect.isEmpty():
@@ -306,7 +306,7 @@ class PageTree(QTreeView):
         return left + side + _GAP
 
     def cell(self, column: PageColumn, rect: QRectF) -> QRectF:
-        """Return the content rectangle of a column in the row ``rect``."""
+        """Return the content rectangle of a column in a row."""
         right = float(self.viewport().width())
         for name in reversed(_WIDTHS):
             if name == column:

@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
 
 def since_words(listed: ListedPage) -> str:
-    """Return a text such as "since 8:32" or "gone 4 s"."""
+    """Format the state of a page, such as "since 8:32" or "gone 4 s"."""
     if listed.gone_s is not None:
         return _("gone {seconds} s").format(seconds=int(listed.gone_s))
     then = dt.datetime.fromtimestamp(listed.page.since_s).astimezone()
@@ -24,18 +24,18 @@ def since_words(listed: ListedPage) -> str:
 
 
 def does_words(topic: PageTopic) -> str:
-    """Return "publishes" or "reads"."""
+    """Return "publishes" or "reads", translated, for a topic of a page."""
     return _("publishes") if topic.is_published else _("reads")
 
 
 def limit_words(topic: PageTopic) -> str:
-    """Return a text such as "at most 15/s", or "" without a limit."""
+    """Format the rate limit of a topic, such as "at most 15/s"; "" without a limit."""
     limit = topic.at_most_per_s
     return _("at most {rate}/s").format(rate=number(limit, ".3g")) if limit else ""
 
 
 def dropped_words(topic: PageTopic) -> str:
-    """Return the dropped share as text, such as "0" or "0.3 %"."""
+    """Format the share of dropped messages, such as "0" or "0.3 %"."""
     if topic.dropped_count <= 0:
         return "0"
     return share_words(dropped_share(topic.sent_count, topic.dropped_count))

@@ -21,12 +21,12 @@ else:  # imported with the first code
 
 SIDE = 140
 QUIET_ZONE = 4
-"""Empty modules on each side, as ISO/IEC 18004 requires."""
+"""Width of the quiet zone in modules on each side, as required by ISO/IEC 18004."""
 _PADDING = 12
 
 
 def modules_of(text: str) -> tuple[bytes, ...]:
-    """Return the modules of a text's QR code, 1 for dark, without the quiet zone."""
+    """Return the rows of modules of a text's QR code, 1 for dark, without the quiet zone."""
     return tuple(bytes(row) for row in segno.make_qr(text, error="m").matrix)
 
 
@@ -47,7 +47,7 @@ class QrCode(QWidget):
         return self._text
 
     def show_code(self, text: str, address: str) -> None:
-        """Show the code of a text; screen readers read only ``address``."""
+        """Show the code of a text. Screen readers read only ``address``."""
         if text == self._text:
             return
         try:
@@ -62,7 +62,7 @@ class QrCode(QWidget):
         self.update()
 
     def show_words(self, words: str) -> None:
-        """Show the reason for a missing code."""
+        """Show a message with the reason why there is no code."""
         if words != self._words:
             self._text, self._modules, self._words = "", (), words
             self.setAccessibleName(words)

@@ -46,7 +46,10 @@ _MIN_TABLE_HEIGHT = 120
 
 
 class WebPagesSheet(Overlay):
-    """Sheet without a scrim that stays open while a person works in the window; changes apply at once."""
+    """Sheet without a scrim, which stays open while the user works in the window.
+
+    Changes are applied at once.
+    """
 
     top = _BELOW_BARS
     docks_right = True
@@ -60,7 +63,7 @@ class WebPagesSheet(Overlay):
         say: ShowToast,
         open_url: Callable[[QUrl], bool] = open_outside,
     ) -> None:
-        # robots returns the names of connected robots; open_url opens a page in the browser.
+        # `robots` returns the names of connected robots; `open_url` opens a page in the browser.
         super().__init__(theme, window, _("Web pages and tablets"))
         self._web, self._say, self._open_url = web, say, open_url
         self._dismissed: set[tuple[str, ...]] = set()
@@ -218,7 +221,7 @@ class WebPagesSheet(Overlay):
         for bar in window.findChildren(QWidget, "statusBar"):
             if bar.isVisible():
                 bottom = min(bottom, bar.mapTo(window, QPoint()).y() - _EDGE)
-        for stop in stops_in(window):  # Stop buttons at the right of a bar would overlap the sheet
+        for stop in stops_in(window):  # Stop buttons at the right end of a bar would overlap the sheet
             top = max(top, stop.mapTo(window, QPoint()).y() + stop.height() + BELOW_STOP)
         size = self.wanted_size(QSize(window.width() - 2 * _EDGE, max(1, bottom - top)))
         return QRect(QPoint(window.width() - size.width() - _EDGE, top), size)
@@ -228,10 +231,10 @@ class WebPagesSheet(Overlay):
         self._scrim.hide()
 
     def _focus_changed(self, _old: QWidget | None, _new: QWidget | None) -> None:
-        return  # stays open while a person works in the window
+        return  # the sheet stays open while the user works in the window
 
     def open(self) -> None:
-        """Open the sheet and update it until it is closed."""
+        """Open the sheet; it is updated until it is closed."""
         self.access.open_to.offer(self._web.addresses(), self._web.host)
         if self._tab not in self._web.protocols and self._web.protocols:
             self.tabs.set_value(next(iter(self._web.protocols)))
@@ -302,7 +305,7 @@ class WebPagesSheet(Overlay):
         self.empty.setText(words)
 
     def _order_tabs(self) -> None:
-        # Tab order follows the reading order; Qt would append widgets created later.
+        # Sets the tab order to the reading order; Qt would append widgets that are created later.
         access, origins = self.access, self.permissions.origins
         parts = (
             self.switch, self.other_port, self.tabs, access.address, access.token, access.new_token,

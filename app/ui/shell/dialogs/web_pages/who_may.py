@@ -1,4 +1,4 @@
-"""Form for allowed origins and for the robots that pages may move."""
+"""Form for the allowed origins, and for the robots that pages may move."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ EXAMPLE = "http://192.168.1.20:8080"
 
 
 class OriginField(TokenField):
-    """Allowed origins as tokens; invalid text stays as typed and is marked as an error."""
+    """Field for allowed origins as tokens. Invalid text is kept and shown as an error."""
 
     def __init__(self, theme: Theme, web: WebPages) -> None:
         super().__init__(theme, _("Origins"), EXAMPLE, _("Add an origin"))
@@ -32,7 +32,7 @@ class OriginField(TokenField):
         self.is_wrong = False
 
     def show_origins(self, origins: Sequence[str]) -> None:
-        """Set the tokens; text being typed stays."""
+        """Set the tokens. Text that is being typed is kept."""
         if [each.entry for each in self.tokens] == [*origins]:
             return
         for token in self.tokens:
@@ -69,7 +69,7 @@ class OriginField(TokenField):
 
 
 class _Box(QWidget):
-    """Framed row for read-only content."""
+    """Framed row with read-only contents."""
 
     def __init__(self, theme: Theme) -> None:
         super().__init__()
@@ -83,12 +83,12 @@ class _Box(QWidget):
 
 
 class RobotChoice(QWidget):
-    """Robots that pages may move, with check boxes; emits `changed` when a person changes them."""
+    """Check boxes of the robots that pages may move; emits `changed` when the user changes them."""
 
     changed = Signal()
 
     def __init__(self, theme: Theme, web: WebPages, robots: Callable[[], tuple[str, ...]]) -> None:
-        # robots returns the names of connected robots.
+        # `robots` returns the names of connected robots.
         super().__init__()
         self._theme, self._web, self._robots = theme, web, robots
         self.words = label("", "body", wrap=True)
@@ -123,7 +123,7 @@ class RobotChoice(QWidget):
         self._open(True)
 
     def show_state(self) -> None:
-        """Show the allowed robots and offer connected and allowed ones."""
+        """Show the allowed robots, and check boxes for connected and allowed ones."""
         names = self._web.robots
         said = listed(list(names)) if names else _("none")
         words = _("May command robots: {robots}").format(robots=said)
@@ -198,7 +198,7 @@ class PermissionForm(QWidget):
 
     def _measure(self) -> None:
         self._grid.setColumnMinimumWidth(0, round(self._theme.scaled(LABEL_WIDE)))
-        for title in self._titles:  # aligned with the first line of a field that grows
+        for title in self._titles:  # aligned with the first line of a field that can grow
             title.setMinimumHeight(round(self._theme.scaled(_FIELD_HEIGHT)))
 
     def show_state(self) -> None:
