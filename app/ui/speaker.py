@@ -1,7 +1,8 @@
 """Speech and tones of robots through Qt, in a separate thread.
 
-Qt's modules are imported on first use and may take seconds to start; the window never waits for them. A voice
-is third-party code that may crash: run as a process, this module tests whether one can be created.
+Qt's modules are imported on first use and may take seconds to start; the window never waits for them. Speech
+engines are third-party code that may crash, so creating one is tested first in another process, which runs
+this module.
 """
 
 from __future__ import annotations
@@ -44,24 +45,24 @@ ADVICE = {
         "Add a voice in System Settings, under “Accessibility” and “Spoken Content”, then start Studio again."
     ),
 }
-"""Instructions to install a voice, by `sys.platform`."""
+"""Instructions to install a speech engine, by `sys.platform`."""
 MAX_TONES = 4
 RATE_HZ, FADE_S, LOUDNESS = 44_100, 0.006, 0.5
 JOIN_TIMEOUT_S = 0.5
 TRIAL_S = 20.0
-"""Time limit for the test process; a voice that takes longer hangs and would hang here, too."""
+"""Timeout in s of the test process. An engine that takes longer would block this process too."""
 Order: TypeAlias = tuple[str, tuple[Any, ...], int]
 _log = logging.getLogger(__name__)
 
 
 def no_voice(language: str) -> str:
-    """Return the sentence that no voice for a language is installed."""
+    """Return the message shown when no voice for a language is installed."""
     name = _(LANGUAGES[language]) if language in LANGUAGES else QLocale(language).nativeLanguageName()
     return _("This computer has no voice for {language}.").format(language=name or language)
 
 
 def has_voice_engine() -> bool:
-    """Return whether Qt finds a speech engine, without starting it."""
+    """Return True if Qt finds a speech engine. The engine is not started."""
     try:
         from PySide6.QtTextToSpeech import QTextToSpeech  # noqa: PLC0415 (heavy, and needs a sound system)
     except (ImportError, RuntimeError) as error:
@@ -71,18 +72,19 @@ def has_voice_engine() -> bool:
 
 
 def try_voice() -> int:
-    """Create a voice and query its languages, as `QtEngine` does; run in the test process.
+    """Create a speech engine and query its languages, as `QtEngine` does. Run in the test process.
 
-    Return the exit code, 0 on success. A faulty voice may end the process in any way.
+    Return the exit code, 0 on success. A faulty engine may end the process in any way.
     """
     with Path(os.devnull).open("w", encoding="utf-8") as nowhere:
-        faulthandler.dump_traceback_later(TRIAL_S, exit=True, file=nowhere)  # even without a parent
+        # ends the process even if its parent is gone
+        faulthandler.dump_traceback_later(TRIAL_S, exit=True, file=nowhere)
         return _make_voice()
 
 
 def _make_voice() -> int:
     if sys.platform == "win32":
-        # Terminate on a crash without a dialog or debugger.
+        # Ends the process on a crash without showing a dialog or debugger.
         kernel = ctypes.windll.kernel32
         kernel.SetUnhandledExceptionFilter.argtypes = [ctypes.c_void_p]
         kernel.SetUnhandledExceptionFilter(ctypes.cast(kernel.ExitProcess, ctypes.c_void_p))
@@ -96,7 +98,7 @@ def _make_voice() -> int:
 
 
 def outlives_trial(command: Sequence[str] = ()) -> bool:
-    """Return whether a test process could create a voice; a faulty one would crash Studio.
+    """Return True if the test process could create a speech engine. A faulty engine would crash Studio.
 
     ``command`` runs the test, by default this module. Blocks for up to `TRIAL_S`.
     """
@@ -119,9 +121,12 @@ def outlives_trial(command: Sequence[str] = ()) -> bool:
 
 
 def voice_words(problem: str, *, has_engine: bool, platform: str = sys.platform) -> str:
-    """Return a text about the speech output: that it works, or the error and what to install.
+    """Describe the state of the speech output: that it works, or the error and what to install.
 
-    ``problem`` is the error of the last speech, "" for none.
+    Args:
+        problem: Error of the last speech output, or "".
+        has_engine: True if Qt finds a speech engine.
+        platform: Value of `sys.platform`.
     """
     if has_engine and not problem:
         return _("Robots speak with the voice of this computer.")
@@ -148,13 +153,13 @@ def samples(notes: Notes, volume: float, rate_hz: int = RATE_HZ) -> bytes:
 
 
 class Engine(Protocol):
-    """Speech and audio output; used in one thread that runs a Qt event loop."""
+    """Speech and audio output, used in one thread that runs a Qt event loop."""
 
     def speak(self, words: str, language: str, volume: float, ended: Callable[[], None]) -> str:
-        """Start speaking; `ended` is called once at the end. Return an error sentence, or ""."""
+        """Start to speak; `ended` is called once at the end. Return an error sentence, or ""."""
 
     def play(self, notes: Notes, volume: float) -> str:
-        """Start playing; return an error sentence, or ""."""
+        """Start to play tones. Return an error sentence, or ""."""
 
     def stop_voice(self) -> None:
         """Stop speaking."""
@@ -164,7 +169,7 @@ class Engine(Protocol):
 
 
 class QtEngine:
-    """Qt's text to speech and audio output, each created on first use."""
+    """Speech and audio output of Qt, each created on first use."""
 
     def __init__(self) -> None:
         self._voice: QTextToSpeech | None = None
@@ -194,7 +199,7 @@ class QtEngine:
             ended()
 
     def speak(self, words: str, language: str, volume: float, ended: Callable[[], None]) -> str:
-        """Start speaking if there is a voice for the language."""
+        """Start to speak, if there is a voice for the language."""
         voice = self._found_voice()
         locales = voice.availableLocales() if voice is not None else []
         locale = next((each for each in locales if each.name().split("_")[0] == language), None)
@@ -210,7 +215,7 @@ class QtEngine:
         return ""
 
     def play(self, notes: Notes, volume: float) -> str:
-        """Start playing on the default audio output, if there is one."""
+        """Start to play on the default audio output, if there is one."""
         try:
             from PySide6.QtMultimedia import QAudioFormat, QAudioSink, QMediaDevices  # noqa: PLC0415 (heavy)
         except (ImportError, RuntimeError) as error:
@@ -234,7 +239,7 @@ class QtEngine:
         return ""
 
     def stop_voice(self) -> None:
-        """Stop speaking immediately, even within a word."""
+        """Stop speaking immediately, even in the middle of a word."""
         self._ended = None
         if self._voice is not None:
             self._voice.stop(self._voice.BoundaryHint.Immediate)
@@ -247,11 +252,11 @@ class QtEngine:
 
 
 class _Desk(QObject):
-    """Executes requests in the engine's thread; those before a stop are skipped."""
+    """Executes requests in the engine's thread. Requests from before a stop are skipped."""
 
     woken = Signal()
     ended = Signal(int)
-    told = Signal(str, str)  # kind of output, error sentence or ""
+    told = Signal(str, str)  # kind of output; error sentence or ""
 
     def __init__(self, make: Callable[[], Engine], orders: deque[Order], speaker: QtSpeaker) -> None:
         super().__init__()
@@ -285,7 +290,7 @@ class _Desk(QObject):
         try:
             if self._engine is None:
                 self._engine = self._make()
-            if not self._speaker.counts(what, turn):  # a stop arrived meanwhile
+            if not self._speaker.counts(what, turn):  # Stop was called in the meantime
                 return
             if what == "say":
                 language, volume = others
@@ -300,10 +305,10 @@ class _Desk(QObject):
 
 
 class QtSpeaker(QObject):
-    """Speaker of a window; queues requests for its thread and never blocks."""
+    """Speech and audio output of a window. Requests are queued for a thread and never block."""
 
     def __init__(self, make: Callable[[], Engine] = QtEngine, parent: QObject | None = None) -> None:
-        # make creates the engine in its thread on first use.
+        # `make` creates the engine, in its thread, on first use.
         super().__init__(parent)
         self._make = make
         self._orders: deque[Order] = deque()
@@ -316,26 +321,26 @@ class QtSpeaker(QObject):
 
     @property
     def busy(self) -> bool:
-        """True while a voice speaks or is about to."""
+        """True while a text is spoken or waits to be spoken."""
         return self._busy
 
     @property
     def problem(self) -> str:
-        """Error of the last output, or ""."""
+        """Error sentence of the last output, or ""."""
         return self._problems.get("say", "") or self._problems.get("play", "")
 
     def counts(self, what: str, turn: int) -> bool:
-        """Return whether a request is still valid, i.e. not cancelled by a stop. Thread-safe."""
+        """Return True if a request is valid, and False if a stop has cancelled it. Thread-safe."""
         return not self._closed and turn >= self._turns[what]
 
     def speak(self, words: str, language: str, volume: float) -> None:
-        """Queue a text to speak."""
+        """Queue a text to be spoken."""
         self._turns["say"] += 1
         self._busy = True
         self._order("say", words, language, volume)
 
     def play(self, notes: Notes, volume: float) -> None:
-        """Queue tones to play; an empty sequence stops the tones."""
+        """Queue tones to be played; an empty sequence stops the tones."""
         if notes:
             self._order("play", tuple(notes), volume)
         else:
@@ -346,7 +351,7 @@ class QtSpeaker(QObject):
         self._stop("voice")
 
     def stop(self) -> None:
-        """Stop all output."""
+        """Stop speech and tones."""
         self._stop("all")
 
     def _stop(self, which: str) -> None:
@@ -359,7 +364,7 @@ class QtSpeaker(QObject):
             self._order("stop", which)
 
     def close(self) -> None:
-        """Stop the thread; it is abandoned if the audio system blocks it."""
+        """Stop the thread. If the audio system blocks the thread, it is abandoned."""
         self.stop()
         if self._thread is not None:
             self._order("end")

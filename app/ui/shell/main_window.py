@@ -1,4 +1,4 @@
-"""Main window: bars, banner, start page and a workbench per layout, refreshed 30 times a second."""
+"""Main window: bars, banner, start page and one workbench per layout, refreshed 30 times a second."""
 
 from __future__ import annotations
 
@@ -65,14 +65,14 @@ OTHER_LOADING_TEXT = lazy("Loading panels.")
 
 @runtime_checkable
 class SupportsFields(Protocol):
-    """A panel that plots fields of topics."""
+    """Panel that plots fields of topics."""
 
     def plot_field(self, topic: str, path: str) -> None:
-        """Add a field; an empty path lets the person choose it."""
+        """Add a curve for a field; with an empty path, ask for the field."""
 
 
 class MainWindow(QMainWindow):
-    """One session in one window; implements `Shell` for its commands."""
+    """Window of one session; implements `Shell` for its commands."""
 
     bench_made = Signal()
 
@@ -86,8 +86,9 @@ class MainWindow(QMainWindow):
         asks: FileDialogs | None = None,
         clock: Callable[[], float] = time.monotonic,
     ) -> None:
-        # asks opens file dialogs, by default those of the system or Studio. clock returns monotonic seconds,
-        # for the time that a panel has been hidden.
+        # `asks` opens file dialogs, by default those of the system or Studio. `clock` returns monotonic
+        # seconds;
+        # it measures how long a panel has been hidden.
         super().__init__()
         self._clock = clock
         self.session, self.theme, self.panels = session, theme, panels
@@ -204,7 +205,7 @@ class MainWindow(QMainWindow):
 
     @property
     def surface(self) -> QWidget:
-        """Parent of sheets and menus, in which shortcuts work."""
+        """Parent widget of sheets and menus, in which shortcuts work."""
         return self
 
     @property
@@ -219,7 +220,7 @@ class MainWindow(QMainWindow):
 
     @property
     def examples(self) -> Sequence[Example]:
-        """Examples of the start page."""
+        """Examples on the start page."""
         return self.start.examples
 
     def show_start(self) -> None:
@@ -234,7 +235,7 @@ class MainWindow(QMainWindow):
 
     @property
     def left(self) -> str:
-        """Layout to return to from the start page, or ""."""
+        """Name of the layout to return to from the start page, or ""."""
         if self._left:
             return self._left
         return "behaviour" if any(not each.blank for each in self.session.documents) else ""
@@ -244,7 +245,7 @@ class MainWindow(QMainWindow):
         self._run("layout.behaviour")
 
     def show_examples(self) -> None:
-        """Show all examples on the start page and focus the first."""
+        """Show all examples on the start page and focus the first one."""
         self.start.focus_examples()
 
     def show_recent(self) -> None:
@@ -252,11 +253,11 @@ class MainWindow(QMainWindow):
         self.start.show_recent(recent_titles(self.session.settings.recent))
 
     def complain(self, sentence: str) -> None:
-        """Log a problem in the Console that needs no action."""
+        """Log a problem that needs no action in the Console."""
         self.session.console.add("warn", "studio", sentence)
 
     def show_layout(self, name: str) -> Workbench:
-        """Show a layout, creating it in its last state on first use."""
+        """Show a layout and return its workbench; on first use it is created in its last state."""
         layout = layout_named(name)
         if layout.name not in self.benches:
             self.benches[layout.name] = bench = self._new_bench(layout)
@@ -285,7 +286,7 @@ class MainWindow(QMainWindow):
         return bench
 
     def steps_ahead(self) -> list[Callable[[], object]]:
-        """Return steps that create the panels of unopened layouts, one panel per step."""
+        """Return steps that create the panels of layouts not opened yet, one panel per step."""
 
         def make(layout: Layout, name: str) -> None:
             if not self._shut and layout.name not in self.benches:
@@ -295,7 +296,7 @@ class MainWindow(QMainWindow):
         return [partial(make, layout, name) for layout in LAYOUTS for name in layout.at_first]
 
     def expect(self, layout: str) -> None:
-        """Show the bars of a layout with a placeholder until it is created."""
+        """Show the bars of a layout, with a placeholder until its workbench is created."""
         self._showing = layout
         placeholder = Placeholder(layout)
         self.pages.addWidget(placeholder)
@@ -318,20 +319,20 @@ class MainWindow(QMainWindow):
         return self.benches.get(self.showing)
 
     def editor(self) -> object:
-        """Return the panel of behaviours, or None before it was first shown."""
+        """Return the panel of behaviours, or None before it is first shown."""
         bench = self.benches.get("behaviour")
         dock = bench.docks.get("behaviour") if bench is not None else None
         return dock.panel if dock is not None else None
 
     def open_panel(self, name: str) -> Dock | None:
-        """Show a panel in the current layout; "behaviour" only in its own layout."""
+        """Show a panel in the current layout; the panel "behaviour" only in its own layout."""
         wanted = "behaviour" if name == "behaviour" or self.bench is None else self.showing
         return self.show_layout(wanted).open(name)
 
     def open_topic(self, topic: str, *, beside: bool = False) -> None:
-        """Show a topic in the open panel that suits it best, otherwise in the Inspector.
+        """Show a topic in the open panel that fits its type best, else in the Inspector.
 
-        With ``beside`` open an additional panel, unless the existing one is still empty.
+        With ``beside``, an additional panel is opened unless the existing one is still empty.
         """
         known = self.session.topic(topic)
         kinds = {known.codec, known.msg_type} if known is not None else set()
@@ -348,7 +349,7 @@ class MainWindow(QMainWindow):
             dock.panel.show_topic(topic)
 
     def plot(self, topic: str, path: str) -> None:
-        """Plot a field of a topic; an empty path lets the person choose it."""
+        """Plot a field of a topic; with an empty path, ask for the field."""
         bench = self.bench if self.bench is not None else self.show_layout("developer")
         dock = bench.open_latest("plot")
         if dock is not None and isinstance(dock.panel, SupportsFields):
@@ -381,8 +382,9 @@ class MainWindow(QMainWindow):
         return self.panel_focus.skip_hidden(self, forward=forward) or super().focusNextPrevChild(forward)
 
     def _half_tick(self) -> None:
-        # Runs 60 times a second while images are visible: at 30 Hz about every tenth image would arrive
-        # together with another one and be dropped. Otherwise it runs at 30 Hz, as the tick.
+        # The timer runs 60 times a second while images are visible: at 30 Hz about every tenth image would
+        # arrive
+        # together with another one and be dropped. Otherwise it runs at 30 Hz, the rate of the tick.
         self._halves += 1
         if self._halves % 2 or not self._twice:
             self.tick()
@@ -391,7 +393,7 @@ class MainWindow(QMainWindow):
         self.tools.follow()
 
     def _follow_source(self) -> None:
-        # Resets all panels when another source is shown.
+        # Resets all panels after a change of the source.
         if self._source_seen != self.session.sources_shown:
             self._source_seen = self.session.sources_shown
             for bench in (*self.benches.values(), *self._ahead.values()):
@@ -408,7 +410,7 @@ class MainWindow(QMainWindow):
             self.timer.setInterval(TICK_MS // 2 if twice else TICK_MS)
 
     def tick(self) -> None:
-        """Process new data and refresh everything that is visible."""
+        """Process new data and refresh all visible parts of the window."""
         began = time.perf_counter()
         self._ticks += 1
         guarded = self.session.guarded
@@ -453,7 +455,7 @@ class MainWindow(QMainWindow):
             self._show_alerts()
 
     def _show_facts(self) -> None:
-        # Less often than the tick: figures can't be read at 30 Hz.
+        # Called less often than the tick, because numbers can't be read at 30 Hz.
         facts, document = self._facts, self.session.document
         alerts = facts.alerts(for_developers=self.showing == "developer")
         web = facts.web_pages()
@@ -494,12 +496,12 @@ class MainWindow(QMainWindow):
         return self.session.runs.active or any(link.state in moves for link in self.session.fleet.links)
 
     def _may_move(self) -> bool:
-        # Also true for a robot that hasn't confirmed Stop.
+        # Also True for a robot that hasn't confirmed Stop.
         is_open = self.session.runs.view().stop_word != "Stop"
         return is_open or self._moves() or any(link.state == NOT_STOPPED for link in self.session.fleet.links)
 
     def _show_alerts(self) -> None:
-        # Filtered for the current layout, shown in the free area of its bar.
+        # Alerts for the current layout, shown in the free area of its bar.
         alerts, is_developer = self.session.alerts, self.showing == "developer"
         if (alerts.revision, is_developer) != self._alerts_seen:
             self._alerts_seen = (alerts.revision, is_developer)
@@ -515,7 +517,7 @@ class MainWindow(QMainWindow):
         self.session.console.add("error", f"panel {name}", sentence)
 
     def begin(self) -> None:
-        """Start the session and the tick."""
+        """Start the session and the timer of the tick."""
         self.session.start()
         self.timer.start()
         GcTimer(self).start()
@@ -523,7 +525,7 @@ class MainWindow(QMainWindow):
         self.bench_made.connect(self.gc_freeze.start)
 
     def restart(self) -> str:
-        """Close the window and restart Studio; return why that is impossible, or ""."""
+        """Close the window and restart Studio. Return the reason if that is impossible, or ""."""
         if self._may_move():
             return _("Press Stop first. Studio can restart when no program is running and no robot is moving")
         self.wants_restart = True
@@ -533,7 +535,7 @@ class MainWindow(QMainWindow):
     def closeEvent(self, event: QCloseEvent) -> None:
         if not self._shut:
             if self._moves():
-                self.session.runs.stop()  # sent now; replies arrive while the session closes
+                self.session.runs.stop()  # sent now, so that replies can arrive while the session closes
             if not self._flush_before_close.ready():
                 event.ignore()
                 return
@@ -554,7 +556,7 @@ class MainWindow(QMainWindow):
         super().closeEvent(event)
 
     def _may_lose_work(self) -> bool:
-        # True if no unsaved work would be lost, or the person has confirmed its loss.
+        # True if no unsaved work would be lost, or the user has confirmed the loss.
         unkept = self.session.documents.unkept()
         if not unkept or self.session.gives_up(unkept[0]):
             return True
@@ -571,13 +573,13 @@ class MainWindow(QMainWindow):
 
 
 class Placeholder(QWidget):
-    """Sentence in place of a layout that is being created, so that startup doesn't wait for panels."""
+    """Text in place of a layout that is being created, so that startup doesn't wait for panels."""
 
     def __init__(self, layout: str) -> None:
         super().__init__()
         words = _(LOADING_TEXTS.get(layout, OTHER_LOADING_TEXT))
         self.setAccessibleName(words)
         self.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
-        self.setProperty("ownFocus", True)  # it only holds the focus, so there is nothing to highlight
+        self.setProperty("ownFocus", True)  # it only holds the focus, so it needs no focus ring
         column = QVBoxLayout(self)
         column.addWidget(label(words, "bodyLarge", role="textSecondary"), 1, Qt.AlignmentFlag.AlignCenter)

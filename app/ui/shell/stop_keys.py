@@ -1,4 +1,4 @@
-"""Keys and buttons of Stop that work with open menus, lists, dialogs, sheets and floating panels."""
+"""Keys and buttons of Stop while menus, lists, dialogs, sheets and floating panels are open."""
 
 from __future__ import annotations
 
@@ -14,16 +14,17 @@ _KINDS = frozenset({QEvent.Type.ShortcutOverride, QEvent.Type.KeyPress})
 
 
 class StopKeys(QObject):
-    """Event filter on every window that gets the focus, called before its widgets.
+    """Event filter for every window that gets the focus; called before the window's widgets.
 
-    Shortcuts alone don't suffice, since open menus, lists, pages and fields can consume the key. Buttons
-    don't either: a click outside an open menu or list only closes that.
+    Shortcuts alone don't suffice, because open menus, lists, pages and fields can consume the key. Neither do
+    buttons: a click outside an open menu or list only closes it.
     """
 
     def __init__(
         self, parent: QObject, keys: Callable[[], Collection[str]], stop: Callable[[], object]
     ) -> None:
-        # keys returns the current keys of Stop in QKeySequence's portable spelling; stop is called at once.
+        # `keys` returns the current keys of Stop in QKeySequence's portable spelling; `stop` is called
+        # immediately.
         super().__init__(parent)
         self._keys, self._stop = keys, stop
         application = QApplication.instance()
@@ -50,7 +51,7 @@ class StopKeys(QObject):
         return super().eventFilter(watched, event)
 
     def _pressed(self, event: QMouseEvent) -> bool:
-        # A click outside a popup: stops and consumes the event if it hits a Stop button.
+        # If a click outside a popup hits a Stop button, stops and consumes the event.
         if event.button() != Qt.MouseButton.LeftButton or QApplication.activePopupWidget() is None:
             return False
         return press_stop(event.globalPosition().toPoint())

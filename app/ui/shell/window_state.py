@@ -1,4 +1,4 @@
-"""Persistent state of the window: position, layouts, theme and text size."""
+"""Settings of the window that persist: position, layouts, theme and text size."""
 
 from __future__ import annotations
 
@@ -15,11 +15,11 @@ from app.ui.theme.system import preference_of
 from app.ui.theme.theme import MODES, Mode, Theme
 
 Saved = dict[str, object]
-FRAME = QSize(16, 48)  # approximate frame of a window manager
+FRAME = QSize(16, 48)  # approximate size of a window manager's frame
 
 
 def fitting(size: QSize, room: QSize) -> QSize:
-    """Return the initial window size for a screen; on a small one Stop would otherwise be outside it."""
+    """Return the initial window size for a screen. On a small screen Stop would otherwise be outside it."""
     fits = size.width() <= room.width() and size.height() <= room.height()
     return size if fits else size.boundedTo(room - FRAME)
 
@@ -28,13 +28,13 @@ class WindowState:
     """Loads and saves position, layouts, theme, text size, motion and contrast of the window."""
 
     def __init__(self, settings: Settings, complain: Callable[[str], object]) -> None:
-        # complain gets a sentence when settings can't be saved.
+        # `complain` is called with a sentence if settings can't be saved.
         self._settings = settings
         self._complain = complain
         self._said = ""
 
     def apply_theme(self, theme: Theme) -> None:
-        """Apply the saved settings to the theme, all at once."""
+        """Apply all saved settings to the theme at once."""
         chosen = self._settings.get("theme", "system")
         mode: Mode = next((mode for mode in MODES if mode == chosen), "system")
         motion = preference_of(self._settings.get("less_motion", None))
@@ -42,25 +42,25 @@ class WindowState:
         theme.begin(mode, self._settings.get("text_percent", 100), motion, contrast)
 
     def keep_theme(self, theme: Theme) -> None:
-        """Save the current theme settings."""
+        """Save the current settings of the theme."""
         self._set("theme", theme.mode)
         self._set("text_percent", theme.text_percent)
         self._set("less_motion", theme.motion)
         self._set("high_contrast", theme.contrast)
 
     def keep(self, key: str, value: object) -> None:
-        """Save a JSON value."""
+        """Save a setting, as JSON value."""
         self._set(key, value)
 
     def place(self, window: QMainWindow) -> bool:
-        """Restore the window's position; return False if none is saved."""
+        """Restore the position of the window. Return False if none is saved."""
         text = self._settings.get("window", "")
         try:
             data = base64.b64decode(text, validate=True)
         except (binascii.Error, ValueError):
             return False
         placed = bool(data) and window.restoreGeometry(QByteArray(data))
-        if window.isFullScreen():  # full screen is only for the room, which isn't shown at start
+        if window.isFullScreen():  # only the robot's room uses full screen, and it isn't shown at startup
             window.setWindowState(window.windowState() & ~Qt.WindowState.WindowFullScreen)
         return placed
 
@@ -70,11 +70,11 @@ class WindowState:
 
     @property
     def layout(self) -> str:
-        """Last layout; "start" for the start page or at the first start."""
+        """Name of the last layout; "start" for the start page, or before the first start."""
         return self._settings.get("layout", "start")
 
     def keep_layout(self, name: str) -> None:
-        """Save the current layout."""
+        """Save the name of the current layout."""
         self._set("layout", name)
 
     def layouts(self) -> Mapping[str, object]:
@@ -92,25 +92,25 @@ class WindowState:
         return self._set("layouts", {key: value for key, value in self.layouts().items() if key != name})
 
     def chosen(self, base: str) -> str:
-        """Return the custom layout last shown in a built-in one's workbench, or ""."""
+        """Return the name of the custom layout last shown in a built-in layout's workbench, or ""."""
         kept: Saved = self._settings.get("chosen_layouts", {})
         name = kept.get(base)
         return name if isinstance(name, str) else ""
 
     def keep_chosen(self, base: str, name: str) -> None:
-        """Save the custom layout shown in a workbench."""
+        """Save the name of the custom layout shown in a workbench."""
         kept: Saved = self._settings.get("chosen_layouts", {})
         self._set("chosen_layouts", {**kept, base: name})
 
     def keep_layouts(self, found: Mapping[str, Mapping[str, object]]) -> bool:
-        """Save the state of these layouts; return False if that failed."""
+        """Save the states of layouts. Return False on failure."""
         return self._set("layouts", {**self.layouts(), **found})
 
     def _set(self, key: str, value: object) -> bool:
         try:
             self._settings.set(key, value)
         except SettingsError as error:
-            if str(error) != self._said:  # report an error only once, as many settings are saved
+            if str(error) != self._said:  # report an error only once, because settings are saved often
                 self._said = str(error)
                 self._complain(self._said)
             return False

@@ -1,4 +1,4 @@
-"""Steps of starting Studio: interpreter settings, single instance, files to open, Qt's log.
+"""Steps of Studio's startup: interpreter settings, single instance, files to open, Qt's log.
 
-`app.ui.application` calls them; they are independent of each other.
+`app.ui.application` calls the steps; they are independent of each other.
 """

@@ -1,4 +1,4 @@
-"""Deferred steps: work needed soon but not for the first paint, done in small portions after it."""
+"""Deferred startup steps, which are run in small portions after the first paint."""
 
 from __future__ import annotations
 
@@ -15,14 +15,15 @@ _log = logging.getLogger(__name__)
 
 
 class DeferredSteps(QObject):
-    """Runs one step per cycle of the event loop, so that a click waits for at most one step."""
+    """Runs one step per iteration of the event loop, so that a click waits for at most one step."""
 
     def __init__(self, window: QWidget, steps: Iterable[Callable[[], object]]) -> None:
-        # Starts with the first paint of `window`. A failing step is logged; the others continue.
+        # Starts after the first paint of `window`. An exception in a step is logged, and the next step
+        # follows.
         super().__init__(window)
         self._window, self._steps = window, deque(steps)
         self.began = False
-        """True if the window was painted, or the time limit passed."""
+        """True once the window was painted or the time limit has passed."""
         self._idle_timer = QTimer(self)
         self._idle_timer.timeout.connect(self._run_step)
         self._deadline = QTimer(self)
@@ -59,5 +60,5 @@ class DeferredSteps(QObject):
 
     @property
     def done(self) -> bool:
-        """True if every step was run."""
+        """True once all steps were run."""
         return not self._steps

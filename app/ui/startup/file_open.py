@@ -1,4 +1,4 @@
-"""Files from outside: dropped on the window, or opened by the system (double click on macOS)."""
+"""Files that other programs pass to the window: by drag and drop or, on macOS, by the system."""
 
 from __future__ import annotations
 
@@ -37,11 +37,11 @@ class IncomingFiles(QObject):
 
 
 class Application(QApplication):
-    """Application; on macOS it receives the files that the Finder opens, instead of a window.
+    """QApplication that, on macOS, receives the files that the Finder opens.
 
-    It supports no Python event filter: that would receive the events of the block editor's browser too and
-    crash the process, because PySide queries each receiver for its C++ type, and Chromium's have none (ADR
-    0018). This applies to plug-ins as well.
+    Installing a Python event filter on the application raises an error: the filter would also receive events
+    of the block editor's browser and crash the process, because PySide queries each receiver for its C++
+    type, and Chromium's have none (ADR 0018). This applies to plug-ins as well.
     """
 
     def __init__(self, arguments: Sequence[str]) -> None:
@@ -50,7 +50,7 @@ class Application(QApplication):
         self._waiting: list[Path] = []
 
     def open_files_with(self, take: Callable[[Sequence[Path]], object]) -> None:
-        """Set the function that opens files, and call it for files that arrived before."""
+        """Set the function that opens files, and call it for files that have arrived already."""
         self._take = take
         waiting, self._waiting = self._waiting, []
         if waiting:
@@ -66,7 +66,7 @@ class Application(QApplication):
         return super().event(event)
 
     def installEventFilter(self, filter_object: QObject) -> None:
-        """Raise TypeError; filter a window or a widget instead (see the class)."""
+        """Raise TypeError. Filter the events of a window or a widget instead (see the class)."""
         raise TypeError(
             f"{type(filter_object).__name__} can't filter the events of the whole application: the first one "
             "of the block editor's browser would end Studio; filter those of a window or a widget"
@@ -74,5 +74,5 @@ class Application(QApplication):
 
 
 def paths_of(dropped: QMimeData) -> list[Path]:
-    """Return the local files of a drag."""
+    """Return the paths of the local files in the data of a drag."""
     return [Path(url.toLocalFile()) for url in dropped.urls() if url.isLocalFile()]

@@ -1,7 +1,7 @@
-"""Software rendering on machines without a GPU, where the graphics driver is software too.
+"""Software rendering on machines without a GPU, where the graphics driver renders in software too.
 
 Once a window shows a web page, Qt lets the graphics driver compose the whole window at every change. Without
-a GPU the driver (llvmpipe on Linux, WARP on Windows) is slow: it took a third of a core for images at 25 Hz.
+a GPU the driver (llvmpipe on Linux, WARP on Windows) is slow: it used a third of a core for images at 25 Hz.
 Qt's own software renderer adds almost nothing.
 """
 
@@ -14,7 +14,7 @@ from collections.abc import Callable, MutableMapping, Sequence
 
 CHOICE, BY_SOFTWARE = "QT_QUICK_BACKEND", "software"
 DEVICES = ("/dev/dri/renderD*", "/dev/nvidia[0-9]*", "/dev/dxg", "/dev/mali*", "/dev/kgsl*", "/dev/pvr*")
-"""Devices of graphics processors on Linux, including WSL and single-board computers."""
+"""Device files of GPUs on Linux, including WSL and single-board computers."""
 BASIC = ("Microsoft Basic Display", "Microsoft Basic Render")
 """Names of Windows' fallback graphics adapters."""
 _ATTACHED = 0x1
@@ -23,10 +23,12 @@ _ATTACHED = 0x1
 def draw_by_software(
     environ: MutableMapping[str, str], platform: str, there: Callable[[str], bool] | None = None
 ) -> bool:
-    """Select Qt's software renderer on machines without a GPU; return True if selected.
+    """Select Qt's software renderer on machines without a GPU. Return True if it was selected.
 
-    A choice in the environment is respected. Call it before Qt is used. ``there`` returns whether a platform
-    has a GPU.
+    Call this before Qt is used. An existing choice in the environment is kept.
+
+    Args:
+        there: Returns True if a platform has a GPU.
     """
     if not environ.get(CHOICE) and not (there or has_graphics_processor)(platform):
         environ[CHOICE] = BY_SOFTWARE
@@ -34,7 +36,7 @@ def draw_by_software(
 
 
 def has_graphics_processor(platform: str) -> bool:
-    """Return whether this computer has a GPU; True where the system doesn't report it."""
+    """Return True if this computer has a GPU, or if the system doesn't report that."""
     if platform.startswith("linux"):
         return any(glob.glob(pattern) for pattern in DEVICES)  # noqa: PTH207 - absolute patterns
     if platform == "win32":
@@ -43,12 +45,12 @@ def has_graphics_processor(platform: str) -> bool:
 
 
 def has_driver(names: Sequence[str]) -> bool:
-    """Return whether one of these adapters is not Windows' fallback; True for an empty list."""
+    """Return True if one of these adapters is not Windows' fallback, or if the list is empty."""
     return not names or any(not name.startswith(BASIC) for name in names)
 
 
 def adapters() -> list[str]:
-    """Return the names of the active graphics adapters on Windows; empty elsewhere."""
+    """Return the names of the active graphics adapters on Windows; empty on other platforms."""
     found: list[str] = []
     if sys.platform == "win32":
 

@@ -1,7 +1,7 @@
-"""Native file dialogs on Linux: through the desktop portal, if it is available on the session bus.
+"""Native file dialogs on Linux through the desktop portal, if it is available on the session bus.
 
 Qt uses the portal if its platform theme "xdgdesktopportal" is selected before the application is created.
-Without a bus nothing is loaded or delayed.
+Without a session bus nothing is loaded or delayed.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ MAX_MS = 300
 
 
 def has_bus(environ: MutableMapping[str, str]) -> bool:
-    """Return whether there is a session bus."""
+    """Return True if there is a session bus."""
     if environ.get("DBUS_SESSION_BUS_ADDRESS"):
         return True
     folder = environ.get("XDG_RUNTIME_DIR")
@@ -24,7 +24,7 @@ def has_bus(environ: MutableMapping[str, str]) -> bool:
 
 
 def chooser_answers() -> bool:
-    """Return whether the portal has a file chooser; False after 0.3 s without a reply."""
+    """Return True if the portal has a file chooser, False if it doesn't reply within 0.3 s."""
     from PySide6.QtDBus import QDBusConnection, QDBusMessage  # noqa: PLC0415 - only where there is a bus
 
     bus = QDBusConnection.connectToBus(QDBusConnection.BusType.SessionBus, "studio-portal")
@@ -41,14 +41,14 @@ def chooser_answers() -> bool:
 def use_portal(
     environ: MutableMapping[str, str], platform: str, answers: Callable[[], bool] = chooser_answers
 ) -> None:
-    """Select the portal's dialogs if available, unless a theme is chosen.
+    """Select the portal's dialogs if they are available and the environment doesn't choose another theme.
 
-    ``platform`` is `sys.platform`. Call it before the application is created.
+    Call this before the application is created. ``platform`` is a value of `sys.platform`.
     """
     if platform.startswith("linux") and not environ.get(CHOICE) and has_bus(environ) and answers():
         environ[CHOICE] = THEME
 
 
 def has_system_dialogs(environ: MutableMapping[str, str], platform: str) -> bool:
-    """Return whether native file dialogs are used: on Windows and macOS, and on Linux with the portal."""
+    """Return True if native file dialogs are used: on Windows and macOS, and on Linux with the portal."""
     return platform in {"win32", "darwin"} or environ.get(CHOICE) == THEME

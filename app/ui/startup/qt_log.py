@@ -1,4 +1,4 @@
-"""Log of Qt, Chromium and Studio: known noise is dropped, the rest goes to the log and the Console.
+"""Log of Qt, Chromium and Studio. Known noise is dropped; everything else goes to the log and the Console.
 
 Noise are messages of these libraries on machines without a GPU or a message bus, where Studio works all the
 same. Only messages known to be harmless are dropped.
@@ -31,7 +31,7 @@ NOISE = re.compile(
     r"|Unable to detect GPU vendor|GBM is not supported with the current configuration"
     r"|GPUInfo not initialized on GpuInfoUpdate|Sandboxing disabled by user"
     r"|Couldn't (load|resolve) (pipewire|va)\b.* (library|symbols)$"
-    r"|Error loading text-to-speech plug-in "  # the speaker reports a missing voice itself
+    r"|Error loading text-to-speech plug-in "  # the speaker reports missing voices itself
     r"|PulseAudioService: pa_context_connect\(\) failed$|Using Qt multimedia with FFmpeg "
     r"|This plugin does not support (propagateSizeHints|raise|createPlatformVulkanInstance)"
 )
@@ -47,17 +47,17 @@ _log = logging.getLogger("qt")
 
 
 def quiet_chromium(environ: MutableMapping[str, str]) -> None:
-    """Silence Chromium's log, unless the user's flags configure it."""
+    """Disable Chromium's log unless the user's flags configure it."""
     flags = environ.get(FLAGS, "")
     if "--log-level" not in flags and "--enable-logging" not in flags:
         environ[FLAGS] = f"{flags} {QUIET}".strip()
 
 
 def on_qt_message(kind: QtMsgType, _context: QMessageLogContext, words: str) -> None:
-    """Log one message of Qt, unless it is known noise.
+    """Log a message of Qt, unless it is known noise.
 
-    If no window can be opened, which happens before there is anything to lose, the program exits here with
-    code 2: Qt would advise to reinstall, and abort.
+    If Qt can't open a window, the program exits here with code 2, because Qt would advise to reinstall the
+    application and abort. This happens during startup, so no work is lost.
     """
     if kind == QtMsgType.QtFatalMsg and NO_WINDOW in words:
         _log.critical(
@@ -73,7 +73,7 @@ def on_qt_message(kind: QtMsgType, _context: QMessageLogContext, words: str) -> 
 
 
 class Log(logging.Handler):
-    """Logging handler that stores warnings and errors of any thread for the Console."""
+    """Logging handler that stores warnings and errors of all threads for the Console."""
 
     def __init__(self) -> None:
         super().__init__(logging.WARNING)
@@ -81,7 +81,7 @@ class Log(logging.Handler):
         self._records: deque[tuple[str, str, str]] = deque(maxlen=KEPT)
 
     def emit(self, record: logging.LogRecord) -> None:
-        """Store a record; repetitions are stored with their count."""
+        """Store a record. Repeated records are stored with their count."""
         if getattr(record, "in_console", False):
             return
         filtered = self._repeat_filter.filter(record)
@@ -90,15 +90,15 @@ class Log(logging.Handler):
             self._records.append((level, filtered.name.partition(".")[0], filtered.getMessage()))
 
     def drain(self, add: Callable[[str, str, str], object]) -> None:
-        """Pass stored records to ``add`` (level, origin, text), oldest first."""
+        """Pass the stored records to ``add`` (level, origin, text), oldest first, and discard them."""
         while self._records:
             add(*self._records.popleft())
 
 
 class TerminalHandler(logging.StreamHandler[terminal.Terminal]):
-    """Logging handler that writes warnings and errors to stderr, with the traceback of new ones.
+    """Logging handler that writes warnings and errors to stderr, with a traceback if the error is new.
 
-    Never blocks a thread: a terminal may not accept output for hours.
+    Never blocks a thread, although a terminal may stop accepting output for hours.
     """
 
     def __init__(self, stream: TextIO | None) -> None:
@@ -108,23 +108,26 @@ class TerminalHandler(logging.StreamHandler[terminal.Terminal]):
         self.setFormatter(terminal.LineFormatter("%(name)s: %(message)s"))
 
     def emit(self, record: logging.LogRecord) -> None:
-        """Write a record; repetitions are written with their count."""
+        """Write a record. Repeated records are written with their count."""
         filtered = self._repeat_filter.filter(record)
         if filtered is not None:
             super().emit(filtered)
-            if filtered.levelno >= logging.CRITICAL:  # Qt ends the program afterwards
+            if filtered.levelno >= logging.CRITICAL:  # Qt ends the program after this message
                 self.stream.drain()
 
     def close(self) -> None:
-        """Give pending output a moment to be written. Called by logging at exit."""
+        """Allow some time for pending output to be written. Called by `logging` at exit."""
         self.stream.close()
         super().close()
 
 
 def listen() -> Log:
-    """Install handlers for Qt's messages, uncaught exceptions and log records; return the Console's.
+    """Install handlers for Qt's messages, uncaught exceptions and log records.
 
-    Records also go to stderr and into the log files (`app.core.faults`).
+    Records also go to stderr and to the log files (`app.core.faults`).
+
+    Returns:
+        The handler that stores records for the Console.
     """
     faults.install_hooks()
     qInstallMessageHandler(on_qt_message)

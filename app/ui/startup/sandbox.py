@@ -1,8 +1,9 @@
-"""Sandbox of the block editor's browser, on Linux systems that deny user namespaces.
+"""Sandbox of the block editor's browser on Linux systems that deny user namespaces.
 
-Chromium isolates its processes by namespaces and by a system call filter. Where the former are denied, for
+Chromium isolates its processes by namespaces and by a system call filter. Where namespaces are denied, for
 example by AppArmor (Ubuntu 24.04 and later, for programs without a profile), Chromium finds out too late and
-crashes Studio. So namespaces are tried first, and disabled for Chromium if necessary: the filter stays.
+crashes Studio. Therefore namespaces are tested first and, if necessary, disabled for Chromium; the filter
+stays active.
 """
 
 from __future__ import annotations
@@ -22,18 +23,18 @@ FILTER_ALONE = "--disable-namespace-sandbox"
 OFF = "QTWEBENGINE_DISABLE_SANDBOX"
 NEW_USER, NEW_PROCESSES = 0x10000000, 0x20000000
 NOWHERE = b"/proc/self/fdinfo"
-"""Root folder of Chromium's isolated processes, which is empty once its process has ended."""
+"""Root folder of Chromium's isolated processes; it is empty once its process has ended."""
 MAX_S = 2.0
 
 _log = logging.getLogger("studio.editor")
 
 
 class SandboxTrial:
-    """Tests whether this program may create namespaces as Chromium does, in a short-lived process."""
+    """Tests in a short-lived process whether this program may create namespaces as Chromium does."""
 
     def __init__(self) -> None:
-        # Takes about 20 ms, during which other work can be done.
-        self._ended, writer = os.pipe()  # closed at the other end when that process has ended
+        # The test takes about 20 ms, during which other work can be done.
+        self._ended, writer = os.pipe()  # the write end is closed when the process has ended
         try:
             self._process = os.fork()
             if self._process == 0:
@@ -48,7 +49,10 @@ class SandboxTrial:
             os.close(writer)
 
     def allowed(self) -> bool:
-        """Return whether it succeeded; call it once. False also when unknown. Waits at most 2 s."""
+        """Return True if namespaces are allowed, False if they are denied or the result is unknown.
+
+        Waits at most 2 s. Call it once.
+        """
         if self._process < 0:
             return False
         if not select.select([self._ended], [], [], MAX_S)[0]:
@@ -58,9 +62,10 @@ class SandboxTrial:
 
 
 def begin_trial(environ: Mapping[str, str], platform: str) -> SandboxTrial | None:
-    """Start the test; None where it isn't needed. ``platform`` is `sys.platform`.
+    """Start the test. Return None where it isn't needed.
 
-    The user may have disabled the sandbox, or chosen another one by Chromium's flags.
+    It isn't needed if the user has disabled the sandbox, or chosen another one by Chromium's flags.
+    ``platform`` is a value of `sys.platform`.
     """
     if not platform.startswith("linux") or environ.get(OFF) or "sandbox" in environ.get(FLAGS, ""):
         return None
@@ -68,7 +73,10 @@ def begin_trial(environ: Mapping[str, str], platform: str) -> SandboxTrial | Non
 
 
 def fit_sandbox(environ: MutableMapping[str, str], trial: SandboxTrial | None) -> None:
-    """Restrict Chromium to its filter if the test failed. Call it before the web engine starts."""
+    """Restrict Chromium to the system call filter if the test failed.
+
+    Call this before the web engine starts.
+    """
     if trial is not None and not trial.allowed():
         _log.info(
             "user namespaces are not permitted: the block editor's browser uses the system call filter only"
@@ -77,7 +85,7 @@ def fit_sandbox(environ: MutableMapping[str, str], trial: SandboxTrial | None) -
 
 
 def shuts_itself_off() -> bool:
-    """Isolate this process as Chromium does; return whether the system permits it."""
+    """Isolate this process as Chromium does. Return False if the system denies it."""
     if sys.platform == "win32":
         return False
     user, group = os.geteuid(), os.getegid()

@@ -1,7 +1,7 @@
-"""Single instance: a second start passes its files to the running Studio.
+"""Single instance: a second start passes its files to the running Studio and exits.
 
-Both use a local socket in a private folder, and each checks the owner of the other. ``--new-window`` skips
-it.
+Both processes use a local socket in a private folder, and each checks the owner of the other. The option
+``--new-window`` skips this.
 """
 
 from __future__ import annotations
@@ -51,14 +51,14 @@ class StartRequest:
 
 
 def place(folder: Path) -> str:
-    """Return the socket name for Studio's folder; empty without a private folder.
+    """Return the name of the socket for Studio's folder; "" if there is no private folder for it.
 
     The socket is in the user's runtime folder, else in Studio's folder, else in a private temporary one: in a
     shared folder another user could impersonate the window.
     """
     mark = hashlib.sha256(os.fsencode(folder.resolve())).hexdigest()[:16]
     if os.name != "posix":
-        return f"nep-studio-{mark}"  # a pipe that only this user may open
+        return f"nep-studio-{mark}"  # a named pipe that only this user may open
     runtime = os.environ.get("XDG_RUNTIME_DIR", "")
     own = [Path(runtime) / "nep-studio"] if Path(runtime).is_absolute() and is_private(Path(runtime)) else []
     for each in (*own, folder.resolve(), Path(tempfile.gettempdir()) / f"nep-studio-{os.geteuid()}"):
@@ -73,7 +73,7 @@ def place(folder: Path) -> str:
 
 
 def is_private(folder: Path) -> bool:
-    """Return whether a folder belongs to this user and is private; False for a link."""
+    """Return True if a folder belongs to this user and is private. A symbolic link is not private."""
     try:
         about = folder.lstat()
     except OSError:
@@ -82,7 +82,7 @@ def is_private(folder: Path) -> bool:
 
 
 def is_ours(name: str) -> bool:
-    """Return whether the socket exists, belongs to this user, and is in a private folder."""
+    """Return True if the socket exists, belongs to this user, and is in a private folder."""
     if os.name != "posix":
         return bool(name)
     try:
@@ -93,7 +93,7 @@ def is_ours(name: str) -> bool:
 
 
 def peer_of(descriptor: int) -> int | None:
-    """Return the user id at the other end of a local socket; None where the system doesn't report it."""
+    """Return the user id of the peer of a local socket; None where the system doesn't report it."""
     asked = getattr(socket, "SO_PEERCRED", None)
     copy = os.dup(descriptor)
     try:
@@ -113,12 +113,12 @@ def peer_of(descriptor: int) -> int | None:
 
 
 def hand_over(name: str, asked: StartRequest) -> bool:
-    """Pass the request to the running window; return False when there is none. Waits at most 3 s.
+    """Pass a request to the running window. Return False if there is none. Waits at most 3 s.
 
     Sockets of other users are ignored.
     """
     if not is_ours(name):
-        return False  # on Unix before Qt's network module is loaded, which takes time
+        return False  # checked on Unix before Qt's network module is loaded, which takes time
     line = QtNetwork.QLocalSocket()
     line.connectToServer(name)
     if not line.waitForConnected(CONNECT_MS) or _belongs_to_other_user(line):
@@ -136,17 +136,17 @@ def hand_over(name: str, asked: StartRequest) -> bool:
 
 
 def found(name: str, asked: StartRequest, turn: FileLock, within_s: float = START_S) -> bool:
-    """Return whether a running or starting window accepted the request.
+    """Return True if a running or starting window accepted the request.
 
-    If not, this start holds the lock ``turn`` and opens a window; it releases the lock when the window is
-    reachable. So a double click on Studio's icon opens one window.
+    Otherwise this process holds the lock ``turn`` and has to open a window; it releases the lock when the
+    window can be reached. A double click on Studio's icon therefore opens only one window.
     """
     until, pause, waited = time.monotonic() + within_s, threading.Event(), False
     while not hand_over(name, asked):
         if not name or time.monotonic() >= until:
             return False
         if turn.acquire():
-            if waited and hand_over(name, asked):  # it appeared between the two attempts
+            if waited and hand_over(name, asked):  # the window appeared between the two attempts
                 turn.release()
                 return True
             return False
@@ -163,12 +163,12 @@ def _belongs_to_other_user(line: QtNetwork.QLocalSocket) -> bool:
 
 
 class SingleInstanceServer(QObject):
-    """Server by which later starts find this window; `close` ends it."""
+    """Server that receives the requests of later starts; `close` stops it."""
 
     def __init__(
         self, name: str, do: Callable[[StartRequest], object], parent: QObject | None = None
     ) -> None:
-        # `do` is called for each request.
+        # `do` is called with each request.
         super().__init__(parent)
         self._do = do
         self._received: dict[QtNetwork.QLocalSocket, bytes] = {}
@@ -176,12 +176,12 @@ class SingleInstanceServer(QObject):
         self._server.setSocketOptions(QtNetwork.QLocalServer.SocketOption.UserAccessOption)
         self._server.newConnection.connect(self._accept)
         self.open = self._listen(name)
-        """True if later starts can find it; otherwise each opens its own window."""
+        """True if later starts can reach this window; otherwise each opens its own."""
 
     def _listen(self, name: str) -> bool:
         if not name:
             return False
-        # On Unix a second listener replaces the first one silently: check first whether one is there.
+        # On Unix a second listener replaces the first one silently, so check first whether there is one.
         probe = QtNetwork.QLocalSocket()
         probe.connectToServer(name)
         if probe.waitForConnected(CONNECT_MS):
@@ -189,7 +189,7 @@ class SingleInstanceServer(QObject):
             return False
         if self._server.listen(name):
             return True
-        QtNetwork.QLocalServer.removeServer(name)  # left behind by a killed instance
+        QtNetwork.QLocalServer.removeServer(name)  # left behind by an instance that was killed
         return self._server.listen(name)
 
     def _accept(self) -> None:
@@ -222,11 +222,11 @@ class SingleInstanceServer(QObject):
 
     def _on_disconnected(self, socket: QtNetwork.QLocalSocket) -> None:
         self._received.pop(socket, None)
-        if isValid(socket):  # not one that is deleted with the window
+        if isValid(socket):  # the socket may have been deleted with the window
             socket.deleteLater()
 
     def close(self) -> None:
-        """Stop accepting requests."""
+        """Stop to accept requests."""
         self._server.close()
 
 

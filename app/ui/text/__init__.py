@@ -1,4 +1,4 @@
-"""Formatting of values for people: numbers, dates, sensors.
+"""Formatting of values for display: numbers, dates, sensors.
 
-Translations come from `nep.i18n`; no widgets here.
+Independent of widgets; translations come from `nep.i18n`.
 """

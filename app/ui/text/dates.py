@@ -8,7 +8,7 @@ from nep.i18n import _, day_text
 
 
 def day_words(then: dt.datetime, now: dt.datetime) -> str:
-    """Format a day: "Today, 8:12", "Yesterday", "17 November", "17 November 2025"."""
+    """Format a day, such as "Today, 8:12", "Yesterday", "17 November" or "17 November 2025"."""
     days = (now.date() - then.date()).days
     if days == 0:
         return _("Today, {clock}").format(clock=clock_words(then))
@@ -18,7 +18,7 @@ def day_words(then: dt.datetime, now: dt.datetime) -> str:
 
 
 def when_words(then: dt.datetime, now: dt.datetime) -> str:
-    """Format a time: "Today, 8:12", "Yesterday, 8:12", "17 November, 8:12"."""
+    """Format a date and time, such as "Today, 8:12", "Yesterday, 8:12" or "17 November, 8:12"."""
     day = day_words(then, now)
     if then.date() == now.date():
         return day
@@ -26,7 +26,7 @@ def when_words(then: dt.datetime, now: dt.datetime) -> str:
 
 
 def seen_words(then: dt.datetime, now: dt.datetime) -> str:
-    """Format a last-seen time: "seen today, 8:12", "seen yesterday, 16:20", "seen 17 November, 16:20"."""
+    """Format when something was last seen, such as "seen today, 8:12" or "seen 17 November, 16:20"."""
     clock = clock_words(then)
     days = (now.date() - then.date()).days
     if days == 0:
@@ -37,5 +37,5 @@ def seen_words(then: dt.datetime, now: dt.datetime) -> str:
 
 
 def clock_words(then: dt.datetime) -> str:
-    """Format a time of day: "8:12"."""
+    """Format a time of day, such as "8:12"."""
     return f"{then.hour}:{then.minute:02d}"

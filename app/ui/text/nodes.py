@@ -1,4 +1,4 @@
-"""Formatting of nodes: NEP version and CPU use."""
+"""Formatting of properties of nodes: NEP version and CPU use."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ GENERATIONS = {
 
 
 def generation_words(node: NodeEntry) -> str:
-    """Return "native", the versions of the original NEP, or the other network."""
+    """Return "native", the version of the original NEP, or the name of the other network."""
     kind = kind_named(node.network)
     if kind is not None:
         return kind.words
@@ -22,7 +22,7 @@ def generation_words(node: NodeEntry) -> str:
 
 
 def cpu_words(ratio: float | None) -> str:
-    """Format a share of a core: 0.4 %, 12 %, 130 %; "" if unknown."""
+    """Format a share of a core, such as "0.4 %", "12 %" or "130 %"; "" if it is unknown."""
     if ratio is None:
         return ""
     percent = ratio * 100

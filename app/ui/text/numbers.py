@@ -1,4 +1,4 @@
-"""Formatting of numbers with units, "" if unknown; and of keyboard shortcuts."""
+"""Formatting of numbers with units ("" for unknown ones), and of keyboard shortcuts."""
 
 from __future__ import annotations
 
@@ -32,25 +32,25 @@ KEYS = {
     "Tab": plazy("key", "Tab"),
     "Up": plazy("key", "Up"),
 }
-"""Labels of keys by Qt's names; letters and F12 are the same in all languages."""
+"""Labels of keys by Qt's names. Letters and function keys are the same in all languages."""
 _KEY = re.compile(r"[A-Z][A-Za-z]+")
-THIN = "\u2009"  # thin space between thousands
+THIN = "\u2009"  # thin space, as thousands separator
 
 
 def rate_words(rate_hz: float | None) -> str:
-    """Format a rate in messages per second: 30.0, 0.4, 1 204; "" if unknown."""
+    """Format a rate in messages per second, such as "30.0", "0.4" or "1 204"; "" if it is unknown."""
     if rate_hz is None:
         return ""
     return number(rate_hz, ".1f") if rate_hz < 1000 else grouped(round(rate_hz))
 
 
 def bandwidth_words(bytes_per_s: float | None) -> str:
-    """Format a bandwidth: 92 B/s, 1.6 kB/s, 46 kB/s, 5.1 MB/s; "" if unknown."""
+    """Format a bandwidth, such as "92 B/s", "1.6 kB/s" or "5.1 MB/s"; "" if it is unknown."""
     return "" if bytes_per_s is None else f"{size_words(bytes_per_s)}/s"
 
 
 def size_words(size_bytes: float) -> str:
-    """Format a size: 412 B, 1.6 kB, 46 kB, 5.1 MB."""
+    """Format a size, such as "412 B", "1.6 kB", "46 kB" or "5.1 MB"."""
     if size_bytes < 1000:
         return f"{round(size_bytes)} B"
     value, unit = size_bytes / 1000, "kB"
@@ -62,7 +62,7 @@ def size_words(size_bytes: float) -> str:
 
 
 def age_words(age_s: float | None) -> str:
-    """Format an age: 12 ms, 0.4 s, 6 s, 2 min, 3 h; "" if unknown."""
+    """Format an age, such as "12 ms", "0.4 s", "6 s", "2 min" or "3 h"; "" if it is unknown."""
     if age_s is None:
         return ""
     if age_s < 0.0995:
@@ -75,39 +75,39 @@ def age_words(age_s: float | None) -> str:
 
 
 def latency_words(latency_s: float) -> str:
-    """Format a latency: 0.6 ms, 41 ms, 1.2 s."""
+    """Format a latency, such as "0.6 ms", "41 ms" or "1.2 s"."""
     if latency_s < 0.00995:
         return f"{number(latency_s * 1000, '.1f')} ms"
     return f"{round(latency_s * 1000)} ms" if latency_s < 0.9995 else f"{number(latency_s, '.1f')} s"
 
 
 def grouped(count: int) -> str:
-    """Format a count with grouped thousands: 18 204."""
+    """Format a count with a thousands separator, such as "18 204"."""
     return f"{count:,}".replace(",", THIN)
 
 
 def seconds_words(value_s: float) -> str:
-    """Format a duration: 0.4 s, 14 s, 2 min."""
+    """Format a duration, such as "0.4 s", "14 s" or "2 min"."""
     if value_s < 10:
         return f"{number(value_s, '.1f')} s"
     return f"{round(value_s)} s" if value_s < 120 else f"{round(value_s / 60)} min"
 
 
 def spoken_key(shortcut: str, platform: str = sys.platform) -> str:
-    """Format shortcuts, separated by commas: "Ctrl+Shift+S"; on a Mac, where Ctrl is Cmd, "⇧⌘S"."""
+    """Format shortcuts, separated by commas, such as "Ctrl+Shift+S", or "⇧⌘S" on a Mac, where Ctrl is Cmd."""
     if platform != "darwin":
         return _named_keys(shortcut, {})
     return ", ".join(_mac_key(each) for each in shortcut.split(", "))
 
 
 def _mac_key(shortcut: str) -> str:
-    # In the order of a Mac's menus.
+    # In the order of menus on a Mac.
     *held, key = re.split(r"\+(?=.)", shortcut)
     return "".join(sign for name, sign in MAC_KEYS.items() if name in held) + _named_keys(key, MAC_KEYS)
 
 
 def tip_with_key(tip: str, shortcut: str, platform: str = sys.platform) -> str:
-    """Return a tooltip with its shortcut: "Save (Ctrl+S)"; on a Mac "Save (⌘S)"."""
+    """Append a shortcut to a tooltip, such as "Save (Ctrl+S)", or "Save (⌘S)" on a Mac."""
     return f"{tip} ({spoken_key(shortcut, platform)})" if shortcut else tip
 
 
@@ -116,7 +116,7 @@ def _named_keys(shortcut: str, signs: Mapping[str, str]) -> str:
 
 
 def length_words(seconds: float) -> str:
-    """Format the length of a recording: 0:42, 12:04, 1:32:10."""
+    """Format the length of a recording, such as "0:42", "12:04" or "1:32:10"."""
     whole = int(seconds) if 0 <= seconds < 1e9 else 0
     minutes, rest = divmod(whole, 60)
     hours, minutes = divmod(minutes, 60)

@@ -1,7 +1,7 @@
-"""Escaping of names from the network: plain text, never markup, in tooltips and menus.
+"""Escaping of names from the network, so that tooltips and menus show them as plain text.
 
-Qt interprets a tooltip that looks like HTML as HTML. A node named ``<img src="//server/share">`` could then
-show a file of this computer, or reveal this user to a server, when the mouse is on its name.
+Qt interprets a tooltip that looks like HTML as HTML. A node named ``<img src="//server/share">`` could
+therefore show a file of this computer, or reveal the user to a server, when the mouse is over its name.
 """
 
 from __future__ import annotations
@@ -16,12 +16,12 @@ MAY_BREAK = "\u200b"  # zero-width space, at which a line may break
 
 
 def breakable(words: str) -> str:
-    """Insert break opportunities into very long words, which a label would otherwise cut off."""
+    """Insert line break opportunities into very long words, which a label would otherwise cut off."""
     return " ".join(_pieces(word) if len(word) > LONG_WORD else word for word in words.split(" "))
 
 
 def _pieces(word: str) -> str:
-    # Combining characters stay with their letter.
+    # Combining characters are not separated from their letter.
     result, since = "", 0
     for letter in word:
         if since >= PIECE and not unicodedata.combining(letter) and unicodedata.category(letter)[0] in "LN":
@@ -31,12 +31,12 @@ def _pieces(word: str) -> str:
 
 
 def tip(words: str) -> str:
-    """Return a tooltip that shows exactly this text."""
+    """Escape a text for a tooltip that shows exactly this text."""
     if not Qt.mightBeRichText(words):
         return words
     return f'<span style="white-space: pre-wrap">{html.escape(words)}</span>'
 
 
 def entry(name: str) -> str:
-    """Return a menu entry that shows exactly this name: no mnemonic by an ampersand, no shortcut by a tab."""
+    """Escape a name for a menu entry: an ampersand makes no mnemonic, and a tab no shortcut."""
     return name.replace("&", "&&").replace("\t", " ")

@@ -1,4 +1,4 @@
-"""Formatting of sensor values for a row: value, details, and share of the range."""
+"""Formatting of sensor values for a table row: value, details, and position in the range."""
 
 from __future__ import annotations
 
@@ -16,9 +16,12 @@ _MAX_NAMES = 20
 
 @dataclass(frozen=True, slots=True)
 class ReadingWords:
-    """Formatted reading.
+    """Formatted sensor value.
 
-    ``value`` in bold at the right, ``beside`` in the middle, ``share`` (0 to 1) as a bar, or None.
+    Attributes:
+        value: Value, shown in bold at the right.
+        beside: Details, shown in the middle.
+        share: Position in the range (0 to 1), shown as a bar, or None.
     """
 
     value: str = ""
@@ -27,7 +30,7 @@ class ReadingWords:
 
 
 def reading_of(sensor: Sensor, value: object) -> ReadingWords:
-    """Format a sensor's newest value; empty when there is none."""
+    """Format a sensor's newest value. All texts are empty if there is none."""
     if value is None:
         return ReadingWords()
     if sensor.kind == "boolean" or isinstance(value, bool):
@@ -52,7 +55,7 @@ def yes_words(value: object) -> str:
 
 
 def number_words(value: float, unit: str | None) -> str:
-    """Format a number with significant decimals: 0.82 m, 84 %, 31°."""
+    """Format a number with its significant decimals, such as "0.82 m", "84 %" or "31°"."""
     if isinstance(value, int) or float(value).is_integer():
         words = f"{value:.0f}"
     elif abs(value) < 10:
@@ -86,7 +89,7 @@ def _detections(value: Mapping[str, object]) -> ReadingWords:
 
 
 def _object(sensor: Sensor, value: Mapping[str, object]) -> ReadingWords:
-    # Fields with the same unit are combined ("1.3, 0.3 m"), the others follow ("facing 31°").
+    # Fields with the same unit are combined ("1.3, 0.3 m"); others follow ("facing 31°").
     fields = sensor.fields or tuple(DataField(str(name), str(name), "number") for name in value)
     known = [(field, value.get(field.name)) for field in fields]
     numbers = [(field, measured) for field, measured in known if _is_number(measured)]

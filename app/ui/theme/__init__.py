@@ -1,5 +1,5 @@
-"""Theme of Studio: tokens, colours, fonts, icons and the style sheet.
+"""Theme of Studio: design tokens, colours, fonts, icons and the style sheet.
 
-`theme` provides each colour, size and font by the name of its role; `tokens` reads them from the design's
-file.
+`theme` provides each colour, size and font by the name of its role; `tokens` reads the design tokens from
+their file.
 """

@@ -10,7 +10,7 @@ from PySide6.QtGui import QFont, QFontDatabase
 from app import resources
 
 LOADED = "fontsRefused"
-"""Application property with the font files that Qt rejected; set once they are loaded."""
+"""Application property with the font files that Qt rejected; set once all are loaded."""
 FILES = (
     "Inter-Regular.otf",
     "Inter-Medium.otf",
@@ -26,7 +26,7 @@ FILES = (
 
 
 def load() -> tuple[str, ...]:
-    """Register the bundled fonts with Qt; return the rejected files.
+    """Register the bundled fonts with Qt. Return the files that Qt rejected.
 
     Needs a QGuiApplication. Idempotent, because each registration, even of a known file, clears Qt's cache of
     text sizes.
@@ -45,7 +45,7 @@ def load() -> tuple[str, ...]:
 
 
 def make(families: Sequence[str], size_px: float, weight: int, *, spacing_em: float = 0.0) -> QFont:
-    """Return a font with tabular figures (``tnum``) and letter spacing in em."""
+    """Return a font with tabular digits (``tnum``) and letter spacing in em."""
     font = QFont(list(families))
     font.setPixelSize(max(1, round(size_px)))
     font.setWeight(QFont.Weight(weight))

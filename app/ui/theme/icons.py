@@ -1,7 +1,7 @@
 """Lucide icons in the colour of the adjacent text, sharp at every device pixel ratio.
 
-One drawing per icon for all themes: an engine replaces ``currentColor`` by the colour of a role when it
-paints. Delegates and painted widgets call `paint_icon`; controls that need a QIcon use `IconEngine`.
+There is one drawing per icon for all themes: ``currentColor`` is replaced by the colour of a role when it is
+painted. Delegates and painted widgets call `paint_icon`; widgets that need a QIcon use `IconEngine`.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ _log = logging.getLogger("studio")
 
 @lru_cache(maxsize=1)
 def _shapes() -> dict[str, str]:
-    # The content of each icon's <svg> by name: all of Lucide, since a robot may name any of them.
+    # The contents of each icon's <svg> by name: all of Lucide, because a robot may name any of them.
     text = resources.path("icons", "lucide.txt").read_text("utf-8")
     return dict(line.split("\t", 1) for line in text.splitlines())
 
@@ -68,9 +68,9 @@ def _renderer(name: str, colour: str, opacity: float, filled: bool, thin: bool) 
 
 
 def paint_icon(painter: QPainter, rect: QRectF, name: str, colour: QColor, *, filled: bool = False) -> None:
-    """Paint an icon into a square of logical pixels; ``dot`` is the filled disc of a running block.
+    """Paint an icon into a square in logical pixels; ``dot`` is the filled disc of a running block.
 
-    An unknown name is replaced by a circle with a question mark, and logged with the most similar one.
+    An unknown name is replaced by a circle with a question mark, and logged with the most similar known name.
     """
     painter.save()
     painter.setRenderHint(QPainter.RenderHint.Antialiasing)
@@ -97,7 +97,7 @@ def _drawn(name: str, side: float, rgba: int, ratio: float) -> QPixmap:
 
 
 def paint_icon_again(painter: QPainter, rect: QRectF, name: str, colour: QColor) -> None:
-    """Paint an icon from a cached pixmap at whole pixels, for frequent repaints; see `paint_icon`."""
+    """Paint an icon like `paint_icon`, but from a cached pixmap at whole pixels, for frequent repaints."""
     ratio = painter.device().devicePixelRatioF()
     place = QPointF(round(rect.x() * ratio) / ratio, round(rect.y() * ratio) / ratio)
     painter.drawPixmap(place, _drawn(name, rect.width(), colour.rgba(), ratio))
@@ -105,10 +105,10 @@ def paint_icon_again(painter: QPainter, rect: QRectF, name: str, colour: QColor)
 
 @guard  # not a QObject
 class IconEngine(QIconEngine):
-    """Paints one icon in the colours of the current state: enabled, disabled, or selected."""
+    """Icon engine that paints an icon in the colours of the current state: enabled, disabled, or selected."""
 
     def __init__(self, name: str, colour: Callable[[QIcon.Mode, QIcon.State], QColor]) -> None:
-        # `colour` is called at each painting, so that a new theme needs no new icon.
+        # `colour` is called at each paint, so that a new theme needs no new icon.
         super().__init__()
         _source(name)
         self._name = name

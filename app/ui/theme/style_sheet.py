@@ -1,4 +1,4 @@
-"""Style sheet of the application, built from the roles of a theme: rules by class and dynamic property.
+"""Style sheet of the application, built from a theme, with rules by class and dynamic property.
 
 Labels get font and colour by the properties ``kind`` and ``role`` (`app.ui.widgets.label`).
 """
@@ -16,18 +16,18 @@ LABEL_ROLES = (
 )  # fmt: skip
 
 OUR_KINDS = {"titleLarge": (14.0, 600), "empty": (17.0, 600), "card": (15.0, 600), "lead": (15.0, 400)}
-"""Additional kinds of labels: size and weight."""
+"""Size and weight of additional kinds of labels."""
 
 
 class ThemeValues(Protocol):
-    """Part of a theme that the style sheet needs."""
+    """Part of a theme that the style sheet uses."""
 
     @property
     def dark(self) -> bool:
         """True if the theme is dark."""
 
     def hex(self, role: str) -> str:
-        """Return a role's colour."""
+        """Return the colour of a role."""
 
     def radius(self, name: str) -> int:
         """Return a corner radius."""
@@ -139,7 +139,7 @@ def _labels(theme: ThemeValues) -> str:
 
 
 class _Roles(dict[str, str]):
-    """Mapping that falls back to the theme's colours."""
+    """Mapping of roles to values, with the theme's colours as defaults."""
 
     def __init__(self, theme: ThemeValues) -> None:
         super().__init__()
@@ -150,7 +150,7 @@ class _Roles(dict[str, str]):
 
 
 def build(theme: ThemeValues) -> str:
-    """Return the style sheet in the colours and sizes of ``theme``."""
+    """Return the style sheet with the colours and sizes of ``theme``."""
     roles = _Roles(theme)
     roles.update(
         small=str(theme.radius("small")),

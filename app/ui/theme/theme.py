@@ -1,7 +1,8 @@
 """Theme of Studio: every colour, size, duration and font by the name of its role.
 
 `Theme` reads the design tokens and creates the palette, the style sheet and the tokens of the block editor.
-No other module contains a colour; painters call ``theme.colour("accent")``. A change repaints immediately.
+No other module contains a colour; painters call ``theme.colour("accent")``. Changes repaint the window
+immediately.
 """
 
 from __future__ import annotations
@@ -56,14 +57,14 @@ STYLED = "isFusion"
 
 
 class Theme(QObject):
-    """Colours, sizes, fonts and icons of the current mode; emits `changed` when any of them changed."""
+    """Colours, sizes, fonts and icons of the current mode. Emits `changed` when any of them changes."""
 
     changed = Signal()
 
     def __init__(
         self, mode: Mode = "light", tokens: Tokens | None = None, hints: QStyleHints | None = None
     ) -> None:
-        # `system` follows `hints`, by default the application's.
+        # The mode "system" follows `hints`, by default those of the application.
         super().__init__()
         self._tokens = tokens if tokens is not None else theme_tokens.load()
         self._hints = hints if hints is not None else QGuiApplication.styleHints()
@@ -82,26 +83,26 @@ class Theme(QObject):
 
     @property
     def mode(self) -> Mode:
-        """Chosen mode: "light", "dark" or "system"."""
+        """Mode chosen by the user: "light", "dark" or "system"."""
         return self._mode
 
     @property
     def dark(self) -> bool:
-        """True if the colours are dark now."""
+        """True if the current colours are dark."""
         return self._dark
 
     @property
     def tokens(self) -> Mapping[str, object]:
-        """Design tokens as in their file."""
+        """Design tokens as stored in their file."""
         return self._tokens.raw
 
     def set_mode(self, mode: Mode) -> None:
-        """Set light, dark or the system's colours, and repaint."""
+        """Use light or dark colours, or those of the system, and repaint."""
         self._mode = mode
         self._refresh()
 
     def begin(self, mode: Mode, text_percent: int, motion: Preference, contrast: Preference) -> None:
-        """Apply all saved choices at once."""
+        """Apply all saved settings at once."""
         self._mode, self.contrast = mode, contrast
         self.high_contrast = self._wanted_contrast()
         self._text_percent = min(max(text_percent, TEXT_PERCENT[0]), TEXT_PERCENT[1])
@@ -110,19 +111,19 @@ class Theme(QObject):
         self._refresh()
 
     def set_text_percent(self, percent: int) -> None:
-        """Set the text size in per cent (100 to 200), which also scales lengths based on text."""
+        """Set the text size in per cent (100 to 200), which also scales lengths that depend on text."""
         self._text_percent = min(max(percent, TEXT_PERCENT[0]), TEXT_PERCENT[1])
         self._fonts.clear()
         self.apply()
 
     def set_motion(self, wish: Preference) -> None:
-        """Set reduced motion: "on", "off", or as the system prefers."""
+        """Set reduced motion: "on", "off", or "system" for the system's preference."""
         self.motion = wish
         self.reduced_motion = wish == "on" or (wish == "system" and system.wants_less_motion())
         self.changed.emit()
 
     def set_contrast(self, wish: Preference) -> None:
-        """Set high contrast (strong edges, no tints): "on", "off", or as the system prefers."""
+        """Set high contrast (strong borders, no tints): "on", "off", or "system" to follow the system."""
         self.contrast = wish
         if self._wanted_contrast() != self.high_contrast:
             self.high_contrast = not self.high_contrast
@@ -143,7 +144,7 @@ class Theme(QObject):
         """Apply style, palette, style sheet and font to the application, and emit `changed`."""
         application = QApplication.instance()
         if isinstance(application, QApplication):
-            # Each of these visits all widgets, even without a change.
+            # Each of these visits all widgets, even if nothing changes.
             if application.property(STYLED) is None:
                 application.setStyle(QStyleFactory.create("Fusion"))
                 application.setProperty(STYLED, True)
@@ -176,7 +177,7 @@ class Theme(QObject):
         return "dark" if self._dark else "light"
 
     def hex(self, role: str) -> str:
-        """Return a role's colour as in the tokens. Raises KeyError for an unknown role."""
+        """Return the colour of a role as in the tokens. Raises KeyError for an unknown role."""
         if self.high_contrast:
             if role in HC_STRONGER:
                 role = "controlBorder"
@@ -185,18 +186,18 @@ class Theme(QObject):
         return self._tokens.colours[self._scheme][role]
 
     def colour(self, role: str) -> QColor:
-        """Return a role's colour. Raises KeyError for an unknown role."""
+        """Return the colour of a role. Raises KeyError for an unknown role."""
         return qt_colour(self.hex(role))
 
     def series(self, index: int) -> QColor:
-        """Return the colour of a curve, cyclically."""
+        """Return the colour of a curve; colours repeat cyclically."""
         colours = self._tokens.series[self._scheme]
         return QColor(colours[index % len(colours)])
 
     def block_colour(self, category: str, part: str = "primary") -> QColor:
-        """Return a block category's "primary", "secondary" or "tertiary" colour.
+        """Return the "primary", "secondary" or "tertiary" colour of a block category.
 
-        Unknown ones are as "values".
+        Unknown categories use the colours of "values".
         """
         block = self._tokens.blocks.get(category, self._tokens.blocks["values"])
         return QColor(block[self._scheme][part])
@@ -210,11 +211,11 @@ class Theme(QObject):
         return self._tokens.block_icons.get(category, self._tokens.block_icons["values"])
 
     def status(self, name: str) -> Status:
-        """Return the style of "ok", "warn", "error", "info", "off", "running" or "recording"."""
+        """Return the style of a status: "ok", "warn", "error", "info", "off", "running" or "recording"."""
         return self._tokens.status[name]
 
     def palette(self) -> QPalette:
-        """Return the palette for widgets that Qt paints."""
+        """Return the palette for widgets that Qt paints itself."""
         return _palette(self.colour)
 
     def style_sheet(self) -> str:
@@ -224,7 +225,7 @@ class Theme(QObject):
     # -- sizes and durations ----------------------------------------------------------------------
 
     def size(self, *path: str) -> int:
-        """Return a length in pixels, such as ``size("row", "compact")``. Raises KeyError if unknown."""
+        """Return a length in px, such as ``size("row", "compact")``. Raises KeyError if it is unknown."""
         value: object = self._tokens.sizes
         for step in path:
             if not isinstance(value, Mapping):
@@ -235,7 +236,7 @@ class Theme(QObject):
         return round(value)
 
     def pair(self, *path: str) -> QSize:
-        """Return a width and height, such as ``pair("stop", "runBar")``."""
+        """Return a width and height in px, such as ``pair("stop", "runBar")``."""
         value: object = self._tokens.sizes
         for step in path:
             value = value[step] if isinstance(value, Mapping) else None
@@ -244,11 +245,11 @@ class Theme(QObject):
         return QSize(int(value[0]), int(value[1]))
 
     def radius(self, name: str) -> int:
-        """Return a corner radius in pixels."""
+        """Return a corner radius in px."""
         return self._tokens.radii[name]
 
     def duration(self, name: str) -> int:
-        """Return a duration in ms; 0 with reduced motion, except display times."""
+        """Return a duration in ms. Except for display times, it is 0 if motion is reduced."""
         if self.reduced_motion and not name.endswith("Shown"):
             return 0
         return self._tokens.motion_ms[name]
@@ -260,7 +261,7 @@ class Theme(QObject):
         return pixels * self._text_percent / 100
 
     def font(self, kind: str) -> QFont:
-        """Return the font of a kind of text, or "mono" (body in JetBrains Mono)."""
+        """Return the font of a kind of text; "mono" is the body font in JetBrains Mono."""
         if kind not in self._fonts:
             text = self._tokens.texts["body" if kind == "mono" else kind]
             family = self._tokens.families["mono" if kind in MONO_KINDS else "text"]
@@ -277,15 +278,15 @@ class Theme(QObject):
         return self._tokens.texts
 
     def family(self, kind: Literal["text", "mono"]) -> str:
-        """Return the font family of text or code."""
+        """Return the font family for text or code."""
         return self._tokens.families[kind]
 
     def icon_name(self, use: str) -> str:
-        """Return the icon of a meaning, such as "play" for "run". Raises KeyError if undefined."""
+        """Return the icon name of a meaning, such as "play" for "run". Raises KeyError if it is undefined."""
         return self._tokens.icons[use]
 
     def icon(self, name: str, role: str = "textSecondary", *, active: str = "text") -> QIcon:
-        """Return an icon in the colour of a role; it follows changes of the theme."""
+        """Return an icon in the colour of a role; the icon follows changes of the theme."""
         key = (name, role, active)
         if key not in self._icons:
 
@@ -300,10 +301,7 @@ class Theme(QObject):
     # -- block editor -----------------------------------------------------------------------------
 
     def blockly_tokens(self) -> dict[str, object]:
-        """Return the tokens for the page of the block editor.
-
-        All roles and block colours of the current mode.
-        """
+        """Return all roles and block colours of the current mode, for the page of the block editor."""
         return theme_tokens.tokens_for_page(
             self._tokens,
             self.hex,
@@ -323,7 +321,7 @@ def _palette(colour: Callable[[str], QColor]) -> QPalette:
 
 
 def qt_colour(text: str) -> QColor:
-    """Convert a token to a QColor; ``#RRGGBBAA`` has its alpha last, which Qt doesn't support."""
+    """Convert a token to a QColor. In ``#RRGGBBAA`` alpha is last, which Qt doesn't support."""
     if len(text) == len("#RRGGBBAA"):
         colour = QColor(text[:7])
         colour.setAlpha(int(text[7:], 16))

@@ -1,7 +1,7 @@
-"""Design tokens, parsed once into typed, frozen values.
+"""Design tokens, parsed once into typed, immutable values.
 
-Colours keep the form of the file (``#RRGGBB`` or ``#RRGGBBAA``); `app.ui.theme.theme` converts them to Qt
-values. Also the subset for the page of the block editor.
+Colours keep the format of the file (``#RRGGBB`` or ``#RRGGBBAA``); `app.ui.theme.theme` converts them to Qt
+values. Also provides the subset for the page of the block editor.
 """
 
 from __future__ import annotations
@@ -16,13 +16,13 @@ from typing import cast
 from app import resources
 
 Numbers = Mapping[str, "int | float | Numbers | list[int]"]
-# Statuses whose icon the tokens describe in words: their dot is painted.
+# Statuses whose icon the tokens describe in words, because it is a painted dot.
 _DRAWN_ICONS = MappingProxyType({"a filled dot 10 px": "dot"})
 
 
 @dataclass(frozen=True)
 class Status:
-    """Style of a status: colour role, tint role (None: no tint) and icon."""
+    """Style of a status: colour role, tint role (None for no tint) and icon."""
 
     colour: str
     tint: str | None
@@ -31,7 +31,7 @@ class Status:
 
 @dataclass(frozen=True)
 class TextKind:
-    """Text size: pixels, line height in pixels, weight 400 to 700."""
+    """Kind of text: size and line height in px, and weight (400 to 700)."""
 
     size_px: int
     line_px: int
@@ -117,7 +117,7 @@ def _texts(raw: Mapping[str, Mapping[str, int]]) -> Mapping[str, TextKind]:
 def tokens_for_page(
     tokens: Tokens, colour: Callable[[str], str], *, dark: bool, reduced_motion: bool, text_percent: int
 ) -> dict[str, object]:
-    """Return all roles and block colours of the current mode; ``colour`` returns a role's colour."""
+    """Return all roles and block colours of the current mode; ``colour`` returns the colour of a role."""
     scheme = "dark" if dark else "light"
     return {
         "dark": dark,

@@ -1,6 +1,7 @@
-"""Small painted widgets of panels and the shell; each takes the theme as its first argument.
+"""Small painted widgets for panels and the shell. Each takes the theme as its first argument.
 
-None depends on the session or a panel. Buttons, chips and labels are exported here, the others by module.
+The widgets are independent of the session and of panels. Buttons, chips and labels are exported here, others
+by their modules.
 """
 
 from __future__ import annotations

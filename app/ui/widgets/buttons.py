@@ -1,6 +1,6 @@
-"""Buttons that paint their icon, gap and text, because Fusion's gap is narrow and fixed.
+"""Buttons that paint their icon, gap and text themselves, because Fusion's gap is narrow and fixed.
 
-Includes Run, Pause, Step and Stop, which keep their position and width in every state.
+Run, Pause, Step and Stop keep their position and width in every state.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ from nep.i18n import _
 
 Kind = Literal["plain", "primary", "ghost", "run", "stop"]
 Size = Literal["small", "normal", "form", "large"]
-# kind: fill, hovered fill, pressed fill, border, text
+# by kind: fill, hovered fill, pressed fill, border, text
 _COLOURS: dict[str, tuple[str | None, str | None, str | None, str | None, str]] = {
     "plain": ("panel", "hover", "pressed", "borderStrong", "text"),
     "ghost": (None, "hover", "pressed", None, "text"),
@@ -35,7 +35,7 @@ Place = Literal["runBar", "toolBar", "appBar"]
 RUN_WIDTH = 112
 BARE_WIDTH = 56
 AIM_WIDTH = 2.0
-RING = 4  # px around Stop, for the ring while replies are pending
+RING = 4  # px around Stop, for the ring that shows pending replies
 
 
 class _Measure(NamedTuple):
@@ -56,19 +56,20 @@ _MEASURES: dict[str, _Measure] = {
 
 
 def name_command(widget: QWidget, command: str) -> None:
-    """Set the command of a button: its tooltip is the command's, with the current shortcut."""
+    """Set the command of a button. The tooltip is then the command's, with the current shortcut."""
     widget.setProperty("command", command)
 
 
 class PaintedButton(QAbstractButton):
-    """Base class of painted buttons; subclasses implement `paint_button`.
+    """Base class of painted buttons. Subclasses implement `paint_button`.
 
-    It accepts the keyboard focus (the focus ring follows its corners), repaints on hover and press, scales
-    with the theme's text size, and its accessible name is its text unless another is set.
+    Buttons accept the keyboard focus (the focus ring follows their corners), are repainted on hover and
+    press, and scale with the theme's text size. Their accessible name is their text unless another one is
+    set.
     """
 
     shortens = False
-    """True if the text is elided when narrow; the tooltip then has all of it."""
+    """True if the text is elided when the button is narrow; the tooltip then has the full text."""
 
     def __init__(
         self,
@@ -79,7 +80,7 @@ class PaintedButton(QAbstractButton):
         checkable: bool = False,
         parent: QWidget | None = None,
     ) -> None:
-        # `radius` is the theme's name of the corner radius.
+        # `radius` is the name of the corner radius in the theme.
         super().__init__(parent)
         self._theme = theme
         self.set_text(text)
@@ -93,28 +94,28 @@ class PaintedButton(QAbstractButton):
 
     @property
     def is_aimed(self) -> bool:
-        """True if it is the drop target of a drag."""
+        """True if the button is the drop target of a drag."""
         return self._aimed
 
     def set_aimed(self, aimed: bool) -> None:
-        """Draw a ring around it: it is the drop target."""
+        """Draw a ring around the button, or remove it, to show that it is the drop target."""
         if aimed != self._aimed:
             self._aimed = aimed
             self.update()
 
     def set_text(self, text: str, name: str = "") -> None:
-        """Set the text, and the accessible name, which is ``name`` or the text."""
+        """Set the text, and ``name`` or else the text as the accessible name."""
         self.setText(text)
         self.setAccessibleName(name or text)
 
     @property
     def is_hovered(self) -> bool:
-        """True if the mouse is on it and it is enabled."""
+        """True if the mouse is over the button and the button is enabled."""
         return self.underMouse() and self.isEnabled()
 
     @property
     def is_highlighted(self) -> bool:
-        """True if the mouse is on it or it is held down."""
+        """True if the mouse is over the button or the button is held down."""
         return self.is_hovered or self.isDown()
 
     def resizeEvent(self, event: QResizeEvent) -> None:
@@ -123,9 +124,9 @@ class PaintedButton(QAbstractButton):
             paint.tell_whole(self, self.text())
 
     def keyPressEvent(self, event: QKeyEvent) -> None:
-        """Click on Enter as on Space, without auto-repeat.
+        """Click on Enter as well as on Space, without auto-repeat.
 
-        Qt's `autoDefault` does so only for a QPushButton, and repeatedly while Enter is held.
+        Qt's `autoDefault` does so only for a QPushButton, and repeats the click while Enter is held.
         """
         if event.key() not in {Qt.Key.Key_Return, Qt.Key.Key_Enter} or not is_plain(event):
             super().keyPressEvent(event)
@@ -138,7 +139,8 @@ class PaintedButton(QAbstractButton):
         if self._aimed:
             paint.box(painter, rect, radius, role("accentTint"))
         self.paint_button(painter, rect)
-        if self._aimed:  # above its own painting: the tab that opens under dragged blocks is filled
+        # above the button's own painting, because the tab that opens under dragged blocks is filled
+        if self._aimed:
             paint.box(painter, rect, radius, None, role("accent"), AIM_WIDTH)
         painter.end()
 
@@ -147,7 +149,7 @@ class PaintedButton(QAbstractButton):
 
 
 class Button(PaintedButton):
-    """Button with a text and optionally an icon; filled kinds are for the main action."""
+    """Button with a text and optionally an icon. Filled kinds are for primary actions."""
 
     shortens = True
 
@@ -167,12 +169,12 @@ class Button(PaintedButton):
         self.icon_name = icon
         self.fill_icon = False
         self.icon_role = ""
-        """Colour role of the icon; "" for that of the text."""
+        """Colour role of the icon; "" for the colour of the text."""
         self._least: int | None = None
         self.setCursor(Qt.CursorShape.ArrowCursor)
 
     def set_word(self, text: str, icon: str | None = None, *, name: str = "") -> None:
-        """Set the text, and the icon if given.
+        """Set the text and, if given, the icon.
 
         ``name`` is the accessible name if it differs from the text.
         """
@@ -185,7 +187,7 @@ class Button(PaintedButton):
         self.update()
 
     def set_size(self, size: Size) -> None:
-        """Set height, font and padding to those of another size."""
+        """Set height, font and padding to those of a size."""
         if self.measure != _MEASURES[size]:
             self.measure = _MEASURES[size]
             self.setProperty("focusRadius", self._theme.radius(self.measure.radius))
@@ -193,13 +195,13 @@ class Button(PaintedButton):
             self.update()
 
     def set_kind(self, kind: Kind) -> None:
-        """Set whether the button is filled or outlined."""
+        """Set the kind of the button, such as filled or outlined."""
         if kind != self.kind:
             self.kind = kind
             self.update()
 
     def width_with(self, text: str) -> int:
-        """Return the width for this text."""
+        """Return the width that the button needs for a text."""
         width = paint.width_of(self._theme.font(self.measure.font), text) + 2 * self.measure.padding
         if self.icon_name is not None:
             width += self.icon_side() + (self.measure.gap if text else 0)
@@ -214,16 +216,19 @@ class Button(PaintedButton):
         return wanted if self._least is None else QSize(min(self._least, wanted.width()), wanted.height())
 
     def let_shrink(self, least: int = 72) -> None:
-        """Let the text be elided in narrow places, rather than cut off; the tooltip then has all of it."""
+        """Elide the text if the button is narrow, down to a minimum width.
+
+        The tooltip then has the full text.
+        """
         self._least = least
         self.setSizePolicy(QSizePolicy.Policy.Maximum, QSizePolicy.Policy.Fixed)
 
     def icon_side(self) -> int:
-        """Return the icon size, which scales with the text."""
+        """Return the size of the icon in px, which scales with the text size."""
         return round(self._theme.scaled(self.measure.icon))
 
     def shown_word(self) -> str:
-        """Return the painted text."""
+        """Return the text that is painted."""
         return self.text()
 
     def paint_button(self, painter: QPainter, rect: QRectF) -> None:
@@ -252,7 +257,7 @@ class Button(PaintedButton):
         paint.words(painter, area, word, font, ink)
 
     def _colours(self) -> tuple[QColor | None, QColor | None, QColor]:
-        # Fill, border and text colour.
+        # Colours of fill, border and text.
         theme = self._theme
         rest, hover, pressed, border, ink = _COLOURS[self.kind]
         if not self.isEnabled():
@@ -267,7 +272,7 @@ class Button(PaintedButton):
 
 
 class MenuButton(Button):
-    """Button that opens a menu, marked by a chevron."""
+    """Button that opens a menu, with a chevron."""
 
     def sizeHint(self) -> QSize:
         return super().sizeHint() + QSize(round(self._theme.scaled(CHEVRON)) + CHEVRON_GAP, 0)
@@ -299,7 +304,7 @@ class ToggleButton(Button):
 
 
 class IconButton(PaintedButton):
-    """Button with only an icon; its tooltip and accessible name are its name and shortcut."""
+    """Button with an icon only. Tooltip and accessible name contain its name and shortcut."""
 
     def __init__(
         self,
@@ -366,7 +371,7 @@ class LinkButton(PaintedButton):
         self.setCursor(Qt.CursorShape.PointingHandCursor)
 
     def set_word(self, text: str, icon: str | None) -> None:
-        """Set the text, and an arrow or none."""
+        """Set the text and, if given, the arrow icon."""
         self._icon = icon
         self.set_text(text)
         self.updateGeometry()
@@ -391,24 +396,24 @@ class LinkButton(PaintedButton):
 
 
 class RunButton(Button):
-    """Button of the run bar: 112 x 44, wider only with a larger text size."""
+    """Button of the run bar, 112 x 44 px, wider only for large text."""
 
     def __init__(
         self, theme: Theme, text: str, icon: str, *, widest: str = "", parent: QWidget | None = None
     ) -> None:
-        # `widest` is the longest text that it will show, so that its width never changes.
+        # `widest` is the longest text that the button will show, so that its width never changes.
         super().__init__(theme, text, icon, size="large", parent=parent)
         self._widest = widest or text
         self._bare = False
         self.fill_icon = False
 
     def set_filled(self, filled: bool) -> None:
-        """Set filled green (Run, Resume) or outlined."""
+        """Make the button filled green (Run, Resume) or outlined."""
         self.fill_icon = filled
         self.set_kind("run" if filled else "plain")
 
     def set_bare(self, bare: bool) -> None:
-        """Show only the icon, where large text leaves no space; the accessible name stays."""
+        """Show only the icon if `bare`, where large text leaves no space. The accessible name stays."""
         if bare != self._bare:
             self._bare = bare
             self.updateGeometry()
@@ -431,15 +436,15 @@ class RunButton(Button):
         return QSize(self.full_width(), height)
 
     def full_width(self) -> int:
-        """Return the width with its longest text."""
+        """Return the width in px for the longest text."""
         words = paint.width_of(self._theme.font("button"), self._widest)
         return max(RUN_WIDTH, round(self.icon_side() + self.measure.gap + words) + 28)
 
 
 class StopButton(PaintedButton):
-    """Stop button: always enabled; its ring means that replies are pending.
+    """Stop button, which is always enabled. A ring shows that replies are pending.
 
-    It has a margin of 4 px for that ring.
+    The button has a margin of 4 px for the ring.
     """
 
     def __init__(self, theme: Theme, place: Place = "runBar", parent: QWidget | None = None) -> None:
@@ -448,13 +453,13 @@ class StopButton(PaintedButton):
         self._place: Place = place
         self._ring = False
         self.filled = True
-        # A click doesn't take the focus: sheets stay open, and typing continues where it was.
+        # A click doesn't take the focus, so sheets stay open and typing continues.
         self.setFocusPolicy(Qt.FocusPolicy.TabFocus)
         name_command(self, "run.stop")
         self.setProperty("focusInset", RING)
 
     def show_state(self, word: str, *, ring: bool = False, filled: bool = True) -> None:
-        """Show "Stop", "Stopping" (with the ring) or "Stop again"; outlined only while nothing can move."""
+        """Show "Stop", "Stopping" (with the ring) or "Stop again"; outlined only if nothing can move."""
         if (word, ring, filled) == (self.text(), self._ring, self.filled):
             return
         self.set_text(word)

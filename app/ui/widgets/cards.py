@@ -1,6 +1,6 @@
-"""Surfaces: cards, the tile of an action or block, and alerts in the colours of their severity.
+"""Surfaces: cards, the tile of an action or block, and boxes for alerts in the colours of their severity.
 
-The banner and the rows of alerts and findings are such alerts.
+The banner and the rows of alerts and findings are such boxes.
 """
 
 from __future__ import annotations
@@ -55,13 +55,16 @@ class Tile(QWidget):
 
 
 class AlertBox(QWidget):
-    """Box with the tint, border and icon of a status, text, and buttons beside it or, when narrow, below."""
+    """Box in the colours of a status, with its icon and a text.
+
+    Buttons are beside the text or, if narrow, below.
+    """
 
     icon_side, icon_left, left, high, gap = 18, 12, 40, 10, 10
-    least_words = 220  # minimum width of the text beside the buttons, px at 100 %
+    least_words = 220  # minimum width of the text beside the buttons, in px at 100 %
 
     def __init__(self, theme: Theme, *, framed: bool = True) -> None:
-        # Without a frame only the icon shows the status; for good ones.
+        # Without a frame only the icon shows the status; used for "ok".
         super().__init__()
         self._theme, self._framed = theme, framed
         self._status = "info"
@@ -75,7 +78,7 @@ class AlertBox(QWidget):
         self._whole.addLayout(self.button_row)
 
     def set_status(self, status: str) -> None:
-        """Set the status, which determines colours and icon."""
+        """Set the status, which determines the colours and the icon."""
         self._status = status
         self.update()
 
@@ -89,7 +92,7 @@ class AlertBox(QWidget):
         return super().event(event)
 
     def _fit(self) -> None:
-        # With large or long text the buttons move below it.
+        # If the text is large or long, the buttons are below it.
         room = self.width() - self.button_row.sizeHint().width()
         beside = self.button_row.isEmpty() or room >= self._theme.scaled(self.least_words)
         wanted = QBoxLayout.Direction.LeftToRight if beside else QBoxLayout.Direction.TopToBottom
@@ -99,7 +102,7 @@ class AlertBox(QWidget):
             self._whole.setAlignment(self.button_row, Qt.AlignmentFlag(0) if beside else right)
 
     def icon_top(self) -> float:
-        """Return the distance of the icon from the upper edge."""
+        """Return the distance in px of the icon from the upper edge."""
         return 11.0 if self._framed else 4.0
 
     def paintEvent(self, _event: QPaintEvent) -> None:
@@ -115,7 +118,7 @@ class AlertBox(QWidget):
 
 
 class AlertRow(AlertBox):
-    """Row of an alert: title in bold, detail, command, time, and next step."""
+    """Row of an alert: title in bold, detail, command, time, and button for the next step."""
 
     def __init__(self, theme: Theme, *, framed: bool = True) -> None:
         super().__init__(theme, framed=framed)
@@ -135,7 +138,10 @@ class AlertRow(AlertBox):
     def set_texts(
         self, status: str, title: str, detail: str, *, command: str = "", note: str = "", button: str = ""
     ) -> None:
-        """Show these texts, without empty ones; the button stays, so that a click in progress is not lost."""
+        """Show the given texts; empty ones are hidden.
+
+        The button is kept, so that a click in progress is not lost.
+        """
         self.set_status(status)
         for line, text in zip(self._lines, (title, detail, command, note), strict=True):
             line.setText(text)

@@ -1,4 +1,4 @@
-"""Empty state of a panel: the missing content, how it will appear, and the next step."""
+"""Empty state of a panel, which explains what would be shown, how to get it, and offers next steps."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ ABOVE_ROW = 14
 
 @dataclass(frozen=True)
 class EmptyAction:
-    """Next step: label, function, icon, and whether it is the filled button."""
+    """Button of an empty state: text, function, icon, and True if it is filled."""
 
     text: str
     run: Callable[[], object]
@@ -91,7 +91,7 @@ class EmptyState(QWidget):
         self.set_actions(actions)
 
     def set_texts(self, title: str, text: str, icon: str | None = None) -> None:
-        """Set other texts."""
+        """Replace the title, the text and the icon."""
         self._title.setText(title)
         self._text.setText(text)
         if icon is not None:
@@ -100,10 +100,11 @@ class EmptyState(QWidget):
         self._update_visibility()
 
     def _update_visibility(self) -> None:
-        # In a low place the tile is hidden first, then the smaller text before the buttons.
+        # If the height is low, the tile is hidden first, then the text; the buttons stay.
         width = self.width() - 32
         text = self._text.heightForWidth(min(width, TEXT_WIDTH))
-        self._text.setMinimumHeight(max(0, text))  # otherwise a low place cuts off the last line
+        # otherwise the last line would be cut off if the height is low
+        self._text.setMinimumHeight(max(0, text))
         high = self._title.heightForWidth(width) + text + 4
         high += ABOVE_ROW + self._buttons[0].sizeHint().height() if self._buttons else 0
         self._tile.setVisible(self.height() - 2 * MARGIN >= high + TILE + BELOW_TILE)
@@ -119,7 +120,7 @@ class EmptyState(QWidget):
         self._update_visibility()
 
     def set_actions(self, actions: Sequence[EmptyAction]) -> None:
-        """Set the buttons."""
+        """Replace the buttons."""
         while (item := self._row.takeAt(0)) is not None:
             if (old := item.widget()) is not None:
                 old.deleteLater()

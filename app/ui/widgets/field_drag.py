@@ -1,4 +1,4 @@
-"""Drag and drop of message fields: from a tree to a plot."""
+"""Drag and drop of message fields from a tree to a plot."""
 
 from __future__ import annotations
 
@@ -13,11 +13,11 @@ from app.ui.widgets.labels import label
 
 MIME = "application/x-nep-field"
 MODIFIERS = {Qt.Key.Key_Shift, Qt.Key.Key_Control, Qt.Key.Key_Alt, Qt.Key.Key_Meta, Qt.Key.Key_AltGr}
-"""Modifiers choose the drop action, and are not shortcuts of commands."""
+"""Modifier keys, which choose the drop action and are no shortcuts of commands."""
 
 
 def field_in_hand(topic: str, path: str) -> QMimeData:
-    """Return the drag data of a field; ``topic`` is a key among all networks. Includes it as text."""
+    """Return the drag data of a field, also as text; ``topic`` is a topic's key with its network."""
     data = QMimeData()
     data.setData(MIME, json.dumps([topic, path]).encode())
     data.setText(f"{topic}{'' if path.startswith('[') else '.'}{path}")
@@ -25,7 +25,7 @@ def field_in_hand(topic: str, path: str) -> QMimeData:
 
 
 def dropped_field(data: QMimeData) -> tuple[str, str] | None:
-    """Return (topic, path) of a dropped field; None for other data."""
+    """Return topic and path of a dropped field; None for other data."""
     if not data.hasFormat(MIME):
         return None
     try:
@@ -38,24 +38,27 @@ def dropped_field(data: QMimeData) -> tuple[str, str] | None:
 
 
 class DragKeys(QObject):
-    """Keyboard shortcuts during a drag, when Qt takes all keys: any but Esc cancels it and is executed.
+    """Keyboard shortcuts during a drag: any key but Esc cancels the drag and runs its shortcut.
 
-    So Stop also works during a drag.
+    Qt grabs all keys during a drag. This way the key of Stop works nevertheless.
     """
 
     def __init__(self, press: Callable[[str], object]) -> None:
-        # `press` executes the shortcut with this name, such as "F12".
+        # `press` runs the shortcut with this name, such as "F12".
         super().__init__()
         self._press = press
 
     def begin(self) -> None:
-        """Start filtering keys. Call it after the drag has started, so that it precedes Qt's own filter."""
+        """Start to filter keys.
+
+        Call this after the drag has started, so that this filter precedes Qt's own.
+        """
         application = QApplication.instance()
         if application is not None:
             application.installEventFilter(self)
 
     def end(self) -> None:
-        """Stop filtering keys."""
+        """Stop to filter keys."""
         application = QApplication.instance()
         if application is not None:
             application.removeEventFilter(self)
@@ -72,9 +75,9 @@ class DragKeys(QObject):
 
 
 def drag_field(source: QWidget, topic: str, path: str, *, press: Callable[[str], object]) -> None:
-    """Start dragging a field; returns after the drop. ``press`` is as in `DragKeys`."""
+    """Drag a field; returns after the drop. ``press`` is as in `DragKeys`."""
     keys = DragKeys(press)
-    QTimer.singleShot(0, keys.begin)  # in the drag's own event loop, after its filter
+    QTimer.singleShot(0, keys.begin)  # runs in the event loop of the drag, after Qt has installed its filter
     drag = QDrag(source)
     data = field_in_hand(topic, path)
     drag.setMimeData(data)

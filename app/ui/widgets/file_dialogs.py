@@ -1,4 +1,4 @@
-"""File dialogs: the system's own where available, non-modal so that Stop stays usable."""
+"""File dialogs: the system's own where available. They are non-modal, so that Stop stays accessible."""
 
 from __future__ import annotations
 
@@ -16,14 +16,14 @@ from nep.i18n import _, lazy
 
 @dataclass(frozen=True)
 class FileKind:
-    """File type: label, marked with `lazy`, and suffix."""
+    """Type of file: label, wrapped in `lazy`, and suffix."""
 
     words: str
     ending: str
 
 
 def meant(chosen: Path, kind: FileKind, kinds: Sequence[FileKind]) -> tuple[Path, FileKind]:
-    """Return path and type with a suffix; a typed suffix takes precedence over the chosen type."""
+    """Return path and type for a chosen name. A typed suffix takes precedence over the chosen type."""
     ending = chosen.suffix.lower()
     if ending != kind.ending:
         typed = next((each for each in kinds if each.ending == ending), None)
@@ -32,13 +32,13 @@ def meant(chosen: Path, kind: FileKind, kinds: Sequence[FileKind]) -> tuple[Path
 
 
 class FileDialogs(Protocol):
-    """Asks the user for a file; ``take`` is called with the answer, never on cancel."""
+    """Dialogs that ask for a file. ``take`` is called with the path, and never on cancel."""
 
     def open(self, folder: str, take: Callable[[Path], None]) -> None:
         """Ask for a file to open."""
 
     def save(self, suggestion: str, take: Callable[[Path], None]) -> None:
-        """Ask where to save."""
+        """Ask where to save a behaviour."""
 
     def save_as(
         self,
@@ -47,16 +47,16 @@ class FileDialogs(Protocol):
         kinds: Sequence[FileKind],
         take: Callable[[Path, FileKind], None],
     ) -> None:
-        """Ask where to save something other than a behaviour, and its type; the path gets the suffix."""
+        """Ask for place and type to save another kind of file. The path gets the suffix of the type."""
 
     def open_picture(self, folder: str, take: Callable[[Path], None]) -> None:
-        """Ask for an image; "" starts in the picture folder."""
+        """Ask for an image file; an empty `folder` stands for the picture folder."""
 
     def open_recording(self, folder: str, take: Callable[[Path], None]) -> None:
-        """Ask for a recording."""
+        """Ask for a recording to open."""
 
     def open_layout(self, folder: str, take: Callable[[Path], None]) -> None:
-        """Ask for a layout."""
+        """Ask for a layout file to import."""
 
     def choose_folder(self, folder: str, take: Callable[[Path], None]) -> None:
         """Ask for a folder."""
@@ -66,7 +66,7 @@ PICTURE_ENDINGS = (".png", ".jpg", ".jpeg")
 
 
 def pictures_folder() -> str:
-    """Return the system's picture folder, else the home folder."""
+    """Return the system's picture folder, or else the home folder."""
     place = QStandardPaths.writableLocation(QStandardPaths.StandardLocation.PicturesLocation)
     return place if place and Path(place).is_dir() else str(Path.home())
 
@@ -75,13 +75,14 @@ BEHAVIOURS = (lazy("Behaviours"), f"*{SUFFIX}")
 RECORDINGS = (lazy("Recordings"), "*.mcap")
 LAYOUTS = (lazy("Layouts"), "*.nep-layout")
 PICTURES = (lazy("Images"), " ".join(f"*{ending}" for ending in PICTURE_ENDINGS))
-"""Name filters of dialogs: label and patterns."""
+"""Name filter for images in dialogs: label and patterns."""
 
 
 class SystemDialogs:
-    """Native file dialogs: of Windows, macOS, or a Linux desktop through its portal.
+    """Native file dialogs of Windows, macOS, or a Linux desktop through its portal.
 
-    The window stays usable, for example for Stop. Keys pressed in the dialogs don't reach Studio.
+    The window can be used while a dialog is open, for example for Stop. Keys pressed in the dialog don't
+    reach Studio.
     """
 
     def __init__(self, window: QWidget) -> None:

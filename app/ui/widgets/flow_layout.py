@@ -1,4 +1,4 @@
-"""Layout of a row that wraps into several rows when narrow, so that nothing is scrolled sideways."""
+"""Layout of a row that wraps into several rows if it is narrow."""
 
 from __future__ import annotations
 
@@ -9,9 +9,9 @@ from PySide6.QtWidgets import QLabel, QLayout, QLayoutItem, QWidget
 
 
 class Flow(QLayout):
-    """One row if everything fits, else as many as necessary, each item vertically centred.
+    """Layout with one row if everything fits, else as many as necessary, with items vertically centred.
 
-    In one row the spare space is at the position of `push`, and elastic items may be narrower than their
+    In one row the spare space is at the position of `push`, and elastic items may be narrower than their size
     hint. A wrapping label takes the rest of its row.
     """
 
@@ -24,11 +24,11 @@ class Flow(QLayout):
         self.setContentsMargins(0, 0, 0, 0)
 
     def push(self) -> None:
-        """Align the following items to the right end when everything is in one row."""
+        """Align the following items to the right end if everything is in one row."""
         self._push = len(self._items)
 
     def add_elastic(self, widget: QWidget, *, greedy: bool = False) -> None:
-        """Add a widget that may be narrower than its hint; a ``greedy`` one takes the remaining space."""
+        """Add a widget that may be narrower than its size hint. A ``greedy`` one takes the spare space."""
         self._elastic[widget] = greedy
         self.addWidget(widget)
 
@@ -84,7 +84,7 @@ class Flow(QLayout):
 
     def _preferred_width(self, item: QLayoutItem) -> int:
         widget = item.widget()
-        if isinstance(widget, QLabel) and widget.wordWrap():  # Qt's own hint is for several lines
+        if isinstance(widget, QLabel) and widget.wordWrap():  # Qt's own size hint is for several lines
             return widget.fontMetrics().horizontalAdvance(widget.text()) + 2
         return item.sizeHint().width()
 
@@ -102,7 +102,7 @@ class Flow(QLayout):
         return widget in self._elastic
 
     def _arrange(self, rect: QRect, *, move: bool) -> int:
-        # Returns the height; places the items only with `move`.
+        # Returns the height; places the items only if `move`.
         edge = self.contentsMargins()
         room = rect.marginsRemoved(edge)
         shown = [*self._shown()]
@@ -121,7 +121,7 @@ class Flow(QLayout):
         return used + edge.top() + edge.bottom()
 
     def _one_row(self, items: list[QLayoutItem], room: int) -> list[tuple[QLayoutItem, int, int]]:
-        # (item, left, width); empty when it does not fit.
+        # Rows of (item, left, width); empty if the items do not fit.
         widths = [
             item.minimumSize().width() if self._is_elastic(item) else self._preferred_width(item)
             for item in items
@@ -144,7 +144,7 @@ class Flow(QLayout):
         return row
 
     def _rows(self, items: list[QLayoutItem], room: int) -> list[list[tuple[QLayoutItem, int, int]]]:
-        # An item wider than the space gets a whole row.
+        # An item that is wider than the space gets its own row.
         rows: list[list[tuple[QLayoutItem, int, int]]] = []
         left = room + 1
         for item in items:

@@ -28,7 +28,7 @@ from nep.i18n import _, lazy
 
 CHIP_HEIGHT, CHIP_PADDING, CHIP_GAP = 22, 8, 5
 ICON = 18
-# minimum width of an item when space is scarce, px at 100 %; its tooltip has the whole text
+# minimum width in px at 100 % of an item if space is scarce; its tooltip has the full text
 MIN_ITEM = 64
 SPARK = QSize(56, 16)
 SPARK_STROKE = 1.25
@@ -41,7 +41,7 @@ SPOKEN = {
     "running": lazy("running"),
     "off": lazy("off"),
 }
-# chip status by `RobotLink.state`
+# status of the chip by `RobotLink.state`
 ROBOT_STATUS = {
     "ready": "ok", "busy": "running", "stopping": "running", "silent": "warn", "not stopped": "error",
     "away": "off", "connecting": "off",
@@ -49,12 +49,12 @@ ROBOT_STATUS = {
 
 
 def spoken(status: str) -> str:
-    """Return a status for screen readers."""
+    """Return the name of a status for screen readers."""
     return _(SPOKEN.get(status, status))
 
 
 class Chip(QWidget):
-    """Chip with an icon and text on the tint of a status; hidden while the text is empty."""
+    """Chip with an icon and text on the tint of a status; hidden if the text is empty."""
 
     def __init__(
         self,
@@ -66,7 +66,8 @@ class Chip(QWidget):
         large: bool = False,
         parent: QWidget | None = None,
     ) -> None:
-        # `icon` "" shows none, None that of the status; `large` is the chip of the app bar (26 px high).
+        # An `icon` of "" shows none, None that of the status; `large` is the chip of the app bar (26 px
+        # high).
         super().__init__(parent)
         self._theme = theme
         self._large = large
@@ -102,14 +103,14 @@ class Chip(QWidget):
         self.update()
 
     def set_bare(self, bare: bool) -> None:
-        """Show only the icon where space is scarce; the tooltip then has the text."""
+        """Show only the icon if `bare`, where space is scarce; the tooltip then has the text."""
         if bare != self._bare:
             self._bare = bare
             self.updateGeometry()
             self.update()
 
     def full_width(self) -> int:
-        """Return the width with the text."""
+        """Return the width in px with the text."""
         width = paint.width_of(self._font(), self._text) + 2 * CHIP_PADDING + (2 if self._large else 0)
         return round(width + (self._side() + CHIP_GAP if self._icon_name() else 0)) + 1
 
@@ -125,7 +126,7 @@ class Chip(QWidget):
         return font
 
     def bare_width(self) -> int:
-        """Return the width with the icon only."""
+        """Return the width in px with the icon only."""
         return max(self._high(), round(self._side()) + CHIP_PADDING)
 
     def _high(self) -> int:
@@ -172,7 +173,7 @@ class Chip(QWidget):
 
 
 class StatusIcon(QWidget):
-    """Icon of a status beside text with the same meaning; its accessible name is the status."""
+    """Icon of a status beside a text with the same meaning. Its accessible name is the status."""
 
     def __init__(self, theme: Theme, status: str = "off", *, height: int = 0, ink: str = "") -> None:
         # `height` is that of the adjacent line of text (0: the icon's own); `ink` overrides the colour.
@@ -200,7 +201,7 @@ class StatusIcon(QWidget):
 
 
 class StatusItem(QWidget):
-    """Item of the status bar: optional icon and short text. With a ``command`` it can be clicked."""
+    """Item of the status bar: optional icon and short text. If it has a ``command``, it can be clicked."""
 
     ICON = 14
     pressed = Signal(str)
@@ -222,7 +223,7 @@ class StatusItem(QWidget):
         return self._text
 
     def set(self, icon: str, text: str, status: str | None = None) -> None:
-        """Set icon, text and status (colour); an empty text hides the item."""
+        """Set icon, text and status (which determines the colour). An empty text hides the item."""
         if (icon, text, status) == (self._icon, self._text, self._status):
             return
         before = self.sizeHint()
@@ -234,7 +235,7 @@ class StatusItem(QWidget):
         self.update()
 
     def set_command(self, command: str) -> None:
-        """Set the command of a click, or "" for none."""
+        """Set the command that a click emits, or "" for none."""
         if command != self.command:
             self.command = command
             self.setFocusPolicy(Qt.FocusPolicy.TabFocus if command else Qt.FocusPolicy.NoFocus)
@@ -258,8 +259,8 @@ class StatusItem(QWidget):
 
     def sizeHint(self) -> QSize:
         font = self._theme.font("small")
-        # The width treats all digits equally: values change many times a second, and each new width is a
-        # relayout.
+        # All digits count with the same width: values change many times a second, and each new width would
+        # cause a relayout.
         words = re.sub(r"\d", "0", self._text)
         width = paint.width_of(font, words) + (self._side() + 6 if self._icon else 0)
         return QSize(round(width) + 1, round(paint.height_of(font)))
@@ -311,10 +312,11 @@ class Sparkline(QWidget):
 
 
 def paint_sparkline(painter: QPainter, rect: QRectF, values: Sequence[float], colour: QColor) -> None:
-    """Paint a line through the values, oldest left, without axes; fewer than two values paint nothing.
+    """Paint a line through the values without axes, with the oldest value at the left.
 
-    The lower edge is 0 (or the minimum, if negative), the upper one the maximum: an almost constant rate is a
-    level line, and one that stops falls to the bottom. Values that include NaN or infinity paint nothing.
+    The lower edge is 0 (or the minimum, if negative) and the upper edge the maximum, so an almost constant
+    rate is a level line, and one that stops falls to the bottom. Nothing is painted for fewer than two
+    values, or if one is NaN or infinite.
     """
     if len(values) < 2 or not isfinite(sum(values)):
         return
@@ -337,7 +339,7 @@ def paint_sparkline(painter: QPainter, rect: QRectF, values: Sequence[float], co
 
 
 class ValueBar(QWidget):
-    """Bar of a sensor's value between its limits; None shows only the track."""
+    """Bar that shows a sensor's value between its limits. None shows an empty bar."""
 
     def __init__(self, theme: Theme, fraction: float | None = None) -> None:
         super().__init__()
@@ -350,11 +352,11 @@ class ValueBar(QWidget):
 
     @property
     def fraction(self) -> float | None:
-        """Displayed fraction, 0 to 1, or None."""
+        """Displayed fraction (0 to 1), or None."""
         return self._fraction
 
     def set_fraction(self, fraction: float | None) -> None:
-        """Set the fraction (clamped to 0 to 1), or None if unknown."""
+        """Set the fraction, which is clamped to 0 to 1, or None if it is unknown."""
         value = None if fraction is None or fraction != fraction else min(max(fraction, 0.0), 1.0)  # noqa: PLR0124
         if value != self._fraction:
             self._fraction = value
@@ -367,7 +369,7 @@ class ValueBar(QWidget):
 
 
 def paint_bar(painter: QPainter, theme: Theme, rect: QRectF, fraction: float | None) -> None:
-    """Paint a track with a filled fraction, 0 to 1; None or 0 only the track."""
+    """Paint a bar with a filled fraction (0 to 1); None and 0 paint an empty bar."""
     round_end = rect.height() / 2
     paint.box(painter, rect, round_end, theme.colour("sunken"))
     if fraction:

@@ -2,8 +2,8 @@
 
 Queries of the tab order must not have side effects. PySide makes the result of a getter without arguments a
 child of the queried object. For the next widget in the focus chain, or a focus proxy, that is wrong: when the
-queried widget is deleted, PySide deletes the other one too, while Qt still uses it. So each result gets its
-own parent back immediately, and no other module in `app.ui` may make these queries (ADR 0018).
+queried widget is deleted, PySide deletes the other one too, while Qt still uses it. Therefore each result
+immediately gets its own parent back, and no other module in `app.ui` may make these queries (ADR 0018).
 """
 
 from __future__ import annotations
@@ -19,22 +19,21 @@ _LEADS_PROPERTY = "keyboardLeads"
 
 
 def is_plain(event: QKeyEvent) -> bool:
-    """Return whether a key has no modifiers.
+    """Return True if a key press has no modifiers.
 
-    On a Mac, Cmd+Down moves to the end of a text, Down into the list.
-
-    Arrow keys of a Mac and keys of a number pad have a modifier of their own, which is ignored.
+    On a Mac, for example, Cmd+Down moves to the end of a text, and Down into the list. The modifier of arrow
+    keys on a Mac and of keys on a number pad is ignored.
     """
     return not event.modifiers() & ~Qt.KeyboardModifier.KeypadModifier
 
 
 def is_pressed_key(key: int) -> bool:
-    """Return whether a key activates the focused widget."""
+    """Return True if a key activates the focused widget."""
     return key in {Qt.Key.Key_Return, Qt.Key.Key_Enter, Qt.Key.Key_Space}
 
 
 def keyboard_leads() -> bool:
-    """Return whether the focus was moved by the keyboard: only then it gets a ring."""
+    """Return True if the keyboard moved the focus. Only then a focus ring is shown."""
     application = QApplication.instance()
     return bool(application is not None and application.property(_LEADS_PROPERTY))
 
@@ -47,7 +46,7 @@ def set_keyboard_leads(leads: bool) -> None:
 
 
 def following(widget: QWidget, *, forward: bool = True) -> QWidget:
-    """Return the next (or previous) widget in the window's focus chain; itself when it is alone."""
+    """Return the next (or previous) widget in the window's focus chain; the widget itself if it is alone."""
     found = widget.nextInFocusChain() if forward else widget.previousInFocusChain()
     return widget if found is None else _with_own_parent(found)
 
@@ -59,10 +58,10 @@ def proxy_of(widget: QWidget) -> QWidget | None:
 
 
 def tab_stops(widget: QWidget, begin: QWidget, *, forward: bool = True) -> Iterator[QWidget]:
-    """Yield the tab stops inside a widget, in order, after (or before) ``begin``; each once.
+    """Yield the tab stops inside a widget in order, after (or before) ``begin``, each once.
 
-    It ends early at a widget that PySide confuses with a deleted one at the same address: only Qt knows the
-    next one.
+    Ends early at a widget that PySide confuses with a deleted one at the same address: only Qt knows the next
+    one.
     """
     step = following(begin, forward=forward)
     while step is not begin and isValid(step):
@@ -73,9 +72,9 @@ def tab_stops(widget: QWidget, begin: QWidget, *, forward: bool = True) -> Itera
 
 
 def stops_of(widget: QWidget) -> list[QWidget]:
-    """Return the tab stops of a widget and its children, in order of creation.
+    """Return the tab stops of a widget and its children, in the order of their creation.
 
-    The popup of a combo box is a child but a separate window, which Tab does not reach.
+    The popup of a combo box is a child, but a separate window that Tab does not reach.
     """
     return [
         each
@@ -85,7 +84,7 @@ def stops_of(widget: QWidget) -> list[QWidget]:
 
 
 def _with_own_parent(found: QWidget) -> QWidget:
-    # Restores the ownership in PySide; a no-op for Qt.
+    # Restores the ownership in PySide; has no effect in Qt.
     if not isValid(found):
         return found
     QObject.setParent(found, found.parentWidget())

@@ -1,4 +1,4 @@
-"""Labels of a kind and colour, elided when narrow; separators."""
+"""Labels of a kind and colour, elided if narrow; separators."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from app.ui.widgets import paint
 
 
 def label(text: str = "", kind: str = "body", *, role: str = "text", wrap: bool = False) -> QLabel:
-    """Return a label of one kind ("body", "small", "title", ...) in the colour of a role."""
+    """Return a label of a kind ("body", "small", "title", ...) in the colour of a role."""
     result = QLabel(text)
     result.setTextFormat(Qt.TextFormat.PlainText)
     result.setProperty("kind", kind)
@@ -30,12 +30,12 @@ def set_role(shown: QLabel, role: str) -> None:
 
 
 class ElidedLabel(QLabel):
-    """Label elided in the middle when narrow; the tooltip has the whole text."""
+    """Label that is elided in the middle if narrow; the tooltip then has the full text."""
 
     mode = Qt.TextElideMode.ElideMiddle
 
     def __init__(self, kind: str, role: str, least: int = 0) -> None:
-        # `least` is the minimum width in pixels.
+        # `least` is the minimum width in px.
         super().__init__()
         self._least = least
         self.setTextFormat(Qt.TextFormat.PlainText)
@@ -58,9 +58,9 @@ class ElidedLabel(QLabel):
 
 
 class FixedWidthLabel(ElidedLabel):
-    """Label with frequent changes, whose size does not depend on its text.
+    """Label for a text that changes often, with a size that does not depend on it.
 
-    A normal label updates its size with every text, which triggers a relayout of the whole window.
+    A normal label updates its size with every text, which causes a relayout of the whole window.
     """
 
     def __init__(self, kind: str, role: str) -> None:
@@ -79,7 +79,7 @@ class FixedWidthLabel(ElidedLabel):
 
 
 class SteadyLabel(ElidedLabel):
-    """Label with a change about every second, as wide as its longest text so far: rarely a relayout."""
+    """Label for a text that changes about every second. It is as wide as its longest text so far."""
 
     def __init__(self, kind: str, role: str, least: int = 0) -> None:
         self._words = ""
@@ -101,7 +101,7 @@ class SteadyLabel(ElidedLabel):
 
 
 class BoldInLine(QWidget):
-    """Label with ``subject`` in bold within ``sentence``."""
+    """Label that shows a ``sentence`` with the ``subject`` in bold."""
 
     def __init__(self, theme: Theme, sentence: str, subject: str, kind: str = "bodyLarge") -> None:
         super().__init__()

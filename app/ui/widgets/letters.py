@@ -1,4 +1,4 @@
-"""Mnemonics of menu entries, computed for the current language.
+"""Mnemonics of menu entries, assigned automatically for the current language.
 
 Translators need not define them: each entry gets a unique letter of its text, preferably the first of a word.
 """
@@ -11,14 +11,14 @@ from collections.abc import Iterator, Sequence
 
 
 def plain_words(text: str) -> str:
-    """Return an entry's text without mnemonic mark and shortcut."""
+    """Return the text of an entry without mnemonic mark and shortcut."""
     return re.sub("&(.)", r"\1", text.partition("\t")[0])
 
 
 def letters_of(texts: Sequence[str]) -> list[int]:
-    """Return the position of each text's letter, unique; -1 for none.
+    """Return the position of the mnemonic letter in each text, or -1 for none; letters are unique.
 
-    Beginnings of texts take precedence, then those of their other words, then any letter.
+    First letters of texts take precedence, then first letters of other words, then any letter.
     """
     found, taken = [-1] * len(texts), set[str]()
     for places in (_beginning, _beginnings, _all):
@@ -32,13 +32,16 @@ def letters_of(texts: Sequence[str]) -> list[int]:
 
 
 def key_of(letter: str) -> str:
-    """Return the key of a letter without its accent; "" if no letter key types it."""
+    """Return the key that types a letter without its accent; "" if there is none."""
     base = unicodedata.normalize("NFD", letter)[:1].upper()
     return base if base.isascii() and base.isalpha() else ""
 
 
 def marked(texts: Sequence[str]) -> list[str]:
-    """Return the texts with Qt's mnemonic mark; letters with accents can't be typed with Alt."""
+    """Return the texts with Qt's mnemonic mark.
+
+    Letters with accents are not used, because Alt can't type them.
+    """
     bare = [re.sub(r"[^\x00-\x7f]", "\N{BULLET}", text) for text in texts]
     return [
         text if place < 0 else f"{text[:place]}&{text[place:]}"

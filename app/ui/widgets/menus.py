@@ -1,7 +1,7 @@
-"""Menus with round corners: of the menu bar, panels, and text fields.
+"""Menus with round corners, for the menu bar, panels, and text fields.
 
 Where the system composites windows (Wayland, macOS, Windows) the corners are transparent. X11 may have no
-compositor, and would show them black: there a mask cuts the window.
+compositor, which would show them black; there a mask clips the window.
 """
 
 from __future__ import annotations
@@ -37,11 +37,11 @@ CUT_ON = frozenset({"xcb"})
 MARK, MAX_MARK, TEXT_LEFT = 15, 22, 33
 SCROLLER = 22  # px, as in the style sheet
 GUESSED = QAction.MenuRole.TextHeuristicRole
-MIN_WIDTH = 160  # px; a narrower menu is unreadable, and is better placed over Stop
+MIN_WIDTH = 160  # px; narrower menus are unreadable and better placed over Stop
 
 
 def make_round(widget: QWidget) -> None:
-    """Prepare a popup before its first show: no system frame, translucent corners."""
+    """Prepare a popup for its first show: no system frame, transparent corners."""
     widget.setWindowFlag(Qt.WindowType.FramelessWindowHint, True)
     widget.setWindowFlag(Qt.WindowType.NoDropShadowWindowHint, QGuiApplication.platformName() in CUT_ON)
     if QGuiApplication.platformName() not in CUT_ON:
@@ -49,7 +49,7 @@ def make_round(widget: QWidget) -> None:
 
 
 def cut(widget: QWidget, radius: float) -> None:
-    """Mask a popup to its round corners on systems without a compositor."""
+    """Clip a popup to its round corners, on systems without a compositor."""
     if QGuiApplication.platformName() in CUT_ON:
         widget.setMask(round_region(widget.size(), radius))
 
@@ -62,9 +62,9 @@ def round_region(size: QSize, radius: float) -> QRegion:
 
 
 def beside(menu: QRect, stop: QRect, screen: QRect) -> QRect:
-    """Return a menu position that doesn't cover Stop: left of it, below it, or narrower.
+    """Return a position of a menu that doesn't cover Stop: left of it, below it, or narrower.
 
-    Unchanged when the screen has no such space.
+    If there is no such space on the screen, the position is unchanged.
     """
     if not menu.intersects(stop):
         return menu
@@ -78,7 +78,7 @@ def beside(menu: QRect, stop: QRect, screen: QRect) -> QRect:
 
 
 def stop_at(place: QPoint) -> QAbstractButton | None:
-    """Return the stop button, of all robots or one, at a screen position that no popup covers."""
+    """Return the Stop button at a screen position, unless a popup covers it."""
     windows = [window for window in QApplication.topLevelWidgets() if window.isVisible()]
     inside = [window for window in windows if window.rect().contains(window.mapFromGlobal(place))]
     if any(window.windowType() == Qt.WindowType.Popup for window in inside):
@@ -91,7 +91,7 @@ def stop_at(place: QPoint) -> QAbstractButton | None:
 
 
 def press_stop(place: QPoint) -> bool:
-    """Click the stop button at this position, if any, and close all popups."""
+    """Click the Stop button at a position, if there is one, and close all popups. Return True if clicked."""
     stop = stop_at(place)
     if stop is None:
         return False
@@ -104,9 +104,8 @@ def press_stop(place: QPoint) -> bool:
 class Menu(QMenu):
     """Menu in Studio's style: icons and check marks in one column, shortcuts at the right.
 
-    Each entry has a mnemonic letter, underlined if the menu was opened by keyboard.
-
-    On a Mac entries stay in the menu unless they have an explicit role.
+    Each entry has a mnemonic letter, which is underlined if the menu was opened by keyboard. On a Mac,
+    entries stay in the menu unless they have an explicit role.
     """
 
     def __init__(self, theme: Theme, parent: QWidget | None = None, title: str = "") -> None:
@@ -119,8 +118,8 @@ class Menu(QMenu):
     def actionEvent(self, event: QActionEvent) -> None:
         """Prevent macOS from guessing an entry's role by its text.
 
-        A file, layout or robot may be called "About us", "Quit" or "Setup", and would move to the application
-        menu.
+        A file, layout or robot may be called "About us", "Quit" or "Setup", and would be moved to the
+        application menu.
         """
         action = event.action()
         if event.type() == QEvent.Type.ActionAdded and action.menuRole() == GUESSED:
@@ -128,13 +127,13 @@ class Menu(QMenu):
         super().actionEvent(event)
 
     def letters(self) -> dict[QAction, int]:
-        """Return the position of each entry's mnemonic letter; -1 for none."""
+        """Return the position of each entry's mnemonic letter, or -1 for none."""
         entries = [action for action in self.actions() if action.isVisible() and not action.isSeparator()]
         places = letters_of([plain_words(action.text()) for action in entries])
         return dict(zip(entries, places, strict=True))
 
     def keyPressEvent(self, event: QKeyEvent) -> None:
-        """Activate an entry by its letter, as Enter does."""
+        """Activate an entry by its mnemonic letter, as Enter does."""
         self._by_keys = True
         self.update()
         held = event.modifiers() & ~(Qt.KeyboardModifier.ShiftModifier | Qt.KeyboardModifier.AltModifier)
@@ -156,7 +155,7 @@ class Menu(QMenu):
         self._move_off_stop()
 
     def _move_off_stop(self) -> None:
-        # Moves aside where it would cover a Stop, since Qt may move it in a small window.
+        # Moves the menu if it covers Stop, because Qt may have moved it in a small window.
         owner = self.parentWidget()
         while isinstance(owner, QMenu):
             owner = owner.parentWidget()
@@ -169,10 +168,10 @@ class Menu(QMenu):
                 self.setGeometry(beside(self.geometry(), place, screen))
 
     def mousePressEvent(self, event: QMouseEvent) -> None:
-        """Close the menu on a click outside, which also activates Stop if it is there.
+        """Close the menu on a click outside it, and trigger Stop if the click is on a Stop button.
 
-        `app.ui.shell.stop_keys` receives the events of windows that get the keyboard first; a submenu never
-        does.
+        `app.ui.shell.stop_keys` receives the events of windows that get the keyboard first, which a submenu
+        never does.
         """
         left = event.button() == Qt.MouseButton.LeftButton
         if not (left and press_stop(event.globalPosition().toPoint())):
@@ -206,7 +205,7 @@ class Menu(QMenu):
         painter.end()
 
     def _hidden_ends(self, shown: list[QAction]) -> tuple[bool, bool]:
-        # A low screen hides entries, to which the mouse at the edge scrolls.
+        # On a low screen some entries are hidden; the mouse at the edge scrolls to them.
         if not shown:
             return False, False
         first, last = self.actionGeometry(shown[0]), self.actionGeometry(shown[-1])
@@ -240,7 +239,7 @@ class Menu(QMenu):
         text = plain_words(action.text())
         whole = width_of(self.font(), text)
         if whole + 12 + width_of(self.font(), key) > inside.width():
-            key = ""  # in a narrowed menu the text takes precedence; shortcuts are listed on F1
+            key = ""  # in a narrow menu the text takes precedence; shortcuts are listed on F1
         words(painter, inside, text, self.font(), ink)
         if self._by_keys and letter >= 0 and whole <= inside.width():
             self._underline(painter, inside, text, letter)
@@ -253,7 +252,7 @@ class Menu(QMenu):
 
 
 def drop_below(menu: Menu, anchor: QWidget) -> None:
-    """Open a menu below a button, right-aligned where it would exceed the window."""
+    """Open a menu below a button; right-aligned if it would exceed the window."""
     place = anchor.rect().bottomLeft() + QPoint(0, 3)
     over = anchor.mapTo(anchor.window(), place).x() + menu.sizeHint().width() - anchor.window().width()
     if over > 0:
@@ -262,7 +261,7 @@ def drop_below(menu: Menu, anchor: QWidget) -> None:
 
 
 class EditMenu(QObject):
-    """Gives a field its editing menu in Studio's style."""
+    """Gives a text field its context menu in Studio's style."""
 
     def __init__(self, theme: Theme, field: QLineEdit | QPlainTextEdit) -> None:
         super().__init__(field)
@@ -274,6 +273,6 @@ class EditMenu(QObject):
         standard = self._field.createStandardContextMenu()
         menu = Menu(self._theme, self._field)
         menu.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
-        menu.destroyed.connect(standard.deleteLater)  # which owns the actions
+        menu.destroyed.connect(standard.deleteLater)  # the standard menu owns the actions
         menu.addActions(standard.actions())
         menu.popup(self._field.mapToGlobal(at))

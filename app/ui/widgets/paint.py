@@ -1,4 +1,4 @@
-"""Common shapes of painted widgets: crisp boxes, single-line text, key caps."""
+"""Shapes of painted widgets: crisp boxes, single-line text, key caps."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ def box(
     border: QColor | None = None,
     width: float = 1.0,
 ) -> None:
-    """Paint a rounded box; its border is inside ``rect`` on whole pixels."""
+    """Paint a rounded box, with its border inside ``rect`` and on whole pixels."""
     painter.setRenderHint(QPainter.RenderHint.Antialiasing)
     painter.setBrush(fill if fill is not None else Qt.BrushStyle.NoBrush)
     if border is None:
@@ -46,7 +46,7 @@ def box(
 
 
 def hairline(painter: QPainter, rect: QRectF, edge: Qt.Edge, colour: QColor) -> None:
-    """Paint a line inside one edge of ``rect``, equally thin everywhere: one pixel at 125 %, never two."""
+    """Paint a line inside one edge of ``rect`` with the same thickness everywhere: 1 px, even at 125 %."""
     ratio = painter.device().devicePixelRatioF()
     thin = max(1, int(ratio)) / ratio
     line = QRectF(rect)
@@ -72,7 +72,7 @@ def words(
     colour: QColor,
     align: Qt.AlignmentFlag = LEFT,
 ) -> None:
-    """Paint one line of text, elided at its end when it does not fit."""
+    """Paint one line of text, elided at its end if it does not fit."""
     painter.setFont(font)
     painter.setPen(colour)
     fitting = QFontMetricsF(font).elidedText(text, Qt.TextElideMode.ElideRight, rect.width() + 1)
@@ -80,7 +80,7 @@ def words(
 
 
 def two_lines(font: QFont, text: str, width: float) -> list[str]:
-    """Break a text into one or two lines; the second may be too long."""
+    """Break a text into one or two lines. The second line may be too long."""
     line, *rest = text.split(" ")
     while rest and width_of(font, f"{line} {rest[0]}") <= width:
         line = f"{line} {rest.pop(0)}"
@@ -88,22 +88,22 @@ def two_lines(font: QFont, text: str, width: float) -> list[str]:
 
 
 def width_of(font: QFont, text: str) -> float:
-    """Return the width of a line of text."""
+    """Return the width in px of a line of text."""
     return QFontMetricsF(font).horizontalAdvance(text)
 
 
 def height_of(font: QFont) -> float:
-    """Return the height of a line of text."""
+    """Return the height in px of a line of text."""
     return QFontMetricsF(font).height()
 
 
 def key_width(theme: Theme, key: str) -> float:
-    """Return the width of a key cap."""
+    """Return the width in px of a key cap."""
     return max(SMALLEST_KEY, width_of(theme.font("caption"), key) + 2 * KEY_PADDING)
 
 
 def key_cap(painter: QPainter, theme: Theme, right: float, middle: float, key: str) -> QRectF:
-    """Paint a key cap that ends at ``right``; return its rectangle."""
+    """Paint a key cap whose right edge is at ``right``. Return its rectangle."""
     height = max(SMALLEST_KEY, theme.scaled(SMALLEST_KEY))
     width = key_width(theme, key)
     rect = QRectF(right - width, middle - height / 2, width, height)
@@ -113,7 +113,7 @@ def key_cap(painter: QPainter, theme: Theme, right: float, middle: float, key: s
 
 
 def tell_whole(widget: QWidget, words: str) -> None:
-    """Set a tooltip with the whole text where it is elided; an explicit tooltip stays."""
+    """Set a tooltip with the full text if it is elided. An explicit tooltip is kept."""
     own = widget.property("tip") or (widget.toolTip() and not widget.property("shortened"))
     if own:
         return
@@ -123,13 +123,13 @@ def tell_whole(widget: QWidget, words: str) -> None:
 
 
 def announce(widget: QWidget, words: str) -> None:
-    """Announce a text to a screen reader: alerts and stopped robots, never changing values."""
+    """Announce a text to screen readers. Used for alerts and stopped robots, never for changing values."""
     if QAccessible.isActive():
         QAccessible.updateAccessibility(QAccessibleAnnouncementEvent(widget, words))
 
 
 def show_when(widget: QWidget, shown: bool) -> None:
-    """Show or hide a widget; one without a parent does not become a window."""
+    """Show or hide a widget. Unlike with `setVisible`, a widget without a parent doesn't become a window."""
     if not shown:
         widget.hide()
     elif widget.parentWidget() is not None:

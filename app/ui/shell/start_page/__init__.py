@@ -1,4 +1,4 @@
 """Start page with its cards, images and previews of behaviours.
 
-`StartPage` emits signals for a person's choices.
+`StartPage` emits signals for the user's choices.
 """

@@ -1,4 +1,4 @@
-"""Painted images of the start page: the robot in its room, a first block, completed steps."""
+"""Illustrations of the start page: the robot in its room, a first block, completed steps."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ ROOM_HEIGHT = 296  # height of the painted room; the card shows its upper part
 
 
 class Art(QWidget):
-    """Image at the top of a card, clipped to its round corners; subclasses implement `picture`."""
+    """Illustration at the top of a card, clipped to its round corners. Subclasses implement `picture`."""
 
     def __init__(self, theme: Theme) -> None:
         super().__init__()
@@ -29,7 +29,7 @@ class Art(QWidget):
         return QSize(300, ART_HEIGHT)
 
     def picture(self, painter: QPainter, area: QRectF) -> None:
-        """Paint the image into ``area``."""
+        """Paint the illustration into ``area``."""
 
     def paintEvent(self, _event: QPaintEvent) -> None:
         painter = QPainter(self)
@@ -42,7 +42,7 @@ class Art(QWidget):
 
 
 def upper_corners(area: QRectF, radius: float) -> QPainterPath:
-    """Return a rectangle with round upper corners."""
+    """Return the outline of a rectangle whose upper corners are round."""
     path = QPainterPath()
     path.addRoundedRect(area.adjusted(0, 0, 0, 2 * radius), radius, radius)
     box = QPainterPath()
@@ -51,7 +51,7 @@ def upper_corners(area: QRectF, radius: float) -> QPainterPath:
 
 
 class RobotArt(Art):
-    """The virtual robot at rest, as drawn by the Robot panel."""
+    """Illustration of the virtual robot at rest, as drawn by the Robot panel."""
 
     def __init__(self, theme: Theme) -> None:
         super().__init__(theme)
@@ -64,7 +64,7 @@ class RobotArt(Art):
         painter.drawPixmap(area.topLeft(), self._still(room, area))
 
     def _still(self, room: QRectF, area: QRectF) -> QPixmap:
-        # Cached for each size and theme, in a pixmap because the drawing sets a clip of its own.
+        # Cached for each size and theme, in a pixmap because the drawing sets its own clip.
         ratio = self.devicePixelRatioF()
         key = (area.width(), area.height(), ratio, self._theme.dark)
         if self._made is None or self._made[0] != key:
@@ -80,7 +80,7 @@ class RobotArt(Art):
 
 
 class EmptyPageArt(Art):
-    """The block "when started" on an empty page with a drop target and a mouse pointer."""
+    """Illustration of the block "when started" on an empty canvas, with a drop target and a mouse pointer."""
 
     def __init__(self, theme: Theme) -> None:
         super().__init__(theme)
@@ -121,7 +121,7 @@ class EmptyPageArt(Art):
 
 
 class StepsArt(Art):
-    """Two completed steps and the next one."""
+    """Illustration of two completed steps and the next one."""
 
     def __init__(self, theme: Theme) -> None:
         super().__init__(theme)

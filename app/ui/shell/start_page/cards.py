@@ -1,4 +1,4 @@
-"""Parts of the start page: cards, examples, recent files and the line for developers."""
+"""Widgets of the start page: cards, examples, recent files and the line for developers."""
 
 from __future__ import annotations
 
@@ -26,7 +26,10 @@ TILE = 30
 
 
 class CardTitle(QLabel):
-    """Heading as wide as its text, followed by a chip; wraps if there is too little room."""
+    """Heading followed by a chip.
+
+    The heading is as wide as its text, and wraps if there is too little room.
+    """
 
     def __init__(self, text: str) -> None:
         super().__init__(text)
@@ -40,7 +43,7 @@ class CardTitle(QLabel):
 
 
 class BigCard(Card):
-    """Card with an image, a heading with an optional chip, text, and buttons."""
+    """Card with an illustration, a heading with an optional chip, text, and buttons."""
 
     def __init__(self, theme: Theme, art: Art, title: str, text: str, buttons: list[Button]) -> None:
         super().__init__(theme)
@@ -80,7 +83,7 @@ class BigCard(Card):
 
 
 class ExampleCard(PaintedButton):
-    """Card of an example that acts as a button: preview of its blocks, name and description."""
+    """Button for an example, painted as a card with a preview of its blocks, its name and description."""
 
     def __init__(self, theme: Theme, path: Path, name: str, text: str, rows: tuple[Row, ...]) -> None:
         super().__init__(theme, radius="card")
@@ -148,7 +151,7 @@ class RecentRow(PaintedButton):
 
 
 class _Key(QWidget):
-    """A shell command with the background of a key."""
+    """Shell command with the background of a key cap."""
 
     def __init__(self, theme: Theme, text: str) -> None:
         super().__init__()
@@ -170,7 +173,7 @@ class _Key(QWidget):
 
 
 class DevelopersLine(QWidget):
-    """Last line of the page, with the entry point for programmers."""
+    """Last line of the page, with instructions for programmers."""
 
     developer_pressed = Signal()
 

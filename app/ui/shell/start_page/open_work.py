@@ -1,4 +1,4 @@
-"""Rows of the open behaviours on the start page."""
+"""List of the open behaviours on the start page."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ DOT = 7.0
 
 @dataclass(frozen=True)
 class OpenWork:
-    """An open behaviour: ``key`` of its tab, and its file or ""."""
+    """Open behaviour; ``key`` is the key of its tab, and the path of its file is "" if it has none."""
 
     key: str
     name: str
@@ -34,7 +34,7 @@ class OpenWork:
 
 
 def open_work(session: Session) -> tuple[OpenWork, ...]:
-    """Return the open behaviours that aren't empty, the current one first."""
+    """Return the open behaviours that aren't empty, with the current one first."""
     current, runs = session.document, session.runs
     documents = sorted(session.documents, key=lambda each: each is not current)
     return tuple(
@@ -51,7 +51,7 @@ def open_work(session: Session) -> tuple[OpenWork, ...]:
 
 
 class OpenRow(PaintedButton):
-    """Row of an open behaviour: icon, name with a dot while unsaved, and "Continue"."""
+    """Row of an open behaviour: icon, name with a dot if it is unsaved, and "Continue"."""
 
     def __init__(self, theme: Theme, work: OpenWork) -> None:
         super().__init__(theme, radius="panel")
@@ -104,7 +104,7 @@ class OpenRow(PaintedButton):
 
 
 def state_words(work: OpenWork) -> str:
-    """Return the state as text; an unchanged example needs no saving."""
+    """Describe whether a behaviour is saved. An unchanged example doesn't need to be."""
     if work.runs:
         return _("running")
     if work.unsaved:
@@ -113,7 +113,7 @@ def state_words(work: OpenWork) -> str:
 
 
 class OpenWorkList(QWidget):
-    """Heading and rows; hidden without open work."""
+    """Heading and rows of the open behaviours; hidden if there are none."""
 
     chosen = Signal(str)
 
@@ -135,7 +135,7 @@ class OpenWorkList(QWidget):
         self.hide()
 
     def show_work(self, work: Sequence[OpenWork]) -> None:
-        """Set the rows; does nothing if they are unchanged."""
+        """Set the rows. Has no effect if they are unchanged."""
         if tuple(work) == self._shown:
             return
         self._shown = tuple(work)

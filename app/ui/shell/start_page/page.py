@@ -1,4 +1,4 @@
-"""Start page: continue open work, use a robot, create a behaviour, open an example or recent file."""
+"""Start page: continue with open behaviours, use a robot, create a behaviour, open an example or file."""
 
 from __future__ import annotations
 
@@ -38,8 +38,9 @@ from nep.i18n import _, lazy, ngettext, translate
 WIDTH, MARGIN, CARD_GAP = 1080, 24, 16
 TOP = 35
 BANNER_ROOM, HIGH, BANNER_GAP, BANNER_LINE = 40, 640, 6, 29
-"""Additional space above the question, so that an alert covers no text. A low page has space for one line (px
-at 100 % text).
+"""Space above the question for an alert, so that it covers no text; a low page has space for one line.
+
+Values are in px at 100 % text.
 """
 EXAMPLES_SHOWN = 4
 EXAMPLES_MARGIN = 60  # margin in px when scrolling to the examples, so that their heading is visible
@@ -51,7 +52,7 @@ ALL_WORDS = {
     9: lazy("All nine examples"),
     10: lazy("All ten examples"),
 }
-"""Spelled out, which is easier to read than a figure."""
+"""Texts of the link to all examples, by their number, which is spelled out for readability."""
 RECENT_SHOWN = 3
 FIRST, OTHER = 408, 318  # relative widths of the first card and the others
 LEARN = (
@@ -66,7 +67,7 @@ OFFER = (
 
 @dataclass(frozen=True)
 class Example:
-    """An example shipped with Studio: file, name, description and first blocks."""
+    """Example shipped with Studio: file, name, description and first blocks."""
 
     path: Path
     name: str
@@ -75,7 +76,7 @@ class Example:
 
 
 def read_examples(folder: Path) -> tuple[Example, ...]:
-    """Return the examples of a folder, sorted by file name; invalid files are skipped."""
+    """Return the examples in a folder, sorted by file name. Invalid files are skipped."""
     found = []
     for path in sorted(folder.glob("*.nepb")) if folder.is_dir() else []:
         try:
@@ -98,7 +99,7 @@ def all_words(count: int) -> str:
 
 
 class StartPage(QWidget):
-    """Start page."""
+    """Page shown at startup, with ways to start or continue work."""
 
     virtual_robot = Signal()
     new_behaviour = Signal()
@@ -197,7 +198,7 @@ class StartPage(QWidget):
         self._frame(content)
 
     def _frame(self, content: QWidget) -> None:
-        # Centred in a scroll area, with the developers' line below.
+        # Centred in a scroll area, with the line for developers below it.
         middle = QWidget()
         middle.setProperty("bare", "true")
         row = QHBoxLayout(middle)
@@ -220,7 +221,7 @@ class StartPage(QWidget):
         whole.addWidget(line)
 
     def banner_area(self) -> QRect:
-        """Return the area for an alert: above the question, at scroll position 0."""
+        """Return the area for an alert: above the question, when the page is scrolled to the top."""
         high = TOP + self._banner_room.sizeHint().height() - 2 * BANNER_GAP
         return QRect(BANNER_GAP, BANNER_GAP, self.width() - 2 * BANNER_GAP, high)
 
@@ -243,7 +244,8 @@ class StartPage(QWidget):
             self._content.invalidate()
 
     def _fit_cards(self) -> None:
-        # With little room, cards are stacked, then lose their images, so that the first button is visible.
+        # If there is little room, cards are stacked, then lose their images, so that the first button is
+        # visible.
         cards = (self.robot_card, self.new_card, self.learn_card)
         needed = sum(card.minimumSizeHint().width() for card in cards) + CARD_GAP * (len(cards) - 1)
         beside = needed <= min(WIDTH, self.width() - 2 * MARGIN)
@@ -261,11 +263,11 @@ class StartPage(QWidget):
 
     @property
     def offers_first_steps(self) -> bool:
-        """True while the first steps are the primary card."""
+        """True if the first steps are the primary card."""
         return self._offers
 
     def offer_first_steps(self, offers: bool = True) -> None:
-        """Make the first steps the primary card, or one of three cards."""
+        """Show the first steps as the primary card if `offers`, else as one of three cards."""
         if offers == self._offers:
             return
         self._offers = offers
@@ -314,7 +316,7 @@ class StartPage(QWidget):
         return grid
 
     def show_all(self, shown: bool) -> None:
-        """Show all examples or only the first row."""
+        """Show all examples, or only their first row."""
         self._shows_all = shown
         for card in self.example_cards[EXAMPLES_SHOWN:]:
             paint.show_when(card, shown)
@@ -323,7 +325,7 @@ class StartPage(QWidget):
         self._all.set_word(words, None if shown else "arrow-right")
 
     def focus_examples(self) -> None:
-        """Show all examples and focus the first."""
+        """Show all examples and focus the first one."""
         self.show_all(True)
         if self.example_cards:
             self.example_cards[0].setFocus(Qt.FocusReason.OtherFocusReason)
@@ -336,7 +338,7 @@ class StartPage(QWidget):
             self._area.ensureWidgetVisible(card, 0, EXAMPLES_MARGIN)
 
     def show_recent(self, recent: Sequence[RecentFile], now: dt.datetime | None = None) -> None:
-        """Set the recent files; the section is hidden without any."""
+        """Set the recent files; the section is hidden if there are none."""
         moment = now if now is not None else dt.datetime.now().astimezone()
         layout = self._recent_box.layout()
         if layout is None:
@@ -368,13 +370,13 @@ class StartPage(QWidget):
         layout.addWidget(holder)
 
     def show_robot(self, chip: str, status: str) -> None:
-        """Set the chip with the connected robot on the card "Connect a robot"."""
+        """Set the chip on the card "Connect a robot" that shows the connected robot."""
         self.robot_card.chip.set(chip, status)
 
     def show_open(self, work: Sequence[OpenWork]) -> None:
-        """Set the open behaviours; the section is hidden without any.
+        """Set the open behaviours; the section is hidden if there are none.
 
-        With open work the first steps are no longer the primary card.
+        If there are open behaviours, the first steps are not the primary card.
         """
         self.open_work.show_work(work)
         if work:

@@ -1,4 +1,4 @@
-"""Preview of a behaviour: its first blocks as coloured bars, read from the workspace JSON."""
+"""Preview of a behaviour, which shows its first blocks as coloured bars."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ _LAST_WORD = {"do": "robot", "get": "sensors", "when": "events"}
 
 @dataclass(frozen=True)
 class Row:
-    """A block: nesting depth, category, and the numbers of words and values."""
+    """Block in a preview: nesting depth, category, and the numbers of words and values."""
 
     depth: int
     category: str
@@ -77,7 +77,7 @@ def _child(link: object) -> Mapping[str, object] | None:
 
 
 def block_path(rect: QRectF, *, radius: float = 4.0, notch: float = 11.0) -> QPainterPath:
-    """Return the outline of a block with a notch at the top and a tab at the bottom."""
+    """Return the outline of a block, with a notch at the top and a tab at the bottom."""
     left, top, right, bottom = rect.left(), rect.top(), rect.right(), rect.bottom()
     wide, deep = notch, notch * 0.36
     path = QPainterPath(QPointF(left + radius, top))
@@ -102,7 +102,7 @@ def block_path(rect: QRectF, *, radius: float = 4.0, notch: float = 11.0) -> QPa
 
 
 def paint_rows(painter: QPainter, area: QRectF, theme: Theme, found: tuple[Row, ...]) -> None:
-    """Paint rows from the top of ``area``; the painter must clip the overflow."""
+    """Paint rows from the top of ``area``. The painter's clip must cut off those that don't fit."""
     painter.setRenderHint(QPainter.RenderHint.Antialiasing)
     top = area.top()
     for row in found:

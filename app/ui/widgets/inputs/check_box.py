@@ -1,4 +1,4 @@
-"""One of several names that can be chosen."""
+"""Check box with a label, painted in Studio's style."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ SIDE, GAP, MIN_HEIGHT = 18, 8, 26
 
 
 class CheckBox(PaintedButton):
-    """A box with a check mark while it is chosen, and a word beside it."""
+    """Box with a check mark if it is checked, and a label."""
 
     shortens = True
 

@@ -17,10 +17,10 @@ SHOWN_AT_ONCE = 12
 
 
 class ComboBox(QComboBox):
-    """Combo box for texts; the wheel changes it only with the focus."""
+    """Combo box for texts. The wheel changes it only while it has the focus."""
 
     def __init__(self, theme: Theme, options: Sequence[tuple[str, str]] = (), *, name: str = "") -> None:
-        # Options are (value, label).
+        # `options` are (value, label).
         super().__init__()
         self._theme = theme
         self.setAccessibleName(name)
@@ -29,7 +29,7 @@ class ComboBox(QComboBox):
         self.setAttribute(Qt.WidgetAttribute.WA_Hover)
         for value, words in options:
             self.addItem(words, value)
-        self.setItemDelegate(QStyledItemDelegate(self))  # which the style sheet can give padding
+        self.setItemDelegate(QStyledItemDelegate(self))  # lets the style sheet set the padding of items
         self.setMaxVisibleItems(SHOWN_AT_ONCE)
         make_round(self.view().window())
 
@@ -40,7 +40,7 @@ class ComboBox(QComboBox):
         return data if isinstance(data, str) else self.currentText()
 
     def set_value(self, value: str) -> None:
-        """Select an offered value; others are ignored."""
+        """Select one of the values; other values are ignored."""
         index = self.findData(value)
         if index >= 0:
             self.setCurrentIndex(index)

@@ -1,4 +1,4 @@
-"""Input fields: search and filter, numbers with units, long texts."""
+"""Text fields: search and filter, numbers with units, long texts."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from nep.i18n import number as number_text
 
 MAX_LINES = 5
 MIN_HEIGHT = 34
-SHEET_PADDING = 9  # padding from the style sheet above and below, and a pixel for rounding
+SHEET_PADDING = 9  # padding of the style sheet above and below, and a pixel for rounding
 
 
 class SearchField(QLineEdit):
@@ -52,12 +52,12 @@ class SearchField(QLineEdit):
 
 
 class FilterField(SearchField):
-    """Filter of a list: Down and Return move on to the list (`leave`), Esc clears it."""
+    """Filter of a list: Down and Return move the focus to the list (`leave`), Esc clears the filter."""
 
     leave = Signal()
 
     def __init__(self, theme: Theme, name: str) -> None:
-        # `name` is the accessible name: "Filter topics".
+        # `name` is the accessible name, such as "Filter topics".
         super().__init__(theme, _("Filter"), "/")
         self.setAccessibleName(name)
         self.setMaximumWidth(190)
@@ -73,9 +73,9 @@ class FilterField(SearchField):
 
 
 class NumberEdit(QLineEdit):
-    """Number field with its unit inside; invalid text stays, and its problem is reported.
+    """Number field with its unit inside. Invalid text is kept and reported.
 
-    If it may be ``empty``, `emptied` reports that.
+    If the field may be ``empty``, `emptied` is emitted when the text is deleted.
     """
 
     number = Signal(float)
@@ -109,12 +109,12 @@ class NumberEdit(QLineEdit):
         self.setTextMargins(0, 0, round(unit) + (6 if self._unit else 0), 0)
 
     def show_number(self, value: float) -> None:
-        """Show a valid value."""
+        """Show a number and clear the error state."""
         self.setText(self.written(value))
         self._judge("")
 
     def written(self, value: float) -> str:
-        """Format a number as the field does."""
+        """Format a number in the format of the field."""
         return number_text(value, f".{self._decimals}f")
 
     def _read(self) -> None:
@@ -160,7 +160,7 @@ class NumberEdit(QLineEdit):
 
 
 class _Text(QPlainTextEdit):
-    """Text edit; Tab leaves it."""
+    """Multi-line text edit that is left with Tab."""
 
     left = Signal()
     entered = Signal()
@@ -187,7 +187,7 @@ class _Text(QPlainTextEdit):
     def keyPressEvent(self, event: QKeyEvent) -> None:
         held = event.modifiers() & (Qt.KeyboardModifier.ControlModifier | Qt.KeyboardModifier.MetaModifier)
         if event.key() in {Qt.Key.Key_Return, Qt.Key.Key_Enter} and held:
-            event.ignore()  # handled by the card: try the action
+            event.ignore()  # handled by the card, which tries the action
         else:
             super().keyPressEvent(event)
 
@@ -231,11 +231,11 @@ class LongText(QWidget):
 
     @property
     def wrong(self) -> bool:
-        """True if it is marked as invalid."""
+        """True if the text is shown as invalid."""
         return self._wrong
 
     def mark(self, *, wrong: bool) -> None:
-        """Mark it as invalid or valid."""
+        """Show the text as invalid or valid."""
         if wrong != self._wrong:
             self._wrong = wrong
             self.update()
@@ -263,7 +263,7 @@ class LongText(QWidget):
 
     def resizeEvent(self, event: QResizeEvent) -> None:
         super().resizeEvent(event)
-        self._grow()  # the wrapping may have changed
+        self._grow()  # the number of lines may have changed
 
     def sizeHint(self) -> QSize:
         return QSize(240, self.height())

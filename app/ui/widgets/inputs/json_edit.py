@@ -1,4 +1,4 @@
-"""JSON editor with line numbers, syntax colours, and a mark at an invalid line."""
+"""JSON editor with line numbers, syntax highlighting, and a mark at an invalid line."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ from app.ui.widgets import paint
 from app.ui.widgets.menus import EditMenu
 
 INDENT = 2
-# The first matching rule applies: strings before their content, keys before strings.
+# The first matching rule applies: strings before their contents, keys before strings.
 _RULES: tuple[tuple[str, str], ...] = (
     ("textSecondary", r'"(?:\\.|[^"\\])*"(?=\s*:)'),
     ("ok", r'"(?:\\.|[^"\\])*"?'),
@@ -57,7 +57,7 @@ class _JsonColours(QSyntaxHighlighter):
 
 
 class _JsonLines(QWidget):
-    """Line numbers at the left."""
+    """Line numbers at the left of the text."""
 
     def __init__(self, text: JsonLinesEdit) -> None:
         super().__init__(text)
@@ -68,7 +68,7 @@ class _JsonLines(QWidget):
 
 
 class JsonLinesEdit(QPlainTextEdit):
-    """Text edit. Enter keeps the indentation; Tab leaves; Ctrl+Enter emits `sent`."""
+    """Text edit for JSON. Enter keeps the indentation; Tab leaves; Ctrl+Enter emits `sent`."""
 
     sent = Signal()
     focus_changed = Signal()
@@ -142,7 +142,7 @@ class JsonLinesEdit(QPlainTextEdit):
             self.ensureCursorVisible()
 
     def mark(self, line: int) -> None:
-        """Mark a line as invalid, from 1; 0 for none."""
+        """Show a line as invalid, counted from 1; 0 for none."""
         self.wrong_line = line
         marks = []
         if line:
@@ -179,13 +179,13 @@ class JsonLinesEdit(QPlainTextEdit):
 
 
 class JsonEdit(QWidget):
-    """JSON editor in the frame of a field. Emits `changed` at each edit, `sent` on Ctrl+Enter."""
+    """JSON editor in the frame of a field. Emits `changed` on each edit, and `sent` on Ctrl+Enter."""
 
     changed = Signal()
     sent = Signal()
 
     def __init__(self, theme: Theme, name: str, *, least_lines: int = 6) -> None:
-        # `name` is the accessible name; `least_lines` the minimum height.
+        # `name` is the accessible name; `least_lines` determines the minimum height.
         super().__init__()
         self._theme, self._least = theme, least_lines
         self._is_wrong = False
@@ -210,27 +210,27 @@ class JsonEdit(QWidget):
             self.edit.setPlainText(text)
 
     def replace(self, start: int, end: int, text: str) -> None:
-        """Replace a range as an edit that can be undone."""
+        """Replace a range of the text as an undoable edit."""
         cursor = QTextCursor(self.edit.document())
         cursor.setPosition(start)
         cursor.setPosition(end, QTextCursor.MoveMode.KeepAnchor)
         cursor.insertText(text)
 
     def go_to(self, line: int, column: int) -> None:
-        """Move the cursor, line and column from 1."""
+        """Move the cursor to a line and column, counted from 1."""
         block = self.edit.document().findBlockByNumber(line - 1)
         cursor = QTextCursor(block)
         cursor.setPosition(block.position() + min(column - 1, max(0, block.length() - 1)))
         self.edit.setTextCursor(cursor)
 
     def set_coloured(self, is_json: bool) -> None:
-        """Set whether the text is JSON, which is coloured."""
+        """Set whether the text is JSON, which is highlighted."""
         if self.edit.colours.is_on != is_json:
             self.edit.colours.is_on = is_json
             self.edit.colours.rehighlight()
 
     def mark(self, line: int) -> None:
-        """Mark a line as invalid, from 1; 0 for none."""
+        """Show a line as invalid, counted from 1; 0 for none."""
         if line != self.edit.wrong_line or bool(line) != self._is_wrong:
             self._is_wrong = bool(line)
             self.edit.mark(line)
@@ -238,7 +238,7 @@ class JsonEdit(QWidget):
 
     @property
     def wrong_line(self) -> int:
-        """Marked line, 0 for none."""
+        """Line that is shown as invalid, or 0."""
         return self.edit.wrong_line
 
     def _high(self, lines: int) -> int:

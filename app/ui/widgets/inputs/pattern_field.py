@@ -1,4 +1,4 @@
-"""Field of topic patterns as tokens; excluded patterns have "not" before them."""
+"""Field for topic patterns as tokens. Excluded patterns are preceded by "not"."""
 
 from __future__ import annotations
 
@@ -10,7 +10,10 @@ from nep.i18n import _
 
 
 class PatternField(TokenField):
-    """Emits `changed` for every change, also of unfinished text; `settled` when no text is unfinished."""
+    """Field for topic patterns.
+
+    `changed` is emitted on every change, also of unfinished text; `settled` if no text is unfinished.
+    """
 
     def patterns(self) -> tuple[tuple[str, ...], tuple[str, ...]]:
         """Return the included and the excluded patterns."""
@@ -20,7 +23,7 @@ class PatternField(TokenField):
         return tuple(dict.fromkeys((*wanted, *more))), tuple(dict.fromkeys((*unwanted, *less)))
 
     def show_patterns(self, wanted: Sequence[str], unwanted: Sequence[str]) -> None:
-        """Replace the tokens, unless they are the same."""
+        """Replace the tokens, unless they are the same already."""
         if (tuple(wanted), tuple(unwanted)) == self.patterns():
             return
         for each in list(self._tokens):
@@ -29,7 +32,7 @@ class PatternField(TokenField):
         self._add(wanted, unwanted)
 
     def _edited(self, text: str) -> None:
-        # A space finishes an entry; "not" waits for its pattern.
+        # A space completes a pattern; "not" is combined with the pattern that follows.
         plain = text.replace(",", " ")
         finished, blank, rest = plain.rpartition(" ")
         words = finished.split()

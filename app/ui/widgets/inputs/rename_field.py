@@ -1,4 +1,4 @@
-"""Overlay field for renaming in place."""
+"""Overlay text field to rename an item in place."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from app.ui.widgets.menus import EditMenu
 
 
 class RenameField(QLineEdit):
-    """Rename field. ``take`` is called with the new name and returns whether it is accepted."""
+    """Text field for a name. ``take`` is called with the new name and returns False to reject it."""
 
     ended = Signal()
 
@@ -48,7 +48,7 @@ class RenameField(QLineEdit):
             self.leave()
 
     def leave(self) -> None:
-        """Close the field; the name is the last accepted one."""
+        """Close the field. The last accepted name is kept."""
         if not self._is_over:
             self._is_over = True
             self.hide()

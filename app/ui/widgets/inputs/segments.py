@@ -1,4 +1,4 @@
-"""Segmented control for up to four options."""
+"""Segmented control with up to four options."""
 
 from __future__ import annotations
 
@@ -36,13 +36,13 @@ class _Segment(PaintedButton):
         self.setAutoExclusive(True)
 
     def set_bare(self, bare: bool) -> None:
-        # With the text as its tooltip.
+        # The text becomes the tooltip.
         self._bare = bare and self._icon is not None
         self.updateGeometry()
         self.update()
 
     def set_dot(self, shown: bool) -> None:
-        """Show a dot behind the word: what it names is on."""
+        """Show or hide a dot after the text, which means that the option is active."""
         if shown != self._dot:
             self._dot = shown
             words = _("{choice}, on") if shown else "{choice}"
@@ -101,7 +101,7 @@ class _Segment(PaintedButton):
 
 
 class Segments(QWidget):
-    """Up to four segments, one selected; emits `changed` when the user selects one."""
+    """Up to four segments, one of which is selected. Emits `changed` when the user selects another one."""
 
     changed = Signal(str)
 
@@ -117,8 +117,8 @@ class Segments(QWidget):
         wraps: bool = False,
         dots: bool = False,
     ) -> None:
-        # Options are (value, label, icon or None); `check` shows a check mark at the selected one; `wraps`
-        # uses several rows when narrow.
+        # `options` are (value, label, icon or None); `check` shows a check mark at the selected one; `wraps`
+        # uses several rows if narrow.
         super().__init__()
         self._theme = theme
         self.setAccessibleName(name)
@@ -141,30 +141,30 @@ class Segments(QWidget):
         self.set_value(value if value is not None else next(iter(self._segments), ""))
 
     def set_bare(self, bare: bool) -> None:
-        """Show only the icons where space is scarce."""
+        """Show only the icons if `bare`, where space is scarce."""
         for segment in self._segments.values():
             segment.set_bare(bare)
 
     def set_dot(self, value: str, shown: bool) -> None:
-        """Show a dot behind one of the words: what it names is on."""
+        """Show or hide a dot after the text of an option, which means that the option is active."""
         self._segments[value].set_dot(shown)
 
     @property
     def value(self) -> str:
-        """Selected value, or "" without options."""
+        """Selected value, or "" if there are no options."""
         return next((key for key, segment in self._segments.items() if segment.isChecked()), "")
 
     def chosen_button(self) -> QAbstractButton | None:
-        """Return the selected segment, for the focus."""
+        """Return the selected segment, to give it the focus."""
         return self._segments.get(self.value)
 
     def set_value(self, value: str) -> None:
-        """Select a value without emitting `changed`; an unknown one is ignored."""
+        """Select a value without emitting `changed`; an unknown value is ignored."""
         if value in self._segments:
             self._segments[value].setChecked(True)
 
     def choose_none(self) -> None:
-        """Deselect all; the user can select one again."""
+        """Deselect all segments until the user selects one."""
         for segment in self._segments.values():
             segment.setAutoExclusive(False)
             segment.setChecked(False)

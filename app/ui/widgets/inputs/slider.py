@@ -19,7 +19,10 @@ PAGE_STEPS = 10
 
 
 class Track(QSlider):
-    """Slider track: 4 px, handle 20 px; counts steps, and the wheel changes it only with the focus."""
+    """Slider with a 4 px track and a 20 px handle, which counts steps.
+
+    The wheel works only with the focus.
+    """
 
     reset = Signal()
 
@@ -100,7 +103,7 @@ def decimals_of(step: float) -> int:
 
 
 class SliderWithUnit(QWidget):
-    """Value between two limits, with slider and field; emits `changed` when the user sets a value."""
+    """Value between two limits, with slider and field. Emits `changed` when the user sets a value."""
 
     changed = Signal(float)
 

@@ -1,4 +1,4 @@
-"""Field with finished entries as removable tokens, followed by the text being typed."""
+"""Text field with completed entries as removable tokens, followed by the text being typed."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ MAX_LETTERS = 400
 
 
 class Token(PaintedButton):
-    """Finished entry, with "not" if it is excluded; a click or Delete removes it."""
+    """Token for a completed entry, with "not" if it is excluded. A click or Delete removes it."""
 
     def __init__(self, theme: Theme, entry: str, *, is_left_out: bool = False) -> None:
         super().__init__(theme)
@@ -68,7 +68,10 @@ class Token(PaintedButton):
 
 
 class _TokenEdit(QLineEdit):
-    """Text being typed; Enter finishes it, Backspace at its start removes the last token."""
+    """Line edit for the text being typed.
+
+    Enter completes it, Backspace at its start removes the last token.
+    """
 
     ended = Signal()
     back = Signal()
@@ -103,9 +106,14 @@ class _TokenEdit(QLineEdit):
 
 
 class TokenField(QWidget):
-    """Base of fields of tokens: subclasses decide when typed text is finished.
+    """Base class of fields with tokens. Subclasses decide when typed text is complete.
 
-    `changed` when entries or the typed text change; `settled` when entries change and no text is unfinished.
+    `changed` is emitted when tokens or the typed text change, `settled` when tokens change and no text is
+    unfinished.
+
+    Args:
+        example: Placeholder of the empty field.
+        add: Placeholder after tokens.
     """
 
     changed = Signal()
@@ -136,21 +144,21 @@ class TokenField(QWidget):
 
     @property
     def tokens(self) -> Sequence[Token]:
-        """Finished entries, in their order."""
+        """Tokens of the completed entries, in their order."""
         return tuple(self._tokens)
 
     def set_wrong(self, is_wrong: bool) -> None:
-        """Show or remove the edge of an invalid value."""
+        """Show or remove the outline of an invalid value."""
         self._is_wrong = is_wrong
         self.update()
 
     # ---- input
 
     def _edited(self, text: str) -> None:
-        """Handle typed text."""
+        """Handle a change of the typed text."""
 
     def _end_typing(self) -> None:
-        """Finish the text: Enter was pressed or the focus left."""
+        """Complete the typed text after Enter was pressed or the focus left."""
 
     def _remove_last(self) -> None:
         if self._tokens:

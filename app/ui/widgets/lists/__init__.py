@@ -1,4 +1,4 @@
 """Lists: entries with highlighted matches, fuzzy search, scroll areas.
 
-The command palette and the table of shortcuts use them.
+Used by the command palette and the table of shortcuts.
 """

@@ -34,20 +34,20 @@ Line = Heading | Match
 
 
 class EntryModel(QAbstractListModel):
-    """List model of the lines; headings can't be selected."""
+    """List model of headings and entries. Headings can't be selected."""
 
     def __init__(self) -> None:
         super().__init__()
         self.lines: Sequence[Line] = ()
 
     def show_lines(self, lines: Sequence[Line]) -> None:
-        """Set the lines."""
+        """Replace the lines."""
         self.beginResetModel()
         self.lines = lines
         self.endResetModel()
 
     def update_entry(self, id: str, note: str, reason: str) -> None:
-        """Update note and reason of an entry in place."""
+        """Update the note and the reason of an entry in place."""
         for row, line in enumerate(self.lines):
             if isinstance(line, Match) and line.entry.id == id:
                 updated = replace(line, entry=replace(line.entry, note=note, reason=reason))
@@ -77,13 +77,13 @@ class EntryModel(QAbstractListModel):
 
 
 def spoken(entry: Entry) -> str:
-    """Return an entry for screen readers."""
+    """Return the text of an entry for screen readers."""
     key = _("key {key}").format(key=spoken_key(entry.key)) if entry.key else ""
     return ", ".join(part for part in (entry.words, entry.note, key, entry.reason) if part)
 
 
 class EntryDelegate(QStyledItemDelegate):
-    """Paints one line."""
+    """Delegate that paints a heading or an entry."""
 
     def __init__(self, theme: Theme) -> None:
         super().__init__()
@@ -131,7 +131,7 @@ class EntryDelegate(QStyledItemDelegate):
         self._words(painter, area, found, ink, marked)
 
     def _right(self, painter: QPainter, rect: QRectF, entry: Entry, quiet: str, *, chosen: bool) -> float:
-        # Note, shortcut and Enter sign; returns their left edge.
+        # Paints note, shortcut and Enter sign; returns their left edge.
         theme, right, middle = self._theme, rect.right() - RIGHT, rect.center().y()
         if entry.id == self.waiting:
             font = theme.font("body")
@@ -158,7 +158,7 @@ class EntryDelegate(QStyledItemDelegate):
         return right
 
     def _words(self, painter: QPainter, area: QRectF, found: Match, ink: str, marked: str) -> None:
-        # With matching letters in bold.
+        # Paints the text with matching letters in bold.
         theme = self._theme
         plain = theme.font("code" if found.entry.kind == "topic" else "bodyLarge")
         if found.entry.kind == "topic":
@@ -181,7 +181,10 @@ class EntryDelegate(QStyledItemDelegate):
 
 
 class EntryList(QListView):
-    """List with one selected row; emits `moved` when the selection changes, `pressed_row` on activation."""
+    """List with one selected row.
+
+    Emits `moved` when the selection changes, and `pressed_row` on activation.
+    """
 
     moved = Signal()
     pressed_row = Signal()
@@ -202,7 +205,7 @@ class EntryList(QListView):
         self.clicked.connect(self._clicked)
 
     def show_lines(self, lines: Sequence[Line], chosen: str = "") -> None:
-        """Set the lines and select the one with this id, else the first row."""
+        """Replace the lines and select the entry with the id `chosen`, or the first entry."""
         self.lines.show_lines(lines)
         rows = [row for row, line in enumerate(lines) if isinstance(line, Match)]
         wanted = (row for row in rows if chosen and _id(lines[row]) == chosen)
@@ -222,12 +225,12 @@ class EntryList(QListView):
         return line.entry if isinstance(line, Match) else None
 
     def height_of_all(self) -> int:
-        """Return the height of all lines."""
+        """Return the height in px of all lines."""
         heights = {Heading: self._theme.scaled(HEADING), Match: self._theme.scaled(ROW)}
         return sum(round(heights[type(line)]) for line in self.lines.lines)
 
     def step(self, steps: int) -> None:
-        """Move the selection by a number of rows, limited to the ends."""
+        """Move the selection by a number of rows; stops at the ends."""
         rows = [row for row, line in enumerate(self.lines.lines) if isinstance(line, Match)]
         if rows:
             current = self.currentIndex().row()
@@ -235,7 +238,7 @@ class EntryList(QListView):
             self._choose(rows[max(0, min(len(rows) - 1, place + steps))])
 
     def handle(self, key: int) -> bool:
-        """Handle Up, Down, Page up, Page down, Home and End; return False for other keys."""
+        """Handle Up, Down, Page up, Page down, Home and End. Return False for other keys."""
         page = max(1, self.viewport().height() // round(self._theme.scaled(ROW)) - 1)
         far = len(self.lines.lines)
         steps = {

@@ -1,8 +1,8 @@
-"""Fuzzy search of the command palette: whether and how well texts match a query, and at which letters.
+"""Fuzzy search of the command palette, with scores and the positions of matching letters.
 
-A contiguous match scores higher than spread letters; the start of a word higher than its middle. Letters in
-arbitrary places don't match at all, because the user would not understand why. Initials of a command match
-this command best.
+A contiguous match scores higher than spread letters, and the start of a word higher than its middle. Letters
+in arbitrary places don't match at all, because the user would not understand why. A command's initials match
+that command best.
 """
 
 from __future__ import annotations
@@ -22,10 +22,14 @@ Span = tuple[int, int]
 
 @dataclass(frozen=True, slots=True)
 class Entry:
-    """Searchable action.
+    """Entry that can be found and run.
 
-    ``id`` is "command:file.save", "panel:topics", "topic:/faces", "robot:Pepper" or "file:/home/me/a.nepb".
-    ``note`` is shown at the right, ``key`` is its shortcut; ``reason`` is why it is unavailable now.
+    Attributes:
+        id: Kind and name, such as "command:file.save", "panel:topics", "topic:/faces" or "robot:Pepper".
+        words: Text that is searched.
+        note: Text shown at the right.
+        key: Shortcut.
+        reason: Reason why the entry is unavailable, or "".
     """
 
     id: str
@@ -37,18 +41,18 @@ class Entry:
 
     @property
     def kind(self) -> str:
-        """Kind: "command", "panel", "topic", "robot", "file" or "example"."""
+        """Kind of the entry: "command", "panel", "topic", "robot", "file" or "example"."""
         return self.id.partition(":")[0]
 
     @property
     def name(self) -> str:
-        """Name within its kind."""
+        """Part of the id after the kind."""
         return self.id.partition(":")[2]
 
 
 @dataclass(frozen=True, slots=True)
 class Match:
-    """Matching entry with its score (higher is better) and the matching letters as (from, to)."""
+    """Matching entry with its score (higher is better) and the spans of matching letters as (from, to)."""
 
     entry: Entry
     score: float = 0.0
@@ -56,9 +60,9 @@ class Match:
 
 
 def match(query: str, words: str) -> tuple[float, tuple[Span, ...]] | None:
-    """Return score and matches of ``words`` for a query of one or more pieces in any order.
+    """Return score and matching spans of ``words`` for a query, or None if it doesn't match.
 
-    None if no match.
+    The query may consist of several parts, which match in any order.
     """
     lower = words.lower()
     if len(lower) != len(words):  # lower case changes the length of some letters, which would shift positions
@@ -89,7 +93,7 @@ def _piece(piece: str, text: str) -> tuple[float, list[Span]] | None:
 
 
 def _spread(piece: str, text: str) -> tuple[float, list[Span]] | None:
-    # Letters in order, preferably contiguous or at the start of a word.
+    # Matches letters in order, preferably contiguous or at the start of a word.
     places: list[int] = []
     good, at = 0, 0
     for letter in piece:
@@ -130,17 +134,20 @@ def _merged(spans: Iterable[Span]) -> tuple[Span, ...]:
 
 
 class Finder:
-    """Searches entries. Large kinds match only contiguous pieces, which is fast."""
+    """Search index of entries.
+
+    In kinds with many entries only contiguous matches are found, which is fast.
+    """
 
     def __init__(self, entries: Sequence[Entry]) -> None:
-        # Entries of equal score keep their order.
+        # Entries with equal scores keep their order.
         self.entries = entries
         self._kinds: dict[str, list[tuple[str, Entry]]] = {}
         for entry in entries:
             self._kinds.setdefault(entry.kind, []).append((entry.words.lower(), entry))
 
     def find(self, query: str, most: int) -> tuple[list[Match], int]:
-        """Return the best matches, at most ``most`` per kind, best first; and the number of all matches."""
+        """Return the best matches (at most ``most`` per kind, best first) and the number of all."""
         pieces = query.lower().split()
         best: list[list[Match]] = []
         count = 0
@@ -173,7 +180,7 @@ def _says_initials(query: str, found: Sequence[Match]) -> bool:
 
 
 def is_initials(query: str, words: str) -> bool:
-    """Return whether a query consists of initials of words, in order, including the first word."""
+    """Return True if a query consists of initials of words, in order, including the first word's."""
     wanted = query.lower().strip()
     firsts = [word[0] for word in "".join(c if c.isalnum() else " " for c in words.lower()).split()]
     if len(wanted) < 2 or not firsts or wanted[0] != firsts[0]:
@@ -183,6 +190,6 @@ def is_initials(query: str, words: str) -> bool:
 
 
 def _by_position(pieces: Sequence[str]) -> Callable[[tuple[str, Entry]], tuple[int, int]]:
-    # Cheap preliminary order: position of the first piece, then text length.
+    # Fast preliminary order, by position of the first part, then by length of the text.
     first = pieces[0] if pieces else ""
     return lambda pair: (pair[0].find(first), len(pair[0]))

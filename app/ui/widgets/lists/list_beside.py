@@ -1,4 +1,4 @@
-"""List with a filter beside the details of the selected entry, or above them when narrow."""
+"""List with a filter beside the details of the selected entry, or above them if narrow."""
 
 from __future__ import annotations
 
@@ -14,7 +14,11 @@ NO_LIMIT = 16_777_215
 
 
 class ListBeside(QWidget):
-    """The list is ``list_px`` wide, at most two fifths; below ``narrow_px`` it is ``list_high_px`` high."""
+    """Widget with a list and the details of the selected entry.
+
+    The list is ``list_px`` wide, at most two fifths of the width. In a widget narrower than ``narrow_px`` it
+    is above the details and ``list_high_px`` high.
+    """
 
     def __init__(
         self,
@@ -51,7 +55,7 @@ class ListBeside(QWidget):
         self.fit()
 
     def fit(self) -> None:
-        """Update the sizes, also after a change of the text size."""
+        """Update the sizes; call this after a change of the text size."""
         beside = self.width() >= self._theme.scaled(self._narrow_px)
         way = QBoxLayout.Direction.LeftToRight if beside else QBoxLayout.Direction.TopToBottom
         self._sides.setDirection(way)

@@ -1,4 +1,4 @@
-"""Scroll areas: for texts that don't fit, and for rows that fill a panel."""
+"""Scroll areas for texts that don't fit, and for rows that fill a panel."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from app.ui.widgets.keyboard import stops_of
 
 
 class Scrolled(QScrollArea):
-    """Scroll area whose size hint is the height of its content."""
+    """Scroll area whose size hint is the height of its contents."""
 
     def __init__(self, inside: QWidget) -> None:
         super().__init__()
@@ -47,12 +47,12 @@ class Scrolled(QScrollArea):
 
     def viewportEvent(self, event: QEvent) -> bool:
         if event.type() == QEvent.Type.LayoutRequest:
-            self.updateGeometry()  # the content's height has changed, which a scroll area doesn't propagate
+            self.updateGeometry()  # a scroll area doesn't propagate changes of its contents' height
         return super().viewportEvent(event)
 
 
 class RowsLayout(QVBoxLayout):
-    """Rows in tab order: Qt appends a later row to the end of the window's order."""
+    """Layout that keeps its rows in tab order. Qt appends later rows to the end of the window's tab order."""
 
     def __init__(self, inside: QWidget, before: QWidget) -> None:
         # `before` precedes the first row in the tab order.
@@ -74,7 +74,7 @@ class RowsLayout(QVBoxLayout):
 
 
 class ScrollColumn(QScrollArea):
-    """Scrolling column of rows; add them to `column`, which ends with a stretch."""
+    """Scrolling column of rows. Add rows to `column`, which ends with a stretch."""
 
     def __init__(self, name: str, *, margins: tuple[int, int, int, int] = (0, 0, 0, 0), gap: int = 0) -> None:
         # `name` is the accessible name; `margins` are left, top, right, bottom.
@@ -104,7 +104,7 @@ class PanelRows(QStackedWidget):
         self.addWidget(scroll)
 
     def put(self, place: int, row: QWidget) -> None:
-        """Show a row at a position, moving it if necessary."""
+        """Show a row at a position; the row is moved if necessary."""
         if self._column.indexOf(row) != place:
             self._column.insertWidget(place, row)
 
@@ -114,7 +114,7 @@ class PanelRows(QStackedWidget):
         row.deleteLater()
 
     def show_rows(self, shown: bool) -> None:
-        """Show the rows, or the empty state."""
+        """Show the rows, or the empty state if not `shown`."""
         self.setCurrentIndex(1 if shown else 0)
 
     def fill(self, panel: QWidget) -> None:

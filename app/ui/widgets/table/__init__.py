@@ -1,4 +1,4 @@
 """Virtual table: model, view, cells, columns.
 
-Panels describe `Column`s; cells are not widgets.
+Panels describe `Column`s; cells are painted and are no widgets.
 """

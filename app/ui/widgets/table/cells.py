@@ -1,4 +1,4 @@
-"""Painting of cells and headers of a table."""
+"""Painters of the cells and headers of a table."""
 
 from __future__ import annotations
 
@@ -18,16 +18,17 @@ from app.ui.widgets.table.model import Cell, Column, Order
 
 Index = QModelIndex | QPersistentModelIndex
 EDGE, PADDING, ICON = 12, 6, 14
-REMEMBERED = 4000  # cells: some screens, so that scrolling does not accumulate all of them
+# maximum number of cached cells: some screens, so that the cache does not grow by scrolling
+REMEMBERED = 4000
 LEFT = Qt.AlignmentFlag.AlignLeft | Qt.AlignmentFlag.AlignVCenter
 
 
 class TableAppearance(Protocol):
-    """Part of the table view that painting needs; rows may have any type."""
+    """Interface of the table view that the painters use; rows may have any type."""
 
     row_height: int
     hovered_row: int
-    last_shown: int  # the last visible column
+    last_shown: int  # index of the last visible column
 
     @property
     def shown_columns(self) -> Sequence[Column[Any]]:
@@ -38,17 +39,17 @@ class TableAppearance(Protocol):
         """Sort order."""
 
     def cell_font(self, cell: Cell) -> QFont:
-        """Return the font of a cell."""
+        """Return the font for a cell."""
 
     def cell_at(self, row: int, column: int) -> Cell:
-        """Return a cell's content."""
+        """Return the contents of a cell."""
 
     def columnWidth(self, column: int) -> int:
-        """Return the width of a column; 0 when hidden."""
+        """Return the width of a column in px; 0 if it is hidden."""
 
 
 def padded(rect: QRect, column: int, last: int) -> QRectF:
-    """Return the inside of a cell: the outer columns have more padding."""
+    """Return the inner rectangle of a cell. The outer columns have more padding."""
     left = EDGE if column == 0 else PADDING
     right = EDGE if column == last else PADDING
     return QRectF(rect.adjusted(left, 0, -right, 0))
@@ -62,12 +63,12 @@ def head_font(theme: Theme) -> QFont:
 
 
 def head_width(theme: Theme, column: Column[Any]) -> int:
-    """Return the width that a column's header needs, including the outer edge."""
+    """Return the width in px that the header of a column needs, including the outer edge."""
     return math.ceil(QFontMetricsF(head_font(theme)).horizontalAdvance(column.head)) + EDGE + PADDING + 1
 
 
 class CellDelegate(QStyledItemDelegate):
-    """Paints a `Cell`, and caches what each position showed last."""
+    """Delegate that paints a `Cell`, and caches what was painted last at each position."""
 
     def __init__(self, theme: Theme, view: TableAppearance, parent: QWidget) -> None:
         super().__init__(parent)
@@ -76,7 +77,7 @@ class CellDelegate(QStyledItemDelegate):
         self._painted: dict[tuple[int, int], Cell] = {}
 
     def changed(self, row: int, columns: Sequence[int]) -> list[int]:
-        """Return the columns of a row whose content differs from the last painting."""
+        """Return the columns of a row whose contents differ from those painted last."""
         if len(self._painted) > REMEMBERED:
             self._painted.clear()
         at = self._view.cell_at
@@ -170,7 +171,7 @@ class CellDelegate(QStyledItemDelegate):
 
 
 class TableHeader(QHeaderView):
-    """Header: small text, the sorted column in the text colour with an arrow."""
+    """Table header with small text. The title of the sorted column is darker and has an arrow."""
 
     def __init__(self, theme: Theme, view: TableAppearance, parent: QWidget) -> None:
         super().__init__(Qt.Orientation.Horizontal, parent)

@@ -1,4 +1,4 @@
-"""Visible columns of a table: the user's choice first, then what fits."""
+"""Visible columns of a table: those that the user chose, then those that fit."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from nep.i18n import _
 
 
 class ColumnChoice:
-    """The user's choice of columns; others have their default."""
+    """User's choice of columns; others have their default visibility."""
 
     def __init__(self, columns: Sequence[Column[Any]]) -> None:
         # The first column is always shown, because it identifies the row.
@@ -22,7 +22,7 @@ class ColumnChoice:
         self._chosen: dict[str, bool] = {}
 
     def wanted(self, column: Column[Any]) -> bool:
-        """Return whether the column should be shown if there is space."""
+        """Return True if the column should be shown, provided that there is space."""
         if column.when is not None and not column.when():
             return False
         return self._chosen.get(column.name, not column.off) or column is self._columns[0]
@@ -36,7 +36,7 @@ class ColumnChoice:
                     self._chosen[name] = shown
 
     def reset(self) -> None:
-        """Restore the default columns."""
+        """Restore the default visibility of all columns."""
         self._chosen.clear()
 
     @property
@@ -45,9 +45,9 @@ class ColumnChoice:
         return bool(self._chosen)
 
     def fit(self, widths: Sequence[int], room: int) -> set[int]:
-        """Return the indexes of columns that fit into ``room`` pixels; those that yield are hidden first.
+        """Return the indexes of the columns that fit into ``room`` px. Columns that yield are hidden first.
 
-        Columns that the user chose stay, even if they do not fit.
+        Columns that the user chose are included even if they do not fit.
         """
         shown = {place for place, column in enumerate(self._columns) if self.wanted(column)}
         yielding = sorted(
@@ -60,13 +60,13 @@ class ColumnChoice:
         return shown
 
     def menu(self, theme: Theme, parent: QWidget, changed: Callable[[], object]) -> Menu:
-        """Return a new menu filled by `fill`."""
+        """Return a new menu with the entries of `fill`."""
         menu = Menu(theme, parent, _("Columns"))
         self.fill(menu, changed)
         return menu
 
     def fill(self, menu: Menu, changed: Callable[[], object]) -> None:
-        """Fill a menu with all columns but the first, checked when shown.
+        """Fill a menu with an entry for each column but the first; visible columns are checked.
 
         ``changed`` is called after each choice.
         """
@@ -93,11 +93,11 @@ class ColumnChoice:
         again.triggered.connect(lambda _on=False: begin_anew())
 
     def saved(self) -> dict[str, bool]:
-        """Return the choices for a layout."""
+        """Return the choices as JSON values for a layout."""
         return dict(self._chosen)
 
     def restore(self, saved: object) -> None:
-        """Restore the result of `saved`; invalid parts are ignored."""
+        """Restore choices returned by `saved`; invalid values are ignored."""
         self._chosen.clear()
         if isinstance(saved, Mapping):
             for name, shown in saved.items():

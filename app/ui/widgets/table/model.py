@@ -1,4 +1,4 @@
-"""Virtual table model of `Column` descriptions: one signal per refresh, no widgets in cells.
+"""Virtual table model based on `Column` descriptions: one signal per refresh, no widgets in cells.
 
 Rows are filtered and sorted as Python lists, without a proxy model; values are read only for visible rows.
 """
@@ -23,25 +23,31 @@ if TYPE_CHECKING:
 Row = TypeVar("Row")
 Index = QModelIndex | QPersistentModelIndex
 CELL_ROLE = int(Qt.ItemDataRole.UserRole)
-RUNS_AT_MOST = 40  # with more removed runs a reset is cheaper than a signal for each
+RUNS_AT_MOST = 40  # with more runs of removed rows, a reset is cheaper than a signal for each
 _ROOT = QModelIndex()
 
 
 class CellMark(Protocol):
-    """Custom painting of a cell; equal marks look the same."""
+    """Custom contents of a cell. Marks that look the same must be equal."""
 
     def paint(self, painter: QPainter, box: QRectF, theme: Theme) -> None:
-        """Paint it inside a cell."""
+        """Paint the mark inside a cell."""
 
 
 @dataclass(frozen=True, slots=True)
 class Cell:
-    """Content of a cell; ``role`` is its colour role, ``chip`` a state after the text.
+    """Contents of a cell.
 
-    Text that does not fit is elided at its end, or in its ``middle``. ``curve`` are values of a sparkline
-    instead of the text, ``indent`` is in pixels, ``tint`` the role of a box behind the text. Text that
-    ``spills`` extends over blank cells at its left. A ``mark`` is painted instead of the text; ``said`` is
-    the accessible text for it or for an icon.
+    Attributes:
+        role: Colour role of the text.
+        chip: Chip after the text, such as a state.
+        middle: True to elide a long text in its middle instead of its end.
+        curve: Values of a sparkline, which replaces the text.
+        indent: Indentation in px.
+        tint: Colour role of a box behind the text.
+        spills: True to extend a long text over blank cells at its left.
+        mark: Painted instead of the text.
+        said: Accessible text for a mark or an icon.
     """
 
     text: str = ""
@@ -67,13 +73,18 @@ class Cell:
 
 @dataclass(frozen=True, slots=True)
 class Column(Generic[Row]):
-    """Column: title, width, and the content for a row.
+    """Description of a column: title, width, and a function that returns the cell of a row.
 
-    ``title`` and ``words`` are marked with `lazy`. ``key`` returns the sort key (None is last in both
-    directions); without it the column can't be sorted. ``stretch`` takes the remaining width. ``tip`` returns
-    the tooltip. When space is scarce, columns with ``yields`` are hidden, the largest number first. ``off``
-    columns are hidden by default, those with ``when`` shown only while it is true; ``words`` names one whose
-    title is empty. A ``verbatim`` title is not translated.
+    Attributes:
+        title, words: Title, and name for a column with an empty title; wrapped in `lazy`.
+        key: Returns the sort key of a row (None is last in both directions); without it the column can't be
+            sorted.
+        stretch: True to take the remaining width.
+        tip: Returns the tooltip of a row's cell.
+        yields: If space is scarce, columns with this number are hidden, the largest number first.
+        off: True to hide the column by default.
+        when: Returns True while the column should be shown.
+        verbatim: True if the title is not translated.
     """
 
     name: str
@@ -97,19 +108,19 @@ class Column(Generic[Row]):
 
     @property
     def called(self) -> str:
-        """Translated name, also where the title is empty."""
+        """Translated name, also for a column with an empty title."""
         return _(self.words) if self.words else self.head
 
 
 @dataclass(slots=True)
 class Order(Generic[Row]):
-    """Sort order: column and direction; None keeps the original order."""
+    """Sort order: column and direction. A column of None keeps the original order."""
 
     column: Column[Row] | None = None
     falling: bool = False
 
     def sort(self, rows: list[Row]) -> list[Row]:
-        """Return the sorted rows; equal and unknown values keep their order. Stable."""
+        """Return the sorted rows. The sort is stable; rows with unknown values are last."""
         key = self.column.key if self.column is not None else None
         if key is None:
             return rows
@@ -168,7 +179,7 @@ class TableModel(QAbstractTableModel, Generic[Row]):
         column = self.columns[section]
         if role == Qt.ItemDataRole.DisplayRole:
             return column.head
-        if role == Qt.ItemDataRole.ToolTipRole:  # where the title is cut off
+        if role == Qt.ItemDataRole.ToolTipRole:  # shown if the title is cut off
             return plain.tip(column.called) or None
         if role == Qt.ItemDataRole.TextAlignmentRole:
             return _alignment(column.figures)
@@ -185,11 +196,11 @@ class TableModel(QAbstractTableModel, Generic[Row]):
         return self._key(row)
 
     def cell_at(self, row: int, column: int) -> Cell:
-        """Return a cell's content directly, without Qt's roles."""
+        """Return a cell's contents directly, without Qt's roles."""
         return self.columns[column].cell(self._rows.shown[row])
 
     def index_of(self, key: str) -> QModelIndex:
-        """Return the first cell of the row with this key; invalid when not shown."""
+        """Return the first cell of the row with this key; an invalid index if the row is not shown."""
         keys = self._rows.keys
         return self.index(keys.index(key), 0) if key in keys else QModelIndex()
 
@@ -216,7 +227,7 @@ class TableModel(QAbstractTableModel, Generic[Row]):
         self._rows.shown = list(rows)
 
     def tell_changed(self, first: int, last: int) -> None:
-        """Emit one signal that the values of these rows changed."""
+        """Emit one signal for changed values of these rows."""
         last = min(last, len(self._rows.shown) - 1)
         if 0 <= first <= last:
             corner = self.index(last, len(self.columns) - 1)
@@ -248,7 +259,7 @@ def _alignment(figures: bool) -> int:
 
 
 def _runs(places: Sequence[int]) -> list[tuple[int, int]]:
-    # Consecutive numbers as (first, last).
+    # Groups consecutive numbers to (first, last).
     runs: list[tuple[int, int]] = []
     for place in places:
         if runs and runs[-1][1] == place - 1:

@@ -1,4 +1,4 @@
-"""Cell with two lines: a name, and its origin below."""
+"""Cell with two lines, for a name and its origin."""
 
 from __future__ import annotations
 
@@ -15,14 +15,14 @@ ROW_PX = 50
 
 @dataclass(frozen=True, slots=True)
 class TwoLines:
-    """Two-line cell; the name is ``mono`` for topics and services, whose second line is plain text."""
+    """Cell with two lines. The name is ``mono`` for topics and services; the second line is plain text."""
 
     name: str
     below: str
     mono: bool = False
 
     def paint(self, painter: QPainter, box: QRectF, theme: Theme) -> None:
-        """Paint it inside a cell."""
+        """Paint the two lines inside a cell."""
         name, below = (
             theme.font("code" if self.mono else "body"),
             theme.font("small" if self.mono else "mono"),

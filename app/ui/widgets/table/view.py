@@ -55,9 +55,10 @@ KEYBOARD = frozenset(
 
 
 class TableView(QTableView, Generic[Row]):
-    """Table of `Column`s. Emits `opened` with the key of a clicked or entered row.
+    """Table of `Column`s.
 
-    Emits `menu_wanted` with the key and the screen position for a row's context menu.
+    Emits `opened` with the key of a row that was clicked or activated by Enter, and `menu_wanted` with the
+    key and the screen position for a context menu.
     """
 
     opened = Signal(str)
@@ -66,7 +67,7 @@ class TableView(QTableView, Generic[Row]):
     order_changed = Signal()
 
     def __init__(self, theme: Theme, model: TableModel[Row], key: str = "") -> None:
-        # `key` is the column sorted by default.
+        # `key` is the name of the column that is sorted by default.
         super().__init__()
         self.theme = theme
         self.columns: tuple[Column[Row], ...] = model.columns
@@ -112,7 +113,7 @@ class TableView(QTableView, Generic[Row]):
         return self.order
 
     def set_row_height(self, height: int, *, large: bool) -> None:
-        """Set the height of all rows; ``large`` text is for the comfortable density."""
+        """Set the height of all rows; ``large`` selects the text size of the comfortable density."""
         self.row_height, self._large = height, large
         self._fonts.clear()
         rows = self.verticalHeader()
@@ -124,7 +125,7 @@ class TableView(QTableView, Generic[Row]):
         self.viewport().update()
 
     def cell_font(self, cell: Cell) -> QFont:
-        """Return the font of a cell."""
+        """Return the font for a cell."""
         key = (cell.mono, cell.bold, cell.struck)
         if key not in self._fonts:
             font = self.theme.font("bodyLarge" if self._large else "body")
@@ -139,11 +140,11 @@ class TableView(QTableView, Generic[Row]):
         return self._fonts[key]
 
     def cell_at(self, row: int, column: int) -> Cell:
-        """Return a cell's content."""
+        """Return the contents of a cell."""
         return self._model.cell_at(row, column)
 
     def visible_rows(self) -> tuple[int, int]:
-        """Return the first and last visible row; the last is before the first when there is none."""
+        """Return the first and the last visible row; the last is lower than the first if there is none."""
         first = self.rowAt(0)
         if first < 0:
             return 0, -1
@@ -151,12 +152,12 @@ class TableView(QTableView, Generic[Row]):
         return first, last if last >= 0 else self._model.rowCount() - 1
 
     def tell_visible_changed(self) -> None:
-        """Repaint the visible values that changed, with one signal."""
+        """Repaint the visible cells whose values changed, with one signal."""
         first, last = self.visible_rows()
         self._model.tell_changed(first, last)
 
     def dataChanged(self, first: Index, last: Index, _roles: Sequence[int] = ()) -> None:
-        """Repaint changed cells only; Qt would repaint all rows."""
+        """Repaint only the changed cells; Qt would repaint all rows."""
         top, bottom = self.visible_rows()
         columns = [place for place in range(len(self.columns)) if not self.isColumnHidden(place)]
         dirty = QRegion()
@@ -187,7 +188,7 @@ class TableView(QTableView, Generic[Row]):
         return self._model.key_of(row) if row is not None else None
 
     def choose(self, key: str) -> None:
-        """Select the row with this key without opening it; no effect when it is not shown."""
+        """Select the row with this key without opening it. Has no effect if the row is not shown."""
         index = self._model.index_of(key)
         if index.isValid() and index.row() != self.currentIndex().row():
             self.setCurrentIndex(index)
@@ -235,12 +236,12 @@ class TableView(QTableView, Generic[Row]):
         self.fit_columns()
 
     def fit_columns(self) -> None:
-        """Give the stretch column the remaining width, at least its own; columns may be hidden."""
+        """Give the stretch column the remaining width, but at least its own; columns may be hidden."""
         scaled = [round(self.theme.scaled(column.width)) for column in self.columns]
         room = self.viewport().width()
         shown = self.choice.fit(scaled, room)
         spare = room - sum(scaled[place] for place in shown)
-        for place in sorted(shown):  # translations may be longer; they get remaining space
+        for place in sorted(shown):  # translations may be longer; they get the remaining space
             more = head_width(self.theme, self.columns[place]) - scaled[place]
             if not self.columns[place].stretch and more > 0 and spare > 0:
                 scaled[place] += min(more, spare)
@@ -255,11 +256,11 @@ class TableView(QTableView, Generic[Row]):
         self.setHorizontalScrollBarPolicy(policy)
 
     def column_menu(self) -> Menu:
-        """Return the menu of columns."""
+        """Return a menu to choose the visible columns."""
         return self.choice.menu(self.theme, self, self.fit_columns)
 
     def fill_column_menu(self, menu: Menu) -> None:
-        """Fill an existing menu of columns."""
+        """Fill a menu with the entries to choose the visible columns."""
         self.choice.fill(menu, self.fit_columns)
 
     def _show_columns(self, at: QPoint) -> None:
@@ -268,7 +269,7 @@ class TableView(QTableView, Generic[Row]):
         menu.popup(at)
 
     def saved_state(self) -> dict[str, object]:
-        """Return sort order and columns for a layout."""
+        """Return the sort order and the visible columns for a layout."""
         order = self.order
         return {
             "sort": order.column.name if order.column else "",
@@ -277,7 +278,7 @@ class TableView(QTableView, Generic[Row]):
         }
 
     def restore(self, state: Mapping[str, object]) -> None:
-        """Restore the result of `saved_state`; invalid parts become defaults."""
+        """Restore a state returned by `saved_state`; invalid values are replaced by defaults."""
         chosen = (column for column in self.columns if column.name == state.get("sort"))
         self.order.column = next(chosen, self.columns[0])
         self.order.falling = state.get("falling") is True
