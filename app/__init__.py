@@ -1,5 +1,5 @@
 """NEP Studio, the desktop application.
 
-Packages import downward: `ui`, `core`, `blocks`, `robots`, and `nep` below them. `app.__main__` holds every
-entry point.
+Packages import downward: `ui`, `core`, `blocks`, `robots`, and `nep` below them. `app.__main__` contains
+every entry point.
 """

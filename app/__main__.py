@@ -40,7 +40,7 @@ PROCESSES = (
 )
 
 GRACE_S = 5.0
-"""Time that non-daemon threads get to end after the window has closed."""
+"""Time that non-daemon threads have to end after the window was closed."""
 
 _log = logging.getLogger("studio")
 
@@ -170,7 +170,7 @@ def _main(given: Sequence[str]) -> int:
 
 
 def start_again(theme: str | None) -> None:
-    """Start Studio as a new process, after this one has closed all its resources."""
+    """Start Studio in a new process. Call this after all resources of this process were closed."""
     from app.core.own_process import fresh_environ, studio_command  # noqa: PLC0415  needed only here
     from nep.masters.process import NO_CONSOLE  # noqa: PLC0415  needed only here
 
@@ -185,7 +185,7 @@ def start_again(theme: str | None) -> None:
 def self_test(folder: Path, *, web: bool) -> int:
     """Run the self-test in a real window and write its report to ``folder``.
 
-    Return 0 when all steps passed, 1 when one failed (see the report), 2 when ``folder`` can't be written.
+    Returns 0 if all steps passed, 1 if one failed (see the report), 2 if ``folder`` can't be written.
     """
     from app.core.self_test import SelfTest, UnwritableFolderError, prepare  # noqa: PLC0415  needed only here
 
@@ -227,7 +227,7 @@ def run_behaviour(arguments: Sequence[str]) -> int:
 
 
 def hand_over(module: str, arguments: Sequence[str]) -> int:
-    """Run one of `PROCESSES` as ``__main__`` in this process; return 2 when ``module`` is not in the list."""
+    """Run one of `PROCESSES` as ``__main__`` in this process; return 2 if ``module`` is not in the list."""
     if module not in PROCESSES:
         sys.stderr.write(
             _("no process '{module}'; available: {names}").format(module=module, names=", ".join(PROCESSES))
@@ -255,8 +255,8 @@ def still_running(within_s: float) -> tuple[str, ...]:
 def end_process(code: int, within_s: float = GRACE_S) -> int:
     """Return ``code`` once all threads have ended; otherwise log the remaining ones and exit the process.
 
-    Python waits for every non-daemon thread at exit: a plug-in's thread that never ends, or one that writes
-    to a disk that doesn't respond, would keep a process without a window alive forever.
+    Python waits for every non-daemon thread at exit. A plug-in's thread that never ends, or a thread that
+    writes to a disk that doesn't respond, would keep a process without a window alive forever.
     """
     left = still_running(within_s)
     if not left:

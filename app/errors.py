@@ -33,7 +33,7 @@ MAX_NAME_LENGTH, MAX_PROBLEM_LENGTH = 40, 300
 
 
 class AppError(Exception):
-    """Base class of errors that Studio explains in one sentence: ``str(error)``."""
+    """Base class of errors that are shown to the user as one sentence, ``str(error)``."""
 
     def __init__(self, sentence: str) -> None:
         super().__init__(sentence)
@@ -43,7 +43,10 @@ class AppError(Exception):
 class DocumentError(AppError):
     """A behaviour file can't be read or written.
 
-    ``path`` is the file, ``reason`` a sentence that names it, ``advice`` the next step, if known.
+    Attributes:
+        path: The file.
+        reason: Sentence that contains the name of the file.
+        advice: What the user can do, if known.
     """
 
     def __init__(self, path: Path | None, reason: str, advice: str = "") -> None:
@@ -54,7 +57,10 @@ class DocumentError(AppError):
 
 
 class CompileError(AppError):
-    """A workspace can't be compiled to a program; ``block`` is the id of the block that causes it, if any."""
+    """A workspace can't be compiled to a program.
+
+    ``block`` is the id of the block that causes this, if any.
+    """
 
     def __init__(self, reason: str, block: str | None = None) -> None:
         self.reason = reason
@@ -99,7 +105,7 @@ class QueryError(AppError):
 
 
 class DescriptionError(AppError):
-    """A robot's description is invalid; ``problems`` holds all sentences."""
+    """The description of a robot is invalid. ``problems`` contains a sentence for each problem."""
 
     def __init__(self, name: str, problems: tuple[str, ...]) -> None:
         # The description comes from another program, so its text is escaped and shortened.
@@ -116,7 +122,10 @@ class DescriptionError(AppError):
 
 
 class DeclarationError(DescriptionError):
-    """A driver's declaration is invalid; ``declared`` is its name, ``where`` its line."""
+    """The declaration of a driver is invalid.
+
+    ``declared`` is the declared name, ``where`` the line in the source.
+    """
 
     def __init__(self, declared: str, problem: str, where: str = "") -> None:
         super().__init__(declared, (problem,))
@@ -127,9 +136,10 @@ class DeclarationError(DescriptionError):
 
 
 class InputProblem(NamedTuple):
-    """Problem of one value of an action's input.
+    """Problem of one value in the input of an action.
 
-    ``parameter`` is the value's name, or "" when it concerns no parameter; ``sentence`` is complete.
+    ``parameter`` is the name of the value, or "" if the problem concerns no single value; ``sentence``
+    describes it.
     """
 
     parameter: str
@@ -137,7 +147,7 @@ class InputProblem(NamedTuple):
 
 
 class RobotInputError(AppError):
-    """An action's input is invalid; ``sentences`` has one sentence for each invalid value.
+    """The input of an action is invalid. ``sentences`` contains a sentence for each invalid value.
 
     ``problems`` assigns each sentence to its parameter.
     """
@@ -149,7 +159,7 @@ class RobotInputError(AppError):
 
 
 class RobotValueError(AppError, ValueError):
-    """A driver's value doesn't match its declared type.
+    """A value of a driver doesn't match its declared type.
 
     ``place`` is the part of the value that is invalid; "" means the whole value.
     """
@@ -161,7 +171,7 @@ class RobotValueError(AppError, ValueError):
         super().__init__(_(words).format(place=place or _("the value"), **holes))
 
     def inside(self, outer: str) -> RobotValueError:
-        """Return this error for a value that contains the invalid one."""
+        """Return this error for a value that contains the invalid value."""
         place = _("{place} {inner}").format(place=outer, inner=self.place) if self.place else outer
         return RobotValueError(self._words, place, **self._holes)
 

@@ -1,6 +1,7 @@
-"""Paths of the files that Studio ships: icons, fonts, examples, the web editor.
+"""Paths of the files shipped with Studio: icons, fonts, examples, the web editor.
 
-A checkout has them in ``resources/`` beside ``app/``, an installed or frozen Studio in ``app/_resources/``.
+In a checkout they are in ``resources/`` next to ``app/``, in an installed or frozen Studio in
+``app/_resources/``.
 """
 
 from __future__ import annotations
@@ -9,7 +10,7 @@ from pathlib import Path
 
 
 def folder() -> Path:
-    """Return the folder that holds all resources."""
+    """Return the folder that contains all resources."""
     package = Path(__file__).resolve().parent
     installed = package / "_resources"
     return installed if installed.is_dir() else package.parent / "resources"
@@ -18,7 +19,7 @@ def folder() -> Path:
 def path(*parts: str) -> Path:
     """Return the path of a resource, such as ``path("icons", "play.svg")``.
 
-    Raises FileNotFoundError if Studio doesn't ship it.
+    Raises FileNotFoundError if there is no such resource.
     """
     found = folder().joinpath(*parts)
     if not found.exists():

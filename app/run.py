@@ -58,18 +58,19 @@ def run_file(
 ) -> int:
     """Run a behaviour file to its end and return the exit code (see the module docstring).
 
-    Ctrl+C stops the behaviour and waits for the proof that its robots stopped. When ``out`` can't be written
-    (its reader has closed it, the disk is full) the behaviour is stopped in the same way and the exit code is
-    1.
+    Ctrl+C stops the behaviour and waits for the proof that its robots have stopped. If ``out`` can't be
+    written (its reader has closed it, the disk is full), the behaviour is stopped in the same way and the
+    exit code is 1.
 
     Args:
         path: Behaviour file.
-        robot_wait_s: Seconds to wait for the robots that the blocks name.
+        robot_wait_s: Seconds to wait for the robots that the blocks use.
         master: Master address; default as for `nep.node`.
         out: Stream for the output, one event per line; default stdout.
         interrupted: Event that another thread can set to stop the behaviour like Ctrl+C.
-        allow_moving: Allow the behaviour to move real robots; otherwise it is rejected if it would.
-        keep_position: Leave virtual robots where they are; otherwise they are moved to their start position.
+        allow_moving: True to let the behaviour move real robots; otherwise it is rejected if it would.
+        keep_position: True to leave virtual robots where they are; otherwise they are moved to their start
+            position.
     """
     ending = interrupted or threading.Event()
     say = _Lines(out or sys.stdout, ending)
@@ -127,7 +128,10 @@ def _with_trusted_virtual(found: FoundRobots) -> FoundRobots:
 
 
 def robots_named(workspace: Mapping[str, object]) -> tuple[str, ...]:
-    """Return the names of robots in scripts that an event starts, described in the file or not."""
+    """Return the names of the robots used in scripts that an event starts.
+
+    Includes robots that the file does not describe.
+    """
     parsed = parse_workspace(workspace)
     started = tuple(script for script in parsed.scripts if _STARTER.match(script[0].type))
     blocks = Workspace(started, parsed.variables).all_blocks()
@@ -135,7 +139,7 @@ def robots_named(workspace: Mapping[str, object]) -> tuple[str, ...]:
 
 
 class _Lines:
-    """Thread-safe line writer. Sets `ending` when the stream can't be written any more."""
+    """Writes lines to a stream. Thread-safe. Sets ``ending`` if the stream can't be written any more."""
 
     def __init__(self, stream: TextIO, ending: threading.Event) -> None:
         self._stream = stream
@@ -261,7 +265,7 @@ def _run(
 
 
 class _LateRobots:
-    """Reports newly found robots to a program with publish blocks, which must not move them."""
+    """Reports newly found robots to a program with publish blocks, which must not move these robots."""
 
     def __init__(self, node: nep.Node, runner: Runner) -> None:
         self._node, self._runner = node, runner
@@ -284,7 +288,7 @@ class _LateRobots:
 
 
 class _RunEvents:
-    """Writes the runner's events as lines and stores how the run ended."""
+    """Writes the runner's events as lines and stores the result of the run."""
 
     def __init__(self, say: Callable[[str], None]) -> None:
         self._say = say
@@ -306,7 +310,7 @@ class _RunEvents:
 
 
 def stop_lines(report: StopReport) -> list[str]:
-    """Return the result of a stop as lines: "all 2 robots stopped (41 ms)", and each robot that did not."""
+    """Return the result of a stop as lines, including one for each robot that has not stopped."""
     strange = [
         _("“{program}” replied to Stop on behalf of {robot}; the reply was ignored.").format(
             program=program, robot=name

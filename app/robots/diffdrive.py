@@ -1,7 +1,7 @@
-"""Two-wheeled robot with a camera: its declaration and its actions for any base with speed control.
+"""Two-wheeled robot with a camera: its declaration, and its actions for any base with speed control.
 
-A driver supplies the base (:class:`Wheels`): a real one over its own connection, or the virtual one of
-:mod:`app.robots.turtle`. Distances are measured by the base's odometry.
+A driver supplies the base (:class:`Wheels`): a real one, or the virtual one of :mod:`app.robots.turtle`.
+Distances are measured by the odometry of the base.
 """
 
 from __future__ import annotations
@@ -41,16 +41,19 @@ class Wheels(Protocol):
     """Base of the robot. All methods must be thread-safe."""
 
     def drive(self, speed: float, turn_speed: float) -> None:
-        """Move at this speed (m/s, forwards positive) and turn (°/s, left positive); 0, 0 brakes."""
+        """Set the speed (m/s, positive forwards) and the turning speed (°/s, positive to the left).
+
+        0, 0 brakes.
+        """
 
     def pose(self) -> tuple[float, float, float]:
         """Return the position in metres and the orientation in degrees: x, y, theta."""
 
     def still(self) -> bool:
-        """Return whether the base stands still."""
+        """Return True if the base is not moving."""
 
     def bumped(self) -> str:
-        """Return the side that touches something, or ""."""
+        """Return the side at which the base touches something, or ""."""
 
     def light(self, colour: str) -> None:
         """Set the colour of the light, ``#rrggbb``."""
@@ -177,7 +180,7 @@ class DiffDrive:
             self.wheels.drive(0.0, 0.0)
 
     def odometer(self) -> Callable[[], float]:
-        """Return a function that gives the metres driven straight since now, by default from the position."""
+        """Return a function that returns the metres driven since now, computed from the position."""
         start_x, start_y, _ = self.wheels.pose()
 
         def made() -> float:
@@ -246,7 +249,7 @@ def _left(amount: float, done: float) -> float:
 
 
 class Pattern(DiffDrive):
-    """Description without a base: a driver replaces it by its own class."""
+    """Robot without a base, for the description only; drivers replace it by their own class."""
 
     def __init__(self, link: Link) -> None:
         raise Failed(

@@ -1,4 +1,4 @@
-"""Heartbeat to robots: a robot that receives none stops by itself."""
+"""Heartbeat to robots, which stop when they don't receive any."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ class Heartbeat:
     """Thread that sends ``alive`` five times a second to each robot in motion.
 
     Args:
-        sender: Program id of the commands.
+        sender: Program id in the commands.
         thread: Name of the thread.
     """
 
@@ -34,7 +34,7 @@ class Heartbeat:
         self._errors = SurvivedErrors(_log, thread)
 
     def beat(self, robot: str, publish: Publish) -> None:
-        """Send heartbeats to this robot until `rest`; ``publish`` publishes on its command topic."""
+        """Send heartbeats to a robot until `rest`; ``publish`` publishes on its command topic."""
         with self._lock:
             self._robots[robot] = publish
             if self._thread is None and not self._closing:
@@ -43,7 +43,7 @@ class Heartbeat:
         self._changed.set()
 
     def stop(self, robot: str) -> None:
-        """Stop sending heartbeats to this robot."""
+        """Stop sending heartbeats to a robot."""
         with self._lock:
             self._robots.pop(robot, None)
 

@@ -1,4 +1,4 @@
-"""Messages of publishers unknown to the master so far, bounded per publisher and in publishers."""
+"""Messages of publishers that the master does not list yet, limited per publisher and in total."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ MAX_PER_PUBLISHER = 4
 class HeldMessages:
     """Bounded store of messages of unknown publishers.
 
-    A flooding publisher only evicts its own messages, and a new publisher none of another.
+    A publisher that sends too many messages only evicts its own messages; a new publisher evicts none.
     """
 
     def __init__(self, *, per_publisher: int = MAX_PER_PUBLISHER, publishers: int = MAX_PUBLISHERS) -> None:
@@ -24,7 +24,7 @@ class HeldMessages:
         return bool(self._messages)
 
     def holds(self, publisher: int | None) -> bool:
-        """Return whether messages of this publisher are held."""
+        """Return True if messages of this publisher are stored."""
         return publisher in self._messages
 
     def put(self, message: Message) -> None:
@@ -37,7 +37,7 @@ class HeldMessages:
         held.append(message)
 
     def pop_all(self) -> list[Message]:
-        """Remove and return all messages, in order within each publisher."""
+        """Remove and return all messages, in order for each publisher."""
         taken = [message for held in self._messages.values() for message in held]
         self._messages.clear()
         return taken

@@ -1,8 +1,8 @@
-"""Identity of robots: which node is a robot, and which claims and subscribers are valid. Pure.
+"""Identity of robots: which node is a robot, and which claims and subscribers are valid. No side effects.
 
-A robot is its name, its topics and the node that announced it first. The master's graph decides: it lists
-each publisher's node, and every native message carries its publisher's id. This protects against programs
-that don't lie to the master (docs/trust.md).
+A robot is defined by its name, its topics and the node that announced it first. The master's graph lists the
+node of each publisher, and every native message contains the id of its publisher. This protects against
+programs that don't lie to the master (docs/trust.md).
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ from nep.text import bounded_str, harmless
 
 GATEWAY = "gateway"
 SHARED = frozenset({RIZE_COMMANDS, "action_state"})
-"""Topics shared by all RIZE robots (`app.robots.rize`)."""
+"""Topics that all robots of RIZE share (`app.robots.rize`)."""
 MAX_SENDERS = 20_000
 WORDS_MOST = 200
 MAY_MOVE = lazy("{robot} may still move: {why}")
@@ -34,7 +34,7 @@ _NATIVE = frozenset({"native", GATEWAY})
 
 @dataclass(frozen=True, slots=True)
 class Identity:
-    """Program of a robot, as the master knows its node. ``pid`` is a process on ``host``."""
+    """Program of a robot, as the master knows its node. ``pid`` is the process id on ``host``."""
 
     node_id: str
     node: str = ""
@@ -43,13 +43,13 @@ class Identity:
 
     @property
     def words(self) -> str:
-        """Text for people: "“rover driver” on lab-2"."""
+        """Display name, such as "“rover driver” on lab-2"."""
         name = f"“{self.node or self.node_id}”"
         return _("{program} on {host}").format(program=name, host=self.host) if self.host else name
 
 
 def identity_of(view: GraphView, node_id: str) -> Identity:
-    """Return what the master knows about a node; only its id if it is not in the graph."""
+    """Return the identity of a node as known to the master; only its id if it is not in the graph."""
     node = view.nodes.get(node_id)
     return Identity(node_id) if node is None else Identity(node_id, node.name, node.host, node.pid)
 
@@ -65,7 +65,10 @@ def publishing(view: GraphView, topic: str) -> tuple[str, ...]:
 
 
 def hearing(view: GraphView, topic: str) -> tuple[str, ...]:
-    """Return the ids of the nodes that subscribe to a topic, original programs instead of their gateway."""
+    """Return the ids of the nodes that subscribe to a topic.
+
+    Programs of the original NEP are listed instead of their gateway.
+    """
     info = view.topics.get(topic)
     found = (each.node_id for each in info.subscribers) if info is not None else ()
     nodes = view.nodes
@@ -78,16 +81,16 @@ def _is_native(view: GraphView, node_id: str) -> bool:
 
 
 def first_to_announce(view: GraphView, topic: str) -> Identity | None:
-    """Return the node that announced a robot on its description topic first, or None."""
+    """Return the node that first announced a robot on its description topic, or None."""
     found = publishing(view, topic)
     return identity_of(view, found[0]) if found else None
 
 
 def wrong_topic(robot: Robot, topic: str) -> str | None:
-    """Return why a description is invalid on this topic, or None if it belongs there.
+    """Return why a description is invalid on this topic, or None if it is valid.
 
-    A robot is announced on ``/NAME/description`` of its own name only; otherwise one program could speak for
-    another's robot.
+    A robot may only be announced on ``/NAME/description`` with its own name; otherwise a program could
+    announce the robot of another one.
     """
     home = topic_of(robot.name, "description")
     if topic == home and robot.topics.description == home:
@@ -98,7 +101,7 @@ def wrong_topic(robot: Robot, topic: str) -> str | None:
 
 
 def reserved(robot: Robot) -> tuple[str, ...]:
-    """Return the topics that move a robot or carry its answers; no other robot may use them."""
+    """Return the topics that move a robot or carry its replies. No other robot may use them."""
     topics = robot.topics
     return tuple(topic for topic in (topics.command, topics.answer, topics.world) if topic is not None)
 
@@ -111,21 +114,21 @@ def controls_of(robot: Robot, earlier: Iterable[RobotTopics] = ()) -> RobotContr
 
 
 def program_of(key: str) -> str:
-    """Derive a program's name in ``from`` from its secret key.
+    """Derive the name of a program in ``from`` from its secret key.
 
     A stop whose ``ends`` is the key makes robots reject later commands under this name. Names are public: if
-    the name were enough, any program could lock another one out.
+    the name were sufficient, any program could block another one.
     """
     return f"program-{hashlib.sha256(key.encode('utf-8', 'replace')).hexdigest()[:16]}"
 
 
 def is_home(robot_name: str, topic: str) -> bool:
-    """Return whether a topic belongs to a robot of this name: ``/NAME/...``."""
+    """Return True if a topic belongs to a robot with this name: ``/NAME/...``."""
     return topic.startswith(topic_of(robot_name, ""))
 
 
 def said(error: object) -> str:
-    """Return a robot's error as safe, bounded text for people."""
+    """Return a robot's error as text that is safe to show, with limited length."""
     return harmless(bounded_str(error or "", ERROR_MOST), lines=True)
 
 
@@ -139,7 +142,7 @@ def said_of_stop(name: str, error: object) -> str:
 
 
 def may_move(name: str, words: str) -> bool:
-    """Return whether an error says that the robot may still move, in our language or in English."""
+    """Return True if an error says that the robot may still move, in the current language or in English."""
     return any(
         words.startswith(sentence.partition("{why}")[0].rstrip(": ").format(robot=name))
         for sentence in (MAY_MOVE, _(MAY_MOVE))
@@ -147,9 +150,9 @@ def may_move(name: str, words: str) -> bool:
 
 
 def foreign_topic(robot: Robot, others: Iterable[Robot]) -> str | None:
-    """Return why a robot can't use the topics that it names, because they are another robot's; else None.
+    """Return why a robot can't use its topics, because they belong to another robot; None if it can.
 
-    ``/NAME/...`` belongs to the robot of that name; other topics belong to the first robot that uses them.
+    ``/NAME/...`` belongs to the robot with that name; other topics belong to the first robot that uses them.
     """
     known = [other for other in others if other.name != robot.name]
     for topic in set(reserved(robot)) - SHARED:
@@ -164,10 +167,10 @@ def foreign_topic(robot: Robot, others: Iterable[Robot]) -> str | None:
 
 
 class Senders:
-    """Map from publisher ids to nodes, as the master reported them. Thread-safe.
+    """Nodes by publisher id, as reported by the master. Thread-safe.
 
-    The last 20 000 entries are kept: a node that reuses another's publisher id while that one is present is
-    not believed.
+    The last 20 000 entries are stored. A node that uses the publisher id of another node is ignored while
+    that one is present.
     """
 
     def __init__(self) -> None:
@@ -192,17 +195,17 @@ class Senders:
 
 
 class RobotProcesses(Protocol):
-    """Interface to the processes of robots."""
+    """Access to the processes of robots."""
 
     def is_ours(self, identity: Identity) -> bool:
-        """Return whether this program is a virtual robot started here."""
+        """Return True if this program is a virtual robot started by Studio."""
 
     def has_ended(self, identity: Identity) -> bool:
-        """Return whether this program has certainly ended."""
+        """Return True if this program has certainly exited."""
 
 
 class AllVirtual:
-    """Fake that accepts every robot's claim to be virtual, for tests."""
+    """Accepts the claim of every robot to be virtual; for tests."""
 
     def is_ours(self, identity: Identity) -> bool:  # noqa: ARG002
         """Return True."""

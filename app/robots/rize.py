@@ -1,7 +1,8 @@
-"""RIZE robots: their primitives, and conversion of ``robot_action`` messages in both directions.
+"""Robots of RIZE: their primitives, and conversion of ``robot_action`` messages in both directions.
 
-RIZE robots don't describe themselves, so all are assumed to have the primitives of RIZE's drivers. They don't
-answer a stop: ``safe_stop.confirmed`` is False, and people read "stop sent; this robot cannot confirm".
+Robots of RIZE don't describe themselves, so all are assumed to have the primitives of RIZE's drivers. They
+don't reply to a stop: ``safe_stop.confirmed`` is False, and the user is informed that the robot can't
+confirm.
 """
 
 from __future__ import annotations
@@ -27,18 +28,18 @@ _FAILED = lazy("{robot} could not {action}")
 
 @lru_cache(maxsize=1)
 def thing_model() -> Mapping[str, object]:
-    """Return the Thing Model of all RIZE robots."""
+    """Return the Thing Model of all robots of RIZE."""
     found = json.loads(resources.path("robots", "rize.tm.jsonld").read_text(encoding="utf-8"))
     return as_part(found)
 
 
 def robot(name: str) -> Robot:
-    """Return a RIZE robot with the name of its driver; its commands use ``robot_action``."""
+    """Return a robot of RIZE with the name of its driver. Its commands are sent on ``robot_action``."""
     return parse({**thing_model(), "title": name})
 
 
 def ready(message: object) -> str | None:
-    """Return the robot's name if a message of ``rize_event`` announces a robot, else None."""
+    """Return the name of the robot if a message on ``rize_event`` announces one, else None."""
     said = as_part(message)
     return text(said.get("name")) if said.get("robot") == "ready" else None
 
@@ -46,8 +47,9 @@ def ready(message: object) -> str | None:
 def to_command(robot: Robot, action: str, given: Mapping[str, object], command_id: str) -> dict[str, object]:
     """Return the message for ``robot_action``. Raises RobotInputError for invalid input.
 
-    The stop is the cancel of RIZE's older drivers. It has all keys of an action, because drivers that don't
-    know cancel read them: for those it is an unknown primitive, which fails harmlessly.
+    A stop is sent as the cancel of RIZE's older drivers. The message has all keys of an action, because
+    drivers that don't support cancel read them: for those it is an unknown primitive, which fails without
+    effect.
     """
     if action == robot.safe_stop.action:
         return {
@@ -91,7 +93,7 @@ def _as_text(value: object) -> str:
 
 
 def from_answer(message: object) -> dict[str, object] | None:
-    """Convert a message of ``action_state`` to the form of ``robot/answer``; None unless it is final."""
+    """Convert a message of ``action_state`` to the form of ``robot/answer``; None if it is not final."""
     said = as_part(message)
     state = _STATES.get(bounded_str(said.get("state")))
     wanted = text(said.get("id"))

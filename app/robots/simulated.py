@@ -1,7 +1,7 @@
 """Virtual Pepper: ``python -m app.robots.simulated --name Pepper`` runs it as a process.
 
-It lives in a small room (:mod:`app.robots.virtual`). Studio draws it from ``/<name>/state``; people act on
-its world through ``/<name>/world``.
+The robot is simulated in a small room (:mod:`app.robots.virtual`). Studio draws the state published on
+``/<name>/state``; users change the room through ``/<name>/world``.
 """
 
 from __future__ import annotations
@@ -273,7 +273,7 @@ class VirtualPepper(Acting):
 
     @safe_stop(watchdog_s=1.0, within_s=0.2)
     def stop(self) -> None:
-        """Brake, hold the joints, be quiet; returns when nothing moves any more."""
+        """Brake, hold the joints and be silent; returns when nothing moves any more."""
         with self._simulation.changed:
             self._simulation.body.halt()
         if not self._simulation.wait_for(lambda: self._simulation.body.still, timeout_s=2.0):
@@ -292,7 +292,7 @@ ROBOT = Kind(
 
 
 def room_of(seed: int | None) -> Room:
-    """Return the default room, or with a seed a room with ball and person at reproducible random places."""
+    """Return the default room; with a seed, ball and person are at random but reproducible places."""
     if seed is None:
         return Room()
     places = random.Random(seed)  # noqa: S311 - furniture, not secrets
@@ -301,7 +301,7 @@ def room_of(seed: int | None) -> Room:
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Run the virtual robot; ``--seed`` places ball and person elsewhere, other arguments are the kit's."""
+    """Run the virtual robot. ``--seed`` places ball and person randomly; other arguments are the kit's."""
     parser = argparse.ArgumentParser(add_help=False)
     parser.add_argument("--seed", type=int, default=None)
     chosen, others = parser.parse_known_args(arguments)

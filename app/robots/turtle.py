@@ -1,6 +1,7 @@
 """Virtual two-wheeled robot: ``python -m app.robots.turtle --name Turtle`` runs it as a process.
 
-It lives in the same kind of room as the virtual Pepper, and is drawn from ``/<name>/state``.
+The robot is simulated in the same kind of room as the virtual Pepper. Studio draws the state published on
+``/<name>/state``.
 """
 
 from __future__ import annotations
@@ -33,7 +34,7 @@ _JOIN_TIMEOUT_S = 2.0
 
 
 class VirtualWheels:
-    """Simulated base: a body thread at 60 Hz and a camera thread at 15 Hz. Thread-safe."""
+    """Simulated base, with a thread for the body at 60 Hz and one for the camera at 15 Hz. Thread-safe."""
 
     def __init__(self, link: Link, clock: Clock) -> None:
         self.body = WheelBody()
@@ -70,18 +71,18 @@ class VirtualWheels:
             return self.body.x, self.body.y, self.body.theta_deg
 
     def driven(self) -> float:
-        """Return the metres rolled so far; being carried by a person doesn't count."""
+        """Return the metres rolled so far; being carried by the user doesn't count."""
         with self._lock:
             return self.body.driven
 
     def still(self) -> bool:
-        """Return whether it stands still."""
+        """Return True if the base is not moving."""
         with self._lock:
             self._advance_locked()  # don't wait for the next step of the body thread
             return self.body.still
 
     def bumped(self) -> str:
-        """Return the side that touches something, or ""."""
+        """Return the side at which the base touches something, or ""."""
         return self.body.bumped
 
     def light(self, colour: str) -> None:
@@ -159,7 +160,7 @@ class VirtualWheels:
             self._seen = set(found)
 
     def act(self, change: Mapping[str, object]) -> None:
-        """Apply a person's change of the world: move, hold, reset, start, or simulate an event."""
+        """Apply a change of the world by the user: move, hold, reset, start, or a simulated event."""
         moved, x, y = change.get("move"), finite(change.get("x")), finite(change.get("y"))
         with self._lock:
             if isinstance(change.get("hold"), bool):
@@ -186,7 +187,7 @@ class VirtualWheels:
 
 
 class VirtualTurtle(DiffDrive):
-    """Two-wheeled robot in its room."""
+    """Virtual two-wheeled robot in its room."""
 
     def __init__(self, link: Link) -> None:
         wheels = VirtualWheels(link, MonotonicClock())
@@ -195,7 +196,7 @@ class VirtualTurtle(DiffDrive):
         wheels.start()
 
     def odometer(self) -> Callable[[], float]:
-        """Return a function that gives the metres rolled since now; being carried doesn't count."""
+        """Return a function that returns the metres rolled since now; being carried doesn't count."""
         began = self._wheels.driven()
         return lambda: self._wheels.driven() - began
 

@@ -245,7 +245,7 @@ class RobotHandle:
         return told if field is None else values.part(told, field)
 
     def on(self, event: str, /, **filters: object) -> Decorator:
-        """Decorate a script that runs at each such event of the robot.
+        """Return a decorator for scripts that run at each event with this name.
 
         Args:
             event: Name of the event.
@@ -254,11 +254,11 @@ class RobotHandle:
         return self._runtime.on_event(self._name, event, filters)
 
     def on_change(self, sensor: str) -> Decorator:
-        """Decorate a script that runs each time the sensor's value changes."""
+        """Return a decorator for scripts that run each time the value of the sensor changes."""
         return self._runtime.on_change(self._name, sensor)
 
     def on_pass(self, sensor: str, side: str, limit: float) -> Decorator:
-        """Decorate a script that runs each time the sensor passes the limit.
+        """Return a decorator for scripts that run each time the sensor passes the limit.
 
         Args:
             sensor: Name of the sensor.
@@ -377,7 +377,7 @@ def _waiting_text(robot: Robot, call: RobotCall) -> str:
 
 
 def sentence(robot: Robot, action: Action, input: Mapping[str, object]) -> str:
-    """Return what the robot is doing: "Pepper says “Touch my head.”"."""
+    """Return a sentence about what the robot is doing: "Pepper says “Touch my head.”"."""
 
     def place(match: re.Match[str]) -> str:
         if match[1] == "robot":
@@ -426,10 +426,10 @@ def _check_hint(robot: Robot) -> str:
 
 
 def rest_of(action: Action, input: Mapping[str, object], call: RobotCall) -> dict[str, object] | None:
-    """Return the input for the rest of a canceled call; None if nothing is left to do.
+    """Return the input for the remaining part of a cancelled call; None if nothing is left to do.
 
-    An action that reports its remaining amount does the rest, others start again. An action that drives the
-    robot without reporting the amount would go too far: its rest is skipped.
+    An action that reports the remaining amount continues with that; other actions start again. An action that
+    drives the robot without reporting the amount would go too far, so that its remaining part is skipped.
     """
     if not call.began:
         return dict(input)
@@ -445,7 +445,7 @@ def rest_of(action: Action, input: Mapping[str, object], call: RobotCall) -> dic
 
 
 def is_unknown(action: Action, input: Mapping[str, object], call: RobotCall) -> bool:
-    """Return whether the robot was driving to another place without reporting the remaining amount."""
+    """Return True if the robot was driving somewhere without reporting the remaining amount."""
     name = measured_by(action, input)
     if not call.began or name is None:
         return call.began and action.risk == "locomotes"
@@ -453,7 +453,7 @@ def is_unknown(action: Action, input: Mapping[str, object], call: RobotCall) -> 
 
 
 def measured_by(action: Action, input: Mapping[str, object]) -> str | None:
-    """Return the parameter to which the remaining amount refers: the only number with the same unit."""
+    """Return the parameter that the remaining amount refers to: the only number with the same unit."""
     unit = next((field.unit for field in action.feedback if field.name == LEFT), None)
     same = [
         parameter.name

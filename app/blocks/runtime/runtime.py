@@ -1,7 +1,7 @@
-"""Commands of a running program: robots, waiting, topics, functions, and the start of its scripts.
+"""Commands of a running program: robots, waiting, topics, functions, and starting its scripts.
 
-One `Runtime` runs one program. Its methods and the functions of `app.blocks.runtime.values` are the names of
-the compiled program (`namespace`).
+Each `Runtime` runs one program. Its methods and the functions of `app.blocks.runtime.values` are the names
+available to the compiled program (`Runtime.namespace`).
 """
 
 from __future__ import annotations
@@ -35,7 +35,7 @@ _VALUE_NAMES = (
     "is_known", "join", "length", "part", "random_number", "repeat", "rounded", "rounded_down", "rounded_up",
 )  # fmt: skip
 _FUNCTION_MODULES: tuple[ModuleType, ...] = (calculation, clock, lists, texts)
-"""Modules whose ``__all__`` are names available to programs."""
+"""Modules whose ``__all__`` contains names available to programs."""
 
 Script = Callable[..., None]
 Decorator = Callable[[Script], Script]
@@ -48,12 +48,12 @@ _RECURSION_LIMIT = 6000  # recursion limit: one function call takes up to a doze
 
 
 def stop_script() -> None:
-    """End the script from inside a function."""
+    """End the script, even from within a function."""
     raise EndScript
 
 
 class Calls:
-    """Function calls of one program: their depth, and the script's position afterwards."""
+    """Function calls of one program: their depth, and the block at which the script continues."""
 
     def __init__(self, scheduler: Scheduler) -> None:
         self._scheduler = scheduler
@@ -64,7 +64,7 @@ class Calls:
         sys.setrecursionlimit(max(sys.getrecursionlimit(), _RECURSION_LIMIT))
 
     def run(self, block: str, name: str, call: Callable[[], object]) -> object:
-        """Call a function. Raises BehaviourError if the calls are nested too deeply."""
+        """Call a function. Raises BehaviourError if calls are nested too deeply."""
         depth = int(getattr(self._local, "depth", 0))
         if depth >= MAX_DEPTH:
             raise BehaviourError(
@@ -84,14 +84,14 @@ class Calls:
 class Runtime:
     """Running program.
 
-    After `start`, `finished` is set when no script is left or one of them failed; then ``error`` has the
-    reason.
+    After `start`, `finished` is set when all scripts have ended or one of them failed; then ``error``
+    contains the reason.
 
     Args:
-        printed: Callback for each line that the program writes.
-        labels: Names of blocks by id.
+        printed: Called with each line that the program writes.
+        labels: Labels of blocks by id.
         readings: Texts of blocks by id.
-        asked: Callback for the question to show; without it questions raise BehaviourError.
+        asked: Called with the question to be shown. Without this callback, questions raise BehaviourError.
     """
 
     def __init__(
@@ -133,7 +133,7 @@ class Runtime:
     # ---- start and end
 
     def start(self, link: ProgramLink, robots: Sequence[Robot]) -> None:
-        """Start all scripts, after the program's code has registered its hats."""
+        """Start all scripts. Call this after the program's code has registered its scripts."""
         self._link = link
         self.reset_timer()
         self._robots = {robot.name: robot for robot in robots}
@@ -224,13 +224,13 @@ class Runtime:
         raise Stopped
 
     def stop_others(self) -> None:
-        """End the current runs of all other scripts; events can start them again."""
+        """End the current runs of all other scripts. Events can start them again."""
         self.scheduler.end_others()
 
     # ---- blocks
 
     def step(self, block: str) -> None:
-        """Note that a block begins."""
+        """Record that the script has reached a block."""
         self.scheduler.step(block)
 
     def value(self, block: str, work_out: Callable[[], object]) -> object:
@@ -241,7 +241,7 @@ class Runtime:
             raise explain(error, self._labels.get(block, ""), block) from error
 
     def number(self, block: str, work_out: Callable[[], object]) -> object:
-        """Return the result of a block that must give a number; text joined by "+" is an error."""
+        """Return the result of a block that must return a number; text joined by "+" is an error."""
         result = self.value(block, work_out)
         if result is None or isinstance(result, (int, float)):
             return result
@@ -251,7 +251,7 @@ class Runtime:
         raise BehaviourError(_("{name} needs numbers, not a text.").format(name=name), block)
 
     def called(self, block: str, call: Callable[[], object]) -> object:
-        """Return the result of a function call; the script continues in its previous block."""
+        """Return the result of a function call; afterwards the script continues in the calling block."""
         name = self._labels.get(block, "")
         return self.value(block, lambda: self._calls.run(block, name, call))
 
@@ -260,7 +260,7 @@ class Runtime:
         raise BehaviourError(sentence)
 
     def wait(self, seconds: object) -> None:
-        """Wait this many seconds; pauses don't count."""
+        """Wait for a number of seconds; time in which the program is paused doesn't count."""
         self.scheduler.wait(float(values.number(seconds, lazy("“wait”"))))
 
     def wait_until(self, condition: Callable[[], object], at_most_s: object = None) -> None:
@@ -268,37 +268,43 @@ class Runtime:
 
         Args:
             condition: Evaluated repeatedly.
-            at_most_s: Maximum wait in seconds; None waits forever.
+            at_most_s: Maximum wait in seconds; None for no limit.
         """
         limit = None if at_most_s is None else float(values.number(at_most_s, lazy("“wait until”")))
         self.scheduler.wait_until(lambda: _is_true(condition), limit)
 
     def write(self, value: object) -> None:
-        """Write a line to the console."""
+        """Write a line to the Console."""
         self._printed(values.text(value))
 
     def show(self, value: object) -> None:
-        """Write a tried value in short form; an empty line while it is unknown."""
+        """Write a tried value in short form; an empty line if the value is unknown."""
         self._printed("" if value is None else brief_words(value))
 
     # ---- questions
 
     def ask(self, question: object) -> None:
-        """Ask the person in front of Studio and wait for the answer, which `answer` returns."""
+        """Ask the user a question and wait for the answer, which `answer` returns."""
         self.questions.ask(question)
 
     def ask_with_choices(self, question: object, choices: object) -> None:
-        """Ask the person in front of Studio to choose an item of a list, and wait."""
+        """Ask the user to select an item of a list, and wait for the answer, which `answer` returns."""
         self.questions.ask_with_choices(question, choices)
 
     def answer(self) -> object:
-        """Return the last answer: a number if it is one, an empty text before the first answer."""
+        """Return the last answer, converted to a number if possible.
+
+        An empty text before the first answer.
+        """
         return self.questions.answer
 
     # ---- time
 
     def timer(self) -> float:
-        """Return the seconds since the start or the last reset; pauses don't count."""
+        """Return the seconds since the start or the last reset.
+
+        Time in which the program is paused doesn't count.
+        """
         return round(self.scheduler.running_s() - self._timer_from_s, 3)
 
     def reset_timer(self) -> None:
@@ -311,33 +317,33 @@ class Runtime:
         """Publish a message on a topic.
 
         Raises:
-            BehaviourError: It would move a robot without permission.
+            BehaviourError: The message would move a robot without permission.
         """
         self._linked().publish(topic, payload)
 
     def newest(self, topic: str, path: str) -> object:
-        """Return a field of a topic's newest message; None while it is unknown."""
+        """Return a field of the newest message of a topic; None until a message is received."""
         message = self._linked().newest(topic)
         return None if message is None else values.part(message, path)
 
     def broadcast(self, name: str) -> None:
-        """Start the scripts that receive this name."""
+        """Start the scripts that receive a broadcast."""
         self._broadcasts.send(name)
 
     def broadcast_and_wait(self, name: str) -> None:
-        """Start the scripts that receive this name, and wait until they have ended."""
+        """Start the scripts that receive a broadcast, and wait until they have ended."""
         sent = self._broadcasts.send(name)
         self.scheduler.wait_until(lambda: all(each.done for each in sent), None)
 
     # ---- hats
 
     def on_start(self, script: Script) -> Script:
-        """Decorate a script that runs when the program starts."""
+        """Register a script that runs when the program starts."""
         self._starts.append(script)
         return script
 
     def on_message(self, topic: str) -> Decorator:
-        """Decorate a script that runs for each message on a topic; it gets the payload."""
+        """Return a decorator for scripts that run for each message on a topic and take its payload."""
 
         def prepare(hat: Hat, link: ProgramLink) -> None:
             link.on_message(topic, lambda payload: hat.happened((payload,)))
@@ -347,7 +353,10 @@ class Runtime:
         )
 
     def on_broadcast(self, name: str) -> Decorator:
-        """Decorate a script that runs at each broadcast of this name, and restarts if it is still running."""
+        """Return a decorator for scripts that run at each broadcast with this name.
+
+        A script that is still running is restarted.
+        """
 
         def decorate(script: Script) -> Script:
             self._broadcasts.receivers.append(Receiver(name, script))
@@ -356,7 +365,7 @@ class Runtime:
         return decorate
 
     def on_true(self, condition: Callable[[], object]) -> Decorator:
-        """Decorate a script that runs each time the condition becomes true."""
+        """Return a decorator for scripts that run each time the condition becomes true."""
 
         def decorate(script: Script) -> Script:
             self._hats.append((Hat(_("when … becomes true"), condition=lambda: _is_true(condition)), script))
@@ -365,7 +374,7 @@ class Runtime:
         return decorate
 
     def on_event(self, robot: str, event: str, filters: Mapping[str, object]) -> Decorator:
-        """Decorate a script that runs at each such event of the robot."""
+        """Return a decorator for scripts that run at each event of the robot with this name."""
 
         def prepare(hat: Hat, link: ProgramLink) -> None:
             description = self._robots[robot].event(event)
@@ -380,7 +389,7 @@ class Runtime:
         return self._hat(_("when {robot} {event}").format(robot=robot, event=event), prepare, EVENTS_WAITING)
 
     def on_change(self, robot: str, sensor: str) -> Decorator:
-        """Decorate a script that runs each time the sensor's value changes."""
+        """Return a decorator for scripts that run each time the value of the sensor changes."""
 
         def prepare(hat: Hat, link: ProgramLink) -> None:
             link.on_sensor(robot, sensor, changes(lambda: hat.happened(())))
@@ -390,7 +399,7 @@ class Runtime:
         )
 
     def on_pass(self, robot: str, sensor: str, side: str, limit: float) -> Decorator:
-        """Decorate a script that runs each time the sensor passes the limit to that side."""
+        """Return a decorator for scripts that run each time the sensor passes the limit to this side."""
 
         def prepare(hat: Hat, link: ProgramLink) -> None:
             link.on_sensor(robot, sensor, PassGate(side, limit, lambda: hat.happened(())))
@@ -426,11 +435,11 @@ class Runtime:
 
     @property
     def robot_count(self) -> int:
-        """Number of robots of the program."""
+        """Number of robots that the program uses."""
         return len(self._robots)
 
     def linked(self) -> ProgramLink:
-        """Return the network."""
+        """Return the network link of the program."""
         return self._linked()
 
     def _linked(self) -> ProgramLink:

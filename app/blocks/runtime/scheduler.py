@@ -1,7 +1,7 @@
-"""Cooperative scheduler of scripts: threads that take turns, one block at a time.
+"""Cooperative scheduler of scripts, which are threads that take turns, one block at a time.
 
-Only the script with the turn runs; it passes the turn on at each `step` and while it waits. So a block is
-never interrupted by another script, a pause holds every script at the beginning of a block, and a step runs
+Only one script runs at a time; it passes its turn on at each `step` and while it waits. So a block is never
+interrupted by another script, a pause holds every script at the start of a block, and a single step runs
 exactly one block. See ``docs/adr`` on concurrent scripts.
 """
 
@@ -20,7 +20,7 @@ POLL_S = 0.02
 
 
 class Stopped(BaseException):
-    """Raised in a script when the program ends; programs never catch it."""
+    """Raised in a script when the program ends. Programs never catch it."""
 
 
 @dataclass(frozen=True)
@@ -33,11 +33,11 @@ class Snapshot:
 
 
 class EndScript(Stopped):
-    """Raised in a script whose run ends while the program continues; an event can start it again."""
+    """Raised in a script whose run ends while the program continues. An event can start the script again."""
 
 
 class Script:
-    """Script: a thread, its position, and how it is woken."""
+    """Script: its thread, its current block, and the condition on which it wakes up."""
 
     def __init__(self, name: str, lock: threading.Lock) -> None:
         self.name = name
@@ -50,7 +50,7 @@ class Script:
 
 
 class Scheduler:
-    """Scheduler that gives the turn to one script after the other."""
+    """Gives the turn to one script after the other."""
 
     def __init__(self, clock: Callable[[], float] = time.monotonic) -> None:
         self._clock = clock
@@ -71,9 +71,9 @@ class Scheduler:
     # ---- scripts
 
     def start(self, name: str, body: Callable[[], None], *, idle: bool = True) -> threading.Thread:
-        """Run `body` as a script in its own thread; it begins when it gets the turn.
+        """Run ``body`` as a script in a new thread, which starts when it gets the turn.
 
-        A script that is not `idle` waits for no event: it counts as running at once.
+        A script that is not ``idle`` does not wait for an event and counts as running immediately.
         """
         script = Script(name, self._lock)
         script.idle = idle
@@ -95,7 +95,7 @@ class Scheduler:
 
     @contextmanager
     def opening(self) -> Iterator[None]:
-        """Start scripts within this context: none gets the turn before all exist."""
+        """Return a context for starting several scripts: none gets the turn before the context ends."""
         with self._lock:
             self._opening = True
         yield
@@ -104,14 +104,17 @@ class Scheduler:
             self._grant_locked()
 
     def begin(self) -> None:
-        """Take the turn to begin the script's run. Raises Stopped when the program ends."""
+        """Wait for the turn to start a run of the script. Raises Stopped when the program ends."""
         script = self._script()
         with self._lock:
             script.idle = False
             self._enter_locked(script)
 
     def look(self) -> None:
-        """Take the turn to evaluate the condition of an idle script, not while paused; `rest` returns it."""
+        """Wait for the turn to evaluate the condition of an idle script; `rest` gives the turn back.
+
+        Waits while the program is paused.
+        """
         script = self._script()
         with self._lock:
             while self._paused and not self._stopping:
@@ -126,9 +129,10 @@ class Scheduler:
             self._leave_locked(script)
 
     def step(self, block: str) -> None:
-        """Note that the script reaches this block: others get their turn, and a pause holds it here.
+        """Record that the script has reached a block.
 
-        In slow motion it first stays here for the duration of a block.
+        Other scripts get the turn, and a pause holds the script here. With a pace, it first waits for that
+        duration.
         """
         script = self._script()
         with self._lock:
@@ -150,7 +154,10 @@ class Scheduler:
         return self._script()
 
     def end_run(self, script: Script) -> None:
-        """End a script's current run: EndScript is raised at its next call; an idle one is not affected."""
+        """End the current run of a script: EndScript is raised at its next call.
+
+        An idle script is not affected.
+        """
         with self._lock:
             self._end_run_locked(script)
 
@@ -170,11 +177,11 @@ class Scheduler:
     # ---- waiting: other scripts run meanwhile
 
     def wait(self, seconds: float) -> None:
-        """Wait; the time of pauses doesn't count."""
+        """Wait; the duration of pauses doesn't count."""
         self.wait_until(None, seconds)
 
     def wait_until(self, condition: Callable[[], bool] | None, at_most_s: float | None) -> bool:
-        """Wait until the condition is true, evaluated 50 times a second; return False at the timeout."""
+        """Wait until the condition, evaluated 50 times a second, is true; return False on timeout."""
         script = self._script()
         remaining = at_most_s
         while condition is None or not condition():
@@ -194,9 +201,9 @@ class Scheduler:
     def wait_for(
         self, ready: Callable[[], bool], timeout_s: float | None = None, *, idle: bool = False
     ) -> bool:
-        """Wait for another thread, which calls `poke`; continues while paused. Return False at the timeout.
+        """Wait for another thread, which calls `poke`; return False on timeout. Does not stop while paused.
 
-        `ready` is called with the lock held and should only read a value.
+        ``ready`` is called with the lock held and should only read a value.
         """
         script = self._script()
         until = None if timeout_s is None else self._clock() + timeout_s
@@ -215,16 +222,16 @@ class Scheduler:
             return ready()
 
     def holds(self) -> bool:
-        """Return whether a pause holds the calling script; callable with the lock held."""
+        """Return True if a pause holds the calling script. May be called with the lock held."""
         return self._paused and self._stepping is not self._script()
 
     def hold(self) -> None:
-        """Wait within a block until the pause ends or this script is stepped."""
+        """Wait within a block until the pause ends or the script is stepped."""
         with self._lock:
             self._stay_locked(self._script(), lambda: None if self._paused else 0.0, step_ends=True)
 
     def poke(self) -> None:
-        """Wake waiting scripts because something arrived."""
+        """Wake waiting scripts so that they check their conditions."""
         with self._lock:
             self._wake_all_locked()
 
@@ -240,7 +247,7 @@ class Scheduler:
 
     @property
     def is_paused(self) -> bool:
-        """True while scripts are paused, also during a step."""
+        """True while scripts are paused, even during a single step."""
         return self._paused
 
     def go_on(self) -> None:
@@ -253,17 +260,17 @@ class Scheduler:
             self._wake_all_locked()
 
     def running_s(self) -> float:
-        """Return a clock in seconds that stops while paused."""
+        """Return the time of a clock in seconds that stops while the program is paused."""
         with self._lock:
             return (self._paused_since_s if self._paused else self._clock()) - self._paused_total_s
 
     def set_pace(self, seconds: float) -> None:
-        """Set how long each script stays at a block in slow motion; 0 disables it."""
+        """Set the duration that each script waits at a block, in seconds; 0 for full speed."""
         self.pace_s = max(0.0, seconds)
         self.poke()
 
     def step_once(self) -> None:
-        """While paused: run one block, of the script that has waited longest."""
+        """Run one block of the script that has waited longest. Has an effect only while paused."""
         with self._lock:
             if not self._paused or self._stepping is not None or self._owner is not None:
                 return
@@ -276,26 +283,26 @@ class Scheduler:
             self._wake_all_locked()
 
     def stop(self) -> None:
-        """End every script at its next call, waiting ones at once."""
+        """End every script at its next call, and waiting scripts immediately."""
         with self._lock:
             self._stopping = True
             self._wake_all_locked()
 
     @property
     def stopping(self) -> bool:
-        """True once the program ends."""
+        """True after `stop`."""
         return self._stopping
 
     def return_to(self, block: str | None) -> None:
-        """Continue inside this block after a function call."""
+        """Set the current block of the calling script after a function call."""
         self._script().block = block
 
     def block(self) -> str | None:
-        """Return the block of the calling script."""
+        """Return the current block of the calling script."""
         return self._script().block
 
     def snapshot(self) -> Snapshot:
-        """Return the current state."""
+        """Return the current blocks of the scripts."""
         with self._lock:
             active = [script for script in self._scripts if not script.idle]
             blocks = tuple(dict.fromkeys(script.block for script in active if script.block))

@@ -1,4 +1,4 @@
-"""Triggers of scripts: queued events, and values watched for a change."""
+"""Triggers of scripts: queued events, and values monitored for a change."""
 
 from __future__ import annotations
 
@@ -12,8 +12,8 @@ from app.robots.description.description import Event
 class Hat:
     """Event queue of one script.
 
-    Events come from the network's thread; at most `most` wait, the oldest is dropped and counted. With a
-    `condition`, the event is that it becomes true.
+    Events arrive from the network's thread. At most ``most`` events are queued; beyond that, the oldest is
+    dropped and counted. With a ``condition``, the event is that the condition becomes true.
     """
 
     def __init__(self, title: str, *, most: int = 1, condition: Callable[[], bool] | None = None) -> None:
@@ -24,13 +24,13 @@ class Hat:
         self._was_true: bool | None = None
 
     def happened(self, arguments: tuple[object, ...]) -> None:
-        """Queue an event; the caller pokes the scheduler."""
+        """Queue an event. The caller has to poke the scheduler."""
         if len(self._waiting) == self._waiting.maxlen and self._waiting.maxlen > 1:
             self.dropped += 1
         self._waiting.append(arguments)
 
     def next(self, scheduler: Scheduler) -> tuple[object, ...]:
-        """Wait for the next event and return the arguments of its script."""
+        """Wait for the next event and return the arguments for the script."""
         if self._condition is None:
             scheduler.wait_for(lambda: bool(self._waiting), idle=True)
             return self._waiting.popleft()
@@ -53,9 +53,9 @@ class Hat:
 
 
 class PassGate:
-    """Threshold trigger: calls `passed` when a number passes a limit to one side.
+    """Threshold trigger: calls ``passed`` when a number passes a limit to one side.
 
-    A value beyond the limit from the beginning doesn't count.
+    An initial value beyond the limit doesn't count.
     """
 
     def __init__(self, side: str, limit: float, passed: Callable[[], None]) -> None:
@@ -75,7 +75,7 @@ class PassGate:
 
 
 def changes(changed: Callable[[], None]) -> Callable[[object], None]:
-    """Return a callback that calls `changed` for each value that differs from the previous one."""
+    """Return a callback that calls ``changed`` for each value that differs from the previous one."""
     before: list[object] = []
 
     def told(value: object) -> None:
@@ -92,10 +92,10 @@ def event_matches(
     event: Event | None,
     source: Mapping[str, object],
 ) -> bool:
-    """Return whether an event's data match the filters of a hat.
+    """Return True if the data of an event match the filters of a script.
 
-    Texts are compared ignoring case. An event that also reports its end (``rb:level`` with a boolean field:
-    touched, and down or not) counts only when it begins.
+    Texts are compared ignoring case. An event that is also sent when it ends (``rb:level`` with a boolean
+    field, such as "down" of a touch) matches only when it starts.
     """
     fields: Mapping[str, object] = data if isinstance(data, Mapping) else {}
     for name, wanted in filters.items():

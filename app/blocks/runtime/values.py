@@ -1,4 +1,4 @@
-"""Value functions of programs, used by blocks of several categories. Pure."""
+"""Functions on values, used by blocks of several categories. Without side effects."""
 
 from __future__ import annotations
 
@@ -14,13 +14,15 @@ from nep.i18n import _, lazy
 
 MAX_TEXT_LENGTH = 1_000_000
 MAX_BITS = 14_000
-"""Python refuses to print integers of more than 4300 digits; larger ones are shown as 1.2e+4932."""
+"""Maximum size of a printed integer: Python rejects more than 4300 digits. Larger ones are shown as
+1.2e+4932.
+"""
 _MAX_ROUNDS = 10**9
 _JOINER = "\u200d"
 
 
 def text(value: object) -> str:
-    """Convert a value to text for people: 2 for 2.0, yes and no, "" for an unknown value."""
+    """Convert a value to text for the user: 2 for 2.0, yes or no, "" for an unknown value."""
     if value is None:
         return ""
     if isinstance(value, bool):
@@ -51,7 +53,7 @@ def _writable(value: object, around: tuple[int, ...]) -> object:
 
 
 def is_known(value: object) -> bool:
-    """Return whether a value is known."""
+    """Return True if a value is known."""
     return value is not None
 
 
@@ -96,7 +98,7 @@ def _is_combining(before: str, character: str) -> bool:
 
 
 def number(value: object, what: str) -> int | float:
-    """Return the value if it is a finite number. Raises BehaviourError; the sentence begins with `what`."""
+    """Return the value as a finite number. Raises BehaviourError with a message that starts with ``what``."""
     if value is None:
         raise BehaviourError(
             _("{what} needs a value, but it has none yet.").format(what=_(what)), unknown=True
@@ -109,22 +111,22 @@ def number(value: object, what: str) -> int | float:
 
 
 def rounded(value: object) -> int:
-    """Return the nearest whole number; halves go up."""
+    """Return the nearest whole number; halves are rounded up."""
     return math.floor(number(value, lazy("“round”")) + 0.5)
 
 
 def rounded_up(value: object) -> int:
-    """Return the next whole number above."""
+    """Round up to a whole number."""
     return math.ceil(number(value, lazy("“round up”")))
 
 
 def rounded_down(value: object) -> int:
-    """Return the next whole number below."""
+    """Round down to a whole number."""
     return math.floor(number(value, lazy("“round down”")))
 
 
 def random_number(low: object, high: object) -> int | float:
-    """Return a random number between both limits; a whole one if both are whole."""
+    """Return a random number between two limits; a whole number if both limits are."""
     first, last = number(low, lazy("“random number”")), number(high, lazy("“random number”"))
     first, last = min(first, last), max(first, last)
     if float(first).is_integer() and float(last).is_integer():
@@ -133,15 +135,15 @@ def random_number(low: object, high: object) -> int | float:
 
 
 def repeat(times: object) -> range:
-    """Return the rounds of a loop: rounded, at least 0."""
+    """Return the range for a loop: the number is rounded, and at least 0."""
     return range(max(0, min(rounded(number(times, lazy("“repeat”"))), _MAX_ROUNDS)))
 
 
 def part(message: object, path: str) -> object:
     """Return the value at a path in a message, such as ``faces.0.name``; None if it is missing.
 
-    An empty path is the whole message; ``value`` of a plain value is the value itself. A list is copied, so
-    that changes don't affect the message.
+    An empty path returns the whole message. If the message is a plain value, the path ``value`` returns it. A
+    list is copied, so that changes don't affect the message.
     """
     found = _found(message, path)
     return list(found) if isinstance(found, list) else found

@@ -1,4 +1,4 @@
-"""Variables of a running program for display: short texts, however large the values."""
+"""Variables of a running program for display, as short texts even for large values."""
 
 from __future__ import annotations
 
@@ -16,17 +16,25 @@ MAX_TEXT_LENGTH = 200
 MAX_ITEM_LENGTH = 80
 MAX_ITEMS = 100
 MAX_INSIDE = 20
-"""Maximum nesting depth that is shown."""
+"""Maximum depth of nested values that are displayed."""
 MAX_CHARACTERS = 200_000
-"""Maximum amount of text sent at once; the rest follows with the next read."""
+"""Maximum number of characters sent at once. The remaining variables follow with the next read."""
 _MAX_PRINTED_BITS = 600
-"""Integers with more bits are described by their number of digits: printing them could take seconds."""
+"""Maximum size of a printed integer. Larger ones are described by their number of digits, to save time."""
 _CUT = "…"
 
 
 @dataclass(frozen=True)
 class VariableValue:
-    """Displayed value of a variable: ``text`` in short, and for a list the first ``items`` of ``length``."""
+    """Value of a variable for display.
+
+    Attributes:
+        id: Id of the variable.
+        kind: Kind of the value.
+        text: Short text.
+        items: First items of a list.
+        length: Length of a list.
+    """
 
     id: str
     kind: ValueKind
@@ -35,7 +43,7 @@ class VariableValue:
     length: int = 0
 
     def to_json(self) -> dict[str, object]:
-        """Return the JSON form."""
+        """Return the value as a JSON object."""
         return {
             "id": self.id,
             "kind": self.kind,
@@ -46,7 +54,7 @@ class VariableValue:
 
     @classmethod
     def from_json(cls, told: object) -> VariableValue | None:
-        """Restore a value from `to_json`; None for invalid data. Texts are cut to their limits."""
+        """Restore a value from `to_json`; None for invalid data. Texts are truncated to their limits."""
         if not isinstance(told, Mapping):
             return None
         items, length = told.get("items"), told.get("length")
@@ -64,7 +72,7 @@ class VariableValue:
 
 
 class VariableWatch:
-    """Change detector for a program's variables, without any cost for the program."""
+    """Detects changes of a program's variables, without slowing down the program."""
 
     def __init__(self, names: dict[str, object], variables: Sequence[Variable]) -> None:
         self._names = names
@@ -73,7 +81,10 @@ class VariableWatch:
         self._told: dict[str, VariableValue] = {}
 
     def changes(self) -> list[VariableValue]:
-        """Return the variables whose display has changed since the last call, at first all."""
+        """Return the variables whose displayed value has changed since the last call.
+
+        All at the first call.
+        """
         found, characters = [], 0
         for python, variable in self._variables.items():
             if characters > MAX_CHARACTERS:
@@ -93,7 +104,7 @@ class VariableWatch:
         return found
 
     def put(self, python: str, value: str | float | bool) -> None:
-        """Set a variable of the program; other names are ignored."""
+        """Set a variable of the program. Names that aren't variables are ignored."""
         if python in self._variables:
             self._names[python] = value
 
@@ -113,7 +124,7 @@ def _is_plain(value: object) -> bool:
 
 
 def brief(id: str, value: object) -> VariableValue:
-    """Return a value for display. Raises RuntimeError if a script changes it meanwhile."""
+    """Return a value for display. Raises RuntimeError if a script changes the value meanwhile."""
     if value is None:
         return VariableValue(id, "unknown", _("unknown"))
     if isinstance(value, (list, tuple)):
@@ -130,12 +141,12 @@ def brief(id: str, value: object) -> VariableValue:
 
 
 def brief_words(value: object) -> str:
-    """Return a value as short text for people."""
+    """Return a value as short text."""
     return words(value, MAX_TEXT_LENGTH)
 
 
 def words(value: object, most: int) -> str:
-    """Return a value as text of at most `most` characters; parts that aren't shown aren't read."""
+    """Return a value as text of at most ``most`` characters; parts that aren't shown aren't read."""
     if isinstance(value, str):
         return _cut(value[: most + 1], most)
     if isinstance(value, int) and not isinstance(value, bool) and value.bit_length() > _MAX_PRINTED_BITS:

@@ -16,7 +16,10 @@ _HOLE = re.compile(r"%[A-Za-z_][A-Za-z0-9_]*")
 
 
 class Catalogue:
-    """Blocks by type. ``connected`` robots by name; `absent` ones have blocks, but can't be used."""
+    """Blocks by type.
+
+    ``connected`` are the robots by name. The blocks of ``absent`` robots are included, but can't run.
+    """
 
     def __init__(self, robots: Sequence[Robot], absent: Sequence[Robot] = ()) -> None:
         self.connected: Mapping[str, Robot] = {robot.name: robot for robot in robots}
@@ -52,7 +55,7 @@ def english_categories() -> tuple[Category, ...]:
 
 
 def has_words(english: str) -> bool:
-    """Return whether a text has words to translate: "%A %SIGN %B" and "+" don't."""
+    """Return True if a text contains words that can be translated; "%A %SIGN %B" and "+" don't."""
     return any(letter.isalpha() for letter in _HOLE.sub("", english))
 
 

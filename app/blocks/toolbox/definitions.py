@@ -16,11 +16,11 @@ STYLES = ("events", "control", "values", "variables", "functions", "messages", "
 def editor_definitions(
     robots: Sequence[Robot], absent: Sequence[Robot] = (), topics: Sequence[str] = ()
 ) -> dict[str, object]:
-    """Return the definitions for the editor.
+    """Return the definitions for the editor as a JSON object.
 
-    ``blocks`` are the JSON definitions of all categories and all robots, connected or `absent`, ``help``
-    their help (`app.blocks.toolbox.help`), ``toolbox`` a category toolbox, ``styles`` the names of the
-    styles, ``robots`` and ``topics`` the options of the drop-downs.
+    ``blocks`` are the JSON definitions of all categories and all robots, connected or ``absent``; ``help`` is
+    their help (`app.blocks.toolbox.help`). ``toolbox`` is a toolbox with categories, ``styles`` are the names
+    of the styles, and ``robots`` and ``topics`` are the options of the drop-downs.
     """
     catalogue = Catalogue(robots, absent)
     return {

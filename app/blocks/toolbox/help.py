@@ -1,4 +1,4 @@
-"""Help of a block: what it does, what its gaps take, an example."""
+"""Help for a block: what it does, what its slots accept, and an example."""
 
 from __future__ import annotations
 
@@ -137,10 +137,11 @@ _MAX_UNIT_LENGTH = 3  # letters that a unit has at most
 
 
 def help_of(block: Block) -> dict[str, object]:
-    """Return the help of a block.
+    """Return the help for a block.
 
-    Its keys are ``title``, ``name``, ``does``, ``more``, ``gaps`` as (name, text), ``example``. ``words``,
-    ``english`` and ``choices`` are for search: other words, and the options of its fields.
+    The keys are ``title``, ``name``, ``does``, ``more``, ``gaps`` as (name, text), and ``example``.
+    ``words``, ``english`` and ``choices`` are for search: further search words, and the options of the
+    fields.
     """
     gaps = [
         [name_of_gap(block, argument), words]
@@ -166,7 +167,7 @@ def _example(block: Block) -> str:
 
 
 def title(block: Block) -> str:
-    """Return the text on the block with its gaps in brackets: "wait (seconds) s"."""
+    """Return the text on the block with slots in parentheses: "wait (seconds) s"."""
 
     def place(hole: re.Match[str]) -> str:
         argument = block.argument(hole[1])
@@ -178,9 +179,9 @@ def title(block: Block) -> str:
 
 
 def name(block: Block) -> str:
-    """Return the block's name in a sentence: "walk", "repeat … times"; "" if it has only signs.
+    """Return the name of a block for use in a sentence, such as "walk" or "repeat … times".
 
-    Without its robot, and without the unit after its last gap.
+    "" if the block has no words. The robot slot and a unit after the last slot are left out.
     """
     words = [part.strip() for part in _HOLE.split(block.text.removeprefix("%ROBOT "))[::2]]
     if len(words) > 1 and len(words[-1]) <= _MAX_UNIT_LENGTH:
@@ -190,7 +191,7 @@ def name(block: Block) -> str:
 
 
 def name_of_gap(block: Block, argument: Argument) -> str:
-    """Return the name of a gap or field in words."""
+    """Return the display name of a slot or field."""
     told = block.about.get(argument.name)
     if told:
         return told[0]
@@ -198,7 +199,7 @@ def name_of_gap(block: Block, argument: Argument) -> str:
 
 
 def english_name_of_gap(argument: Argument) -> str:
-    """Return the default name of a gap in English."""
+    """Return the default name of a slot in English."""
     return _NAMES.get(argument.name, argument.name.lower().replace("_", " "))
 
 

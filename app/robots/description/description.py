@@ -1,7 +1,7 @@
 """Robot descriptions parsed from W3C Thing Models or Thing Descriptions.
 
-The document is parsed once by :func:`parse`; Studio works with :class:`Robot`. The ``rb:`` terms are
-documented in ``resources/robots/README.md``.
+:func:`parse` parses the document once; Studio works with :class:`Robot`. The ``rb:`` terms are documented in
+``resources/robots/README.md``.
 """
 
 from __future__ import annotations
@@ -25,17 +25,17 @@ __all__ = [
 ]  # fmt: skip
 
 MAX_BYTES = 1_000_000
-"""Size limit of a description; larger ones are rejected before decoding."""
+"""Maximum size of a description in bytes; larger ones are rejected before decoding."""
 _NOT_IN_TOPICS = re.compile(r"[^\w.-]")
 
 
 def topic_of(name: str, leaf: str) -> str:
-    """Return the topic of a robot's part: ``topic_of("My robot", "camera")`` is ``/My_robot/camera``."""
+    """Return the topic of a part of a robot: ``topic_of("My robot", "camera")`` is ``/My_robot/camera``."""
     return f"/{_NOT_IN_TOPICS.sub('_', name)}/{leaf}"
 
 
 def parse(document: Mapping[str, object]) -> Robot:
-    """Parse a Thing Model or Thing Description. Raises DescriptionError with all problems."""
+    """Parse a Thing Model or Thing Description. Raises DescriptionError, which lists all problems."""
     problems = validate(document)
     if problems:
         title = as_part(document).get("title")
@@ -45,7 +45,7 @@ def parse(document: Mapping[str, object]) -> Robot:
 
 
 def announced(message: Message) -> Robot:
-    """Parse the robot description in a message; messages above 1 MB are not decoded.
+    """Parse the robot description in a message. Messages larger than 1 MB are not decoded.
 
     Raises:
         DescriptionError: The description is invalid.
@@ -64,7 +64,7 @@ def announced(message: Message) -> Robot:
 
 
 def default_topics(name: str, *, virtual: bool = False) -> RobotTopics:
-    """Return the default topics of a robot of that name, as the driver kit uses them."""
+    """Return the default topics for a robot with this name, which the driver kit uses."""
     return RobotTopics(
         description=topic_of(name, "description"),
         command=topic_of(name, "command"),
@@ -75,9 +75,9 @@ def default_topics(name: str, *, virtual: bool = False) -> RobotTopics:
 
 
 def td_for(model: Mapping[str, object], name: str) -> dict[str, object]:
-    """Return the Thing Description of a robot of this model and name, with its id and forms.
+    """Return the Thing Description of a robot with this model and name, including id and forms.
 
-    The model must be valid (see :func:`validate`); it is not modified.
+    The model must be valid (see :func:`validate`). It is not modified.
     """
     described = copy.deepcopy(dict(model))
     kind = part(described, "rb:robot")

@@ -1,6 +1,6 @@
-"""Validation of action inputs, with sentences for people.
+"""Validation of action inputs, with messages for the user.
 
-``turn: angle must be between -360 and 360 °``
+Example: ``turn: angle must be between -360 and 360 °``
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ _UNITS = {"deg": "°", "deg/s": "°/s", "Cel": "°C", "degC": "°C", "um": "µm"
 
 @dataclass(frozen=True)
 class Choice:
-    """Allowed value of a parameter, and the word shown for it."""
+    """Allowed value of a parameter, and the text shown for it."""
 
     value: str | int | float
     title: str
@@ -41,20 +41,20 @@ class Parameter:
 
     Attributes:
         name: Name in messages.
-        title: Name for people.
+        title: Display name.
         kind: text, number, integer, choice, colour, boolean, angle (degrees), image, list or object.
         minimum: Smallest number.
         maximum: Largest number.
-        step: Hint for editors, never a reason to reject.
-        unit: Unit as people write it.
+        step: Step for editors. Values between steps are valid too.
+        unit: Unit as displayed.
         default: Default value.
         choices: Allowed values of a choice.
         required: True if the value must be given.
-        advanced: True if forms collapse it.
+        advanced: True if forms collapse the parameter.
         options_from: Sensor that lists possible values.
         min_length: Minimum length of a text, or number of values.
         max_length: Maximum length of a text, or number of values.
-        widget: Hint for editors.
+        widget: Preferred editor.
         bare: True for an image sent as base64 without a ``data:`` prefix.
         nullable: True if the value may be None.
         each: Schema of the values of a list or map.
@@ -85,7 +85,7 @@ class Parameter:
 
 
 def pretty_unit(unit: str | None) -> str | None:
-    """Return the unit as people write it: "deg" is "°"; None stays None."""
+    """Return the unit as displayed: "deg" is "°"; None stays None."""
     return None if unit is None else _UNITS.get(unit, unit)
 
 
@@ -95,7 +95,7 @@ def pretty_number(value: float) -> str:
 
 
 def near_miss(wrong: str, known: Iterable[str]) -> str:
-    """Return the known word similar to a wrong one, or ""."""
+    """Return the most similar known word, or ""."""
     if len(wrong) > _MAX_WORD_LENGTH:
         return ""
     return next(iter(difflib.get_close_matches(wrong, list(known), n=1)), "")
@@ -141,7 +141,7 @@ def fields_of(data: Mapping[str, object]) -> tuple[Parameter, ...]:
 
 
 def kind_of(data: Mapping[str, object]) -> str:
-    """Return the kind of a data schema as in :class:`Parameter`, or "object"."""
+    """Return the kind of a data schema as in :class:`Parameter`; "object" if there is no other."""
     widget, kind = data.get("rb:widget"), data.get("type")
     if choices_of(data):
         return "choice"
@@ -155,7 +155,7 @@ def kind_of(data: Mapping[str, object]) -> str:
 
 
 def choices_of(data: Mapping[str, object]) -> tuple[Choice, ...]:
-    """Return the choices of a data schema with their words; empty if it has none."""
+    """Return the choices of a data schema with their texts; empty if any value is allowed."""
     enum = data.get("enum")
     pairs: list[tuple[object, str | None]] = []
     if isinstance(enum, (list, tuple)):
@@ -171,10 +171,10 @@ def choices_of(data: Mapping[str, object]) -> tuple[Choice, ...]:
 
 
 def from_words(parameter: Parameter, words: str) -> object:
-    """Parse a list or object that a person typed: ``1, 2.5`` or JSON; return invalid text unchanged.
+    """Parse a list or object that the user typed: ``1, 2.5`` or JSON. Invalid text is returned unchanged.
 
     Numbers with a decimal comma are separated by semicolons: ``1; 2,5``. ``0,2, 0,5`` is ambiguous and
-    returned unchanged for the validation.
+    returned unchanged, so that the validation rejects it.
     """
     if parameter.kind == "object" or words.lstrip().startswith(("[", "{")):
         try:
@@ -197,7 +197,7 @@ def from_words(parameter: Parameter, words: str) -> object:
 
 
 def to_words(value: object) -> str:
-    """Format a list or object as people type it; the inverse of :func:`from_words`."""
+    """Format a list or object for editing; the inverse of :func:`from_words`."""
     if isinstance(value, (list, tuple)) and all(isinstance(item, (str, int, float)) for item in value):
         words = [str(item).lower() if isinstance(item, bool) else str(item) for item in value]
         if not any("," in word or not word.strip() or word.startswith(("[", "{")) for word in words):
@@ -220,7 +220,7 @@ def _parse_word(parameter: Parameter, word: str) -> object:
 
 
 def check_input(action: str, parameters: tuple[Parameter, ...], given: object) -> tuple[str, ...]:
-    """Return a sentence for each problem of an input; empty if it is valid."""
+    """Return a message for each problem of an input; empty if the input is valid."""
     return tuple(f"{action}: {problem.sentence}" for problem in problems_of(parameters, given))
 
 
@@ -252,9 +252,9 @@ def problems_of(parameters: tuple[Parameter, ...], given: object) -> tuple[Input
 
 
 def wrong_value(parameter: Parameter, value: object, place: str = "") -> str | None:
-    """Return what a value must be instead ("speed must be a number"), or None if it is valid.
+    """Return what a value must be instead ("speed must be a number"), or None if the value is valid.
 
-    ``place`` names the value in the sentence (default: the parameter's title).
+    ``place`` names the value in the message (default: the title of the parameter).
     """
     place = place or parameter.title
     if parameter.choices:

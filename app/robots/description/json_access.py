@@ -10,17 +10,17 @@ from nep.text import bounded_str
 
 
 def part(mapping: Mapping[str, object], name: str) -> Mapping[str, object]:
-    """Return the object of that name; empty if it is missing or of another type."""
+    """Return the member with this name if it is an object, else an empty object."""
     return as_part(mapping.get(name))
 
 
 def as_part(value: object) -> Mapping[str, object]:
-    """Return the value if it is an object, else an empty one."""
+    """Return the value if it is an object, else an empty object."""
     return value if isinstance(value, Mapping) else {}
 
 
 def names(value: object) -> tuple[str, ...]:
-    """Return the strings of a list; empty if it is of another type."""
+    """Return the items of a list as strings; empty for other types."""
     return (
         tuple(item if isinstance(item, str) else bounded_str(item) for item in value)
         if isinstance(value, (list, tuple))
@@ -29,14 +29,14 @@ def names(value: object) -> tuple[str, ...]:
 
 
 def text(value: object) -> str | None:
-    """Return a non-empty string, or None."""
+    """Return the value if it is a non-empty string, else None."""
     return value if isinstance(value, str) and value else None
 
 
 def spoken(owner: Mapping[str, object], member: str = "title") -> str | None:
-    """Return a text for people in the current language: `titles` and `descriptions` hold translations.
+    """Return a member that is shown to the user, in the current language.
 
-    Without a translation in the description, our own catalogue is tried.
+    ``titles`` and ``descriptions`` contain translations. If there is none, Studio's catalogue is used.
     """
     words = part(owner, f"{member}s")
     own = text(owner.get(member))
@@ -44,12 +44,12 @@ def spoken(owner: Mapping[str, object], member: str = "title") -> str | None:
 
 
 def number(value: object) -> float | None:
-    """Return a number as it is (integers stay integers), or None; booleans are not numbers."""
+    """Return the value if it is a number, else None. Integers stay integers; booleans are not numbers."""
     return value if isinstance(value, (int, float)) and not isinstance(value, bool) else None
 
 
 def number_of(value: object) -> float | None:
-    """Return a number that may be sent as text, as RIZE does, or None."""
+    """Convert a value to a number, or None. Text is accepted, because RIZE sends numbers as text."""
     if isinstance(value, bool):
         return None
     try:
@@ -59,7 +59,10 @@ def number_of(value: object) -> float | None:
 
 
 def finite(value: object) -> float | None:
-    """Return a number as a float; None for other types, NaN, infinity and integers too large for a float."""
+    """Convert a number to a finite float.
+
+    None for other types, NaN, infinity, and integers too large for a float.
+    """
     if isinstance(value, bool) or not isinstance(value, (int, float)):
         return None
     try:

@@ -11,7 +11,7 @@ from app.robots.description.inputs import Choice, Parameter, check_input, proble
 
 @dataclass(frozen=True)
 class DataField:
-    """Value in a sensor's object or an action's output; the unit is as people write it."""
+    """Value in the object of a sensor or the output of an action. ``unit`` is the unit as displayed."""
 
     name: str
     title: str
@@ -21,9 +21,12 @@ class DataField:
 
 @dataclass(frozen=True)
 class Action:
-    """Action of a robot; ``text`` is its block text, with ``%robot`` once, words and ``%parameter``.
+    """Action of a robot.
 
-    An action with ``repeat_s`` (a speed) continues after it succeeded, until a stop or the next one.
+    Attributes:
+        text: Text of the block, with ``%robot`` once, words, and ``%parameter`` for each parameter.
+        repeat_s: Set for an action that continues after it has succeeded (a speed), until a stop or the next
+            action.
     """
 
     name: str
@@ -46,19 +49,19 @@ class Action:
     repeat_s: float | None = None
 
     def parameter(self, name: str) -> Parameter | None:
-        """Return the parameter of that name, or None."""
+        """Return the parameter with this name, or None."""
         return next((found for found in self.parameters if found.name == name), None)
 
     def check(self, given: object) -> tuple[str, ...]:
-        """Return a sentence for each problem of an input; empty if it is valid."""
+        """Return a message for each problem of an input; empty if the input is valid."""
         return check_input(self.name, self.parameters, given)
 
     def problems(self, given: object) -> tuple[InputProblem, ...]:
-        """Return the problems of an input with their parameters, without the action's name."""
+        """Return the problems of an input and the parameters concerned, without the name of the action."""
         return problems_of(self.parameters, given)
 
     def complete(self, given: Mapping[str, object]) -> dict[str, object]:
-        """Return the input completed with default values."""
+        """Return the input with default values for missing parameters."""
         defaults = {found.name: found.default for found in self.parameters if found.default is not None}
         return {**defaults, **given}
 
@@ -67,8 +70,10 @@ class Action:
 class Sensor:
     """Value that the robot publishes continuously.
 
-    ``kind`` is boolean, number, integer, text, choice, object, list, image or detections (boxes in pixels of
-    the image of ``camera``). ``text`` is its block text with ``%robot`` once; empty if it has no block.
+    Attributes:
+        kind: boolean, number, integer, text, choice, object, list, image or detections (boxes in pixels of
+            the image of `camera`).
+        text: Text of the block, with ``%robot`` once; empty if there is no block.
     """
 
     name: str
@@ -94,7 +99,7 @@ class Sensor:
 
 @dataclass(frozen=True)
 class Event:
-    """Event of a robot; ``filters`` are the fields that its block offers as choices."""
+    """Event of a robot. ``filters`` are the fields that the block offers as choices."""
 
     name: str
     title: str
@@ -108,7 +113,10 @@ class Event:
 
 @dataclass(frozen=True)
 class SafeStop:
-    """How the robot is stopped; ``confirmed`` is False for robots that never reply to a stop."""
+    """Declaration of how the robot is stopped.
+
+    ``confirmed`` is False for robots that never reply to a stop.
+    """
 
     action: str
     watchdog_s: float | None
@@ -120,7 +128,7 @@ class SafeStop:
 
 @dataclass(frozen=True)
 class RobotTopics:
-    """Topics of a robot; ``state`` and ``world`` exist for virtual robots."""
+    """Topics of a robot. Only virtual robots have ``state`` and ``world``."""
 
     description: str
     command: str
@@ -131,10 +139,10 @@ class RobotTopics:
 
 @dataclass(frozen=True)
 class Robot:
-    """Parsed description of a robot; ``source`` is the unchanged document.
+    """Parsed description of a robot; ``source`` is the original document.
 
-    ``beat_s`` is the interval at which it reports on its answer topic that it is alive while it acts; None:
-    never.
+    ``beat_s`` is the interval at which the robot sends heartbeats on its reply topic during actions; None for
+    none.
     """
 
     name: str
@@ -152,13 +160,13 @@ class Robot:
     beat_s: float | None = None
 
     def action(self, name: str) -> Action | None:
-        """Return the action of that name, or None."""
+        """Return the action with this name, or None."""
         return next((found for found in self.actions if found.name == name), None)
 
     def sensor(self, name: str) -> Sensor | None:
-        """Return the sensor of that name, or None."""
+        """Return the sensor with this name, or None."""
         return next((found for found in self.sensors if found.name == name), None)
 
     def event(self, name: str) -> Event | None:
-        """Return the event of that name, or None."""
+        """Return the event with this name, or None."""
         return next((found for found in self.events if found.name == name), None)

@@ -14,7 +14,7 @@ _ICONS = {"moves": "move", "locomotes": "footprints"}
 
 
 def read(document: Mapping[str, object], topics: RobotTopics) -> Robot:
-    """Convert a valid document; `topics` are used where the document names none."""
+    """Convert a valid document. ``topics`` are the default topics."""
     own = part(document, "rb:topics")
     topics = RobotTopics(
         description=text(own.get("description")) or topics.description,

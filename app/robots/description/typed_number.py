@@ -1,7 +1,7 @@
-"""Parsing of numbers that people type: comma and point are both decimal separators.
+"""Parsing of typed numbers: comma and point are both decimal separators.
 
-``editor/src/typed_number.ts`` uses the same rules for number fields of blocks; both are tested with
-``tests/data/typed_numbers.json``.
+``editor/src/typed_number.ts`` uses the same rules for number fields of blocks;
+``tests/data/typed_numbers.json`` tests both.
 """
 
 from __future__ import annotations
@@ -19,9 +19,9 @@ _GROUPED = re.compile("[+-]?[0-9][0-9.,' _\N{RIGHT SINGLE QUOTATION MARK}]*", re
 
 
 class TypedNumberError(ValueError):
-    """Text that is not a number; ``has_separators`` if only its separators are ambiguous.
+    """Raised for text that is not a number. The message is for the user.
 
-    The message is a sentence for people.
+    ``has_separators`` is True if the separators are ambiguous.
     """
 
     def __init__(self, *, has_separators: bool) -> None:
@@ -30,7 +30,7 @@ class TypedNumberError(ValueError):
 
 
 def parse_number(text: str) -> float:
-    """Return the number that a person typed.
+    """Parse a typed number.
 
     Thousands separators are rejected instead of removed: "1.234" may mean 1234 or 1.234, and a robot that
     moves a thousand times too far can't be undone.

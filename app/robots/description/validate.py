@@ -1,4 +1,4 @@
-"""Validation of robot descriptions: the profile's JSON Schema, and rules that a schema can't express.
+"""Validation of robot descriptions by the profile's JSON Schema, and by rules that a schema can't express.
 
 The schema is ``resources/robots/robot-profile.schema.json``; its terms are documented in the README next to
 it.
@@ -28,14 +28,14 @@ PLACEHOLDER = re.compile(r"%([A-Za-z_][A-Za-z0-9_-]*)")
 _MAX_PROBLEMS = 20
 _MAX_DEPTH = 40
 MAX_VALUES = 20_000
-"""Limit of values in a description; each takes some 0.05 ms to check. Pepper has 900."""
+"""Maximum number of values in a description; checking one takes about 0.05 ms. Pepper's has 900."""
 _BLOCK = "rb:block"
 _TEXT_MEMBERS = frozenset({"title", "description", "unit", "vendor", _BLOCK})
-"""Members of a description that are shown to people or contain shown text."""
+"""Members of a description that are shown to the user or contain such texts."""
 _VALUE_MEMBERS = frozenset({"default", "enum", "const"})
 _MAX_NUMBER = 1e15
 _accepted: deque[str] = deque(maxlen=8)
-"""Recently accepted descriptions: a robot publishes the same one again and again."""
+"""Recently accepted descriptions, because a robot publishes the same one repeatedly."""
 _RESERVED = {"description", "command", "answer", "state", "world"}
 
 
@@ -49,7 +49,7 @@ def _validator() -> Draft7Validator:
 
 
 def validate(model: object) -> tuple[str, ...]:
-    """Return the problems of a Thing Model or Thing Description, one sentence each; empty if it is valid."""
+    """Return the problems of a Thing Model or Thing Description, one message each; empty if it is valid."""
     if not isinstance(model, Mapping):
         return (_("a description must be a JSON object"),)
     model = dict(model)
@@ -74,10 +74,10 @@ def validate(model: object) -> tuple[str, ...]:
 
 
 def cleaned(document: Mapping[str, object]) -> dict[str, object]:
-    """Return the document without control characters in texts for people; names are validated instead.
+    """Return the document without control characters in texts for the user; names are validated instead.
 
-    A bidirectional control character in an action's title would also reorder the text after it, such as the
-    question whether the robot may move.
+    A bidirectional control character in the title of an action would also reorder the text after it, such as
+    the question whether the robot may move.
     """
 
     def clean(value: object, place: str) -> object:

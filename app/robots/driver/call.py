@@ -20,37 +20,36 @@ class Clock(Protocol):
         """Return monotonic time in seconds."""
 
     def wait(self, event: threading.Event, timeout_s: float | None) -> bool:
-        """Wait until the event is set (return True) or the timeout has passed (False).
+        """Wait until the event is set; return False on timeout.
 
         Args:
             event: Event to wait for.
-            timeout_s: Timeout in seconds; None waits forever.
+            timeout_s: Timeout in seconds; None for no limit.
         """
 
 
 class MonotonicClock:
-    """Clock of the computer."""
+    """Monotonic clock of the computer."""
 
     def now(self) -> float:
         """Return monotonic time in seconds."""
         return time.monotonic()
 
     def wait(self, event: threading.Event, timeout_s: float | None) -> bool:
-        """Wait until the event is set (return True) or the timeout has passed (False)."""
+        """Wait until the event is set; return False on timeout."""
         return event.wait(timeout_s)
 
 
 class Canceled(Exception):  # noqa: N818 - not an error: the word of the answer's state
-    """Raised in an action that must end now. Drivers clean up and let it propagate."""
+    """Raised in an action that must end now. Drivers clean up and let the exception propagate."""
 
 
 class Failed(Exception):  # noqa: N818 - the word of the answer's state
-    """Raised by an action that can't be done; the sentence is shown to people.
+    """Raised by an action that can't be executed. The message is shown to the user.
 
-    Example:
-        ::
+    Example::
 
-            raise Failed("no ball in sight")
+        raise Failed("no ball in sight")
     """
 
 
@@ -83,11 +82,11 @@ class Link(Protocol):
     name: str
 
     def sense(self, sensor: str, value: object) -> None:
-        """Publish a sensor's value.
+        """Publish the value of a sensor.
 
         Args:
             sensor: Name of the sensor.
-            value: Its value: a mapping for an object, an array or JPEG bytes for a camera.
+            value: A mapping for an object; an array or JPEG bytes for a camera.
         """
 
     def happen(self, event: str, **data: object) -> None:
@@ -95,20 +94,26 @@ class Link(Protocol):
 
         Args:
             event: Name of the event.
-            data: Its fields.
+            data: Fields of the event.
         """
 
     def wrong_in(self, event: str, data: Mapping[str, object]) -> Sequence[str]:
-        """Return a sentence for each way in which an event differs from the description; empty if valid."""
+        """Return a message for each way in which an event differs from the description.
+
+        Empty if it is valid.
+        """
 
     def tell(self, leaf: str, value: object) -> None:
-        """Publish a value that the description doesn't name on ``/<name>/<leaf>``, such as ``state``."""
+        """Publish a value that is not in the description on ``/<name>/<leaf>``, such as ``state``."""
 
     def watchers(self, leaf: str) -> int:
-        """Return the number of subscribers of a sensor's topic, to skip expensive work without any."""
+        """Return the number of subscribers of a sensor's topic.
+
+        Without any, expensive work can be skipped.
+        """
 
     def on_world(self, changed: Callable[[Mapping[str, object]], None]) -> None:
-        """Call `changed` with each message that changes a virtual robot's world, in a thread of its own."""
+        """Call ``changed`` in a background thread with each message that changes a virtual robot's world."""
 
     def share(
         self, topic: str, changed: Callable[[Mapping[str, object]], None], *, latched: bool = False
@@ -118,18 +123,21 @@ class Link(Protocol):
         Args:
             topic: Name of the topic.
             changed: Called with each message, in the same thread as for `on_world`.
-            latched: Keep the last message for later subscribers.
+            latched: True to keep the last message for later subscribers.
 
         Returns:
             A function that publishes a message.
         """
 
     def run(self, work: Awaitable[object]) -> object:
-        """Run a coroutine in the robot's event loop, where its ``async def`` actions run, and wait for it."""
+        """Run a coroutine in the robot's event loop and wait for the result.
+
+        The robot's ``async def`` actions run in the same event loop.
+        """
 
 
 class Call:
-    """Running action. Its methods may be called from the action's thread.
+    """Running action. All methods may be called from the action's thread.
 
     Attributes:
         action: Name of the action.
@@ -147,7 +155,7 @@ class Call:
 
     @property
     def canceled(self) -> bool:
-        """True once the action must end."""
+        """True after `cancel` was called."""
         return self._ended.is_set()
 
     def cancel(self) -> None:
@@ -166,14 +174,14 @@ class Call:
                 _call_each(callbacks)
 
     def close(self) -> None:
-        """Wait up to 2 s until the callbacks of `on_cancel` have returned."""
+        """Wait at most 2 s until the callbacks of `on_cancel` have returned."""
         if self._canceling is not None:
             self._canceling.join(_JOIN_TIMEOUT_S)
 
     def on_cancel(self, tell: Callable[[], object]) -> None:
-        """Call `tell` once, in another thread, when the action must end; at once if it must already.
+        """Call ``tell`` once, in another thread, when the action is cancelled; immediately if it already is.
 
-        For blocking calls of a library that can be aborted.
+        Use it to abort a blocking call of a library.
         """
         with self._lock:
             if not self._ended.is_set():
@@ -182,14 +190,14 @@ class Call:
         tell()
 
     def wait(self, seconds: float) -> None:
-        """Sleep, and raise Canceled as soon as the action must end.
+        """Sleep. Raises Canceled as soon as the action is cancelled.
 
         Args:
-            seconds: Time to sleep.
+            seconds: Duration in seconds.
 
         Raises:
             Canceled: The action must end.
-            RuntimeError: Called in an ``async def`` action, whose event loop it would block.
+            RuntimeError: Called in an ``async def`` action, whose event loop would be blocked.
         """
         if _in_event_loop():
             raise RuntimeError("call.wait holds an async function up; use `await asyncio.sleep` there")
@@ -197,15 +205,15 @@ class Call:
             raise Canceled
 
     def until(self, done: Callable[[], bool], *, for_s: float | None = None, every_s: float = 1 / 30) -> bool:
-        """Poll `done` until it returns True.
+        """Poll ``done`` until it returns True.
 
         Args:
             done: Condition.
-            for_s: Timeout in seconds; None waits forever.
+            for_s: Timeout in seconds; None for no limit.
             every_s: Interval between two polls in seconds.
 
         Returns:
-            True, or False if the timeout passed first.
+            True, or False on timeout.
 
         Raises:
             Canceled: The action must end.
@@ -218,14 +226,14 @@ class Call:
         return True
 
     def feedback(self, **values: object) -> None:
-        """Publish progress; raises Canceled if the action must end."""
+        """Publish the progress of the action. Raises Canceled if the action must end."""
         if self.canceled:
             raise Canceled
         self._report(values)
 
     def last(self, **values: object) -> None:
-        """Publish the final progress even if the action is canceled.
+        """Publish the final progress, even if the action is cancelled.
 
-        A resumed program uses it to do the rest.
+        A program that was paused uses it to execute the remaining part.
         """
         self._report(values)

@@ -1,4 +1,7 @@
-"""Handling of a robot's commands: ``robot/command`` messages become tasks, answered by ``robot/answer``."""
+"""Handling of a robot's commands: messages of type ``robot/command`` become tasks.
+
+The replies are of type ``robot/answer``.
+"""
 
 from __future__ import annotations
 
@@ -27,7 +30,10 @@ _MAX_ENDED_PROGRAMS = 100
 
 
 class CommandHandler:
-    """Command handler of one robot. Runs in the deciding thread of its tasks; `stop` and `is_stop` in any."""
+    """Command handler of one robot.
+
+    Runs in the thread of the robot's `Tasks`; `stop` and `is_stop` may be called from any thread.
+    """
 
     def __init__(
         self,
@@ -52,7 +58,7 @@ class CommandHandler:
         )
 
     def stop(self, command: object) -> None:
-        """Execute a command for which `is_stop` is true. Thread-safe; does not wait for queued commands."""
+        """Execute a stop command. Thread-safe; does not wait for queued commands."""
         message = as_part(command)
         ended = text(message.get("ends"))
         if ended is not None:
@@ -67,10 +73,10 @@ class CommandHandler:
         """Handle one message of the command topic.
 
         Args:
-            command: Payload of any type. It is answered if it has an id.
-            publisher: Id of its publisher: signs of life and cancels count only from the publisher that
+            command: Payload of any type. There is a reply if the command has an id.
+            publisher: Id of the publisher. Heartbeats and cancels are valid only from the publisher that
                 requested the action.
-            epoch: `Tasks.epoch` when it was received.
+            epoch: `Tasks.epoch` when the message was received.
         """
         message = as_part(command)
         wanted = _id_of(message)
@@ -124,11 +130,11 @@ class CommandHandler:
             self._answering(wanted, quotable(operation), "")(Answer("failed", error=error))
 
     def beat(self, not_ended: Sequence[str] = (), error: str | None = None, rejected: int = 0) -> None:
-        """Publish that the robot is alive while it acts; programs notice its absence.
+        """Publish a heartbeat, whose absence programs notice.
 
         Args:
             not_ended: Actions whose functions keep running although they were asked to end.
-            error: Sentence about them.
+            error: Message about them.
             rejected: Number of messages to the robot that were not handled.
         """
         told: dict[str, object] = {"op": "alive", "id": "", "action": "", "state": "running"}
@@ -180,7 +186,7 @@ class CommandHandler:
         )
 
     def unknown(self, name: str) -> str:
-        """Return the sentence for an unknown action."""
+        """Return the error message for an unknown action."""
         close = near_miss(name, [each.name for each in self._robot.actions])
         words = (
             _("{robot} can't “{action}”; did you mean “{close}”?") if close else _("{robot} can't “{action}”")

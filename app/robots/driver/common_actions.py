@@ -1,4 +1,4 @@
-"""Declarations shared by robots: driving, moving parts, position, battery, distance."""
+"""Declarations that several robots use: driving, moving parts, position, battery, distance."""
 
 from __future__ import annotations
 
@@ -23,10 +23,10 @@ def drives(
     rize: str | None = None,
     from_rize: FromRize | None = None,
 ) -> action:
-    """Declare an action that moves the robot to another place; a newer one replaces it.
+    """Declare an action that moves the robot to another place; a newer action replaces it.
 
-    Its feedback has the remaining amount ``to_go`` in ``unit``, so that a resumed program can do the rest;
-    with ``moved`` also the amount done.
+    Its feedback contains the remaining amount ``to_go`` in ``unit``, so that a program can continue after a
+    pause; with ``moved`` also the amount done.
     """
     made: Mapping[str, object] = {"moved": Annotated[float, Range(unit=unit)]} if moved else {}
     return action(
@@ -55,7 +55,7 @@ def moves(
     title: str | None = None,
     rize: str | None = None,
 ) -> action:
-    """Declare an action that moves ``parts`` of the robot without driving; a newer one replaces it."""
+    """Declare an action that moves ``parts`` of the robot without driving; a newer action replaces it."""
     return action(
         text,
         MOVEMENT,
@@ -91,6 +91,6 @@ def battery_sensor() -> SensorSpec:
 
 
 def distance_sensor(most_m: float) -> SensorSpec:
-    """Declare the sensor of the distance ahead, up to ``most_m`` metres."""
+    """Declare the sensor of the distance to an obstacle ahead, up to ``most_m`` metres."""
     ahead = Annotated[float, Range(0, most_m, unit="m")]
     return sensor(ahead, title="distance", text="distance", icon="ruler", rate_hz=10)

@@ -1,6 +1,6 @@
 """Declaration of a robot in Python: actions, sensors, events and safe stop, converted to a Thing Model.
 
-A robot is a class. Its constructor takes a :class:`~app.robots.driver.call.Link`; methods decorated with
+A robot is a class. Its constructor takes a :class:`~app.robots.driver.call.Link`. Methods decorated with
 :class:`action` are its actions; :func:`sensor`, :func:`picture`, :func:`detections` and :func:`event` are
 class attributes; exactly one method is decorated with :func:`safe_stop`.
 """
@@ -94,7 +94,10 @@ class action:  # noqa: N801 - used as a decorator
     from_rize: FromRize | None = None
 
     def __call__(self, function: Function) -> Function:
-        """Mark the function and check its types. Raises DeclarationError with the problem and its line."""
+        """Register the function as an action and check its types.
+
+        Raises DeclarationError with the problem and its line.
+        """
         try:
             _check_function(function)
             returns = Returned(self.output, returned_type(function))
@@ -129,13 +132,13 @@ class action:  # noqa: N801 - used as a decorator
 
 @dataclass(frozen=True)
 class Returned:
-    """Result of an action: the fields of ``output=``, else the return type of its function."""
+    """Result of an action: the fields of ``output=``, or else the return type of the function."""
 
     fields: Mapping[str, object] | None = None
     kind: object = None
 
     def schema(self) -> Schema | None:
-        """Return the schema of the output, an object; a single value is its field ``value``."""
+        """Return the schema of the output, which is an object. A single value is in the field ``value``."""
         if self.fields:
             return fields_schema(self.fields)
         if self.kind is None:
@@ -146,7 +149,7 @@ class Returned:
         return {"type": "object", "properties": {"value": {"title": "value", **schema}}}
 
     def to_output(self, value: object) -> Mapping[str, object]:
-        """Convert a function's return value to the output. Raises RobotValueError if the type is wrong."""
+        """Convert the return value of a function to the output. Raises RobotValueError for a wrong type."""
         made = self._to_output(value)
         check_sendable(made)
         return made
@@ -194,7 +197,7 @@ class SensorSpec:
     kind: object = None
 
     def to_json(self, value: object) -> object:
-        """Convert a value for publishing. Raises RobotValueError if the type is wrong."""
+        """Convert a value for publishing. Raises RobotValueError for a wrong type."""
         if self.is_image:
             return value
         if isinstance(self.kind, Mapping):
@@ -214,11 +217,12 @@ class EventSpec:
 def safe_stop(*, watchdog_s: float = 1.0, within_s: float = 0.2) -> Callable[[Function], Function]:
     """Declare a method as the robot's stop.
 
-    The method takes no arguments and returns when the robot stands still; it raises Failed if it can't.
+    The method takes no arguments and returns when the robot stands still; it raises Failed if that isn't
+    possible.
 
     Args:
-        watchdog_s: Silence of the moving program (s) after which the robot stops by itself.
-        within_s: Time in which the robot stops (s).
+        watchdog_s: Time (s) without a heartbeat of the moving program after which the robot stops by itself.
+        within_s: Time (s) within which the robot stops.
     """
 
     def mark(function: Function) -> Function:
@@ -235,10 +239,10 @@ def sensor(
 
     Args:
         kind: Type of the value, or a mapping of field names to types.
-        title: Name for people.
-        text: Block text; "" for no block.
+        title: Display name.
+        text: Text of the block; "" for no block.
         icon: Icon of the block.
-        rate_hz: Publishing rate, as a hint.
+        rate_hz: Typical publishing rate.
     """
     schema = _described(fields_schema, kind) if isinstance(kind, Mapping) else _described(schema_of, kind)
     is_object = schema.get("type") == "object"
@@ -252,7 +256,7 @@ def picture(*, title: str, width: int, height: int, rate_hz: float, hfov_deg: fl
     """Declare a camera, which publishes images with the codec ``image``.
 
     Args:
-        title: Name for people.
+        title: Display name.
         width: Width in pixels.
         height: Height in pixels.
         rate_hz: Frame rate.
@@ -266,13 +270,13 @@ def picture(*, title: str, width: int, height: int, rate_hz: float, hfov_deg: fl
 
 
 def detections(*, title: str, camera: str, icon: str, rate_hz: float | None = None) -> SensorSpec:
-    """Declare a sensor of named boxes in pixels of a camera's image.
+    """Declare a sensor that reports named boxes in pixels of a camera's image.
 
     Args:
-        title: Name for people.
+        title: Display name.
         camera: Name of the camera's sensor.
         icon: Icon of the block.
-        rate_hz: Publishing rate, as a hint.
+        rate_hz: Typical publishing rate.
     """
     kind = {"count": int, "name": str}
     part: Schema = {**fields_schema(kind), "title": title}
@@ -294,10 +298,10 @@ def event(
     """Declare an event as a class attribute.
 
     Args:
-        text: Block text.
-        title: Name for people.
+        text: Text of the block.
+        title: Display name.
         icon: Icon of the block.
-        fields: Types of its fields by name.
+        fields: Types of the fields by name.
         choose: Fields that the block offers as choices.
         rize: Converts the fields to RIZE's primitive and input.
     """
@@ -313,11 +317,11 @@ def event(
 
 @dataclass(frozen=True)
 class Kind:
-    """Kind of robot: the class that drives it, and its Thing Model.
+    """Kind of robot: the class that implements it, and its Thing Model.
 
     Attributes:
         model: Id of the model.
-        title: Name for people.
+        title: Display name.
         body: Class of the robot.
         virtual: True for a simulated robot.
         kinds: Categories, such as "mobile".
@@ -348,7 +352,7 @@ class Kind:
 
     @property
     def actions(self) -> dict[str, ActionSpec]:
-        """Decorated methods, in the order of the class."""
+        """Declared actions by name of the method, in the order of the class."""
         return {
             name: getattr(member, _ACTION_ATTRIBUTE)
             for name, member in self._members()
@@ -357,12 +361,12 @@ class Kind:
 
     @property
     def sensors(self) -> dict[str, SensorSpec]:
-        """Sensors, in the order of the class."""
+        """Declared sensors by name, in the order of the class."""
         return {name: member for name, member in self._members() if isinstance(member, SensorSpec)}
 
     @property
     def events(self) -> dict[str, EventSpec]:
-        """Events, in the order of the class."""
+        """Declared events by name, in the order of the class."""
         return {name: member for name, member in self._members() if isinstance(member, EventSpec)}
 
     @property
@@ -473,15 +477,15 @@ class SourceLine:
 
 
 def line_of(function: object) -> SourceLine | None:
-    """Return the line where a function begins; None if it isn't written in Python."""
+    """Return the line at which a function starts; None if it isn't written in Python."""
     code = getattr(inspect.unwrap(function), "__code__", None) if callable(function) else None
     return None if code is None else SourceLine(Path(code.co_filename).name, code.co_firstlineno)
 
 
 def lines_of(body: type) -> dict[str, list[SourceLine]]:
-    """Return the lines at which a class binds each of its names; empty if its source is unavailable.
+    """Return the lines at which a class defines each of its names; empty if the source is unavailable.
 
-    Property setters and overloads don't count as a second binding.
+    Property setters and overloads don't count as a second definition.
     """
     try:
         lines, first = inspect.getsourcelines(body)

@@ -27,14 +27,14 @@ def _do_nothing() -> None:
 
 
 class Dispatcher:
-    """Queue of callbacks run by the thread `name`. Thread-safe.
+    """Queue of callbacks that the thread ``name`` runs. Thread-safe.
 
     Args:
         name: Name of the thread.
-        clock: Clock of the thread's waits.
-        tick: Called in the thread after callbacks, and when `next_due_s` has passed.
-        next_due_s: Returns the seconds until `tick` is needed, or None.
-        on_restart: Called in the thread before a loop that ended runs again.
+        clock: Clock with which the thread waits.
+        tick: Called in the thread after callbacks, and when ``next_due_s`` has elapsed.
+        next_due_s: Returns the seconds until ``tick`` is needed, or None.
+        on_restart: Called in the thread before a loop that ended is started again.
     """
 
     def __init__(
@@ -61,34 +61,35 @@ class Dispatcher:
         self._thread.start()
 
     def post(self, callback: Callable[[], object]) -> None:
-        """Run a callback in the thread, after those posted before."""
+        """Run a callback in the thread, after the callbacks that were posted before."""
         self._callbacks.append(callback)
         self._wake.set()
 
     def post_urgent(self, callback: Callable[[], object]) -> None:
-        """Run a callback in the thread before all non-urgent ones."""
+        """Run a callback in the thread, before all non-urgent ones."""
         self._urgent.append(callback)
         self._wake.set()
 
     @property
     def backlog(self) -> int:
-        """Number of callbacks that have not run."""
+        """Number of pending callbacks."""
         return len(self._callbacks) + len(self._urgent)
 
     @property
     def urgent_backlog(self) -> int:
-        """Number of urgent callbacks that have not run."""
+        """Number of pending urgent callbacks."""
         return len(self._urgent)
 
     @property
     def is_current(self) -> bool:
-        """True in the dispatcher's own thread."""
+        """True in the thread of this dispatcher."""
         return threading.current_thread() is self._thread
 
     def call(self, function: Callable[[], object]) -> None:
         """Call a function in the thread; exceptions are counted and logged instead of raised.
 
-        MemoryError and BaseExceptions such as SystemExit end the loop, which is restarted.
+        MemoryError, and exceptions such as SystemExit that aren't subclasses of Exception, end the loop,
+        which is restarted.
         """
         try:
             function()
@@ -98,7 +99,7 @@ class Dispatcher:
             self.errors.add(error)
 
     def close(self) -> None:
-        """Stop the thread and wait up to 2 s for it; pending callbacks are dropped."""
+        """Stop the thread and wait at most 2 s for it; pending callbacks are dropped."""
         self._closing.set()
         self._wake.set()
         if self._thread.ident is not None and not self.is_current:

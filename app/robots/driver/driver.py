@@ -1,6 +1,6 @@
 """Robot on the network: topics, commands and watchdog, created from its kind.
 
-Its ``async def`` actions run in one event loop (`EventLoop`), to which their connections belong.
+The robot's ``async def`` actions share one event loop (`EventLoop`), to which their connections belong.
 """
 
 from __future__ import annotations
@@ -41,14 +41,14 @@ _log = logging.getLogger(__name__)
 
 
 class Driver:
-    """Driver of one robot; also the `Link` of the robot's class. Thread-safe.
+    """Driver of one robot, and the `Link` of the robot's class. Thread-safe.
 
-    The node is borrowed: closing the driver closes its publishers and subscribers, not the node. Usable as a
-    context manager.
+    The node belongs to the caller: closing the driver closes its publishers and subscribers, not the node.
+    Usable as a context manager.
 
     Args:
         kind: Kind of the robot.
-        name: Name of the robot; its topics begin with it.
+        name: Name of the robot, with which its topics start.
         node: Node for publishers and subscribers.
         clock: Clock, replaceable in tests.
 
@@ -83,7 +83,7 @@ class Driver:
 
     @property
     def body(self) -> object:
-        """Instance of the robot's class while it runs, else None."""
+        """Instance of the robot's class while the driver is running, else None."""
         return self._body
 
     # ---- start and close -----------------------------------------------------------------------------------
@@ -91,8 +91,8 @@ class Driver:
     def start(self) -> None:
         """Create the topics, then the robot, then publish its description.
 
-        Without a master the errors of ``nep`` are raised; everything is cleaned up and it can be called
-        again.
+        Without a master, the exceptions of ``nep`` are raised. After an exception everything is cleaned up,
+        and `start` can be called again.
         """
         try:
             self._create_topics()
@@ -145,7 +145,7 @@ class Driver:
         self._subscribers.append(self._node.new_sub(RIZE_COMMANDS, "json", sink=rize.process))
 
     def close(self) -> None:
-        """Stop the robot, reply to open commands, end its threads and close its topics. Idempotent."""
+        """Stop the robot, reply to open commands, stop the threads and close the topics. Idempotent."""
         for subscriber in self._subscribers:
             subscriber.close()
         self._subscribers.clear()
@@ -178,7 +178,7 @@ class Driver:
     # ---- publishing ---------------------------------------------------------------------
 
     def sense(self, sensor: str, value: object) -> None:
-        """Publish a sensor's value.
+        """Publish the value of a sensor.
 
         Raises:
             KeyError: The kind has no such sensor.
@@ -193,7 +193,7 @@ class Driver:
         self._publish(topic_of(self.name, sensor), told)
 
     def happen(self, event: str, **data: object) -> None:
-        """Publish an event, also on RIZE's blackboard if it has a form there.
+        """Publish an event; also on RIZE's blackboard, if the event has a form there.
 
         Raises:
             KeyError: The kind has no such event.
@@ -211,9 +211,9 @@ class Driver:
             self._publish(BLACKBOARD, {"primitive": primitive, "input": dict(given), "robot": self.name})
 
     def wrong_in(self, event: str, data: Mapping[str, object]) -> Sequence[str]:
-        """Return a sentence for each way in which an event differs from the description; empty if valid.
+        """Return a message for each way in which an event differs from the description; empty if it is valid.
 
-        Every described field must be present with a valid value, and no other.
+        Every described field must be present with a valid value; other fields are not allowed.
         """
         described = self.robot.event(event)
         if described is None:
@@ -225,29 +225,32 @@ class Driver:
         )
 
     def tell(self, leaf: str, value: object) -> None:
-        """Publish a value that the description doesn't name on ``/<name>/<leaf>``, such as ``state``."""
+        """Publish a value that is not in the description on ``/<name>/<leaf>``, such as ``state``."""
         topic = topic_of(self.name, leaf)
         if topic not in self._publishers:
             self._open(topic)
         self._publish(topic, value)
 
     def watchers(self, leaf: str) -> int:
-        """Return the number of subscribers of one of the robot's topics."""
+        """Return the number of subscribers of a topic of the robot."""
         publisher = self._publishers.get(topic_of(self.name, leaf))
         return 0 if publisher is None else publisher.subscribers
 
     def run(self, work: Awaitable[object]) -> object:
-        """Run a coroutine in the robot's event loop, where its ``async def`` actions run, and wait for it."""
+        """Run a coroutine in the robot's event loop and wait for the result.
+
+        The robot's ``async def`` actions run in the same event loop.
+        """
         return self._loop.run(work)
 
     def on_world(self, changed: Callable[[Mapping[str, object]], None]) -> None:
-        """Call `changed` with every message of ``/<name>/world``, in the thread ``<name> world``."""
+        """Call ``changed`` with each message on ``/<name>/world``, in the thread ``<name> world``."""
         self._subscribe(topic_of(self.name, "world"), changed)
 
     def share(
         self, topic: str, changed: Callable[[Mapping[str, object]], None], *, latched: bool = False
     ) -> Callable[[Mapping[str, object]], None]:
-        """Join a topic shared by several robots; `changed` gets each message, as in `on_world`.
+        """Join a topic shared by several robots; ``changed`` is called with each message, as in `on_world`.
 
         Returns:
             A function that publishes a message; after `close` it does nothing.
@@ -290,9 +293,9 @@ class Driver:
 
 
 class EventLoop:
-    """Asyncio event loop in a thread of its own, started by the first coroutine. Thread-safe.
+    """Asyncio event loop in a background thread, which the first coroutine starts. Thread-safe.
 
-    All coroutines of a robot share it, so that one action can use a connection opened by another.
+    All coroutines of a robot share the loop, so that one action can use a connection opened by another.
     """
 
     def __init__(self, name: str) -> None:
@@ -309,9 +312,9 @@ class EventLoop:
 
         Args:
             work: Awaitable.
-            call: Call whose cancellation cancels the awaitable (its next ``await`` raises CancelledError);
-                then Canceled is raised.
-            within_s: Timeout in seconds, after which the awaitable is canceled and TimeoutError raised.
+            call: Call whose cancellation cancels the awaitable (its next ``await`` raises CancelledError).
+                Then Canceled is raised.
+            within_s: Timeout in seconds, after which the awaitable is cancelled and TimeoutError is raised.
         """
         loop, waited = self._running_loop(work), _PendingAwaitable(work)
         self._call_soon(partial(waited.begin, loop, f"{self._name}: {call.action if call else 'run'}"))
@@ -325,7 +328,7 @@ class EventLoop:
         return waited.result
 
     def close(self) -> None:
-        """Cancel running coroutines and end the thread. A blocked loop is abandoned with a warning."""
+        """Cancel running coroutines and stop the thread. A blocked loop is abandoned with a warning."""
         with self._lock:
             self._closed = True
             loop, thread = self._loop, self._thread

@@ -1,4 +1,4 @@
-"""Driver as a process: arguments, waiting for a master, and exit with its owner."""
+"""Driver as a process: arguments, waiting for a master, and exiting together with an owner."""
 
 from __future__ import annotations
 
@@ -30,17 +30,18 @@ _OWNER_CHECK_S = 0.5
 
 
 def main(kind: Kind, arguments: Sequence[str] | None = None) -> int:
-    """Run a robot of this kind until SIGTERM, Ctrl+C or the exit of its owner.
+    """Run a robot of this kind until SIGTERM, Ctrl+C or the exit of the owner.
 
-    Prints the robot's model, topics and master; waits if no master replies.
+    Prints the robot's model, topics and master. Waits while no master replies.
 
     Args:
         kind: Kind of the robot.
         arguments: Command line (default: that of the process).
 
     Returns:
-        Exit code: 0 after a regular end, 1 if the robot can't be connected (its class raised Failed) or
-        described, 2 for invalid arguments.
+        Exit code: 0 after a normal end, 1 if the robot can't be connected (its class raised Failed) or
+            described, 2 for
+        invalid arguments.
     """
     parser = argparse.ArgumentParser(description=_("Drive a robot: {title}.").format(title=kind.title))
     parser.add_argument("--name", default=kind.title, help=_("robot name; its topics begin with it"))
@@ -80,10 +81,10 @@ def tell_briefly() -> None:
 def run(
     kind: Kind, name: str, ended: threading.Event, *, master: str | None = None, owner_pid: int | None = None
 ) -> None:
-    """Drive a robot until `ended` is set or the owner exits; then stop it and leave the network.
+    """Run the driver of a robot until ``ended`` is set or the owner exits; then stop the robot and leave.
 
-    Progress is printed only without an owner: an owner follows the robot over the network and takes printed
-    lines as the reason of its exit.
+    Progress is printed only without an owner. An owner monitors the robot over the network, and treats
+    printed lines as the reason for an exit.
     """
     owner = _owner_process(owner_pid)
     if owner_pid is not None and owner is None:

@@ -1,6 +1,6 @@
-"""Reception of a robot's messages: stops are executed at once, everything else is queued.
+"""Reception of a robot's messages: stops are executed immediately, everything else is queued.
 
-The network's thread only decodes messages that may be a stop, so that large messages don't delay one.
+The network's thread only decodes messages that may be a stop, so that large messages don't delay a stop.
 """
 
 from __future__ import annotations
@@ -35,17 +35,17 @@ class Dialect(Protocol):
         """Return True for a command that stops the robot. Thread-safe."""
 
     def stop(self, command: object) -> None:
-        """Stop the robot at once. Thread-safe."""
+        """Stop the robot immediately. Thread-safe."""
 
     def receive(self, command: object, publisher: int | None, epoch: int | None) -> None:
-        """Handle a command, in the deciding thread."""
+        """Handle a command. Called in the thread of the robot's `Tasks`."""
 
     def reject(self, wanted: str, operation: str, error: str) -> None:
-        """Reply to a command that was not decoded, in the deciding thread."""
+        """Reply to a command that was not decoded. Called in the thread of the robot's `Tasks`."""
 
 
 class RejectedMessages:
-    """Count of messages to one robot that were not handled, logged at increasing intervals. Thread-safe."""
+    """Number of messages to one robot that were not handled, logged at increasing intervals. Thread-safe."""
 
     def __init__(self, robot: str) -> None:
         self.count = 0
@@ -64,13 +64,13 @@ class RejectedMessages:
 
 
 class MessageQueue:
-    """Bounded queue of one topic's messages that are decoded in another thread. Thread-safe.
+    """Bounded queue of messages of one topic that are decoded in another thread. Thread-safe.
 
     Args:
         topic: Name of the topic.
         post: Runs a callback in the decoding thread.
-        rejected: Counter of messages that are too large or too many.
-        max_message_bytes: Size limit of a message.
+        rejected: Counter of messages dropped because they are too large or the queue is full.
+        max_message_bytes: Maximum size of a message.
     """
 
     def __init__(
@@ -86,7 +86,7 @@ class MessageQueue:
         self._count = self._bytes = 0
 
     def put(self, message: Message, use: Callable[[object], object]) -> bool:
-        """Queue a message whose payload is passed to `use`; return False if it is too large."""
+        """Queue a message whose payload is passed to ``use``; return False if the message is too large."""
         size = message.size_bytes
         if size > self.max_message_bytes:
             self._rejected.add(self._topic, self.too_large(message))
@@ -103,7 +103,7 @@ class MessageQueue:
         return True
 
     def too_large(self, message: Message) -> str:
-        """Return the sentence for a message that is too large."""
+        """Return the error message for a message that is too large."""
         return _("the message has {size} kB; the limit is {limit} kB").format(
             size=number(message.size_bytes / 1000, ".0f"), limit=number(self.max_message_bytes / 1000, ".0f")
         )
@@ -127,9 +127,9 @@ class CommandReceiver:
         topic: Name of the topic.
         tasks: Tasks of the robot.
         dialect: Interpreter of the commands.
-        stop_words: Texts of which every stop command contains one.
-        rejected: Counter of messages that are too large, undecodable or too many.
-        queues_stops: Also queue an executed stop, because `Dialect.receive` replies to it.
+        stop_words: Texts, one of which occurs in every stop command.
+        rejected: Counter of messages that are too large, can't be decoded, or don't fit in the queue.
+        queues_stops: True to also queue an executed stop, so that `Dialect.receive` replies to it.
     """
 
     def __init__(
@@ -147,7 +147,7 @@ class CommandReceiver:
         self._needles = sorted({json.dumps(word)[1:-1].encode() for word in stop_words if word})
 
     def process(self, messages: Sequence[Message]) -> None:
-        """Process messages. Runs in the network's thread; never raises."""
+        """Process messages. Called in the network's thread; never raises."""
         stops = [at for at, message in enumerate(messages) if self._is_stop(message)]
         older_epoch = self._tasks.epoch
         for at in stops:

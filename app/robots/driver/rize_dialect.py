@@ -38,7 +38,7 @@ class _Group:
 class RizeDialect:
     """Interpreter of RIZE commands for one robot.
 
-    Runs in the deciding thread of its tasks; `stop` and `is_stop` in any.
+    Runs in the thread of the robot's `Tasks`; `stop` and `is_stop` may be called from any thread.
     """
 
     def __init__(
@@ -54,7 +54,7 @@ class RizeDialect:
         self._numbers = itertools.count(1)
 
     def is_stop(self, message: object) -> bool:
-        """Return True for a message that has the robot's stop among its primitives. Thread-safe."""
+        """Return True for a message whose primitives include the robot's stop. Thread-safe."""
         command = as_part(message)
         return (
             self._is_for_me(command)
@@ -66,13 +66,13 @@ class RizeDialect:
         )
 
     def stop(self, message: object) -> None:  # noqa: ARG002 - see `Dialect`
-        """Stop the robot at once. Thread-safe. `receive` replies to the message."""
+        """Stop the robot immediately. Thread-safe. `receive` replies to the message."""
         self._tasks.stop(None)
 
     def receive(self, message: object, publisher: int | None = None, epoch: int | None = None) -> None:  # noqa: ARG002
-        """Handle one message of ``robot_action``; ignore those for other robots.
+        """Handle one message of ``robot_action``; messages for other robots are ignored.
 
-        `epoch` is `Tasks.epoch` when it was received.
+        ``epoch`` is `Tasks.epoch` when the message was received.
         """
         command = as_part(message)
         if not self._is_for_me(command):
@@ -83,7 +83,7 @@ class RizeDialect:
             self._run(command, epoch)
 
     def reject(self, wanted: str, operation: str, error: str) -> None:
-        """Do nothing: RIZE's reply repeats the whole command."""
+        """Do nothing, because a reply of RIZE's dialect would have to repeat the whole command."""
 
     def _is_for_me(self, command: Mapping[str, object]) -> bool:
         robots = command.get("robots")

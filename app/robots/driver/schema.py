@@ -1,7 +1,7 @@
-"""Conversion of a Python function's types to the data schemas of its description.
+"""Conversion of the types of a Python function to the data schemas of its description.
 
-A value is ``float``, ``int``, ``bool``, ``str``, :data:`Colour`, ``list``, ``tuple``, ``dict``, ``Optional``,
-a ``Literal`` or Enum, a dataclass or TypedDict; further constraints are annotated: ``Annotated[float,
+A type is ``float``, ``int``, ``bool``, ``str``, :data:`Colour`, ``list``, ``tuple``, ``dict``, ``Optional``,
+a ``Literal`` or Enum, a dataclass or TypedDict. Further constraints are annotated: ``Annotated[float,
 Range(-2, 2, step=0.05, unit="m")]``.
 """
 
@@ -51,7 +51,7 @@ class Range:
 
 @dataclass(frozen=True)
 class Text:
-    """Length limits of a text in characters."""
+    """Minimum and maximum length of a text in characters."""
 
     min_length: int = 0
     max_length: int | None = None
@@ -59,43 +59,43 @@ class Text:
 
 @dataclass(frozen=True)
 class Words:
-    """Words shown for the values of a ``Literal``."""
+    """Texts shown for the values of a ``Literal``."""
 
     shown: Mapping[str, str]
 
 
 @dataclass(frozen=True)
 class Title:
-    """Title shown instead of the Python name."""
+    """Title shown instead of the name in Python."""
 
     text: str
 
 
 @dataclass(frozen=True)
 class Suggested:
-    """Initial value in forms and blocks; callers must still give a value."""
+    """Initial value in forms and blocks. Callers must give a value anyway."""
 
     value: object
 
 
 @dataclass(frozen=True)
 class Advanced:
-    """Parameter that forms collapse."""
+    """Marker for a parameter that forms collapse."""
 
 
 @dataclass(frozen=True)
 class _HexColour:
-    """Text that is a colour."""
+    """Marker for a text that is a colour."""
 
 
 @dataclass(frozen=True)
 class _PictureText:
-    """Text that is an image."""
+    """Marker for a text that is an image."""
 
 
 Colour: TypeAlias = Annotated[str, _HexColour()]
 Image: TypeAlias = Annotated[str, _PictureText()]
-"""Image as ``data:image/jpeg;base64,...``, or its address."""
+"""Image as ``data:image/jpeg;base64,...``, or as the address of an image."""
 
 
 def schema_of(annotation: object) -> Schema:
@@ -264,7 +264,7 @@ def input_types(function: Callable[..., object]) -> dict[str, object]:
 
 
 def returned_type(function: Callable[..., object]) -> object:
-    """Return a function's annotated return type; None for no annotation, None, or any object."""
+    """Return the annotated return type of a function; None if there is none, or if it is None or object."""
     kind = get_type_hints(function, include_extras=True).get("return")
     if get_origin(kind) in {Awaitable, Coroutine}:
         kind = get_args(kind)[-1]

@@ -1,7 +1,7 @@
-"""Values of typed Python: inspection of types, conversion from JSON and to JSON.
+"""Values of typed Python: inspection of types, and conversion from and to JSON.
 
-:func:`given` converts valid JSON to a function's argument; :func:`told` converts a driver's value to JSON,
-and raises RobotValueError if it is invalid: "the value must be a number, not 'far'".
+:func:`given` converts valid JSON to an argument of a function. :func:`told` converts a value of a driver to
+JSON and raises RobotValueError if the value is invalid: "the value must be a number, not 'far'".
 """
 
 from __future__ import annotations
@@ -36,7 +36,7 @@ def bare(annotation: object) -> tuple[object, tuple[object, ...]]:
 
 
 def without_none(annotation: object) -> tuple[object, bool]:
-    """Return the type inside an ``Optional``, and whether it is one; ``int | float`` counts as float."""
+    """Return the type inside an ``Optional``, and True if it is one; ``int | float`` counts as float."""
     if get_origin(annotation) not in {Union, UnionType}:
         return annotation, False
     kinds = [kind for kind in get_args(annotation) if kind is not type(None)]
@@ -53,7 +53,7 @@ def without_none(annotation: object) -> tuple[object, bool]:
 
 
 def fields_of(annotation: object) -> Mapping[str, tuple[object, bool]] | None:
-    """Return the fields of a dataclass or TypedDict with type and required flag; None for other types."""
+    """Return type and required flag of each field of a dataclass or TypedDict; None for other types."""
     if not isinstance(annotation, type):
         return None
     if dataclasses.is_dataclass(annotation):
@@ -79,9 +79,9 @@ def _field_type(kind: object, must: bool) -> tuple[object, bool]:
 
 
 def choices_in(annotation: object) -> tuple[tuple[object, object, str | None], ...] | None:
-    """Return the values of a Literal or Enum as (JSON value, Python value, word); None for other types.
+    """Return the values of a Literal or Enum as (JSON value, Python value, text); None for other types.
 
-    Enums with values that JSON can't represent use their names.
+    An Enum with values that JSON can't represent uses its names.
     """
     if get_origin(annotation) is Literal:
         return tuple((value, value, None) for value in get_args(annotation))
@@ -138,7 +138,7 @@ def given(annotation: object, value: object) -> object:
 
 
 def to_json(annotation: object, value: object) -> object:
-    """Convert a driver's value of this type to JSON. Raises RobotValueError if it is invalid."""
+    """Convert a value of this type to JSON. Raises RobotValueError if the value is invalid."""
     kind, is_optional = without_none(bare(annotation)[0])
     kind = bare(kind)[0]
     if value is None and is_optional:
@@ -168,10 +168,10 @@ def to_json(annotation: object, value: object) -> object:
 def told_fields(
     kinds: Mapping[str, object], value: object, required: Sequence[str] = ()
 ) -> dict[str, object]:
-    """Convert a driver's value with these fields to a JSON object; other fields are kept unchanged.
+    """Convert a value with these fields to a JSON object; other fields are kept unchanged.
 
-    None means unknown, except for required fields. Raises RobotValueError naming the field that is invalid or
-    missing.
+    None means unknown, except for required fields. Raises RobotValueError, which names the field that is
+    invalid or missing.
     """
     if dataclasses.is_dataclass(value) and not isinstance(value, type):
         value = {each.name: getattr(value, each.name) for each in dataclasses.fields(value)}
@@ -216,7 +216,7 @@ def plain(value: object, depth: int = 0) -> object:
 
 
 def check_sendable(value: object) -> None:
-    """Raise RobotValueError for NaN, infinity and lone surrogates, which messages can't hold."""
+    """Raise RobotValueError for NaN, infinity and lone surrogates, which messages can't contain."""
     if isinstance(value, str) and not value.isascii() and any("\ud800" <= each <= "\udfff" for each in value):
         raise RobotValueError(lazy("{place} must be valid Unicode text"))
     if isinstance(value, float) and not math.isfinite(value):
@@ -230,7 +230,7 @@ def check_sendable(value: object) -> None:
 
 
 def same(allowed: object, value: object) -> bool:
-    """Return whether two values are equal in JSON: unlike in Python, 1 differs from true."""
+    """Return True if two values are equal in JSON, where 1 differs from true."""
     return allowed == value and isinstance(allowed, bool) == isinstance(value, bool)
 
 

@@ -1,4 +1,4 @@
-"""Thread of a robot's stop function. It is started in advance and runs nothing else."""
+"""Thread of a robot's stop function. The thread is started in advance and runs nothing else."""
 
 from __future__ import annotations
 
@@ -17,15 +17,15 @@ _log = logging.getLogger(__name__)
 
 
 class StopThread:
-    """Runner of one robot's stop function. Thread-safe.
+    """Runs the stop function of one robot. Thread-safe.
 
-    Runs are numbered from 1. Stops requested while the function runs share that run.
+    Runs are numbered from 1. Stops requested while the function is running share that run.
 
     Args:
         name: Name of the robot.
-        stop: The robot's stop function.
-        ended: Called in this thread with the number of a run and its error sentence, or None.
-        clock: Clock of the thread's waits.
+        stop: Stop function of the robot.
+        ended: Called in this thread with the number of a run and its error message, or None.
+        clock: Clock with which the thread waits.
     """
 
     def __init__(
@@ -53,18 +53,18 @@ class StopThread:
         return self._requested
 
     def reserve(self) -> int:
-        """Return the number of the run that serves a stop requested now; `wake` starts it."""
+        """Return the number of the run that serves a stop requested now; `wake` starts that run."""
         with self._lock:
             if self._requested == self._finished:
                 self._requested += 1
             return self._requested
 
     def wake(self) -> None:
-        """Start the reserved run at once, in this object's thread."""
+        """Start the reserved run immediately, in the stop thread."""
         self._wake.set()
 
     def close(self) -> None:
-        """Stop the thread; a stop function that doesn't return is abandoned."""
+        """Stop the thread. A stop function that doesn't return is abandoned."""
         self._is_closing = True
         self._wake.set()
         if self._thread.ident is not None:

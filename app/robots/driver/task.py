@@ -1,4 +1,4 @@
-"""Task of a robot, and the answers to it."""
+"""Task of a robot, and the replies to it."""
 
 from __future__ import annotations
 
@@ -14,9 +14,9 @@ State: TypeAlias = Literal["accepted", "running", "succeeded", "failed", "cancel
 
 @dataclass(frozen=True)
 class Answer:
-    """State of a task; `error` is a sentence for people.
+    """State of a task. ``error`` is a message for the user.
 
-    An accepted task may wait for other actions (`waits_for`) or have replaced them (`replaces`).
+    An accepted task may have to wait for other actions (`waits_for`), or have replaced them (`replaces`).
     """
 
     state: State
@@ -28,7 +28,7 @@ class Answer:
 
     @property
     def is_final(self) -> bool:
-        """True if no other answer follows."""
+        """True if no further reply follows."""
         return self.state in {"succeeded", "failed", "canceled"}
 
 
@@ -46,28 +46,29 @@ class ProgramId(NamedTuple):
 class Task:
     """Execution of an action.
 
-    `run` gets its :class:`Call` in a thread, `answer` is called in the deciding thread.
+    `run` is called with the :class:`Call` in a separate thread, `answer` in the thread of the robot's
+    `Tasks`.
 
     Attributes:
         id: Id of the command.
         action: Name of the action.
         run: Function of the action.
-        answer: Callback for answers.
+        answer: Called with each reply.
         uses: Resources of the action.
         on_busy: "queue", "replace" or "reject".
         timeout_s: Maximum duration.
-        cancellable: False if it can't be canceled.
-        title: Name for people.
-        program: Program that must stay alive while the task runs; with `goes_on` also afterwards.
-        publisher: Id of the command's publisher, also if it named no program.
+        cancellable: False if the action can't be cancelled.
+        title: Display name.
+        program: Program that must stay alive while the task is running; with `goes_on`, also afterwards.
+        publisher: Id of the command's publisher, even if the command named no program.
         goes_on: True for a speed, which continues after success.
-        epoch: `Tasks.epoch` when the command was received: after a later stop it is not run.
+        epoch: `Tasks.epoch` when the command was received. After a later stop, the task isn't run.
         call: Running call.
-        thread: Its thread.
-        due_s: When it is overdue.
-        ending: Answer to give when it ends.
-        answered: True once the final answer was given, even if the function is still running.
-        stopped: True if a stop of the robot ended it.
+        thread: Thread of the running call.
+        due_s: Time at which the time limit elapses.
+        ending: Reply to send when the task ends.
+        answered: True once the final reply was sent, even if the function is still running.
+        stopped: True if a stop of the robot ended the task.
     """
 
     id: str
@@ -91,13 +92,13 @@ class Task:
     stopped: bool = False
 
     def end(self, how: Answer) -> None:
-        """Ask the running function to end; `how` is the answer, whatever it returns."""
+        """Ask the running function to end. ``how`` is the final reply, whatever the function returns."""
         self.ending = self.ending or how
         if self.call is not None:
             self.call.cancel()
 
     def finish(self, answer: Answer) -> None:
-        """Give the final answer once."""
+        """Send the final reply, unless one was already sent."""
         if not self.answered:
             self.answered = True
             self.answer(answer)

@@ -1,8 +1,9 @@
-"""Execution of a robot's tasks: order, busy policies, cancel, stop, watchdog.
+"""Execution of a robot's tasks: order, policies for resources in use, cancel, stop, watchdog.
 
-All decisions are made in one supervised thread, ``<name> commands`` (`Dispatcher`); each running task has its
-own thread. A stop waits for neither: `Tasks.stop` cancels the running calls in the caller's thread and wakes
-the thread of the stop function (`StopThread`). Commands received before a stop are not run after it.
+All decisions are made in one supervised thread, ``<name> commands`` (`Dispatcher`); each running task has a
+separate thread. A stop waits for neither: `Tasks.stop` cancels the running calls in the caller's thread and
+wakes the thread of the stop function (`StopThread`). Commands received before a stop are not executed after
+it.
 """
 
 from __future__ import annotations
@@ -22,18 +23,18 @@ from nep.i18n import _, lazy, ngettext, number
 from nep.text import bounded_str
 
 BEAT_S = 0.5
-"""Maximum interval of signs of life while a task runs or waits."""
+"""Maximum interval of heartbeats while a task is running or queued."""
 STOP_ANSWER_S = 0.5
-"""Maximum time until a stop is answered, even if a function keeps running.
+"""Maximum time until the reply to a stop, even if a function keeps running.
 
-The robot's `within_s` applies if it is longer. Well below the time after which Studio treats a robot as
-silent (`app.core.run.control.STOP_TIMEOUT_S`).
+The ``within_s`` of the robot applies if it is longer. This is well below the time after which Studio treats a
+robot as silent (`app.core.run.control.STOP_TIMEOUT_S`).
 """
 _GRACE_S = 1.0
-"""Time in which a function may clean up after a cancel, a time-out or a replacement."""
+"""Time for a function to clean up after it was cancelled, timed out or replaced."""
 _MAX_QUEUED = 50
 _MAX_RUNNING = 50
-"""Actions without resources run in parallel, each in its own thread."""
+"""Maximum number of running actions. Actions without resources run in parallel, each in its own thread."""
 THE_STOP = lazy("the stop itself")
 NOTHING_RUNS = lazy("no running task has this id")
 _MAX_PENDING_STOPS = 2_000
@@ -42,10 +43,10 @@ _log = logging.getLogger(__name__)
 
 
 class Watchdog:
-    """Detector of programs that fall silent while the robot acts for them. It has no thread.
+    """Detects programs that no longer send heartbeats while the robot acts for them. Has no thread.
 
     Args:
-        patience_s: Allowed silence; None disables the watchdog.
+        patience_s: Maximum time between heartbeats; None disables the watchdog.
     """
 
     def __init__(self, patience_s: float | None) -> None:
@@ -54,33 +55,36 @@ class Watchdog:
         self._going_on: dict[str, ProgramId] = {}  # resource -> the program that left it in motion
 
     def hear(self, program: ProgramId, now: float, *, watch: bool) -> None:
-        """Note a sign of life; `watch` starts to expect more (the program requested an action)."""
+        """Record a heartbeat.
+
+        ``watch`` is True if further ones are expected (the program requested an action).
+        """
         if self.patience_s is not None and (watch or program in self._heard):
             self._heard[program] = now
 
     def begins(self, task: Task) -> None:
-        """Note that a task uses its resources: they are no longer left in motion."""
+        """Record that a task uses its resources, so that an earlier motion of them no longer continues."""
         for used in task.uses:
             self._going_on.pop(used, None)
 
     def ends_well(self, task: Task) -> None:
-        """Note that a task succeeded: one that continues (a speed) leaves its resources in motion."""
+        """Record that a task succeeded. After a speed, its resources continue to move."""
         if task.goes_on and task.program is not None:
             self._going_on |= dict.fromkeys(task.uses, task.program)
 
     def reset(self) -> None:
-        """Forget all programs, because the robot was stopped."""
+        """Remove all programs, because the robot was stopped."""
         self._heard.clear()
         self._going_on.clear()
 
     def due(self) -> list[float]:
-        """Return the times at which programs become silent."""
+        """Return the times at which programs count as silent."""
         return [] if self.patience_s is None else [seen + self.patience_s for seen in self._heard.values()]
 
     def bites(self, now: float, acting: Collection[ProgramId | None]) -> bool:
-        """Return whether the robot must stop; `acting` are the programs of running and waiting tasks.
+        """Return True if the robot must stop; ``acting`` are the programs of running and queued tasks.
 
-        Silent programs without a task are forgotten: they may have ended long ago.
+        Silent programs without a task are removed: they may have ended long ago.
         """
         if self.patience_s is None:
             return False
@@ -91,27 +95,27 @@ class Watchdog:
 
 
 class _PendingStop(NamedTuple):
-    """Stop that is not answered yet."""
+    """Stop that has not been replied to."""
 
     run: int
-    """Number of the stop function's run that it waits for."""
+    """Number of the run of the stop function that the stop waits for."""
     limit_s: float
     answer: Callable[[Answer], None]
 
 
 class Tasks:
-    """Tasks of one robot. Unless stated otherwise, methods run in the deciding thread.
+    """Tasks of one robot. Unless stated otherwise, call methods in the thread of the tasks (`call_soon`).
 
     Args:
         name: Name of the robot.
-        stop: The robot's stop function.
+        stop: Stop function of the robot.
         clock: Clock.
-        within_s: Time in which the robot stops.
-        watchdog_s: Allowed silence of a program; None disables the watchdog.
-        beat: Called in the deciding thread twice a second while a task runs or waits or a stop has not
-            succeeded, with the actions that keep running although they were asked to end and a sentence about
-            them, and once more when the last one has ended. A failed stop of the watchdog is included until a
-            stop succeeds, because it has no other answer.
+        within_s: Time within which the robot stops.
+        watchdog_s: Maximum time between heartbeats of a program; None disables the watchdog.
+        beat: Called twice a second in the thread of the tasks while a task is running or queued or a stop has
+            not succeeded, with the actions that keep running although they were asked to end and a message
+            about them; and once more when the last one has ended. A failed stop of the watchdog is included
+            until a stop succeeds, because there is no other reply to it.
     """
 
     def __init__(
@@ -157,30 +161,30 @@ class Tasks:
         self._dispatcher.start()
 
     def call_soon(self, what: Callable[[], object]) -> None:
-        """Run a callback in the deciding thread."""
+        """Run a callback in the thread of the tasks."""
         self._dispatcher.post(what)
 
     @property
     def backlog(self) -> int:
-        """Number of callbacks that the deciding thread has not run."""
+        """Number of pending callbacks in the thread of the tasks."""
         return self._dispatcher.backlog
 
     @property
     def failures(self) -> int:
-        """Number of exceptions that the deciding thread survived."""
+        """Number of exceptions that were caught in the thread of the tasks."""
         return self._dispatcher.errors.count
 
     @property
     def epoch(self) -> int:
-        """Number of stops so far. A command received in an earlier epoch is not run."""
+        """Number of stops so far. Commands received in an earlier epoch are not executed."""
         return self._epoch
 
     def stop(self, answer: Callable[[Answer], None] | None, why: str = "stopped") -> None:
-        """Stop the robot at once and end all tasks. Thread-safe; does not block.
+        """Stop the robot immediately and end all tasks. Thread-safe; does not block. Starts a new `epoch`.
 
-        `answer` is called in the deciding thread when the robot stands still and every function has ended.
-        Functions that don't end within STOP_ANSWER_S are named in the answer, and no task is accepted until
-        they have. Starts a new `epoch`.
+        ``answer`` is called in the thread of the tasks when the robot stands still and every function has
+        ended. Functions that don't end within STOP_ANSWER_S are named in the reply, and no task is accepted
+        until they have ended.
         """
         with self._lock:
             self._epoch += 1
@@ -198,7 +202,7 @@ class Tasks:
             self._stop_thread.wake()
 
     def close(self) -> None:
-        """Stop the robot, end all tasks and join the threads; a function that never ends is abandoned."""
+        """Stop the robot, end all tasks and join the threads. A function that never ends is abandoned."""
         stopped = threading.Event()
 
         def take(answer: Answer) -> None:
@@ -213,7 +217,10 @@ class Tasks:
     # ---- requests ----------------------------------------------------------------------------
 
     def submit(self, task: Task) -> None:
-        """Run a task as soon as its resources are free; reject it, or end others, by its busy policy."""
+        """Run a task as soon as its resources are free.
+
+        If they are in use, the task is rejected or replaces other tasks, as its ``on_busy`` requires.
+        """
         if task.epoch is not None and task.epoch < self._epoch:
             self._give_answer(task.finish, _stopped_before())
             return
@@ -256,7 +263,10 @@ class Tasks:
         self._start_ready()
 
     def cancel(self, wanted: Callable[[Task], bool]) -> str | None:
-        """End the tasks that `wanted` selects; return None if there were any, else a sentence."""
+        """End the tasks for which ``wanted`` returns True.
+
+        Return None if there were any, else an error message.
+        """
         found = [task for task in (*self._running, *self._queue) if wanted(task)]
         if not found:
             return NOTHING_RUNS
@@ -269,7 +279,10 @@ class Tasks:
         return None
 
     def sign_of_life(self, program: ProgramId, *, watch: bool) -> None:
-        """Note a sign of life; `watch` starts to expect more (the program requested an action)."""
+        """Record a heartbeat.
+
+        ``watch`` is True if further ones are expected (the program requested an action).
+        """
         self._watchdog.hear(program, self._clock.now(), watch=watch)
 
     # ---- the deciding thread ----------------------------------------------------------------------
@@ -522,7 +535,7 @@ def _stopped_before() -> Answer:
 
 
 def still_moving(name: str, actions: Sequence[str]) -> str:
-    """Return the sentence about functions that keep running although they were asked to end."""
+    """Return the message about functions that keep running although they were asked to end."""
     why = ngettext("{actions} is still running", "{actions} are still running", len(actions))
     told = ", ".join(_(THE_STOP) if each == THE_STOP else each for each in actions)
     return _(MAY_MOVE).format(robot=name, why=why.format(actions=told))

@@ -1,4 +1,4 @@
-"""Sensors of the virtual Pepper, and its movements, which brake when their action is canceled."""
+"""Sensors of the virtual Pepper, and its movements, which brake when their action is cancelled."""
 
 from __future__ import annotations
 
@@ -47,7 +47,10 @@ def _face(text: str, title: str, rize_word: str) -> EventSpec:
 
 
 class Senses:
-    """Sensors and events; :class:`~app.robots.virtual.simulation.Simulation` publishes them."""
+    """Declarations of sensors and events.
+
+    :class:`~app.robots.virtual.simulation.Simulation` publishes them.
+    """
 
     battery = battery_sensor()
     distance = distance_sensor(most_m=5)
@@ -94,7 +97,7 @@ class Acting(Senses):
         self._simulation.start()
 
     def close(self) -> None:
-        """Stop its threads."""
+        """Stop the threads of the simulation."""
         self._simulation.close()
 
     def _roll(self, call: Call, start: Callable[[Body], Motion]) -> Motion:

@@ -1,4 +1,4 @@
-"""Body of the virtual Pepper in its room: movements stepped in time; no clock, no threads."""
+"""Body of the virtual Pepper in its room: movements advanced in time steps, without clock and threads."""
 
 from __future__ import annotations
 
@@ -21,16 +21,16 @@ _SECONDS_PER_CHARACTER = 0.06
 _MIN_SPEECH_S = 0.6
 _MAX_STEP_S = 0.02
 TOUCH_LEAST_S = 0.3
-"""Minimum duration of a touch, so that programs that poll see a tap."""
+"""Minimum duration of a touch, so that programs that poll notice a tap."""
 HEARD_FOR_S = 4.0
-"""Time for which the room shows what a person said."""
+"""Time for which the room shows what the user said to the robot."""
 _DRAIN_PER_S = 1 / 180  # % of the battery, standing
 _DRAIN_MOVING_PER_S = 1 / 60
 
 
 @dataclass(frozen=True)
 class BodyEvent:
-    """Event of the robot's description with its data."""
+    """Event in the robot's description, with its data."""
 
     event: str
     data: dict[str, object]
@@ -38,7 +38,7 @@ class BodyEvent:
 
 @dataclass
 class Speech:
-    """Text being spoken; ``done`` after the last word."""
+    """Text being spoken; ``done`` is True after the last word."""
 
     text: str
     seconds: float
@@ -47,7 +47,7 @@ class Speech:
 
     @classmethod
     def of(cls, text: str, speed_percent: float = 100.0) -> Speech:
-        """Return a speech whose duration depends on its length."""
+        """Return a speech with a duration that depends on the length of the text."""
         return cls(text, max(_MIN_SPEECH_S, len(text) * _SECONDS_PER_CHARACTER) * 100.0 / speed_percent)
 
     @property
@@ -79,14 +79,14 @@ class Body:
     emotion: str = "neutral"
     battery: float = 84.4
     touched: dict[str, float] = field(default_factory=dict)
-    """Touched places, and for how many seconds."""
+    """Touched places, and the duration of each touch in seconds."""
     heard: str = ""
     listened_s: float = HEARD_FOR_S
-    """Seconds since it heard that."""
+    """Seconds since the robot heard `heard`."""
     volume: int = 60
     language: str = "en"
     held: bool = False
-    """True while a person holds it up, so that its base doesn't move."""
+    """True while the user lifts the robot, so that its base doesn't move."""
     happenings: deque[BodyEvent] = field(default_factory=lambda: deque(maxlen=200))
     _base: Motion | None = field(default=None, repr=False)
     _turning: bool = field(default=False, repr=False)
@@ -100,11 +100,11 @@ class Body:
     # ---- commands ---------------------------------------------------------------------------
 
     def walk(self, distance: float, speed: float) -> Motion:
-        """Start to drive straight, backwards if negative."""
+        """Start to drive straight; backwards if the distance is negative."""
         return self._start(Motion.walk(distance, speed), turning=False)
 
     def turn(self, angle_deg: float, speed_deg: float) -> Motion:
-        """Start to turn on the spot, to the left if positive."""
+        """Start to turn on the spot; to the left if the angle is positive."""
         return self._start(Motion.turn(angle_deg, speed_deg), turning=True)
 
     def _start(self, motion: Motion, *, turning: bool) -> Motion:
@@ -114,13 +114,13 @@ class Body:
         return motion
 
     def speak(self, text: str, speed_percent: float = 100.0) -> Speech:
-        """Start to speak; the current speech ends."""
+        """Start to speak; a current speech or sound ends."""
         self.hush()
         self._speech = Speech.of(text, speed_percent)
         return self._speech
 
     def hush(self) -> None:
-        """Stop speaking and playing."""
+        """Stop speech and sound."""
         if self._speech is not None:
             self._speech.done = True
             self._speech = None
@@ -129,7 +129,7 @@ class Body:
             self.sound = None
 
     def play(self, title: str, notes: Notes) -> Sound:
-        """Start to play notes; the current speech or sound ends."""
+        """Start to play notes; a current speech or sound ends."""
         self.hush()
         self._sounds += 1
         self.sound = Sound(self._sounds, title, notes)
@@ -148,7 +148,7 @@ class Body:
         self.head_pitch.aim(START_PITCH)
 
     def halt(self) -> None:
-        """Brake and be silent: the base brakes in the next steps, everything else holds at once."""
+        """Stop everything: the base brakes in the next steps, all other movements end immediately."""
         if self._base is not None:
             self._base.halt()
         for wave in self._waves:
@@ -163,7 +163,7 @@ class Body:
             joint.hold()
 
     def reset(self, room: Room) -> None:
-        """Return to the start in this room and stop everything."""
+        """Stop everything and return to the start position in this room."""
         self.halt()
         if self._base is not None:
             self._base.block()
@@ -204,7 +204,7 @@ class Body:
 
     @property
     def distance(self) -> float:
-        """Distance from the rim of the base to the next obstacle ahead, at most 5 m."""
+        """Distance from the edge of the base to the next obstacle ahead, at most 5 m."""
         ahead = self.room.distance_ahead(self.x, self.y, self.theta_deg) - RADIUS
         return min(FULL_RANGE, max(0.0, ahead))
 
@@ -230,29 +230,29 @@ class Body:
                 self.happenings.append(BodyEvent("released", {"place": place}))
 
     def hold(self, *, held: bool) -> None:
-        """Pick it up or put it down; interrupted movements continue afterwards."""
+        """Lift the robot or put it down. Interrupted movements continue afterwards."""
         self.held = held
 
     def carry(self, x: float, y: float) -> None:
-        """Move it to a place if that is free; it stops at walls."""
+        """Move the robot to a place if that is free; it stops at walls."""
         place = self.room.carried(x, y, RADIUS, (self.x, self.y))
         if place is not None:
             self.place(*place)
 
     def place(self, x: float, y: float) -> None:
-        """Set its position."""
+        """Set the position of the robot."""
         self.x, self.y = x, y
         self.room = self.room.pushed_ball(x, y, RADIUS)
 
     def hear(self, word: str) -> None:
-        """Note a word that a person said."""
+        """Process a word that the user said."""
         self.heard, self.listened_s = word, 0.0
         self.happenings.append(BodyEvent("heard", {"word": word}))
 
     # ---- time -------------------------------------------------------------------------------------
 
     def step(self, seconds: float) -> None:
-        """Simulate time in small steps, so that it can't pass through objects."""
+        """Advance the simulation in small steps, so that the robot can't pass through objects."""
         while seconds > 1e-9:
             dt = min(seconds, _MAX_STEP_S)
             seconds -= dt
@@ -260,7 +260,7 @@ class Body:
 
     @property
     def just_heard(self) -> str:
-        """Word heard recently, else ""."""
+        """Word heard recently, or ""."""
         return self.heard if self.listened_s < HEARD_FOR_S else ""
 
     def _step(self, dt: float) -> None:

@@ -1,4 +1,4 @@
-"""Camera of the virtual robot: rendering of the room from its head, 320 x 240 pixels."""
+"""Camera of the virtual robot: renders the room as seen from its head, with 320 x 240 pixels."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ def lens_of(body: Body) -> Lens:
 
 
 class Camera:
-    """Renderer of one room; static parts are rendered once."""
+    """Renderer for one room. Parts that never move are rendered once."""
 
     def __init__(self, room: Room) -> None:
         self._floor = scenery.floor(room)
@@ -144,7 +144,7 @@ def _away(thing: _Upright, lens: Lens) -> float:
 
 
 def looking_across(lens: Lens, x: float, y: float) -> Matrix:
-    """Return the horizontal unit vector to the right, perpendicular to the camera's line to a place."""
+    """Return the horizontal unit vector to the right of the line from the camera to a place."""
     dx, dy = x - lens.place[0], y - lens.place[1]
     length = math.hypot(dx, dy) or 1.0
     return np.array([dy / length, -dx / length, 0.0])

@@ -1,4 +1,4 @@
-"""Drawing of textures on parallelograms in the room, in the camera's perspective, with OpenCV."""
+"""Drawing of textures on parallelograms in the room, in the perspective of the camera, with OpenCV."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ class Texture:
             self.levels.append(picture)
 
     def level_for(self, shrink: float) -> Picture:
-        """Return the level to sample when `shrink` texels of the full image cover one pixel."""
+        """Return the mipmap level for ``shrink`` texels of the full image per pixel."""
         level = round(np.log2(max(1.0, shrink)))
         return self.levels[min(int(level), len(self.levels) - 1)]
 
@@ -48,7 +48,7 @@ class Canvas:
         self.picture: Picture = np.zeros((lens.height, lens.width, 3), dtype=np.uint8)
 
     def fill(self, points: Matrix, colour: tuple[int, int, int]) -> None:
-        """Draw a polygon of the room in one colour."""
+        """Draw a polygon in room coordinates in one colour."""
         outline = self.lens.outline(points)
         if len(outline) >= 3:
             cv2.fillConvexPoly(self.picture, _fixed(outline), colour, cv2.LINE_AA, _SHIFT)

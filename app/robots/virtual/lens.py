@@ -16,7 +16,10 @@ NEAR = 0.06
 
 @dataclass(frozen=True)
 class Lens:
-    """Camera at `place` (m), oriented by `yaw_deg` (left positive) and `pitch_deg` (down positive)."""
+    """Camera at ``place`` (m).
+
+    ``yaw_deg`` is positive to the left, ``pitch_deg`` positive down.
+    """
 
     place: tuple[float, float, float]
     yaw_deg: float
@@ -39,7 +42,7 @@ class Lens:
         return np.stack([right, np.cross(forward, right), forward])
 
     def to_camera(self, points: Matrix) -> Matrix:
-        """Transform points (n, 3) of the room to camera coordinates: right, down, forward in metres."""
+        """Transform points (n, 3) from room to camera coordinates: right, down, forward in metres."""
         seen: Matrix = (points - np.asarray(self.place)) @ self.rotation.T
         return seen
 
@@ -49,7 +52,10 @@ class Lens:
         return np.stack([seen[:, 0] * scale + self.width / 2, seen[:, 1] * scale + self.height / 2], axis=1)
 
     def outline(self, points: Matrix) -> Matrix:
-        """Return the pixels (n, 2) of a flat polygon's part in front of the camera; empty if it is behind."""
+        """Return the pixels (n, 2) of the part of a flat polygon in front of the camera.
+
+        Empty if there is none.
+        """
         clipped = _clipped(self.to_camera(points))
         return self.to_pixels(clipped) if len(clipped) else np.empty((0, 2))
 

@@ -1,6 +1,6 @@
-"""Movements of the virtual body as state machines stepped in time; no clock, no threads.
+"""Movements of the virtual body as state machines advanced in time steps, without clock and threads.
 
-A movement is stepped until ``done``; ``halt`` makes it brake.
+Advance a movement until it is ``done``; ``halt`` makes it brake.
 """
 
 from __future__ import annotations
@@ -16,9 +16,11 @@ TURN_BRAKING = 4000.0
 
 @dataclass
 class Motion:
-    """Movement by `amount` (m or °, signed) with limited speed and acceleration.
+    """Movement by ``amount`` (m or °, signed) with limited speed and acceleration.
 
-    ``moved`` is the progress; ``blocked`` is True if an obstacle ended it.
+    Attributes:
+        moved: Amount moved so far.
+        blocked: True if an obstacle ended the movement.
     """
 
     amount: float
@@ -33,37 +35,37 @@ class Motion:
 
     @classmethod
     def walk(cls, distance: float, speed: float) -> Motion:
-        """Return a straight movement (m, m/s)."""
+        """Return a straight movement; distance in m, speed in m/s."""
         return cls(distance, speed, WALK_ACCELERATION, WALK_BRAKING)
 
     @classmethod
     def turn(cls, angle_deg: float, speed_deg: float) -> Motion:
-        """Return a turn on the spot (°, °/s), to the left if positive."""
+        """Return a turn on the spot, to the left if positive; angle in °, speed in °/s."""
         return cls(angle_deg, speed_deg, TURN_ACCELERATION, TURN_BRAKING)
 
     @property
     def remaining(self) -> float:
-        """Signed remaining amount."""
+        """Remaining amount, signed."""
         return self.amount - self.moved
 
     def halt(self) -> None:
-        """Brake hard and end."""
+        """Brake hard and end the movement."""
         self._halting = True
         self.done = self.done or self._velocity == 0.0
 
     def block(self) -> None:
-        """End at once because of an obstacle."""
+        """End the movement immediately because of an obstacle."""
         self.blocked = True
         self.done = True
         self._velocity = 0.0
 
     def hold(self) -> bool:
-        """Pause at once; return False if it is ending and may not be paused."""
+        """Pause the movement immediately; return False if it is braking and must not be paused."""
         self._velocity = 0.0
         return not self._halting
 
     def step(self, dt: float) -> float:
-        """Advance by `dt` seconds and return the signed distance made."""
+        """Advance by ``dt`` seconds and return the signed distance."""
         if self.done:
             return 0.0
         if self._halting:
@@ -98,16 +100,16 @@ class Joint:
         self.target = min(max(target, self.low), self.high)
 
     def hold(self) -> None:
-        """Set the current angle as target."""
+        """Set the target to the current angle."""
         self.target = self.angle
 
     @property
     def arrived(self) -> bool:
-        """True at the target."""
+        """True if the joint has reached its target."""
         return self.angle == self.target
 
     def step(self, dt: float) -> None:
-        """Advance by `dt` seconds."""
+        """Advance by ``dt`` seconds."""
         way = self.target - self.angle
         reach = self.speed * dt
         self.angle = self.target if abs(way) <= reach else self.angle + math.copysign(reach, way)
@@ -125,7 +127,7 @@ class Wave:
     )
 
     def step(self) -> None:
-        """Aim at the next pose once both joints have arrived; the body steps the joints."""
+        """Set the next pose as target once both joints have arrived; the body advances the joints."""
         if self.done or not (self.arm.arrived and self.elbow.arrived):
             return
         if not self._poses:
@@ -136,7 +138,7 @@ class Wave:
         self.elbow.aim(elbow)
 
     def halt(self) -> None:
-        """Hold the arm at its current angle."""
+        """Stop the arm at its current angles."""
         self.arm.hold()
         self.elbow.hold()
         self.done = True

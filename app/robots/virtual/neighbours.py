@@ -1,4 +1,4 @@
-"""Positions of the virtual robots in the shared room."""
+"""Positions of the virtual robots that share a room."""
 
 from __future__ import annotations
 
@@ -10,9 +10,9 @@ from app.robots.driver.call import Clock
 from app.robots.virtual.room import Other
 
 GONE_AFTER_S = 1.5
-"""Silence after which a robot counts as gone."""
+"""Time without messages after which a robot counts as gone."""
 CALM_S = 0.2
-"""Interval of a standing robot's position messages."""
+"""Interval of position messages of a robot that doesn't move."""
 MAX_COUNT = 12
 
 
@@ -27,7 +27,7 @@ class Neighbours:
         self._told_s = -math.inf
 
     def hear(self, message: Mapping[str, object]) -> None:
-        """Process a robot's position; ignore invalid messages and our own."""
+        """Process a position message; invalid messages and those of this robot are ignored."""
         other = _parsed(message)
         if other is None or other.name == self._name:
             return
@@ -37,13 +37,13 @@ class Neighbours:
         self._seen[other.name] = (other, self._clock.now(), began if isinstance(began, int) else 0)
 
     def others(self) -> tuple[Other, ...]:
-        """Return the robots that are present now."""
+        """Return the robots that are currently present."""
         since = self._clock.now() - GONE_AFTER_S
         self._seen = {name: seen for name, seen in self._seen.items() if seen[1] >= since}
         return tuple(other for other, _at, _began in self._seen.values())
 
     def makes_way(self, x: float, y: float, radius: float, ignored: Collection[str] = ()) -> bool:
-        """Return whether this robot stands where another one (not ``ignored``) stood before it came."""
+        """Return True if this robot overlaps another one (not ``ignored``) that was there first."""
         return any(
             other.name not in ignored
             and math.hypot(other.x - x, other.y - y) < other.radius + radius
@@ -52,7 +52,7 @@ class Neighbours:
         )
 
     def publish_position(self, me: Other, publish: Callable[[Mapping[str, object]], None]) -> None:
-        """Publish this robot's position: at once if it changed, else at intervals."""
+        """Publish the position of this robot: immediately if it changed, otherwise at intervals."""
         now = self._clock.now()
         if me != self._told or now - self._told_s >= CALM_S:
             self._told, self._told_s = me, now

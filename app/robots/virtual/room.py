@@ -1,6 +1,7 @@
-"""Room of the virtual robots: walls, furniture and movable things.
+"""Room of the virtual robots: walls, furniture and movable objects.
 
-Metres; x grows east, y north, z up; angles in degrees, 0 is east, counter-clockwise.
+Lengths are in metres; x grows to the east, y to the north, z up. Angles are in degrees, counter-clockwise, 0
+is east.
 """
 
 from __future__ import annotations
@@ -18,7 +19,12 @@ WALLS: tuple[Wall, ...] = ("north", "south", "east", "west")
 
 @dataclass(frozen=True)
 class Opening:
-    """Flat object on a wall: ``at`` is the x or y of its centre, ``bottom`` its height above the floor."""
+    """Flat object on a wall.
+
+    Attributes:
+        at: x or y of the centre.
+        bottom: Height of the lower edge above the floor.
+    """
 
     kind: str
     wall: Wall
@@ -30,7 +36,7 @@ class Opening:
 
 @dataclass(frozen=True)
 class Box:
-    """Furniture aligned with the walls; it blocks robots and hides what is behind it."""
+    """Furniture aligned with the walls, which blocks robots and hides objects behind it."""
 
     kind: str
     x: float
@@ -41,7 +47,7 @@ class Box:
     name: str = ""
 
     def distance_to(self, x: float, y: float) -> float:
-        """Return the distance from a point on the floor to the nearest side; 0 inside."""
+        """Return the distance from a point on the floor to the nearest side; 0 if the point is inside."""
         dx = max(abs(x - self.x) - self.width / 2, 0.0)
         dy = max(abs(y - self.y) - self.depth / 2, 0.0)
         return math.hypot(dx, dy)
@@ -59,13 +65,13 @@ class Ball:
 
     @property
     def z(self) -> float:
-        """Height of its centre."""
+        """Height of the centre."""
         return self.radius
 
 
 @dataclass(frozen=True)
 class Person:
-    """Standing person who looks at the robot."""
+    """Standing person who looks towards the robot."""
 
     name: str
     x: float
@@ -75,7 +81,7 @@ class Person:
 
     @property
     def face_z(self) -> float:
-        """Height of the face's centre."""
+        """Height of the centre of the face."""
         return self.height - 0.5 * self.face_height
 
     @property
@@ -91,9 +97,10 @@ class Person:
 
 @dataclass(frozen=True)
 class Marker:
-    """ArUco card (dictionary 4x4, 50); ``size`` is the printed square without its white border.
+    """ArUco card (dictionary 4x4, 50); ``size`` is that of the printed square without its white border.
 
-    On a wall it faces one direction; one that stands in the room (None) is visible from everywhere.
+    A card on a wall faces one direction (``facing_deg``); one that stands in the room (None) is visible from
+    everywhere.
     """
 
     id: int
@@ -105,7 +112,7 @@ class Marker:
 
     @property
     def name(self) -> str:
-        """Name for the robot."""
+        """Name by which the robot reports the marker."""
         return f"marker {self.id}"
 
 
@@ -153,13 +160,13 @@ class Room:
 
     @property
     def things(self) -> tuple[Thing, ...]:
-        """Movable things; their names are unique."""
+        """Movable objects, which have unique names."""
         return (*self.balls, *self.people, *self.markers, *self.boxes)
 
     def thing(self, name: str) -> Thing | None:
-        """Return the thing of that name, or the first of that kind.
+        """Return the object with this name, or the first one of this kind.
 
-        Names are such as ``ball 2``; kinds are ``ball``, ``person``, ``face`` and ``marker``.
+        A name is, for example, ``ball 2``; kinds are ``ball``, ``person``, ``face`` and ``marker``.
         """
         named = next((thing for thing in self.things if thing.name == name), None)
         kinds: dict[str, Sequence[Thing]] = {
@@ -171,9 +178,9 @@ class Room:
         return named or next(iter(kinds.get(name, ())), None)
 
     def free(self, x: float, y: float, radius: float, before: tuple[float, float] | None = None) -> bool:
-        """Return whether a disc on the floor is free of obstacles, except balls, which roll away.
+        """Return True if a disc on the floor is free of obstacles, except balls, which roll away.
 
-        From a position ``before`` that overlaps an obstacle, moves away from it are allowed.
+        If the position ``before`` overlaps an obstacle, movements away from the obstacle are allowed.
         """
         if not (
             self.x_min + radius <= x <= self.x_max - radius
@@ -215,7 +222,7 @@ class Room:
         return min(hits)
 
     def hidden(self, eye: tuple[float, float, float], target: tuple[float, float, float]) -> bool:
-        """Return whether furniture or a robot is between two points."""
+        """Return True if furniture or a robot is between two points."""
         ex, ey, ez = eye
         dx, dy, dz = target[0] - ex, target[1] - ey, target[2] - ez
         length = math.hypot(dx, dy)
@@ -232,9 +239,9 @@ class Room:
         return False
 
     def moved(self, name: str, x: float, y: float) -> Room:
-        """Return the room with a thing moved, within the walls; unchanged if the thing doesn't exist.
+        """Return the room with an object moved, within the walls; unchanged if the object doesn't exist.
 
-        A marker near a wall is attached to it.
+        A marker near a wall is attached to the wall.
         """
         thing = self.thing(name)
         match thing:
@@ -257,7 +264,7 @@ class Room:
         return self
 
     def pushed_ball(self, x: float, y: float, radius: float) -> Room:
-        """Return the room after a disc at (x, y) pushed overlapping balls aside."""
+        """Return the room after a disc at (x, y) has pushed overlapping balls aside."""
         room = self
         for ball in self.balls:
             away_x, away_y = ball.x - x, ball.y - y
@@ -288,9 +295,9 @@ class Room:
     def carried(
         self, x: float, y: float, radius: float, at: tuple[float, float]
     ) -> tuple[float, float] | None:
-        """Return where a body ``at`` a position ends up when it is carried to (x, y), or None if blocked.
+        """Return where a body at position ``at`` ends up when it is carried to (x, y); None if it is blocked.
 
-        It stops at walls and slides along obstacles.
+        The body stops at walls and slides along obstacles.
         """
         place = self.inside(x, y, radius)
         for to in (place, (place[0], at[1]), (at[0], place[1])):
@@ -299,7 +306,7 @@ class Room:
         return None
 
     def inside(self, x: float, y: float, half: float, deep: float | None = None) -> tuple[float, float]:
-        """Return the nearest position at which something of this half size is within the walls."""
+        """Return the nearest position at which an object of this half size is within the walls."""
         deep = half if deep is None else deep
         return (
             min(max(x, self.x_min + half), self.x_max - half),

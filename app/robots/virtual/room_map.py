@@ -1,8 +1,8 @@
-"""Replicated map of the shared room's things: a last-writer-wins register per thing.
+"""Replicated map of the objects in the shared room: a last-writer-wins register for each object.
 
-Each thing has the time (ns since 1970) of its last change. A participant that changes something publishes the
-whole map on `TOPIC`; receivers merge newer entries. So all converge to the same room in any message order,
-without an owner (ADR 0022).
+Each object has the time (ns since 1970) of its last change. A participant that changes an object publishes
+the whole map on `TOPIC`; receivers merge newer entries. So all participants converge to the same room in any
+order of messages, without an owner (ADR 0022).
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ _FARTHEST = 100.0
 
 @dataclass(frozen=True, slots=True)
 class ThingPlace:
-    """Thing in the map: kind, position (m), whether it was removed, and the time of its change (ns)."""
+    """Object in the map: kind, position (m), ``gone`` if it was removed, and the time of the change (ns)."""
 
     name: str
     kind: str
@@ -39,12 +39,12 @@ class ThingPlace:
 
     @property
     def order(self) -> tuple[int, bool, float, float]:
-        """Merge key: the greater one of two entries for the same thing wins."""
+        """Merge key: of two entries for the same object, the greater one wins."""
         return self.changed_ns, self.gone, self.x, self.y
 
 
 def kind_of(thing: Thing) -> str:
-    """Return the kind of a thing, as in maps and drawings."""
+    """Return the kind of an object, as in maps and drawings."""
     match thing:
         case Ball():
             return "ball"
@@ -57,7 +57,7 @@ def kind_of(thing: Thing) -> str:
 
 
 class RoomMap:
-    """Things of the room. Not thread-safe: hold the owner's lock around every call."""
+    """Objects of the room. Not thread-safe: hold the owner's lock around every call."""
 
     def __init__(self, start: Room | None = None, clock_ns: Callable[[], int] = time.time_ns) -> None:
         self.start = start if start is not None else Room()
@@ -72,12 +72,12 @@ class RoomMap:
     # -- local changes ------------------------------------------------------------
 
     def move(self, name: str, x: float, y: float) -> bool:
-        """Move a thing within the walls; return whether anything changed."""
+        """Move an object within the walls; return True if anything changed."""
         moved = self.room().moved(name, x, y)
         return self.follow(moved)
 
     def follow(self, room: Room) -> bool:
-        """Copy the positions of all things in a room; return whether anything changed."""
+        """Copy the positions of all objects in a room; return True if anything changed."""
         changed = False
         for thing in room.things:
             known = self._things.get(thing.name)
@@ -87,7 +87,7 @@ class RoomMap:
         return changed
 
     def add(self, kind: str, x: float, y: float) -> str | None:
-        """Add a thing of a kind; return its name, or None if there are enough of them."""
+        """Add an object; return its name, or None if the limit for this kind is reached."""
         there = {each.name for each in self._things.values() if not each.gone}
         free = [name for name in _names(kind) if name not in there]
         if not free:
@@ -97,7 +97,7 @@ class RoomMap:
         return free[0]
 
     def remove(self, name: str) -> bool:
-        """Remove a thing; return False if it doesn't exist."""
+        """Remove an object; return False if it doesn't exist."""
         known = self._things.get(name)
         if known is None or known.gone:
             return False
@@ -105,7 +105,7 @@ class RoomMap:
         return True
 
     def put_back(self) -> None:
-        """Restore the initial state; added things are removed."""
+        """Restore the initial state; objects that were added are removed."""
         first = {thing.name: thing for thing in self.start.things}
         for known in list(self._things.values()):
             thing = first.get(known.name)
@@ -123,7 +123,7 @@ class RoomMap:
     # -- replication ------------------------------------------------------------------------------
 
     def merge(self, message: Mapping[str, object]) -> bool:
-        """Merge newer entries of another map; return whether any changed. Invalid entries are ignored."""
+        """Merge newer entries of another map; return True if any changed. Invalid entries are ignored."""
         told = message.get("things")
         changed = False
         for thing in _parsed(told if isinstance(told, Sequence) and not isinstance(told, str) else ()):
@@ -137,13 +137,13 @@ class RoomMap:
         return changed
 
     def message(self) -> dict[str, object]:
-        """Return the whole map as published and saved."""
+        """Return the whole map as it is published and saved."""
         return {"things": [asdict(thing) for thing in self._things.values()]}
 
     # -- conversion --------------------------------------------------------------------------------
 
     def room(self) -> Room:
-        """Return the room with every thing in its place."""
+        """Return the room with every object at its current place."""
         balls, people, markers, boxes = [], [], [], []
         for made in filter(None, map(self._made, self._things.values())):
             match made:

@@ -21,7 +21,7 @@ FIGURE_WIDTH = FIGURE[0] / FIGURE[1]  # of its height
 
 
 def bgr(colour: str) -> Colour:
-    """Convert "#rrggbb" to OpenCV's order."""
+    """Convert "#rrggbb" to a colour in the order of OpenCV."""
     return int(colour[5:7], 16), int(colour[3:5], 16), int(colour[1:3], 16)
 
 
@@ -40,7 +40,7 @@ def _rect(picture: Picture, left: float, top: float, right: float, bottom: float
 
 
 def wall(room: Room, side: Wall) -> Texture:
-    """Return a wall with its openings, seen from inside: its left end is the left edge."""
+    """Return a wall with its openings as seen from inside."""
     length = room.y_max - room.y_min if side in {"east", "west"} else room.x_max - room.x_min
     width, height = round(length * PER_M), round(room.height * PER_M)
     picture = gradient(height, width, "#b9bdc0", "#d5d6d4")
@@ -131,7 +131,7 @@ def _painting(picture: Picture, left: float, top: float, right: float, bottom: f
 
 
 def floor(room: Room) -> Texture:
-    """Return wooden boards along the x axis, darker near the walls."""
+    """Return a floor of wooden boards along the x axis, darker near the walls."""
     width, depth = round((room.x_max - room.x_min) * PER_M), round((room.y_max - room.y_min) * PER_M)
     shades = np.random.default_rng(5)  # always the same boards
     picture = np.zeros((depth, width, 3), dtype=np.uint8)
@@ -153,7 +153,7 @@ def floor(room: Room) -> Texture:
 
 
 def ceiling() -> Texture:
-    """Return a plain bright texture."""
+    """Return a bright ceiling."""
     return Texture(gradient(64, 64, "#dfe1e1", "#d3d5d5"))
 
 
@@ -181,7 +181,7 @@ MARKER_RIM = 8 / 6  # the card is this much wider than its printed square
 
 
 class _Paint:
-    """Drawing of shapes on a transparent image, in parts of the figure's width and height."""
+    """Draws shapes on a transparent image; positions are fractions of the width and height of the figure."""
 
     def __init__(self, width: int, height: int) -> None:
         self.width, self.height = width * _FINE, height * _FINE
@@ -223,7 +223,7 @@ class _Paint:
 
 
 def person() -> Texture:
-    """Return a friendly person from head to feet."""
+    """Return a person, from head to feet."""
     paint = _Paint(*FIGURE)
     for x in (0.40, 0.60):  # legs and shoes
         paint.shape([(x - 0.1, 0.62), (x + 0.1, 0.62), (x + 0.075, 0.97), (x - 0.075, 0.97)], "#3b4658")
@@ -264,7 +264,7 @@ def _head(paint: _Paint) -> None:
 
 
 def robot(small: bool, *, faces: bool) -> Texture:
-    """Return another robot, the large white or the small green one, from the front or back."""
+    """Return another robot, the large white or the small green one, from the front or from behind."""
     paint = _Paint(*(FIGURE if not small else (400, 300)))
     (_small_robot if small else _large_robot)(paint, faces=faces)
     return Texture(paint.done())

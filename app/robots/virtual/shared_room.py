@@ -1,4 +1,4 @@
-"""Participation of one virtual robot in the shared room."""
+"""Connection of a virtual robot to the room it shares with others."""
 
 from __future__ import annotations
 
@@ -13,11 +13,11 @@ from app.robots.virtual.room import Other, Room
 from app.robots.virtual.room_map import ROBOTS_TOPIC, TOPIC, RoomMap
 
 ARRIVES_S = 3.0
-"""Time after its start in which a robot makes way for one that stood there before."""
+"""Time after its start in which a robot moves away from a place where another robot already stood."""
 
 
 class InRoom(Protocol):
-    """Body in the room, as needed here."""
+    """Part of the interface of a body that is used here."""
 
     room: Room
     x: float
@@ -32,11 +32,11 @@ class InRoom(Protocol):
         """Set the position."""
 
     def reset(self, room: Room) -> None:
-        """Return to the start in this room and stop everything."""
+        """Stop everything and return to the start position in this room."""
 
 
 class SharedRoom:
-    """Synchronization of a body's room with the other robots; ``lock`` guards the body."""
+    """Synchronizes the room of a body with the other robots; ``lock`` guards the body."""
 
     def __init__(
         self, link: Link, clock: Clock, body: InRoom, lock: AbstractContextManager[object], like: Other
@@ -63,7 +63,7 @@ class SharedRoom:
     # -- call with the lock held ------------------------------------------------------------------------
 
     def take_over(self) -> None:
-        """Update the body's room and the other robots in it."""
+        """Update the room of the body and the other robots in it."""
         body, others = self._body, self._neighbours.others()
         if self._map.revision != self._revision:
             self._revision = self._map.revision
@@ -77,20 +77,20 @@ class SharedRoom:
                 self._start = body.x, body.y
 
     def follow(self) -> None:
-        """Publish the positions of things that the body has pushed."""
+        """Publish the positions of objects that the body has pushed."""
         if self._map.follow(self._body.room):
             self._revision, self._is_new = self._map.revision, True
 
     def move(self, name: str, x: float, y: float) -> None:
-        """Move a thing on behalf of a person."""
+        """Move an object on behalf of the user."""
         self._is_new = self._map.move(name, x, y) or self._is_new
         self.take_over()
 
     def to_start(self, together: object) -> None:
-        """Return the body to its start position; the things of the room stay.
+        """Move the body to its start position; the objects in the room are not moved.
 
-        ``together`` are the names of the robots that return now: their positions become free. Other robots at
-        the start position are avoided.
+        ``together`` are the names of the robots that return at the same time, whose positions become free.
+        Other robots at the start position are avoided.
         """
         self.take_over()
         names = together if isinstance(together, list) else []
@@ -111,7 +111,7 @@ class SharedRoom:
     # -- call without the lock -------------------------------------------------------------------------
 
     def publish_changes(self) -> None:
-        """Publish changes; call after every step."""
+        """Publish the changes of the room. Call this after every step."""
         with self._lock:
             body = self._body
             me = replace(

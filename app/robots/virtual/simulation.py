@@ -31,14 +31,14 @@ _SMALL_STEP_S = 0.004  # used while a stop waits for the body to stand still
 _LOST_AFTER_S = 0.5
 _JOIN_TIMEOUT_S = 2.0
 ITSELF = "robot"
-"""Name of the robot itself in a move by a person."""
+"""Name with which the user moves the robot itself."""
 PLACES = ("head", "left_hand", "right_hand")
 _log = logging.getLogger(__name__)
 
 
 @dataclass(frozen=True)
 class _View:
-    """View of a room from one position; reused until one of both changes."""
+    """View of a room from one position, reused until the room or the position changes."""
 
     room: Room
     lens: Lens
@@ -47,7 +47,7 @@ class _View:
 
 
 class Simulation:
-    """Body with its lock and two threads; publishes on `link`."""
+    """Body with its lock and two threads; publishes on ``link``."""
 
     def __init__(self, body: Body, link: Link, clock: Clock) -> None:
         self.body = body
@@ -80,7 +80,7 @@ class Simulation:
             thread.join(_JOIN_TIMEOUT_S)
 
     def wait_for(self, true: Callable[[], bool], timeout_s: float) -> bool:
-        """Wait until a condition on the body is true; return False after the timeout."""
+        """Wait until a condition on the body is true; return False on timeout."""
         limit = self._clock.now() + timeout_s
         with self.changed:
             while self._clock.now() < limit:
@@ -113,7 +113,7 @@ class Simulation:
             self._shared.publish_changes()
 
     def publish_step(self, happenings: list[BodyEvent], step: int) -> None:
-        """Publish events, the drawing, and the sensors due at this step."""
+        """Publish events, the drawing, and the sensor values due at this step."""
         for happening in happenings:
             self._link.happen(happening.event, **happening.data)
             if happening.event in {"touched", "released"}:
@@ -143,7 +143,7 @@ class Simulation:
                 self.capture(publish=is_watched)
 
     def capture(self, *, publish: bool) -> None:
-        """Take one image, detect objects, and publish both."""
+        """Render one image, detect objects, and publish both."""
         with self.changed:
             room, lens = self.body.room, lens_of(self.body)
         if self._view is None or (self._view.room, self._view.lens) != (room, lens):
@@ -187,9 +187,9 @@ class Simulation:
         return Beat(self._clock, self._ended, 1 / rate_hz)
 
     def act(self, change: Mapping[str, object]) -> None:
-        """Apply a person's change of the world.
+        """Apply a change of the world by the user.
 
-        Changes are touch, move, say, hold, reset, start, and the simulation of an event.
+        Changes are touch, move, say, hold, reset, start, and a simulated event.
         """
         place, moved, word = change.get("touch"), change.get("move"), change.get("say")
         x, y = finite(change.get("x")), finite(change.get("y"))
@@ -233,7 +233,7 @@ class Simulation:
 
 
 class Beat:
-    """Iterator over regular times until an event is set; late beats are skipped."""
+    """Iterator over regular times until an event is set. If it is late, times are skipped."""
 
     def __init__(self, clock: Clock, ended: threading.Event, period_s: float) -> None:
         self._clock, self._ended, self._period_s = clock, ended, period_s
@@ -251,12 +251,12 @@ class Beat:
 
 
 def told_event(change: Mapping[str, object]) -> tuple[str, dict[str, object]]:
-    """Return the event that a person simulates, ``{"happen": "bumped", "side": "front"}``, and its data."""
+    """Return name and data of a simulated event, such as ``{"happen": "bumped", "side": "front"}``."""
     return bounded_str(change["happen"]), {name: value for name, value in change.items() if name != "happen"}
 
 
 def may_happen(link: Link, event: str, data: Mapping[str, object]) -> bool:
-    """Return whether a simulated event matches the description; log it if it doesn't."""
+    """Return True if a simulated event matches the description; otherwise log the differences."""
     wrong = link.wrong_in(event, data)
     if wrong:
         _log.warning("%s: it can't notice '%s': %s", link.name, quotable(event), "; ".join(wrong))
@@ -264,7 +264,7 @@ def may_happen(link: Link, event: str, data: Mapping[str, object]) -> bool:
 
 
 def drawable(body: Body) -> dict[str, object]:
-    """Return the state for drawing, in metres and degrees.
+    """Return the state of the body for drawing, in metres and degrees.
 
     Head pitch is positive down; arms hang at 0 and point up at 180.
     """
@@ -293,7 +293,7 @@ def drawable(body: Body) -> dict[str, object]:
 
 
 def surroundings(room: Room) -> dict[str, object]:
-    """Return the room and its things for drawing."""
+    """Return the room and its objects for drawing."""
     return {
         "objects": _objects(room),
         "room": {

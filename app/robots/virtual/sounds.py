@@ -1,4 +1,4 @@
-"""Sounds and tones of a virtual robot, stepped in time."""
+"""Sounds and tones of a virtual robot, advanced in time steps."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import Literal, TypeAlias
 
 Notes: TypeAlias = Sequence[tuple[float, float]]
-"""Frequency in hertz (0 is silence) and duration in seconds."""
+"""Sequence of notes, each with frequency in hertz (0 for a pause) and duration in seconds."""
 SoundName: TypeAlias = Literal["beep", "bell", "cheer", "buzzer", "whistle"]
 
 SOUNDS: Mapping[SoundName, Notes] = {
@@ -21,7 +21,7 @@ SOUNDS: Mapping[SoundName, Notes] = {
 
 @dataclass
 class Sound:
-    """Sound being played; ``done`` after the last note. ``number`` identifies it."""
+    """Sound being played; ``done`` is True after the last note. ``number`` identifies the sound."""
 
     number: int
     title: str
@@ -31,16 +31,16 @@ class Sound:
 
     @property
     def seconds(self) -> float:
-        """Total duration."""
+        """Total duration in seconds."""
         return sum(seconds for _hz, seconds in self.notes)
 
     def step(self, seconds: float) -> None:
-        """Advance by `seconds`."""
+        """Advance by a number of seconds."""
         self.played_s += seconds
         self.done = self.done or self.played_s >= self.seconds
 
     def drawable(self) -> dict[str, object]:
-        """Return the state for Studio; ``played`` goes from 0 to 1."""
+        """Return the state for Studio. ``played`` is the progress from 0 to 1."""
         return {
             "number": self.number,
             "title": self.title,

@@ -1,7 +1,7 @@
 """Object detection of virtual robots: colours, red balls, markers, faces.
 
-Faces are located by the camera's geometry instead of the pixels, because a cascade classifier costs a third
-of a core. A face counts only if most of it is in the image and nothing hides it.
+Faces are located by the geometry of the camera instead of the pixels, because a cascade classifier uses a
+third of a core. A face is detected only if most of it is in the image and nothing hides it.
 """
 
 from __future__ import annotations
@@ -41,13 +41,13 @@ class Detection:
 
     @property
     def middle(self) -> tuple[float, float]:
-        """Centre of its box."""
+        """Centre of the box in pixels."""
         x, y, width, height = self.box
         return x + width / 2, y + height / 2
 
 
 def message(found: Iterable[Detection], lens: Lens) -> dict[str, object]:
-    """Return detections as published; ``name`` is that of the largest, or null."""
+    """Return the message with detections. Its ``name`` is that of the largest one, or null."""
     listed = sorted(found, key=lambda one: -one.box[2] * one.box[3])
     return {
         "count": len(listed),
@@ -61,14 +61,14 @@ def message(found: Iterable[Detection], lens: Lens) -> dict[str, object]:
 
 
 class ObjectDetector:
-    """Detector of balls, markers and faces."""
+    """Detects balls, markers and faces."""
 
     def __init__(self) -> None:
         dictionary = cv2.aruco.getPredefinedDictionary(cv2.aruco.DICT_4X4_50)
         self._markers = cv2.aruco.ArucoDetector(dictionary)
 
     def balls(self, picture: Picture) -> list[Detection]:
-        """Return round red regions."""
+        """Return the round red regions of an image."""
         hsv = cv2.cvtColor(picture, cv2.COLOR_BGR2HSV)
         low, high = (
             cv2.inRange(hsv, (0, 135, 60), (7, 255, 255)),
@@ -85,7 +85,7 @@ class ObjectDetector:
         return found
 
     def markers(self, picture: Picture) -> list[Detection]:
-        """Return ArUco cards of the dictionary 4x4, 50."""
+        """Return the ArUco cards (dictionary 4x4, 50) in an image."""
         corners, ids, _ = self._markers.detectMarkers(cv2.cvtColor(picture, cv2.COLOR_BGR2GRAY))
         # OpenCV returns None for no markers, unlike its annotations say.
         numbers = [int(one) for one in np.asarray(ids).ravel()] if len(corners) else []
@@ -95,7 +95,7 @@ class ObjectDetector:
         ]
 
     def faces(self, room: Room, lens: Lens) -> list[Detection]:
-        """Return people who look at the camera."""
+        """Return the faces of people who look at the camera, the largest first."""
         found = [_face(room, person, lens) for person in room.people]
         return sorted((each for each in found if each is not None), key=lambda one: -one.box[2] * one.box[3])
 
@@ -129,7 +129,7 @@ def _box_of(points: ArrayLike) -> tuple[int, int, int, int]:
 
 
 def angles_to(lens: Lens, pixel: tuple[float, float]) -> tuple[float, float]:
-    """Return how far the head must turn to centre a pixel: degrees to the left, degrees down."""
+    """Return the head movement that centres a pixel: degrees to the left, degrees down."""
     left = -np.degrees(np.arctan2(pixel[0] - lens.width / 2, lens.focal))
     down = np.degrees(np.arctan2(pixel[1] - lens.height / 2, lens.focal))
     return float(left), float(down)
@@ -137,7 +137,7 @@ def angles_to(lens: Lens, pixel: tuple[float, float]) -> tuple[float, float]:
 
 @dataclass(frozen=True)
 class ColourPatch:
-    """Largest region of a colour: ``x`` from -1 (left) to 1, ``area`` as a share of the image."""
+    """Largest region of a colour: ``x`` from -1 (left) to 1, ``area`` as a fraction of the image."""
 
     name: str
     x: float
@@ -145,7 +145,7 @@ class ColourPatch:
 
 
 def colours_in(picture: Picture) -> dict[str, ColourPatch]:
-    """Return the colours of a BGR image that fill at least 0.4 % of it in one region."""
+    """Return the colours that fill at least 0.4 % of a BGR image in one region."""
     height, width = picture.shape[:2]
     hsv = cv2.cvtColor(picture, cv2.COLOR_BGR2HSV)
     found = {}

@@ -1,4 +1,4 @@
-"""Body of the virtual two-wheeled robot: speeds stepped in time; no clock, no threads."""
+"""Body of the virtual two-wheeled robot: speeds advanced in time steps, without clock and threads."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ _MAX_STEP_S = 0.01
 _DRAIN_PER_S, _DRAIN_MOVING_PER_S = 1 / 300, 1 / 90
 _ASIDE_DEG = 50.0
 PRESS_S = 0.3
-"""Time for which a bumper pressed by a person stays pressed."""
+"""Time for which a bumper stays pressed after the user pressed it."""
 
 
 @dataclass
@@ -38,55 +38,58 @@ class WheelBody:
     happenings: deque[BodyEvent] = field(default_factory=lambda: deque(maxlen=200))
     _target: tuple[float, float] = (0.0, 0.0)
     held: bool = False
-    """True while a person holds it up, so that it doesn't move."""
+    """True while the user lifts the robot, so that it doesn't move."""
     driven: float = 0.0
     """Metres rolled, forwards and backwards."""
     _pressed_s: float = 0.0
 
     def drive(self, speed: float, turn_speed: float) -> None:
-        """Set the target speed (m/s, forwards positive) and turn (°/s, left positive); 0, 0 brakes."""
+        """Set the target speed (m/s, positive forwards) and turning speed (°/s, positive to the left).
+
+        0, 0 brakes.
+        """
         self._target = (speed, turn_speed)
 
     @property
     def still(self) -> bool:
-        """True when nothing moves and the target speeds are 0."""
+        """True if nothing moves and the target speeds are 0."""
         return self._target == (0.0, 0.0) and self.speed == 0.0 and self.turn_speed == 0.0
 
     @property
     def distance(self) -> float:
-        """Distance from its rim to the next obstacle ahead, at most 4 m."""
+        """Distance from the edge of the robot to the next obstacle ahead, at most 4 m."""
         ahead = self.room.distance_ahead(self.x, self.y, self.theta_deg) - RADIUS
         return min(FULL_RANGE, max(0.0, ahead))
 
     def press(self, side: str) -> None:
-        """Press a bumper: it stops as after a collision."""
+        """Press a bumper. The robot stops as after a collision."""
         self.speed, self.turn_speed, self._target = 0.0, 0.0, (0.0, 0.0)
         self.bumped, self._pressed_s = side, PRESS_S
         self.happenings.append(BodyEvent("bump", {"side": side}))
 
     def reset(self, room: Room) -> None:
-        """Return to the start in this room."""
+        """Stop and return to the start position in this room."""
         self.room, self._target, self.speed, self.turn_speed = room, (0.0, 0.0), 0.0, 0.0
         self.x, self.y = room.nearest_free(*START[:2], RADIUS)
         self.theta_deg, self.light, self.bumped, self.held = START[2], LIGHT, "", False
 
     def hold(self, *, held: bool) -> None:
-        """Pick it up or put it down; commanded speeds apply again afterwards."""
+        """Lift the robot or put it down. The commanded speeds apply again afterwards."""
         self.held = held
 
     def carry(self, x: float, y: float) -> None:
-        """Move it to a place if that is free; it stops at walls."""
+        """Move the robot to a place if that is free; it stops at walls."""
         place = self.room.carried(x, y, RADIUS, (self.x, self.y))
         if place is not None:
             self.place(*place)
 
     def place(self, x: float, y: float) -> None:
-        """Set its position."""
+        """Set the position of the robot."""
         self.x, self.y = x, y
         self.room = self.room.pushed_ball(x, y, RADIUS)
 
     def step(self, seconds: float) -> None:
-        """Simulate time in small steps, so that it can't pass through objects."""
+        """Advance the simulation in small steps, so that the robot can't pass through objects."""
         while seconds > 1e-9:
             dt = min(seconds, _MAX_STEP_S)
             seconds -= dt
