@@ -91,8 +91,7 @@ class SelfDrive(QObject):
         failed_picture: str = "failed",
     ) -> None:
         # Starts immediately. `steps` replace the default ones; `failed_picture` is the name of the screenshot
-        # of a
-        # failed step.
+        # of a failed step.
         super().__init__(window)
         self._window, self._commands, self._folder = window, window.commands, folder
         self._listener = listener if listener is not None else SaysEnd()

@@ -50,7 +50,7 @@ class PanelContext:
 
     Attributes:
         open_topic: Show a topic in the panel that fits its message type.
-        toast: Report what the person just did.
+        toast: Confirm an action of the user.
         run: Run a command of the window by its id (`app.ui.shell.commands.table`).
         files: Open and save dialogs.
         keys_to_question: Give the keyboard focus to the question of a running behaviour, if any.
@@ -79,7 +79,7 @@ class Hindrance:
 
     Attributes:
         sentence: The reason.
-        fix: What to do; may be empty.
+        fix: Instruction for the user; may be empty.
         button: Text of the button, such as "Resume".
         run: Action of the button.
     """
@@ -121,7 +121,7 @@ class Panel:
 
     Attributes:
         name: Id in saved layouts.
-        title: Title, marked with `lazy`.
+        title: Title, wrapped in `lazy`.
         icon: Name of a Lucide icon.
         accepts: Codecs of the topics that the panel can show, such as "image", or `ANY_TYPE`.
         make: Factory of the widget.

@@ -87,8 +87,7 @@ class MainWindow(QMainWindow):
         clock: Callable[[], float] = time.monotonic,
     ) -> None:
         # `asks` opens file dialogs, by default those of the system or Studio. `clock` returns monotonic
-        # seconds;
-        # it measures how long a panel has been hidden.
+        # seconds; it measures how long a panel has been hidden.
         super().__init__()
         self._clock = clock
         self.session, self.theme, self.panels = session, theme, panels
@@ -383,8 +382,7 @@ class MainWindow(QMainWindow):
 
     def _half_tick(self) -> None:
         # The timer runs 60 times a second while images are visible: at 30 Hz about every tenth image would
-        # arrive
-        # together with another one and be dropped. Otherwise it runs at 30 Hz, the rate of the tick.
+        # arrive together with another one and be dropped. Otherwise it runs at 30 Hz, the rate of the tick.
         self._halves += 1
         if self._halves % 2 or not self._twice:
             self.tick()

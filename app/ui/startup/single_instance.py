@@ -226,7 +226,7 @@ class SingleInstanceServer(QObject):
             socket.deleteLater()
 
     def close(self) -> None:
-        """Stop to accept requests."""
+        """Stop accepting requests."""
         self._server.close()
 
 

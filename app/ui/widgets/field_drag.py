@@ -58,7 +58,7 @@ class DragKeys(QObject):
             application.installEventFilter(self)
 
     def end(self) -> None:
-        """Stop to filter keys."""
+        """Stop filtering keys."""
         application = QApplication.instance()
         if application is not None:
             application.removeEventFilter(self)

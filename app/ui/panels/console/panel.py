@@ -125,7 +125,7 @@ class ConsolePanel(PanelWidget):
         self._say_nothing()
 
     def _follow(self, records: Sequence[ConsoleRecord]) -> None:
-        # Keeps the visible lines in place when the person has scrolled down.
+        # Keeps the visible lines in place when the user has scrolled down.
         bar = self.list.verticalScrollBar()
         before = bar.value()
         came = self.model.follow(records, self._wanted())

@@ -1,4 +1,4 @@
-"""First steps panel: shows the next step and checks off completed ones."""
+"""First steps panel, which shows the next step of the tutorial and checks off completed ones."""
 
 from __future__ import annotations
 

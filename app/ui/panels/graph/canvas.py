@@ -141,7 +141,7 @@ class GraphCanvas(QWidget):
         if scene is None or not self._waiting:
             return 0
         if not scene.has_figures(self.scale):
-            self._waiting = []  # updated when the person zooms in
+            self._waiting = []  # updated when the user zooms in
             return 0
         now, self._waiting = self._waiting[:MAX_UPDATES_PER_TICK], self._waiting[MAX_UPDATES_PER_TICK:]
         has_words = scene.has_words(self.scale)

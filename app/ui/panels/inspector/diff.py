@@ -150,8 +150,7 @@ def _kind(value: object) -> str:
 
 def _same(before: object, after: object) -> bool:
     # Equality at every depth, in which true is not 1 and the order of keys is ignored. Lazy containers
-    # compare
-    # their JSON texts.
+    # compare their JSON texts.
     if isinstance(before, (LazyList, LazyObject)) and isinstance(after, (LazyList, LazyObject)):
         return before == after
     return size_of(before) == size_of(after) and _written(before) == _written(after)

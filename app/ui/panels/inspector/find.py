@@ -185,7 +185,7 @@ class FindBar(QWidget):
         self.mark(wrong=wrong)
 
     def mark(self, *, wrong: bool) -> None:
-        """Show whether the field has no match or an invalid query (`wrong`)."""
+        """Set or remove the style for a missing match or an invalid query."""
         self.field.setProperty("wrong", "true" if wrong else "false")
         self.field.style().unpolish(self.field)
         self.field.style().polish(self.field)

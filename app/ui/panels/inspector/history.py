@@ -66,13 +66,13 @@ class HistoryStrip(QWidget):
             feed.join(topic, self.kept, deep=False)
 
     def pause(self) -> None:
-        """Stop to collect messages until the next `begin`. Collected messages are kept."""
+        """Stop collecting messages until the next `begin`. Collected messages are kept."""
         if self._feed is not None:
             self._feed.leave(self._topic, self.kept)
             self._feed = None
 
     def forget(self) -> None:
-        """Stop to collect messages and clear the history, because the source changed."""
+        """Stop collecting messages and clear the history, because the source changed."""
         self.pause()
         self._topic = ""
         self.kept.rewind()

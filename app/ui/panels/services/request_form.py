@@ -103,7 +103,7 @@ class RequestForm(QWidget):
             field.setChecked(value is True)
             return
         words = value if isinstance(value, str) and kind == "str" else json.dumps(value, ensure_ascii=False)
-        # don't replace "12" by "12.0" while the person types
+        # don't replace "12" by "12.0" while the user types
         if field.text() != words and not (field.hasFocus() and self._meant(name, field.text()) == (value,)):
             field.setText(words)
         self._mark(field, wrong=False)

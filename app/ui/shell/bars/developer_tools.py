@@ -177,8 +177,7 @@ class DeveloperTools(QObject):
 
     def _fit(self) -> None:
         # Hides tools in this order if there is little room: Keep, source, layouts, Freeze, Record. All of
-        # them
-        # are also in menus.
+        # them are also in menus.
         width, scaled, recording = self._bar.width(), self._shell.theme.scaled, self.source.is_recording
         paint.show_when(self.source, recording or width >= scaled(SOURCE_ROOM_PX))
         paint.show_when(self.source.back, recording)

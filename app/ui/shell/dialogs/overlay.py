@@ -61,7 +61,7 @@ class StopPlaces(QObject):
                 widget = widget.parentWidget()
 
     def rest(self) -> None:
-        """Stop to watch the buttons."""
+        """Stop watching the buttons."""
         watched, self._watched = self._watched, []
         for widget in watched:
             if isValid(widget):

@@ -49,8 +49,7 @@ class SettingsSheet(Overlay):
         restart: Callable[[], object] | None = None,
     ) -> None:
         # `voice` describes the speech output and is called whenever the sheet opens. `restart` restarts
-        # Studio and
-        # reopens all documents; None if that is impossible.
+        # Studio and reopens all documents; None if that is impossible.
         super().__init__(theme, window, _("Settings"))
         self._state, self._settings, self._files, self._voice = state, settings, files, voice
         self.language = self._language_input()

@@ -104,7 +104,7 @@ class OpenRow(PaintedButton):
 
 
 def state_words(work: OpenWork) -> str:
-    """Describe whether a behaviour is saved. An unchanged example doesn't need to be."""
+    """Return the saved state as text. An unchanged example doesn't need to be saved."""
     if work.runs:
         return _("running")
     if work.unsaved:
