@@ -59,7 +59,7 @@ class Tokens:
 
 
 def load(path: Path | None = None) -> Tokens:
-    """Read the tokens. Raises KeyError or ValueError if the file is invalid (see `check_tokens`)."""
+    """Load the design tokens. Raises KeyError or ValueError if the file is invalid."""
     source = path if path is not None else resources.path("theme", "tokens.json")
     return parse(json.loads(source.read_text("utf-8")))
 
