@@ -165,7 +165,7 @@ class RobotValueError(AppError, ValueError):
     """
 
     def __init__(self, words: str, place: str = "", **holes: object) -> None:
-        # `words` is marked with `lazy`; its hole `place` and the others are filled here.
+        # `words` is a `lazy` text; its placeholder `place` and the others are filled here.
         self.place = place
         self._words, self._holes = words, holes
         super().__init__(_(words).format(place=place or _("the value"), **holes))

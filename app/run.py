@@ -252,7 +252,7 @@ def _run(
     except KeyboardInterrupt:
         was_interrupted = True
     with without_interrupts():
-        # Once at once, and again after the program has ended and can't move the robots any more.
+        # Immediately, and again when the program has ended and can't move the robots any more.
         stopper.send_stop(ends=runner.program_key)
         runner.close()
         names = [*(robot.name for robot in found.robots if robot.name in program.robots), *events.silent]

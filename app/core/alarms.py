@@ -267,7 +267,7 @@ class SessionAlarms:
             alerts.resolve(_alert_id(rule.id))
             return
         if event.kind == "still":
-            alerts.resolve(_alert_id(rule.id))  # its banner was dismissed by the snooze
+            alerts.resolve(_alert_id(rule.id))  # the snooze dismissed its banner
         self._on.add(rule.id)
         self._update_alert(rule, event.seen, count=1)
         if event.is_snoozed or not any(action.kind == "banner" for action in rule.actions):
@@ -275,7 +275,7 @@ class SessionAlarms:
 
     def _update_alert(self, rule: AlarmRule, seen: Scalar, count: int) -> None:
         condition, record = rule.condition, self.history.last(rule.id)
-        # prefers the recorded value that triggered the alarm over the current one
+        # use the value that triggered the alarm, if it was recorded, instead of the current one
         words = record.words if record is not None else what_words(condition, seen)
         if condition.kind == "silent" and isinstance(seen, int | float) and seen >= 1:
             template = _("{topic} has been silent for {time}")

@@ -427,7 +427,7 @@ class Session:
         self.fleet.unwatched(topic)
 
     def _on_unwatched(self, topic: str) -> None:
-        self._health.forget(topic)  # only now: the problem doesn't depend on whether its panel is shown
+        self._health.forget(topic)  # only now, because the problem doesn't depend on the panel being shown
 
     def _make_stopper(self, node: Node) -> None:
         self.stopper = RobotStopper(node)

@@ -41,7 +41,7 @@ class Lowering:
 
     def __init__(self, workspace: Workspace, catalogue: Catalogue, names: Names) -> None:
         self._catalogue = catalogue
-        self.variables = workspace.variables  # excludes inputs of functions
+        self.variables = workspace.variables  # without inputs of functions
         self._by_id: dict[str, Function] = {}
         for script in workspace.scripts:
             if script[0].type in _HAS_RESULT and script[0].enabled:

@@ -80,7 +80,7 @@ class Stack:
         return next((block for block in saved_blocks(workspace) if block.get("id") == self.id), None)
 
     def _below(self, found: dict[str, object]) -> dict[str, object] | None:
-        # For a hat only the blocks below it.
+        # For an event block, only the blocks below it.
         if self.is_value:
             return {"type": "messages_write", "id": SHOW, "inputs": {"VALUE": {"block": found}}}
         if self.kind != "hat":

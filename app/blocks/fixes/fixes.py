@@ -111,8 +111,8 @@ def _with_definition(workspace: dict[str, object], call: Mapping[str, object]) -
 
 
 def _joined_scripts(workspace: dict[str, object], hats: str) -> dict[str, object] | None:
-    # Removes the hat, which then starts nothing. ``hats`` are two ids joined by a colon; ids may contain
-    # colons.
+    # Removes the event block, which then starts nothing. ``hats`` are two ids joined by a colon; ids may
+    # contain colons.
     blocks = workspace.get("blocks")
     tops = blocks.get("blocks") if isinstance(blocks, dict) else None
     if not isinstance(tops, list):

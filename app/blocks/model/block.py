@@ -53,19 +53,19 @@ class Block:
     trees: Mapping[str, ast.expr] = field(default_factory=dict)  # constants that are syntax trees
     keywords: Mapping[str, tuple[tuple[str, str], ...]] = field(default_factory=dict)
     robot: RobotUse | None = None
-    parameters: tuple[str, ...] = ()  # hats: parameters of the function
+    parameters: tuple[str, ...] = ()  # event blocks: parameters of the function
     fails: bool = True  # values: the Python code may raise
     needs_message: bool = False  # reads the message that started its script
     publishes: bool = False  # publishes on its topics instead of subscribing
     python_in_function: str = ""  # Python code inside a function, if different
-    mutator: str = ""  # how people change its gaps: "items", "branches", "function", "call"
+    mutator: str = ""  # how the user changes its slots: "items", "branches", "function", "call"
     extra: Mapping[str, object] = field(default_factory=dict)  # initial extraState in the toolbox
     needs_function: str = ""  # only allowed in a function: "result" or "plain"
     calls: bool = False  # runs blocks elsewhere
     undefined: str = ""  # why it can't run: the function is undefined
     in_toolbox: bool = True
     about: Mapping[str, tuple[str, str]] = field(default_factory=dict)  # argument -> (name, details)
-    help: str = ""  # longer than the tooltip, with an example
+    help: str = ""  # longer description than the tooltip, with an example
     words: str = ""  # search words separated by commas; those with ! rank first
     english_words: str = ""  # English search words, if the language differs
 
@@ -168,7 +168,7 @@ def _messages(block: Block) -> dict[str, object]:
             continue
         text, arguments = lines[-1]
         if isinstance(argument, ValueInput) and argument.only is not None:
-            # An optional gap must not remove the words and fields before it.
+            # An optional slot must not remove the words and fields before it.
             words = f"{words}%{len(arguments) + 1} "
             arguments = [*arguments, {"type": "input_dummy", "name": f"BEFORE_{argument.name}"}]
         lines[-1] = (f"{text}{words}%{len(arguments) + 1}", [*arguments, argument.to_blockly()])

@@ -82,10 +82,10 @@ class Program:
     labels: Mapping[str, str] = field(default_factory=dict)
     variables: tuple[Variable, ...] = ()
     breakpoints: tuple[str, ...] = ()  # blocks with breakpoints
-    shows_value: bool = False  # it shows a tried value in short form
+    shows_value: bool = False  # the program prints a tried value in short form
     problems: tuple[Problem, ...] = ()
     starts: int = 0  # number of scripts that can start
-    absent: tuple[str, ...] = ()  # blocks of disconnected robots, also in scripts that can't run
+    absent: tuple[str, ...] = ()  # blocks of disconnected robots, including those in scripts that can't run
 
     @property
     def errors(self) -> tuple[Problem, ...]:

@@ -120,7 +120,7 @@ class _Filler(ast.NodeTransformer):
         if name is None:
             return node
         filling = self._expressions[name]
-        # A variable may fill several holes with different contexts: create one node each.
+        # A variable may fill several placeholders with different contexts: create one node for each.
         return ast.Name(filling.id, node.ctx) if isinstance(filling, ast.Name) else filling
 
     def visit_Call(self, node: ast.Call) -> ast.Call:

@@ -43,7 +43,7 @@ class Receiver:
             try:
                 with suppress(EndScript):
                     scheduler.begin()
-                    # Taken with the turn: the broadcast may have come again while waiting for it.
+                    # Read after getting the turn: the broadcast may have been sent again meanwhile.
                     taken, self.waiting = self.waiting, None
                     self.script()
             finally:

@@ -255,7 +255,7 @@ class Run:
         self._runtime.start(network, self._robots)
 
     def _step(self, network: Network, block: str) -> None:
-        # In slow motion robots must not keep driving while the block waits for its turn. Before a breakpoint
+        # With a pace, robots must not keep driving while the block waits. Before a breakpoint
         # everything is paused.
         if block in self._breakpoints and not self._runtime.scheduler.is_paused:
             self.pause()

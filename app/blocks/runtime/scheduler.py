@@ -143,7 +143,7 @@ class Scheduler:
             if self.pace_s and not self._paused:
                 self._stay_locked(script, lambda: self.pace_s, step_ends=True)
             if self._stepping is script:
-                return  # a step was requested while it stayed here
+                return  # a step was requested while the script waited here
             if not self._parked and not self._resuming and not self._paused:
                 return
             self._leave_locked(script, then_park=True)

@@ -46,7 +46,7 @@ class Hat:
             is_so = self._condition()
         finally:
             scheduler.rest()
-        # True from the beginning is not a change.
+        # A condition that is true from the start is not a change.
         became = is_so and self._was_true is False
         self._was_true = is_so
         return became

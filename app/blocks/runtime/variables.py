@@ -95,7 +95,7 @@ class VariableWatch:
             try:
                 told = brief(variable.id, value)
             except RuntimeError:
-                continue  # a script is changing it; the next read gets it
+                continue  # a script is changing the value; the next read gets it
             self._seen[python] = _comparable(value)
             if told != self._told.get(python):
                 self._told[python] = told

@@ -133,7 +133,7 @@ _TYPE_WORDS = {
 }
 _ANY = lazy("any value")
 _MAX_CHOICES = 6
-_MAX_UNIT_LENGTH = 3  # letters that a unit has at most
+_MAX_UNIT_LENGTH = 3  # maximum length of a unit
 
 
 def help_of(block: Block) -> dict[str, object]:

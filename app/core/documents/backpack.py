@@ -208,7 +208,7 @@ class Backpack:
         return _Found(_sorted(item for _entry, item in parsed if item is not None), unknown)
 
     def _use_own_file(self) -> _Found:
-        # The file of a newer Studio stays unchanged; a file of this version is used beside it.
+        # The file of a newer Studio stays unchanged; a file of this version is used in addition.
         newer = self.path
         self.path = newer.with_name(f"backpack.format-{VERSION}.json")
         if self.path == newer:

@@ -80,7 +80,7 @@ class Document:
         """Cache of parsed robot descriptions: parsing one takes 15 ms, and every edit needs all of them."""
         self.dirty = False
         self.saved_at: float | None = None
-        self._stamp: Stamp | None = None  # of the file, as last read or written
+        self._stamp: Stamp | None = None  # stamp of the file when it was last read or written
         self.revision = 0
         self.fixes = 0
         self.edits = 0
@@ -463,7 +463,7 @@ def _parsed(description: Mapping[str, object]) -> Robot | None:
     try:
         return parse(description)
     except DescriptionError:
-        return None  # its blocks stay as unknown ones, and are listed as problems
+        return None  # its blocks become unknown blocks and are listed as problems
 
 
 def read(path: Path) -> tuple[str, Workspace, Descriptions]:

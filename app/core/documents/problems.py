@@ -11,7 +11,7 @@ from app.robots.description.description import Robot
 from nep.i18n import _, ngettext
 
 CONNECT = "connect:"
-MAX_FIXES = 2  # a line has no space for more
+MAX_FIXES = 2  # more don't fit into a line
 
 
 @dataclass(frozen=True)
@@ -108,7 +108,7 @@ def _missing(problem: Problem) -> str | None:
 
 
 def _counted(line: Listed) -> Listed:
-    # A single block is named, several are counted.
+    # A single block is named; several blocks are counted.
     if line.blocks == 1:
         return line
     name = _missing(line.problem) or ""

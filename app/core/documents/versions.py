@@ -85,7 +85,7 @@ def keep_earlier(
         reason = error.strerror or error
         words = _("{file} was not saved: its previous version can't be kept ({reason})")
         raise DocumentError(path, words.format(file=path.name, reason=reason)) from error
-    with contextlib.suppress(OSError):  # another instance was faster
+    with contextlib.suppress(OSError):  # another instance has done this already
         _thin_out(where, _mark(path))
         _drop_oldest(where)
     return Earlier(path, copy)

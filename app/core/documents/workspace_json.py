@@ -25,7 +25,7 @@ class WorkspaceJson:
 
     def __init__(self, text: str | None, blocks: Mapping[str, object] | None = None) -> None:
         # Raises ValueError or RecursionError if `text` can't be parsed. It is parsed immediately only where
-        # it could be nested too deep, which needs many brackets.
+        # the nesting could be too deep, which requires many brackets.
         self._text, self._blocks, self._was_told = text, blocks, text is not None
         if text is not None and blocks is None and text.count("{") + text.count("[") > deep_json.SHALLOW:
             _ = self.blocks

@@ -81,7 +81,7 @@ class CallRates:
 
 
 def _counts(facts: GraphFacts) -> Iterator[tuple[str, int | None]]:
-    # (key of a node, messages or calls so far); None where not counted. Internal topics are skipped.
+    # (key of a node, number of messages or calls); None if not counted. Internal topics are skipped.
     for topic in facts.topics:
         if topic.info is None or topic.name.startswith(OWN):
             continue

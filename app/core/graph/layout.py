@@ -228,7 +228,7 @@ def _block_box(graph: NodeGraph, block: str, places: Mapping[str, Place], sizes:
 
 
 def _place_boxes(boxes: Mapping[str, Box], between: Mapping[tuple[str, str], int]) -> dict[str, Place]:
-    # Centres of boxes of any size.
+    # Returns centres; boxes may have different sizes.
     if len(boxes) == 1:
         return dict.fromkeys(boxes, (0.0, 0.0))
     index = {block: number for number, block in enumerate(boxes)}
@@ -320,7 +320,7 @@ def _in_rows(graph: NodeGraph, sizes: LayoutSizes) -> dict[str, Place]:
 
 
 def _place_new(graph: NodeGraph, places: dict[str, Place], sizes: LayoutSizes) -> dict[str, Place]:
-    # Existing nodes keep their places; new ones are placed beside them.
+    # Existing nodes keep their positions; new ones are placed next to them.
     neighbours = _neighbours(graph)
     for node in graph.nodes:
         if node.key in places:

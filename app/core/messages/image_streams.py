@@ -335,7 +335,7 @@ class Images:
 def _deliver(stream: ImageStream, message: Message, picture: Picture | None, error: str | None) -> None:
     before = stream.picture
     if stream.resting:
-        return  # it can't be seen; the next one after `wake` is shown
+        return  # the stream isn't visible; the next image after `wake` is shown
     if stream.held and before is not None and before.message is not message:
         return  # decoded while the user held the previous image
     stream.error = error

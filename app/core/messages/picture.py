@@ -132,7 +132,7 @@ def _same_bytes(one: memoryview, other: memoryview) -> bool:
 
 
 def _short_message(error: BaseException) -> str:
-    # Last part of OpenCV's long message.
+    # Returns the last part of OpenCV's long message.
     return (
         str(error).strip().splitlines()[-1].rpartition("error: ")[2][:200]
         if str(error)

@@ -95,7 +95,7 @@ class Mailbox:
             ring.messages.extend(newest)
             ring.size_bytes += size_bytes
             ring.dropped += len(messages) - len(newest)
-            # the newest message always stays, however large it is
+            # the newest message is never evicted, whatever its size
             while len(ring.messages) > 1 and (
                 len(ring.messages) > room or ring.size_bytes > self._bytes_per_topic
             ):

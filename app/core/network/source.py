@@ -185,8 +185,7 @@ class LiveSource:
         if self._thread.is_alive():
             self._thread.join(timeout=5)
 
-    # -- overridden for other networks (see `app.core.networks`); called in its thread
-    # ------------------------
+    # -- overridden for other networks (see `app.core.networks`); called in its thread -------------
 
     poll_s = POLL_S
     """Interval of the graph queries."""

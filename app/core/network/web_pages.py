@@ -316,7 +316,7 @@ class WebPages:
             self.state, self._failed, self.protocols = "off", self.protocols, frozenset()
         else:
             self.state = "on"
-            self._push()  # what was changed during the start
+            self._push()  # apply changes made during the start
 
     def refresh(self) -> None:
         """Update `connected` and `listed` from the server."""

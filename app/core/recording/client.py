@@ -134,7 +134,7 @@ class RecorderProcess:
 
     def close(self, wait_s: float) -> None:
         """Close the input and wait at most ``wait_s`` seconds for the process to exit."""
-        with suppress(queue.Full):  # then it does not read, and its work ends with this process
+        with suppress(queue.Full):  # the process does not read its input and will end with this process
             self._orders.put_nowait(None)
         self._has_ended.wait(wait_s)
 
@@ -178,7 +178,7 @@ class RecorderProcess:
     def _write(self, process: subprocess.Popen[bytes]) -> None:
         if process.stdin is None:
             return
-        with suppress(OSError):  # it has ended, which the other thread reports
+        with suppress(OSError):  # the process has ended, which the other thread reports
             while (line := self._orders.get()) is not None:
                 process.stdin.write(line)
                 process.stdin.flush()

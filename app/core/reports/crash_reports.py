@@ -74,7 +74,7 @@ class CrashReports:
             _log.warning("a crash report can't be kept: %s", error, extra=IN_CONSOLE)
             return None
         for old in self.all()[MAX_REPORTS:]:
-            with suppress(OSError):  # another instance was faster
+            with suppress(OSError):  # another instance has done this already
                 old.path.unlink(missing_ok=True)
         return path
 

@@ -146,8 +146,7 @@ class StudioRun:
         self._lock.release()
         _remove(self._mark, self._log)
 
-    # -- earlier runs
-    # -----------------------------------------------------------------------------------------
+    # -- earlier runs ------------------------------------------------------------------------------
 
     def _check(self, mark: Path) -> Crash | None:
         lock = FileLock(mark)

@@ -173,7 +173,7 @@ class Fleet:
         ):
             raise MayNotMoveError([name])
         invocation = self._tries.begin(link, described, input)
-        if invocation.running:  # a velocity outlasts its final answer: only a Stop ends it
+        if invocation.running:  # a speed continues after its final reply: only a Stop ends it
             self.moved.note([name], "form", id="" if described.repeat_s is not None else invocation.id)
         if invocation.running and link.publisher is not None and link.robot.dialect == "native":
             self._heartbeat.beat(name, link.publisher.publish)

@@ -140,7 +140,7 @@ class Health:
         """
         if self._alerts.has(GIVES_UP):
             return True
-        self._alerts.resolve("journal")  # it is raised again after this one
+        self._alerts.resolve("journal")  # raised again after this alert
         self._alerts.put(
             GIVES_UP,
             "error",

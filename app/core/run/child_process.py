@@ -54,7 +54,7 @@ class ChildProcess:
                 env={**os.environ, "PYTHONIOENCODING": "utf-8", "PYTHONUNBUFFERED": "1"},
                 cwd=cwd,
                 creationflags=NO_CONSOLE,
-                # a process group of its own, which can be killed at once
+                # a separate process group, which can be killed as a whole
                 start_new_session=os.name == "posix",
             )
         except OSError as error:

@@ -324,7 +324,7 @@ class Runs:
             self._settle()
 
     def _settle(self) -> None:
-        # Unlocks Run once every robot of the last Stop is proven or confirmed to have stopped.
+        # Enables Run once every robot of the last Stop is proven or confirmed to have stopped.
         report = self._run.report if self._run.state == "unanswered" else None
         if report is not None and not any(name in self._fleet.moved for name in report.silent):
             self._run = replace(self._run, state="ready", report=None)

@@ -244,7 +244,7 @@ class Runner:
     # ---- private
 
     def _write(self) -> None:
-        # In a thread of its own, because a child that hangs does not read.
+        # In a separate thread, because a child that doesn't respond does not read.
         child = self._child
         if child is None or child.popen.stdin is None:
             return

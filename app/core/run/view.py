@@ -170,7 +170,7 @@ def _named(view: RunView, run: RunState, now: float) -> RunView:
             view = replace(view, edited=False, detail=run.says if runs else _paused_detail(run))
         view = replace(view, run_word=RUN if runs else view.run_word)
     if view.state == "running":
-        # just pressed: the previous words stay, and the run's time
+        # just pressed: the previous text and the time of the run remain
         if run.state == "stopping" and run.elapsed_s is None:
             return replace(view, title=_("{name} is ready").format(name=run.name))
         if not run.begun:
@@ -269,7 +269,7 @@ def _paused_detail(run: RunState) -> str:
 
 
 def _stopping_early(run: RunState, now: float) -> RunView:
-    # replies within 100 ms get no state of their own: the words stay, and only Run is disabled
+    # replies within 100 ms: the text does not change, only Run is disabled
     title = _("Ready")
     if run.elapsed_s is not None:
         title = _("Running, {time}").format(time=seconds(run.elapsed_s))
@@ -426,13 +426,13 @@ def unanswered_words(report: StopReport, doubts: Sequence[str] = ()) -> tuple[st
     count, title = len(report.silent), _wrong_words(report)
     switch = ngettext("{wrong}; switch it off by hand", "{wrong}; switch them off by hand", count)
     still_words = ngettext("{robots} isn't moving", "{robots} aren't moving", count).format(robots=names)
-    if len(names) > WIDEST_NAMES:  # leave room for the sentence beside the button
+    if len(names) > WIDEST_NAMES:  # leave room for the sentence next to the button
         still_words = ngettext("It isn't moving", "They aren't moving", count)
     return title, detail, switch.format(wrong=title), still_words
 
 
 def _wrong_words(report: StopReport) -> str:
-    # First what robots reported, then those that the Stop could not be sent to, then silent ones.
+    # First robots' own reports, then robots to which the Stop could not be sent, then silent robots.
     refusals = [robot.wrong for robot in report.unproven if robot.refused]
     untold = [robot.wrong for robot in report.unproven if robot.error and not robot.refused]
     silent = [robot.who for robot in report.unproven if not robot.error]

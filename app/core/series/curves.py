@@ -100,8 +100,7 @@ class Curves:
         self._shared: dict[str, _Shared] = {}  # in order of dependency
         self.all: list[Curve] = []
 
-    # -- commands of the user
-    # -----------------------------------------------------------------------------------
+    # -- commands of the user ----------------------------------------------------------------------
 
     def add(self, text: str, also: Iterable[str] = ()) -> list[Curve]:
         """Add the curves of a typed text; ``[*]`` adds one for each element of the newest message.
@@ -156,8 +155,7 @@ class Curves:
             if shared.calculated is not None:
                 shared.calculated.advance()
 
-    # -- queries
-    # ------------------------------------------------------------------------------------------------
+    # -- queries -----------------------------------------------------------------------------------
 
     def payload_of(self, topic: str) -> object:
         """Return the newest message of a plotted topic; `MISSING` if there is none."""
@@ -222,8 +220,7 @@ class Curves:
             field=curve.text
         )
 
-    # -- private
-    # ------------------------------------------------------------------------------------------------
+    # -- private -----------------------------------------------------------------------------------
 
     def _known_topics(self) -> list[str]:
         return list(dict.fromkeys([*self._topics, *self._existing_topics()]))

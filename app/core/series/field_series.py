@@ -209,7 +209,7 @@ class TopicSeries:
         if self._last_s is None:
             return False
         pause_s, usual_s = time_s - self._last_s, self._usual_s
-        if usual_s is not None and 0 < pause_s <= SILENCE_S:  # almost always
+        if usual_s is not None and 0 < pause_s <= SILENCE_S:  # the usual case
             self._silences = 0
             self._usual_s = usual_s + 0.1 * (pause_s - usual_s)
             return False

@@ -189,8 +189,7 @@ class Samples:
         levels = sum(each.low.nbytes * 3 for each in self._levels)
         return self._times.nbytes + self._values.nbytes + self._gaps.nbytes + levels
 
-    # -- input
-    # --------------------------------------------------------------------------------------------------
+    # -- input -------------------------------------------------------------------------------------
 
     def break_line(self) -> None:
         """Mark a gap before the next sample."""
@@ -316,8 +315,7 @@ class Samples:
         self._count, self.begun = kept, self.begun + drop
         self._shrink_arrays()
 
-    # -- queries
-    # ------------------------------------------------------------------------------------------------
+    # -- queries -----------------------------------------------------------------------------------
 
     def places(self, begin_s: float, end_s: float) -> tuple[int, int]:
         """Return the index range of the samples in an inclusive time range, as (first, last + 1)."""
@@ -392,7 +390,7 @@ class Samples:
             pixels = _Pixels.joined((known, self._pixels(width, (known.end, end), None, part[1])))
         else:
             place, inside = np.searchsorted(self.times, (width * first, width * begin))
-            alone = bool(place == inside)  # then the sample before the range stands in for it
+            alone = bool(place == inside)  # then the sample before the range is used instead
             pixels = self._pixels(width, (first, end), max(0, int(place) - alone), part[1])
             first += alone
         sure = float(np.floor(self._times[self._count - 1] / width)) - 1  # later pixels may get more samples
@@ -432,7 +430,7 @@ class Samples:
         starts, ends = places[there], places[there + 1]
         low, high = self._least_and_most(starts, ends)
         times, values = np.repeat(edges[there] + width / 2, 2), np.empty(2 * len(there))
-        rising = self._values[ends - 1] < self._values[starts]  # closer to the real shape of the line
+        rising = self._values[ends - 1] < self._values[starts]  # closer to the actual shape of the line
         values[0::2], values[1::2] = np.where(rising, high, low), np.where(rising, low, high)
         # otherwise a sample between two gaps would be invisible
         times[1::2] += np.where(low == high, width / 2, 0.0)

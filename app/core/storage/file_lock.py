@@ -73,7 +73,7 @@ class FileLock:
     """Lock that is held until it is released or this process ends."""
 
     def __init__(self, path: Path) -> None:
-        # The lock file is `<name>.lock` beside `path`.
+        # The lock file is `<name>.lock` next to `path`.
         self._path = path
         self._file: IO[bytes] | None = None
 

@@ -57,7 +57,7 @@ def read_kept(
 
 
 def _put_aside(path: Path, reason: str, data: bytes | None = None) -> str:
-    # With `data` a copy is kept beside the file, whose readable part is used.
+    # With `data`, a copy is stored next to the file, whose readable part is used.
     beside = path.with_name(f"{path.stem}.damaged{path.suffix}")
     with suppress(OSError):
         if data is None:

@@ -216,7 +216,7 @@ class Settings:
         return self.path.with_name(_OWN_NAME)
 
     def _use_own_file(self, newer: dict[str, object]) -> dict[str, object]:
-        # The file of a newer Studio stays unchanged; a file of this version is used beside it.
+        # The file of a newer Studio stays unchanged; a file of this version is used in addition.
         found = self.path.name
         self.path = self._own_path()
         if self.path.exists():

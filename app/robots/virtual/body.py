@@ -208,7 +208,7 @@ class Body:
         ahead = self.room.distance_ahead(self.x, self.y, self.theta_deg) - RADIUS
         return min(FULL_RANGE, max(0.0, ahead))
 
-    # ---- people's actions ------------------------------------------------------------------------
+    # ---- the user's actions ------------------------------------------------------------------------
 
     def touch(self, place: str, *, down: bool) -> None:
         """Start or end a touch; a tap lasts at least `TOUCH_LEAST_S`."""

@@ -133,7 +133,7 @@ def _painting(picture: Picture, left: float, top: float, right: float, bottom: f
 def floor(room: Room) -> Texture:
     """Return a floor of wooden boards along the x axis, darker near the walls."""
     width, depth = round((room.x_max - room.x_min) * PER_M), round((room.y_max - room.y_min) * PER_M)
-    shades = np.random.default_rng(5)  # always the same boards
+    shades = np.random.default_rng(5)  # the same boards at every start
     picture = np.zeros((depth, width, 3), dtype=np.uint8)
     board = round(0.16 * PER_M)
     for row in range(0, depth, board):

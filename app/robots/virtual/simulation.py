@@ -161,7 +161,7 @@ class Simulation:
 
     def _painted(self, room: Room, lens: Lens) -> _View:
         picture = self._camera.picture(room, lens)
-        picture.flags.writeable = False  # shared until something moves
+        picture.flags.writeable = False  # reused until something moves
         seen = {
             "faces": self._eyes.faces(room, lens),
             "balls": self._eyes.balls(picture),
@@ -181,7 +181,7 @@ class Simulation:
             gone, self._face = self._face, None
             self._link.happen("face_lost", name=gone)
 
-    # ---- time and people's actions -----------------------------------------------------------------------
+    # ---- time and the user's actions -----------------------------------------------------------------------
 
     def _beat(self, rate_hz: float) -> Beat:
         return Beat(self._clock, self._ended, 1 / rate_hz)

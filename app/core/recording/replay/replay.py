@@ -110,8 +110,7 @@ class Replay:
             self.densities.close()
         self.images.close()
 
-    # -- state
-    # --------------------------------------------------------------------------------------------------
+    # -- state -------------------------------------------------------------------------------------
 
     @property
     def status(self) -> ReplayStatus:
@@ -162,8 +161,7 @@ class Replay:
         player = self.source.status.player
         return player.position_ns if player is not None else self.start_ns
 
-    # -- commands of the user
-    # -----------------------------------------------------------------------------------
+    # -- commands of the user ----------------------------------------------------------------------
 
     def play(self) -> None:
         """Play; at the end, restart from the beginning of the loop or recording."""
@@ -282,8 +280,7 @@ class Replay:
         if self.opened is not None:
             self.opened.bookmarks.remove(bookmark)
 
-    # -- tick
-    # ---------------------------------------------------------------------------------------------------
+    # -- tick --------------------------------------------------------------------------------------
 
     def tick(self, now: float) -> None:
         """Apply the messages read since the last tick; ``now`` is monotonic seconds."""

@@ -137,8 +137,7 @@ class ReplaySource:
         self._next_figures = self._figures_s = 0.0
         self._thread = threading.Thread(target=self._run, name="studio-replay", daemon=True)
 
-    # -- called by the window
-    # -----------------------------------------------------------------------------------
+    # -- called by the window ----------------------------------------------------------------------
 
     @property
     def status(self) -> ReplayStatus:
@@ -219,8 +218,7 @@ class ReplaySource:
         elif self.opened is not None:
             self.opened.recording.close()
 
-    # -- its thread
-    # ---------------------------------------------------------------------------------------------
+    # -- its thread --------------------------------------------------------------------------------
 
     def _run(self) -> None:
         try:
@@ -337,8 +335,7 @@ class ReplaySource:
                 self._mailbox.set_room(topic, room)
             self._results = Handed(jump=own)
 
-    # -- history
-    # ------------------------------------------------------------------------------------------------
+    # -- history -----------------------------------------------------------------------------------
 
     def _read_history(self, playback: Playback, topics: Collection[str]) -> None:
         # Reads messages before the playhead, of topics with history.
@@ -378,8 +375,7 @@ class ReplaySource:
             found[topic].extendleft(reversed(messages))
         return bool(topics) and self._clock() - began <= HISTORY_TIMEOUT_S
 
-    # -- statistics
-    # ---------------------------------------------------------------------------------------------
+    # -- statistics --------------------------------------------------------------------------------
 
     def _schedule_figures(self, playback: Playback) -> None:
         # Some topics in each cycle, so that no command waits for all.

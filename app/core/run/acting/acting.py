@@ -227,7 +227,7 @@ class SessionActing:
             return template.format(type=message.msg_type)
         read = None if is_plain(message.msg_type) else read_json(message.text)
         if read is not None and read.fault is not None:
-            return read.fault.sentence  # before the topic: its line is marked red
+            return read.fault.sentence  # checked before the topic, so that the invalid line is shown
         if not message.topic.strip():
             return _("Choose a topic first.")
         if read is None:

@@ -150,7 +150,7 @@ class ServiceCalls:
                 continue
             self._apply(place, ended)
         waiting, now = self.waiting, self._in_flight
-        has_begun = now is None or now.future is not None  # from then on its client measures the timeout
+        has_begun = now is None or now.future is not None  # from then on, the client measures the timeout
         if waiting is not None and not has_begun and self.waited_s > waiting.timeout_s:
             error = _("no master was found within {time} s").format(time=number(waiting.timeout_s))
             self._cancel("failed", error)
