@@ -60,7 +60,11 @@ def reading(
 
 
 def label(placed: Placed, block: Block) -> str:
-    """Return the label of a block: its text before the first slot, such as "wait until"."""
+    """Return the label of a block: its text before the first slot, such as "wait until".
+
+    For an action of a robot, the title of the action. In Japanese, where the verb comes last, the whole text
+    with "…" for slots.
+    """
     if block.robot is not None and block.robot.kind == "action":
         return block.robot.title
     pieces = _PLACE.split(block.text)  # words, argument, words, argument, …, words

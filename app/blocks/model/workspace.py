@@ -32,10 +32,7 @@ class Placed:
     too_deep: bool = False  # inner blocks were dropped because of deep nesting
 
     def field_id(self, name: str) -> str:
-        """Return the saved text of a field, or the id if the field refers to a variable.
-
-        "" if there is none.
-        """
+        """Return the saved value of a field if that is text, else ""."""
         saved = self.fields.get(name)
         return saved if isinstance(saved, str) else ""
 

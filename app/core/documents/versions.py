@@ -28,8 +28,9 @@ COPIES_KEPT = 300
 BYTES_KEPT = 500_000_000
 OF_ONE_FILE = 30
 NEWEST = 10
-"""Number of newest versions of a file that are never removed. Of older versions, those written shortly after
-another one are removed first.
+"""Number of newest versions of a file that are never removed.
+
+Of older versions, the one that leaves the smallest gap in time is removed first.
 """
 
 _STAMP = "%Y-%m-%d %H.%M.%S"

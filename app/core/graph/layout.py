@@ -34,10 +34,11 @@ LAYER_GAP, NODE_GAP, GROUP_GAP, DUMMY_GAP = 150.0, 36.0, 40.0, 10.0
 ALONE_COLUMNS = 4
 """Number of columns for nodes without lines within their group."""
 MANY = 60
-"""Number of boxes above which the library uses fewer iterations."""
+"""Number of boxes from which the library runs in its fast mode."""
 MAX_LED = 400
-"""Maximum number of routes led around nodes. Above it all are straight, because routing would take many
-seconds.
+"""Maximum number of routes led around nodes.
+
+With more routes, all are straight, because routing would take many seconds.
 """
 WIDEST, ASPECT = 3.0, 1.6
 """Maximum ratio of width to height of a row of groups, and the ratio to which a wider row is broken."""

@@ -123,9 +123,7 @@ class Driver:
         answer = partial(self._publish, self.robot.topics.answer)
 
         def beat(not_ended: tuple[str, ...], error: str | None) -> None:
-            desk.beat(
-                not_ended, error, rejected=self._rejected.count
-            )  # desk is created with the tasks, below
+            desk.beat(not_ended, error, rejected=self._rejected.count)  # desk is created with the tasks below
 
         self._tasks = tasks = Tasks(
             self.name,
