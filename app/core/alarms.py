@@ -141,11 +141,11 @@ class SessionAlarms:
 
     @property
     def on(self) -> Sequence[AlarmRule]:
-        """Alarms that are on and not snoozed."""
+        """Alarms whose condition is true and that are not snoozed."""
         return [rule for rule in self.rules if rule.id in self._on and not rule.is_snoozed(self._clock_s())]
 
     def new(self, condition: AlarmCondition) -> AlarmRule:
-        """Add an alarm that shows a banner; it is evaluated as soon as it is complete."""
+        """Add an alarm that shows a banner. Evaluation starts as soon as the alarm is complete."""
         rule = AlarmRule(new_id(), condition, (AlarmAction("banner"),))
         self.put(rule)
         return rule

@@ -119,7 +119,7 @@ class Alerts:
         return self._alerts.get(id)
 
     def dismiss(self, id: str) -> None:
-        """Hide an alert's banner until it is resolved and raised again; it stays in `active`."""
+        """Hide the banner of an alert until the alert is raised again; the alert remains in `active`."""
         if id in self._alerts and id not in self._dismissed:
             self._dismissed.add(id)
             self.revision += 1

@@ -19,7 +19,7 @@ ASIDE = 420
 def fix(workspace: Mapping[str, object], action: str) -> dict[str, object] | None:
     """Return the workspace after applying the ``fix_action`` of a problem; None for other actions.
 
-    ``limit:<id>`` gives a "wait until" a time limit, ``add:<type>`` puts a block above the first script
+    ``limit:<id>`` sets a time limit for a "wait until", ``add:<type>`` puts a block above the first script
     without a start, ``define:<id>`` creates the function that a block calls, ``begin:list:<id>`` and
     ``begin:number:<id>`` set a variable at the start of the behaviour, ``receive:<name>`` creates a script
     that receives a broadcast, and ``after:<hat>:<hat>`` moves the script of the first start block to the end

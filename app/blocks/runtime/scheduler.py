@@ -131,8 +131,8 @@ class Scheduler:
     def step(self, block: str) -> None:
         """Record that the script has reached a block.
 
-        Other scripts get the turn, and a pause holds the script here. With a pace, it first waits for that
-        duration.
+        Other scripts get the turn, and a pause holds the script here. With a pace, the script first waits for
+        that duration.
         """
         script = self._script()
         with self._lock:

@@ -27,7 +27,7 @@ function, and the comment next to the blocks.
 """
 
 Say = Callable[[str, str], str]
-"""Function that translates an English text in a context."""
+"""Translates an English text in a context."""
 
 
 def translated(example: BehaviourFile, translate_text: Say = translate) -> BehaviourFile:

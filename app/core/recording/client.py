@@ -95,7 +95,7 @@ class RecorderState:
 
 
 class OrderLine(Protocol):
-    """Process that executes commands."""
+    """Running recorder process, as used by `RecorderClient`."""
 
     def order(self, content: Mapping[str, object]) -> bool:
         """Send a command; return False when the queue is full. Never blocks."""

@@ -50,7 +50,7 @@ _log = logging.getLogger("studio.run")
 class StudioRun:
     """Run of Studio, from `begin` to `end`.
 
-    As a context manager, it stores a crash report if an exception leaves the context.
+    Used as a context manager, a run stores a crash report if an exception leaves the context.
     """
 
     def __init__(

@@ -27,7 +27,8 @@ class OwnMessages:
     def update(self, view: GraphView) -> None:
         """Apply a new graph.
 
-        Programs that left it are kept while they are connected, as they may only be suspended.
+        Programs that left the graph are remembered while they are connected, because they may only be
+        suspended.
         """
         before, self.view = self.view, view
         for link in self._links.values() if before.nodes.keys() - view.nodes.keys() else ():

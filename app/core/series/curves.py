@@ -105,9 +105,15 @@ class Curves:
     def add(self, text: str, also: Iterable[str] = ()) -> list[Curve]:
         """Add the curves of a typed text; ``[*]`` adds one for each element of the newest message.
 
-        ``also`` are topics that are valid although they don't exist at the moment. Raises `CurveError`, which
-        says how to fix the text; then nothing is added. Whether a field exists is only known after a message
-        of its topic.
+        If the text is invalid, nothing is added. It is not an error if the field does not exist, because
+        fields are known only after a message of the topic.
+
+        Args:
+            text: Text that the user typed.
+            also: Topics that are valid although they don't exist at the moment.
+
+        Raises:
+            CurveError: The text is invalid; the message says how to fix it.
         """
         source = parse(text, [*self._known_topics(), *also])
         sources: Sequence[Source] = [source]

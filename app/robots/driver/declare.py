@@ -53,16 +53,16 @@ class action:  # noqa: N801 - used as a decorator
     The parameters' type annotations define the input; see `app.robots.driver.schema`.
 
     Attributes:
-        text: Block text with ``%parameter`` in it.
+        text: Text of the block, with ``%parameter`` for each parameter.
         category: Category of the block.
         icon: Icon of the block.
         says: The text in the third person, for messages.
-        title: Name for people (default: the method's name).
+        title: Display name (default: the name of the method).
         uses: Resources, such as "base": actions that share one don't run at the same time.
         on_busy: "queue", "replace" or "reject" when a resource is in use.
         timeout_s: Maximum duration in seconds.
         risk: "moves" or "locomotes".
-        cancellable: False if it can't be canceled.
+        cancellable: False if the action can't be cancelled.
         repeat_s: For actions that continue after their function returned (a speed): the interval at which
             other tools may send them again. The requesting program must stay alive.
         output: Fields of the result (default: the return type).

@@ -234,7 +234,7 @@ class Body:
         self.held = held
 
     def carry(self, x: float, y: float) -> None:
-        """Move the robot to a place if that is free; it stops at walls."""
+        """Move the robot to a place if that is free. Walls limit the movement."""
         place = self.room.carried(x, y, RADIUS, (self.x, self.y))
         if place is not None:
             self.place(*place)

@@ -186,7 +186,7 @@ class ReplaySource:
             self.order(f"history {topic}", lambda playback: self._read_history(playback, [topic]))
 
     def forward(self, topics: Collection[str], to: Forward | None) -> None:
-        """Also pass played messages of these topics to ``to``, except the messages delivered by a seek."""
+        """Pass played messages of these topics also to ``to``, except the messages delivered by a seek."""
         with self._changed:
             self._sent, self._forward = frozenset(topics), to
         self.order("choose", self._choose)
