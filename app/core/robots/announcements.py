@@ -170,7 +170,7 @@ class Announcements:
         self._parse_waiting()
 
     def add(self, batches: Mapping[str, Batch]) -> bool:
-        """Return True if at least one description was parsed; that may be one received earlier."""
+        """Add received descriptions; return True if any was parsed, including earlier ones."""
         for topic in batches.keys() & self._topics.keys():
             known = self._topics[topic]
             for message in batches[topic].messages:
