@@ -38,7 +38,7 @@ class Names:
     def new(self, words: str, otherwise: str) -> str:
         """Return a name similar to ``words``, such as ``when_started_2``.
 
-        ``otherwise`` if no letter remains.
+        If no valid character remains, the name is derived from ``otherwise``.
         """
         # Python normalizes names to NFKC: different names must stay different.
         plain = _GAPS.sub("_", unicodedata.normalize("NFKC", words)).strip("_")[:60]

@@ -295,9 +295,9 @@ class Network:
             return tuple(dict.fromkeys(name for name, _ in waiting.values()))
 
     def stop_words(self, name: str) -> str:
-        """Return why the stop of a robot is not confirmed, in the robot's words if it replied.
+        """Return why the stop of a robot is not confirmed, in the robot's own words if it replied.
 
-        Without full stop.
+        The text has no full stop.
         """
         return self._stop_errors.get(name) or _("{robot} did not reply").format(robot=name)
 

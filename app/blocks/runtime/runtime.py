@@ -292,10 +292,7 @@ class Runtime:
         self.questions.ask_with_choices(question, choices)
 
     def answer(self) -> object:
-        """Return the last answer, converted to a number if possible.
-
-        An empty text before the first answer.
-        """
+        """Return the last answer, as a number if possible; "" before the first answer."""
         return self.questions.answer
 
     # ---- time

@@ -83,7 +83,7 @@ class VariableWatch:
     def changes(self) -> list[VariableValue]:
         """Return the variables whose displayed value has changed since the last call.
 
-        All at the first call.
+        The first call returns all variables.
         """
         found, characters = [], 0
         for python, variable in self._variables.items():

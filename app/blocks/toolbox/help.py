@@ -181,7 +181,7 @@ def title(block: Block) -> str:
 def name(block: Block) -> str:
     """Return the name of a block for use in a sentence, such as "walk" or "repeat … times".
 
-    "" if the block has no words. The robot slot and a unit after the last slot are left out.
+    The name is "" if the block has no words. The robot slot and a unit after the last slot are left out.
     """
     words = [part.strip() for part in _HOLE.split(block.text.removeprefix("%ROBOT "))[::2]]
     if len(words) > 1 and len(words[-1]) <= _MAX_UNIT_LENGTH:

@@ -53,9 +53,9 @@ class Packed:
 
 
 class _Found(NamedTuple):
-    """Content of the file. ``unknown`` are entries that this version can't read.
+    """Content of the file.
 
-    They are preserved unchanged.
+    ``unknown`` are entries that this version can't read. The entries are preserved unchanged.
     """
 
     items: tuple[Packed, ...] = ()

@@ -255,9 +255,9 @@ class Document:
 
     @property
     def journal_error(self) -> str | None:
-        """Message why unsaved work can't be written to the journal.
+        """Why unsaved work can't be written to the journal; None if there is no such problem.
 
-        None if it was written or is being written.
+        Also None while a write is in progress.
         """
         if self.journal_writer is not None:
             self._apply_journal_result(partial(self.journal_writer.pop_result, self._journal.name))

@@ -110,10 +110,7 @@ def versions_of(path: Path, folder: Path | None = None) -> list[Version]:
 
 
 def namesakes_of(path: Path, folder: Path | None = None) -> list[Version]:
-    """Return versions of other files with the same name, newest first.
-
-    For example of a file that was moved.
-    """
+    """Return versions of other files with the same name, such as of a moved file, newest first."""
     mark, stem = _mark(path), _plain(path.stem)
     return [each for each in _newest_first(_folder(folder)) if each.mark != mark and each.name == stem]
 

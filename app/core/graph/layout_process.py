@@ -35,9 +35,9 @@ class LayoutProcess:
         )
 
     def arrange(self, graph: NodeGraph, before: GraphLayout | None, sizes: LayoutSizes) -> GraphLayout | None:
-        """Call `arrange` in the child process.
+        """Call `arrange` in the child process and return its result.
 
-        None if it failed, was killed, or took longer than `TIMEOUT_S`.
+        Returns None if the call failed, was killed, or took longer than `TIMEOUT_S`.
         """
         bare = replace(graph, nodes=tuple(replace(node, entry=None) for node in graph.nodes))
         try:

@@ -95,10 +95,7 @@ class ImageStream:
 
     @property
     def silent_s(self) -> float | None:
-        """Seconds since the last image, without the time in which the stream was suspended.
-
-        None before the first.
-        """
+        """Seconds without an image while the stream was not suspended; None before the first image."""
         picture = self.picture
         if picture is None:
             return None
@@ -106,7 +103,7 @@ class ImageStream:
 
     @property
     def age_s(self) -> float | None:
-        """Seconds since the image arrived; None before the first."""
+        """Seconds since the current image arrived; None before the first image."""
         return self._images.clock() - self.picture.received_s if self.picture is not None else None
 
     @property

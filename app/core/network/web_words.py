@@ -131,7 +131,7 @@ def terminal_command(web: WebPages, platform: str = sys.platform) -> str:
 def notices(web: WebPages, dismissed: Collection[tuple[str, ...]] = ()) -> tuple[WebNotice, ...]:
     """Return the messages to show, newest first.
 
-    They are about slow pages, and rejected connections that are still not allowed.
+    The messages are about slow pages, and about rejected connections that are still not allowed.
     """
     found: dict[tuple[str, ...], WebNotice] = {}
     for notice in (*_refused(web), *_slow(web)):

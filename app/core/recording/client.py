@@ -289,7 +289,7 @@ class RecorderClient:
     def follow_ring(self, choice: RingChoice | None) -> None:
         """Switch the flight recorder on with this selection, or off with None.
 
-        It is restarted after a failure.
+        The flight recorder is restarted after a failure.
         """
         if choice == self._ring:
             return

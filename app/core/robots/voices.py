@@ -39,9 +39,9 @@ class Speaker(Protocol):
 
     @property
     def problem(self) -> str:
-        """Why robots are not audible on this computer.
+        """Why robots are not audible on this computer, or "".
 
-        "" if they are, or before the first attempt.
+        The problem is known only after the first attempt to play something.
         """
 
     def speak(self, words: str, language: str, volume: float) -> None:

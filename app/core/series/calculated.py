@@ -121,7 +121,7 @@ class ExpressionCurve(Calculated):
 def held_values(samples: Samples, times: Floats) -> Floats:
     """Return the newest sample at each time.
 
-    NaN before the first sample, in a gap, and long after the last.
+    The result is NaN before the first sample, in a gap, and long after the last sample.
     """
     if not len(samples):
         return np.full(len(times), np.nan)

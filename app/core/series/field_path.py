@@ -189,7 +189,7 @@ def fields_of(payload: object, most: int = MAX_FIELDS) -> Iterator[FieldFound]:
 def kind_of_value(value: object) -> FieldKind | None:
     """Return how a value can be plotted.
 
-    None for objects, bytes, null, and for arrays of anything but numbers.
+    Returns None for objects, bytes, null, and arrays of anything but numbers.
     """
     if isinstance(value, (bool, str)):
         return "state"

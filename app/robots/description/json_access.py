@@ -59,9 +59,9 @@ def number_of(value: object) -> float | None:
 
 
 def finite(value: object) -> float | None:
-    """Convert a number to a finite float.
+    """Convert a number to a finite float, or None.
 
-    None for other types, NaN, infinity, and integers too large for a float.
+    Returns None for other types, NaN, infinity, and integers too large for a float.
     """
     if isinstance(value, bool) or not isinstance(value, (int, float)):
         return None

@@ -109,7 +109,7 @@ class Link(Protocol):
     def watchers(self, leaf: str) -> int:
         """Return the number of subscribers of a sensor's topic.
 
-        Without any, expensive work can be skipped.
+        Use this to skip expensive work while nobody is subscribed.
         """
 
     def on_world(self, changed: Callable[[Mapping[str, object]], None]) -> None:

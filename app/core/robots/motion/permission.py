@@ -187,9 +187,9 @@ def risky(robot: Robot, actions: Iterable[str]) -> tuple[str, ...]:
 
 
 def wanted_by(program: Program, robots: Iterable[Robot]) -> list[tuple[Robot, Sequence[str]]]:
-    """Return the actions of each robot that a program invokes.
+    """Return the actions that a program invokes on each robot.
 
-    All actions if it publishes to the robot directly.
+    Includes all actions of a robot if the program publishes on its topics directly.
     """
     asked, moved = program.actions, program.moves
     return [

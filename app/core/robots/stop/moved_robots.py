@@ -193,10 +193,7 @@ class MovedRobots:
         self._proven = {node: mark for node, mark in self._proven.items() if mark > last}
 
     def ended(self, name: str, id: str, program: Identity | None = None) -> None:
-        """End a motion, because a program of the robot sent the final reply.
-
-        Only this program's motion ends.
-        """
+        """End a motion of one program of the robot, because that program sent the final reply."""
 
         def stays(motion: UnprovenMotion) -> bool:
             if motion.id != id or program is None or motion.program is None:
@@ -250,7 +247,7 @@ class MovedRobots:
     def drop_ended(self, name: str) -> None:
         """End the motions whose programs have exited.
 
-        For virtual robots, which stop when their program exits.
+        Use this for virtual robots, which stop when their program exits.
         """
         self._retain(name, lambda motion: motion.program is None or not self._has_ended(motion.program))
 
