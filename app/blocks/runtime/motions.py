@@ -27,7 +27,7 @@ class _Motion:
 class Motions:
     """Tracks continuing motions.
 
-    Thread-safe: `rest` and `go_on` are called in another thread than the replies.
+    Thread-safe: `stop_all` and `go_on` are called in another thread than the replies.
 
     Args:
         stop: Ends everything that a robot does.

@@ -243,12 +243,12 @@ class Network:
 
     # ---- stopping
 
-    def stop_all(self) -> None:
+    def hold_robots(self) -> None:
         """Stop robots that are in motion (a speed) until `go_on`, because the program is paused."""
         self._motions.stop_all()
 
     def go_on(self) -> None:
-        """Resume the motions that `rest` stopped."""
+        """Resume the motions that `hold_robots` stopped."""
         self._motions.go_on()
 
     def slow(self) -> AbstractContextManager[None]:

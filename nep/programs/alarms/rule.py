@@ -262,4 +262,6 @@ def _is_scalar(value: object) -> bool:
 
 def topics_of(rules: Sequence[AlarmRule]) -> frozenset[str]:
     """Return the topics to which the rules need a subscription."""
-    return frozenset(rule.condition.name for rule in rules if rule.condition.needs_topic and rule.condition.name)
+    return frozenset(
+        rule.condition.name for rule in rules if rule.condition.needs_topic and rule.condition.name
+    )

@@ -49,7 +49,7 @@ class _Value:
 class AlarmTrack:
     """State of one alarm.
 
-    Call `observe` with new input and `settle` as time passes; both may return a `Turn`.
+    Call `observe` with new input and `advance` as time passes; both may return a `Turn`.
     """
 
     def __init__(self, rule: AlarmRule) -> None:
