@@ -78,7 +78,7 @@ def test_message_composed_by_hand_is_armed_and_published_until_stop(studio: Stud
         write(studio, fingers, "Message name", "Warm light")
         write(studio, fingers, "Topic", "/lamp", kind="TopicEdit")
         fingers.press("Escape")  # what is offered
-        write(studio, fingers, "Message", '{"level": 0.4 "on": true}')
+        write(studio, fingers, "Message", '{"level": 0.4 "on": true}', kind="JsonLinesEdit")
         studio.says("a comma is missing between two values")
         assert seen.heard == []
         studio.click("Fix it")

@@ -56,16 +56,16 @@ def test_click_in_a_picture_publishes_its_pixel_once_armed(studio: Studio, addre
     studio.says(f"Master {address}", 40)
     with program(address, "/webcam/point", camera="/webcam") as heard:
         studio.row("Topics", "/webcam")
-        picture = until(lambda: studio.all("Picture", kind="ClickablePicture"), "a picture shows")[0]
+        picture = until(lambda: studio.all("Image", kind="ClickablePicture"), "a picture shows")[0]
         studio.screen.click(*middle(picture["rect"]))
         studio.screen.key("p")
         studio.says("Clicks send nothing until armed")
-        picture = studio.find("Picture", kind="ClickablePicture")
+        picture = studio.find("Image", kind="ClickablePicture")
         studio.screen.click(*middle(picture["rect"]))
         studio.click(kind="Switch", name="Armed")
         studio.says("left")
         assert heard["/webcam/point"] == []
-        picture = studio.find("Picture", kind="ClickablePicture")
+        picture = studio.find("Image", kind="ClickablePicture")
         studio.screen.click(*middle(picture["rect"]))
         (point,) = until(lambda: heard["/webcam/point"], "the point is heard")
         assert isinstance(point, dict)
