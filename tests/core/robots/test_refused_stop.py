@@ -266,7 +266,9 @@ def test_robot_whose_stop_is_always_late_is_asked_only_once_more(session: Sessio
         tick_until(session, lambda: session.runs.view().state == "unanswered", LONG_S)
         lives(pepper, "the stop itself")
         tick_until(session, lambda: link.goes_on, LONG_S)
-        assert len(pepper.heard("stop")) == stops
+        assert (
+            len({each["id"] for each in pepper.heard("stop")}) == stops
+        )  # a stop may be repeated until it is answered
         lives(pepper)
         tick_until(session, lambda: not link.goes_on, LONG_S)
         session.tick()

@@ -69,7 +69,7 @@ def run(path, **more) -> tuple[int, str]:
 def test_file_runs_to_end_and_robot_is_stopped(pepper, saved):
     code, out = run(saved(workspace(started(say("Hi"), write(text("done"))))))
     assert code == OK
-    assert "“Test” runs" in out
+    assert "Running “Test”" in out
     assert "done" in out.splitlines()
     assert "Pepper stopped (" in out
     told = [command["op"] for command in pepper.commands]
@@ -380,7 +380,7 @@ def test_output_works_in_every_encoding(master, saved, page):
     )
     assert (done.returncode, done.stderr) == (OK, b"")
     assert b'- "?"' in done.stdout
-    assert b'"Test" runs' in done.stdout
+    assert b'Running "Test"' in done.stdout
 
 
 def test_unknown_master_host_is_reported(saved):
