@@ -101,6 +101,6 @@ def test_message_composed_by_hand_is_armed_and_published_until_stop(studio: Stud
         write(studio, fingers, "Request", '{"name": "Aiko"}')
         studio.click("Arm and call")
         until(lambda: seen.asked == [{"name": "Aiko"}], lambda: f"called once: {seen.asked}; {said(studio)}")
-        studio.says("confirmed in ")
+        studio.says("replied in ")
         assert len(seen.heard) == count
     assert studio.quit() == 0

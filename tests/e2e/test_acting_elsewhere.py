@@ -72,7 +72,7 @@ def test_click_in_a_picture_publishes_its_pixel_once_armed(studio: Studio, addre
         assert (point["width"], point["height"], point["topic"]) == (WIDTH, HEIGHT, "/webcam")
         assert abs(point["x"] - WIDTH / 2) <= 2
         assert abs(point["y"] - HEIGHT / 2) <= 2
-        studio.says("1 point sent, heard by 1")
+        studio.says("1 point sent, received by 1")
         Fingers(studio).press("F12")
         studio.says("Clicks send nothing until armed")
         studio.screen.click(*middle(picture["rect"]))
