@@ -39,37 +39,6 @@ from difflib import get_close_matches
 from nep.i18n import _
 from nep.text import escaped, quotable, shortened
 
-__all__ = [
-    "AddressInUseError",
-    "BackendUnavailableError",
-    "BadKeyError",
-    "BadNameError",
-    "BadTopicError",
-    "BadValueError",
-    "ClosedError",
-    "DecodeError",
-    "EncodeError",
-    "MasterUnreachable",
-    "NepError",
-    "NoServerError",
-    "NoValueError",
-    "ParameterError",
-    "PluginsMissingError",
-    "RecordingError",
-    "RecordingsUnavailableError",
-    "RequestRefusedError",
-    "ServerGoneError",
-    "ServiceError",
-    "ServiceTimeoutError",
-    "TooManyFilesError",
-    "UnknownBackendError",
-    "WaitTimeoutError",
-    "WireError",
-    "WrongTypeError",
-    "did_you_mean",
-    "nearest",
-]
-
 _MAX_WORD_LENGTH = 200
 _MAX_REASON_LENGTH = 500
 """Maximum length in characters of a reason received from another program."""

@@ -33,34 +33,6 @@ if TYPE_CHECKING:
 
     from typing_extensions import Self
 
-__all__ = [
-    "DOMAIN",
-    "EDITOR_WORDS",
-    "ENGLISH",
-    "LANG_VARIABLE",
-    "LOCALE",
-    "MIN_SHARE",
-    "PSEUDO",
-    "_",
-    "begin",
-    "best_match",
-    "day_text",
-    "editor_words",
-    "gettext",
-    "holes",
-    "install",
-    "known_languages",
-    "language",
-    "lazy",
-    "listed",
-    "ngettext",
-    "number",
-    "offered",
-    "pgettext",
-    "plazy",
-    "system_language",
-    "translate",
-]
 
 DOMAIN = "nep-studio"
 ENGLISH = "en"

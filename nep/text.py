@@ -12,8 +12,6 @@ from itertools import islice
 
 from nep.i18n import _
 
-__all__ = ["bounded_str", "control_in", "escaped", "harmless", "quotable", "shortened"]
-
 _MAX_QUOTED_LENGTH = 200
 """Default maximum length of a quoted value in characters."""
 

@@ -13,8 +13,6 @@ from nep.protocol.graph_view import Alert, GraphView
 from nep.system.terminal import Terminal
 from nep.text import escaped
 
-__all__ = ["AlertChanges", "AlertLog", "AlertPrinter"]
-
 _LIBRARY = "nep"
 
 

@@ -17,8 +17,6 @@ from types import FrameType
 
 from nep.cli import INTERRUPTED
 
-__all__ = ["TERMINATED", "ask_first", "call_first", "end_at_once", "leave_when_told"]
-
 TERMINATED = 143
 """Exit code of a program that was stopped by SIGTERM."""
 

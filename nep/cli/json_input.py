@@ -14,8 +14,6 @@ from nep.i18n import _
 from nep.messages.json_fault import JsonFault, find_json_fault, looks_like_json
 from nep.text import control_in, escaped, quotable
 
-__all__ = ["parse_json", "text_of"]
-
 _MAX_SHOWN_CHARACTERS = 40
 
 

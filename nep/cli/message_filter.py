@@ -19,8 +19,6 @@ from nep.messages.fields import MISSING, Path, pick
 from nep.system.syntax import parse_expression
 from nep.text import quotable
 
-__all__ = ["MessageFilter"]
-
 _MAX_LENGTH = 1_000
 _EXAMPLE = 'pose.x > 1.5 and state == "moving"'
 _CONSTANTS: Mapping[str, object] = {"true": True, "false": False, "null": None}

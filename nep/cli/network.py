@@ -15,8 +15,6 @@ from nep.protocol.graph_view import GraphView
 from nep.system.addresses import MASTER_VARIABLE
 from nep.system.arguments import text
 
-__all__ = ["BackendOption", "graph_of", "node_for", "open_node"]
-
 
 def _checked_backend(given: str | None) -> str | None:
     try:

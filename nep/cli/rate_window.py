@@ -11,8 +11,6 @@ from dataclasses import dataclass
 
 from nep.messages.message import Message
 
-__all__ = ["MAX_MESSAGES", "AgeWindow", "Bandwidth", "Delay", "Frequency", "RateWindow", "ReplayFilter"]
-
 MAX_MESSAGES = 100_000
 """Maximum number of messages in a window; topics with higher rates are measured over a shorter time."""
 

@@ -26,19 +26,6 @@ else:  # imported on use: other commands stay fast and need no extra packages
     damage = lazy_module("nep.recordings.formats.damage")
     reader = lazy_module("nep.recordings.reader")
 
-__all__ = [
-    "FileArgument",
-    "FromOption",
-    "RecordedTopicsArgument",
-    "ToOption",
-    "TopicsToRecord",
-    "chosen_topics",
-    "clock_text",
-    "end_with_damage",
-    "progress_bar",
-    "span_ns",
-    "time_ns",
-]
 
 _MAX_COMPARED, _MAX_NAMED = 1_000, 20
 FileArgument = Annotated[

@@ -16,8 +16,6 @@ from nep.messages.fields import MISSING, Path, parse_path, pick
 from nep.messages.message import Message
 from nep.text import escaped
 
-__all__ = ["Fields", "Table"]
-
 STAMP = "stamp_s"
 
 

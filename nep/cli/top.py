@@ -43,7 +43,6 @@ if TYPE_CHECKING:
     from rich.console import Console, RenderableType
     from rich.live import Live
 
-__all__ = ["TopicOrder", "node_rows", "top", "topic_rows"]
 
 _WAIT_SLICE_S = 0.1
 _MAX_NAMES_LENGTH = 40

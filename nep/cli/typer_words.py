@@ -18,8 +18,6 @@ from typer.core import TyperCommand, TyperGroup
 from nep.i18n import _, lazy
 from nep.text import escaped
 
-__all__ = ["TranslatedCommand", "TranslatedGroup", "translated"]
-
 _HELPS = frozenset({
     lazy("Show this message and exit."),
     lazy("Install completion for the current shell."),

@@ -14,8 +14,6 @@ from nep.protocol.graph_view import ServiceInfo
 from nep.protocol.service_wire import SERVICE_TYPE
 from nep.text import escaped, shortened
 
-__all__ = ["ids_as_text", "json_of", "presented"]
-
 MAX_ITEMS = 20
 """Maximum number of list items shown on a terminal; further items are counted."""
 MAX_FIELDS = 100

@@ -11,8 +11,6 @@ from nep.protocol.graph_view import Alert
 from nep.system.log_rarely import is_logged
 from nep.text import escaped, shortened
 
-__all__ = ["BadRequests", "describe_sender"]
-
 _logger = logging.getLogger("nep.master")
 _LOG_BURST, _LOG_RATE_HZ = 10.0, 0.2
 """Burst and rate (per second) of log lines. Limited, because each connection may be another sender."""

@@ -8,8 +8,6 @@ from collections.abc import Callable
 from nep.masters.registry import NodeClock, RegisteredNode, Registry
 from nep.messages.clocks import drift_ns, is_clock
 
-__all__ = ["Clocks", "Differences"]
-
 Differences = dict[str, tuple[int, int]]
 """Clock differences by node id: offset to add to its times for the receiver's clock, and uncertainty (ns)."""
 _MASTER_CLOCK = NodeClock(0, 0, None)

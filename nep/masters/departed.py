@@ -8,8 +8,6 @@ from __future__ import annotations
 from collections.abc import Iterable
 from typing import Generic, TypeVar
 
-__all__ = ["Departed"]
-
 _RETENTION_S = 60.0
 _MAX_PUBLISHERS = 1000
 _MAX_PER_TOPIC = 64

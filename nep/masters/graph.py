@@ -67,9 +67,6 @@ from nep.protocol.requests import (
     node_of,
 )
 
-__all__ = ["Graph", "Outgoing", "with_hosts", "without"]
-
-
 _MAX_WAITING = 10_000
 """Maximum number of requests that wait while the master is learning."""
 

@@ -13,8 +13,6 @@ from nep.masters.registry import Counts, RegisteredNode, Registry
 from nep.messages.packing import pack_saturated, unpack, unpack_bounded
 from nep.protocol.requests import RENEW_S
 
-__all__ = ["LEASE_S", "Leases", "RawRenewal", "encode_renewed", "is_renewal", "read_renewal"]
-
 LEASE_S = 3.0
 """Lease in seconds of a node that renews every second; longer intervals extend it accordingly."""
 _LATE_AFTER_S = 0.4

@@ -14,8 +14,6 @@ from nep.i18n import _
 from nep.protocol.graph_view import Alert
 from nep.system.addresses import ANY, OwnAddress, endpoint_of, own_addresses
 
-__all__ = ["ListenAddresses", "check_hosts"]
-
 _logger = logging.getLogger("nep.master")
 
 

@@ -11,8 +11,6 @@ from typing import Generic, TypeVar
 
 from nep.protocol.topic_pattern import matches
 
-__all__ = ["ALL_PATTERNS_MAX", "PATTERNS_MAX", "PatternIndex"]
-
 PATTERNS_MAX = 100
 """Maximum number of one node's subscribers with patterns."""
 ALL_PATTERNS_MAX = 1_000

@@ -34,8 +34,6 @@ _MAX_REQUEST_S = 4.0
 NO_CONSOLE: int = getattr(subprocess, "CREATE_NO_WINDOW", 0)
 """`creationflags` for subprocesses. Without it Windows opens a console window for each of them."""
 
-__all__ = ["NO_CONSOLE", "Owner", "is_running", "listen", "start_process", "view", "view_or_none"]
-
 
 class Owner:
     """Process that started a master. Identified by pid and start time, because the system reuses pids."""

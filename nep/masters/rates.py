@@ -4,8 +4,6 @@ from __future__ import annotations
 
 from collections import deque
 
-__all__ = ["Meter"]
-
 _WINDOW_S = 10.0
 _MIN_MESSAGES = 10
 _MIN_SPAN_S = 0.5

@@ -32,22 +32,6 @@ from nep.protocol.requests import (
 from nep.protocol.wire import check_node_name, check_topic
 from nep.text import control_in, escaped, shortened
 
-__all__ = [
-    "ALL_RECORDS_MAX",
-    "GUARANTEED_RECORDS",
-    "RECORDS_MAX",
-    "Counts",
-    "NodeClock",
-    "RegisteredNode",
-    "RegisteredPublisher",
-    "RegisteredSubscriber",
-    "Registry",
-    "check_record",
-    "check_request",
-    "is_tcp_endpoint",
-    "records_of",
-]
-
 RECORDS_MAX = 5_000
 """Maximum number of publishers and subscribers of one node."""
 ALL_RECORDS_MAX = 20_000

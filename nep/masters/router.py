@@ -13,8 +13,6 @@ from nep.errors import AddressInUseError
 from nep.system.addresses import endpoint_of
 from nep.system.descriptors import check_room
 
-__all__ = ["MasterRouter"]
-
 REQUEST_MAX_BYTES = 4 * 2**20
 """Maximum size of a part in bytes; a peer that sends more is disconnected."""
 UNREAD_MAX_BYTES = 32 * 2**20

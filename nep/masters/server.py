@@ -39,9 +39,6 @@ from nep.system.forks import watch
 from nep.system.log_rarely import is_logged
 from nep.system.wakeup import Waker
 
-__all__ = ["MasterServer", "Submission"]
-
-
 _logger = logging.getLogger("nep.master")
 _TICK_S = 0.25
 _SUSPENDED_S = 1.0

@@ -22,9 +22,6 @@ from nep.protocol.graph_view import (
 from nep.protocol.requests import as_count
 from nep.protocol.service_wire import SURVEY, service_of
 
-__all__ = ["GraphViewer"]
-
-
 _MAX_NAMES = 5
 """Maximum number of program names in an alert."""
 

@@ -5,18 +5,6 @@ from __future__ import annotations
 import time
 from dataclasses import dataclass
 
-__all__ = [
-    "NOT_COMPARED",
-    "OFFSET_MAX_NS",
-    "OWN_CLOCK",
-    "SAME_CLOCK",
-    "UNCERTAINTY_MAX_NS",
-    "ClockDifference",
-    "PublisherClock",
-    "drift_ns",
-    "is_clock",
-]
-
 OFFSET_MAX_NS = 2**62
 """Maximum plausible clock offset in nanoseconds: 146 years."""
 UNCERTAINTY_MAX_NS = 10_000_000_000

@@ -6,8 +6,6 @@ from collections.abc import Callable, Mapping
 from functools import partial
 from typing import NamedTuple
 
-__all__ = ["Encoded", "encoded"]
-
 
 class Encoded(NamedTuple):
     """Encoded payload. A publisher sends it unchanged.

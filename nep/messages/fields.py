@@ -9,8 +9,6 @@ from nep.errors import NepError
 from nep.i18n import _
 from nep.text import quotable
 
-__all__ = ["MISSING", "Path", "leaves", "parse_path", "path_text", "pick"]
-
 Path = tuple[str | int, ...]
 MISSING = object()
 """Value that `pick` returns for a missing field."""

@@ -6,8 +6,6 @@ from collections import deque
 from collections.abc import Iterator
 from typing import Generic, TypeVar
 
-__all__ = ["HISTORY_BYTES", "MAX_HISTORY", "History"]
-
 MAX_HISTORY = 1_000
 """Maximum length of a history; every back end can send this many messages at once to a new subscriber."""
 HISTORY_BYTES = 64 * 2**20

@@ -30,18 +30,6 @@ if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
 
-__all__ = [
-    "JPEG_QUALITY",
-    "ImageFormat",
-    "RawLayout",
-    "decode",
-    "encode",
-    "picture_info",
-    "raw_array",
-    "raw_image",
-    "raw_layout",
-    "read_file",
-]
 
 JPEG_QUALITY = 90
 MAX_WIDTH = 65_535

@@ -14,8 +14,6 @@ from typing import Literal
 from nep.errors import DecodeError
 from nep.i18n import _, number
 
-__all__ = ["MAX_BYTES", "MAX_PIXELS", "ImageFile", "check_size", "examine"]
-
 MAX_PIXELS = 120_000_000
 """Maximum number of pixels; more than any camera of a robot has."""
 MAX_BYTES = 750_000_000

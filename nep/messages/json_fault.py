@@ -12,8 +12,6 @@ import orjson
 from nep.i18n import _
 from nep.text import shortened
 
-__all__ = ["JsonFault", "JsonFix", "find_json_fault", "looks_like_json"]
-
 _MAX_WORD_LENGTH = 30
 _STRING_OR_CONSTANT = re.compile(r'"(?:[^"\\\n]|\\.)*"?|(?P<constant>-?\b(?:NaN|Infinity)\b)')
 _WORD = re.compile(r"[^\W\d][\w.-]*")

@@ -12,8 +12,6 @@ from nep.messages.clocks import NOT_COMPARED, PublisherClock
 from nep.messages.codecs import CODECS
 from nep.messages.codecs import codec as codec_named
 
-__all__ = ["NOTHING", "UNDECODED", "Message", "MessageKind", "arrived", "kind_of", "new_message"]
-
 NOTHING: Mapping[str, object] = MappingProxyType({})
 UNDECODED = object()
 new_message = object.__new__

@@ -16,8 +16,6 @@ from datetime import datetime
 
 from nep.i18n import _
 
-__all__ = ["MAX_LEVELS", "json_is_too_deep", "packed_is_too_deep", "too_deep"]
-
 MAX_LEVELS = 64
 _COUNTED_BYTES = 4_096  # up to this size, all brackets or headers are counted in less than 3 µs
 _AS_LISTS = bytes.maketrans(b"{}", b"[]")

@@ -9,8 +9,6 @@ import msgpack  # type: ignore[import-untyped]
 
 from nep.i18n import _
 
-__all__ = ["clamp_int", "pack", "pack_saturated", "unpack", "unpack_bounded", "unpack_first"]
-
 _Value = TypeVar("_Value")
 _MIN_INT, _MAX_INT = -(2**63), 2**64 - 1
 

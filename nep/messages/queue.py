@@ -7,8 +7,6 @@ from typing import Literal
 
 from nep.messages.message import Message
 
-__all__ = ["AHEAD_MOST", "MAX_BYTES", "MAX_MESSAGES", "Inbox", "Keep", "ReadAhead"]
-
 Keep = Literal["all", "latest"]
 """Queue policy of a subscriber: all messages while there is room, or only the newest."""
 

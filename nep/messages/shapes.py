@@ -14,22 +14,6 @@ from typing import Any
 from nep.i18n import _, listed
 from nep.text import escaped, shortened
 
-__all__ = [
-    "ANYTHING",
-    "SCALARS",
-    "ShapeMismatch",
-    "ValueShape",
-    "enum_shape",
-    "list_shape",
-    "literal_shape",
-    "map_shape",
-    "missing_value",
-    "short_repr",
-    "tuple_shape",
-    "union_shape",
-    "wrong_type",
-]
-
 _MIN_INT, _MAX_INT = -(1 << 63), (1 << 64) - 1
 """Minimum and maximum of ints in JSON."""
 _MAX_TEXT_LENGTH = 100

@@ -48,8 +48,6 @@ from nep.messages.shapes import (
 from nep.system.arguments import text
 from nep.text import escaped, shortened
 
-__all__ = ["OTHER_NAME", "MessageType", "TypedReader", "message_type", "typed_codec", "value_shape"]
-
 OTHER_NAME = "nep.other_name"
 """Key of a field's metadata for an alternative name that is accepted in received messages."""
 

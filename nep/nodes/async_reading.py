@@ -18,7 +18,6 @@ if TYPE_CHECKING:
 else:
     asyncio = lazy_module("asyncio")
 
-__all__ = ["AsyncMessages", "AsyncReader"]
 
 _MAX_READS_PER_TURN = 64
 """Number of messages read without waiting before other coroutines get a turn."""

@@ -19,7 +19,6 @@ if TYPE_CHECKING:
 else:
     asyncio = lazy_module("asyncio")
 
-__all__ = ["spin"]
 
 _MAX_BUSY_TURNS = 64
 """Number of consecutive turns with work before other coroutines get a turn."""

@@ -14,8 +14,6 @@ from nep.messages.image_codec import ImageFormat
 from nep.nodes.arguments import one_of, within
 from nep.protocol.topic_pattern import is_pattern
 
-__all__ = ["codec_with", "history_for", "is_pattern_for", "quality_for"]
-
 
 def is_pattern_for(backend: Backend, topic: str, configuration: Configuration | None) -> bool:
     """Return True if `topic` is a pattern. Raises `ValueError` if the back end has no patterns."""

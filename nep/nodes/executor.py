@@ -14,8 +14,6 @@ from nep.nodes.shared_wait import SharedWait
 from nep.nodes.subscriber import SLICE_S
 from nep.nodes.work import Work
 
-__all__ = ["spin_all"]
-
 
 def spin_all(works: Sequence[Work], timeout_s: float | None) -> None:
     """Run the work of several nodes in this thread until all nodes are stopped or closed.

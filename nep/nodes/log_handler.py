@@ -27,20 +27,6 @@ from nep.i18n import _, ngettext, number
 from nep.system.forks import watch
 from nep.text import bounded_str, shortened
 
-__all__ = [
-    "BURST",
-    "LAST_ERRORS_TOPIC",
-    "LAST_ERRORS_TYPE",
-    "LEVELS",
-    "LOG_TOPIC",
-    "LOG_TYPE",
-    "RATE_HZ",
-    "LogHandler",
-    "LogRecord",
-    "ShownErrors",
-    "level_of",
-]
-
 LOG_TOPIC = "/nep/log"
 LOG_TYPE = "nep/log"
 LAST_ERRORS_TOPIC = "/nep/log/errors"

@@ -26,7 +26,6 @@ if TYPE_CHECKING:
 else:
     asyncio = lazy_module("asyncio")
 
-__all__ = ["LoopWait", "give_way", "loop_wait"]
 
 _LOOP_CHECK_S = 1.0
 """Interval in seconds for detecting a loop that was closed without the shutdown of `asyncio.run`."""

@@ -56,7 +56,6 @@ from nep.system.computer import computer_id
 if TYPE_CHECKING:
     from typing_extensions import Self
 
-__all__ = ["Node", "spin"]
 
 FLUSH_S = 2.0
 """Time in seconds that closing waits for published messages to be delivered."""

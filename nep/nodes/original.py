@@ -17,15 +17,6 @@ from nep.system.addresses import own_addresses
 if TYPE_CHECKING:
     from typing_extensions import Self
 
-__all__ = [
-    "FixedClient",
-    "FixedServer",
-    "dict2json",
-    "getMyIP",
-    "json2dict",
-    "original_hint",
-    "read_json",
-]
 
 _LOOPBACK = "127.0.0.1"
 _REPLACEMENTS: Mapping[str, str] = {

@@ -34,7 +34,6 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
     from typing_extensions import Self
 
-__all__ = ["Publisher", "RejectedPayloads", "path_of"]
 
 _logger = logging.getLogger("nep")
 _VALIDATE_INTERVAL_S = 1.0

@@ -12,8 +12,6 @@ from nep.i18n import _
 from nep.system.descriptors import is_lack, limit, opened
 from nep.system.wakeup import Waker
 
-__all__ = ["SharedWait"]
-
 _POLL_INTERVAL_S = 0.01
 """Polling interval in seconds for subscribers that can't notify."""
 

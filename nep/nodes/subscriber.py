@@ -19,7 +19,6 @@ from nep.system.log_rarely import is_logged
 if TYPE_CHECKING:
     from typing_extensions import Self
 
-__all__ = ["SLICE_S", "Subscriber"]
 
 SLICE_S = 0.1
 """Maximum duration of a single wait in seconds, because on Windows Ctrl+C doesn't interrupt a wait."""

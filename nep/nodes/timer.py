@@ -6,8 +6,6 @@ import math
 import threading
 from collections.abc import Callable, Sequence
 
-__all__ = ["Timer", "next_due"]
-
 
 class Timer:
     """Periodic timer of a node. Thread-safe. Created by `Node.new_timer`.

@@ -21,7 +21,6 @@ if TYPE_CHECKING:
 else:
     typed = lazy_module("nep.messages.typed")
 
-__all__ = ["MsgType", "TypedSubscriber", "codec_of", "name_of", "new_subscriber", "sink_of"]
 
 MsgType = str | type
 """Name of a message type, or a dataclass or TypedDict whose instances are the payloads."""

@@ -15,8 +15,6 @@ from nep.nodes.timer import Timer, next_due
 from nep.patterns.services.owned import ServiceRegistry
 from nep.system.arguments import is_coroutine_function
 
-__all__ = ["NO_MESSAGE", "Callback", "Work"]
-
 NO_MESSAGE = object()
 """Returned instead of a message when there is none."""
 

@@ -9,8 +9,6 @@ from typing import NamedTuple
 
 from nep.messages.clocks import UNCERTAINTY_MAX_NS, drift_ns, is_clock
 
-__all__ = ["ClockSamples", "Moment"]
-
 _MAX_SAMPLES = 8
 """Number of renewals that are kept; the one with the shortest round trip is used."""
 _STEP_NS = 50_000

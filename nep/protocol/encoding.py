@@ -48,20 +48,6 @@ from nep.protocol.requests import (
     Seen,
 )
 
-__all__ = [
-    "AnswerEncoder",
-    "ReceivedRequest",
-    "call_of_view",
-    "collecting_later",
-    "decode_answer",
-    "decode_request",
-    "encode_answer",
-    "encode_request",
-    "make_frozen",
-    "read",
-    "write",
-]
-
 T = TypeVar("T")
 _PLAIN = frozenset({str, int, float, bool, bytes, type(None)})
 

@@ -5,20 +5,6 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field
 
-__all__ = [
-    "BRIDGES_TOPIC",
-    "Alert",
-    "ClientInfo",
-    "GraphView",
-    "NodeInfo",
-    "PatternInfo",
-    "PublisherInfo",
-    "ServerInfo",
-    "ServiceInfo",
-    "SubscriberInfo",
-    "TopicInfo",
-]
-
 BRIDGES_TOPIC = "/nep/bridges"
 """Topic of the bridges' state (connected networks, message counts). Every publisher of it is a bridge."""
 

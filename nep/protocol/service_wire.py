@@ -22,28 +22,6 @@ from nep.i18n import _
 from nep.protocol.wire import check_topic
 from nep.text import bounded_str, escaped, shortened
 
-__all__ = [
-    "HEADER_BYTES",
-    "NATIVE",
-    "ORIGINAL",
-    "ORIGINAL_CODEC",
-    "PAYLOAD_MAX_BYTES",
-    "PREFIX",
-    "SERVICE_TYPE",
-    "SURVEY",
-    "CallHeader",
-    "CallKind",
-    "Framing",
-    "ReadAnswer",
-    "Reply",
-    "check_service",
-    "check_survey",
-    "failure",
-    "read_failure",
-    "service_of",
-    "topic_of",
-]
-
 PREFIX = "nep.service:"
 SURVEY = "survey:"
 """Prefix of a survey's service name. The master lists its respondents as servers of that service."""

@@ -9,8 +9,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-__all__ = ["glob_matches", "is_glob", "widened"]
-
 
 def is_glob(word: str) -> bool:
     """Return True if a word contains a wildcard."""

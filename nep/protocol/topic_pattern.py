@@ -8,8 +8,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-__all__ = ["is_pattern", "levels_match", "matches"]
-
 _ONE, _ANY = "*", "**"
 
 

@@ -20,43 +20,6 @@ from nep.messages.nesting import packed_is_too_deep, too_deep
 from nep.messages.packing import pack, unpack
 from nep.text import control_in
 
-__all__ = [
-    "BATCH",
-    "BYE",
-    "EXTENSION",
-    "HEADER_BYTES",
-    "LATCHED",
-    "OFFER",
-    "SHARED",
-    "SIZE_MAX",
-    "SUBSCRIPTION_MAX_BYTES",
-    "VERSION",
-    "Header",
-    "Hello",
-    "Read",
-    "Shares",
-    "apart",
-    "check_node_name",
-    "check_topic",
-    "extension_part",
-    "form_of",
-    "hello_part",
-    "join",
-    "pack_quickly",
-    "parse_hello",
-    "parse_read",
-    "parse_shares",
-    "read_extension",
-    "read_header",
-    "read_part",
-    "shares_part",
-    "split",
-    "split_rest",
-    "topic_part",
-    "unpack_at",
-    "unpack_quickly",
-]
-
 VERSION = 1
 HEADER_BYTES = 32
 TOPIC_MAX_BYTES = 200

@@ -20,8 +20,6 @@ from nep.recordings.formats.destination import disk_error
 from nep.recordings.reader import Recording
 from nep.system.replace_file import replace_file
 
-__all__ = ["MAX_BOOKMARKS", "Bookmark", "Bookmarks"]
-
 MAX_BOOKMARKS = 10_000
 _MAX_FILE_BYTES = 10_000_000
 _MAX_NAME_LENGTH = 200

@@ -50,8 +50,6 @@ from nep.recordings.recorder import Recorder, TopicSelection
 from nep.recordings.ring import FlightRecorder, RingStatus
 from nep.recordings.writer import RecordingStatus, RecordingWriter
 
-__all__ = ["RecorderService", "main"]
-
 FIGURES_S = 1.0
 _MAX_LINE_BYTES = 1_000_000
 _MAX_SECONDS = 1e9

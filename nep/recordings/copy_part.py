@@ -19,8 +19,6 @@ from nep.recordings.formats.mcap_file import CHUNK_BYTES, FileWriter
 from nep.recordings.formats.records import RawMessage
 from nep.recordings.reader import Recording
 
-__all__ = ["copy_part"]
-
 _MAX_ENTRIES = 100_000
 _COPIED_ROLES = frozenset({"notes", "runs", "alarms", "alerts"})
 _FLUSH_INTERVAL_NS = 500_000_000

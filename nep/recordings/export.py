@@ -25,8 +25,6 @@ from nep.recordings.formats.destination import disk_error
 from nep.recordings.reader import RecordedMessage, Recording
 from nep.system.replace_file import replace_file
 
-__all__ = ["ALL_OF_IT", "FORMATS", "Exported", "Part", "export", "flattened"]
-
 FORMATS = ("csv", "parquet", "pictures", "mp4", "mcap")
 MAX_COLUMNS = 5_000
 MAX_FILES = 1_000

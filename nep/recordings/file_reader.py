@@ -28,7 +28,6 @@ from nep.recordings.formats.records import ChunkInfo, RawMessage, messages_in
 if TYPE_CHECKING:
     from typing_extensions import Self
 
-__all__ = ["CACHE_BYTES", "FileFacts", "FileReader", "RawFile"]
 
 CACHE_BYTES = 64_000_000
 _MAX_EXACT_CHUNKS = 200

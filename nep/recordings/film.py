@@ -17,8 +17,6 @@ from nep.i18n import _
 from nep.messages.message import Message
 from nep.system.replace_file import replace_file
 
-__all__ = ["Container", "Film", "available_container", "frame_of"]
-
 MAX_S = 86_400.0
 """Maximum duration in seconds; an image from another day would cause millions of frames."""
 _TRIAL_SIZE_PX = (64, 48)

@@ -20,8 +20,6 @@ from nep.recordings.formats.records import RawMessage
 if TYPE_CHECKING:
     from typing_extensions import Self
 
-__all__ = ["RecordedMessage", "RecordedTopic", "Recording"]
-
 
 class RecordedMessage(NamedTuple):
     """Message and its time of receipt (ns since 1970)."""

@@ -22,7 +22,6 @@ from nep.recordings.formats.channels import Role
 if TYPE_CHECKING:
     from typing_extensions import Self
 
-__all__ = ["Recorder", "TopicSelection"]
 
 _GRAPH_POLL_S = 1.0
 _MASTER_TIMEOUT_S = 0.5

@@ -44,8 +44,6 @@ from nep.recordings.formats.records import (
 from nep.recordings.formats.walk import Place
 from nep.system.replace_file import replace_file
 
-__all__ = ["RepairReport", "repair", "repaired_path"]
-
 _WINDOW = 4_000_000
 _CHUNK_PATTERN = re.compile(rb"\x06.{4}[\x00-\x7f]\x00\x00\x00", re.DOTALL)
 """Pattern of a chunk's opcode, followed by a length below 2^39."""

@@ -40,7 +40,6 @@ from nep.recordings.writer import LogClock, RecordingWriter
 if TYPE_CHECKING:
     from typing_extensions import Self
 
-__all__ = ["FlightRecorder", "KeptRecording", "RingStatus"]
 
 _SEGMENT_COUNT = 8
 """Number of segments of a full ring."""

@@ -9,8 +9,6 @@ from nep.i18n import _
 from nep.recordings.formats.destination import USUAL_LIMITS, OneFile, WriterLimits, disk_error
 from nep.recordings.formats.mcap_file import ChannelTable, FileWriter
 
-__all__ = ["MIN_PART_BYTES", "SplitFiles", "part_path"]
-
 MIN_PART_BYTES = 100_000
 
 

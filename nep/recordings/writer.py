@@ -37,7 +37,6 @@ from nep.recordings.formats.mcap_file import CHUNK_BYTES, FileWriter
 if TYPE_CHECKING:
     from typing_extensions import Self
 
-__all__ = ["LogClock", "RecordingStatus", "RecordingWriter"]
 
 MAX_PUBLISHER_CHANNELS = 10_000
 """Number of channels beyond which new publishers share one channel per topic."""

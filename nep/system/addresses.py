@@ -22,24 +22,6 @@ if TYPE_CHECKING:
 else:
     psutil = lazy_module("psutil")
 
-__all__ = [
-    "ANY",
-    "DEFAULT_MASTER",
-    "MASTER_VARIABLE",
-    "MasterName",
-    "OwnAddress",
-    "checked_host",
-    "endpoint_of",
-    "has_address",
-    "host_of",
-    "in_numbers",
-    "is_endpoint",
-    "is_loopback",
-    "look_up",
-    "master_address",
-    "nearest",
-    "own_addresses",
-]
 
 _logger = logging.getLogger("nep")
 

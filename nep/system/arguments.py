@@ -13,20 +13,6 @@ from nep.errors import WrongTypeError
 from nep.i18n import _, listed
 from nep.text import control_in, escaped, shortened
 
-__all__ = [
-    "at_least",
-    "flag",
-    "function",
-    "is_coroutine_function",
-    "limit",
-    "one_of",
-    "period",
-    "plain_function",
-    "seconds",
-    "text",
-    "within",
-]
-
 T = TypeVar("T")
 F = TypeVar("F", bound=Callable[..., object])
 _MAX_LENGTH = 200

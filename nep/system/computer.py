@@ -11,8 +11,6 @@ from hashlib import sha256
 from importlib import import_module
 from pathlib import Path
 
-__all__ = ["computer_id"]
-
 _BOOT_ID = Path("/proc/sys/kernel/random/boot_id")
 
 

@@ -5,8 +5,6 @@ from __future__ import annotations
 import time
 from collections.abc import Callable
 
-__all__ = ["CpuLoad"]
-
 _MIN_INTERVAL_S = 0.5
 
 

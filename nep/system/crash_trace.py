@@ -5,8 +5,6 @@ from __future__ import annotations
 import contextlib
 import faulthandler
 
-__all__ = ["say_where_it_crashes"]
-
 
 def say_where_it_crashes() -> None:
     """Make this process write the stacks of all threads to stderr on a segmentation fault or abort.

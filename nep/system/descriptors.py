@@ -15,8 +15,6 @@ import threading
 from nep.errors import TooManyFilesError
 from nep.system.forks import in_child
 
-__all__ = ["SPARE", "allow_many", "check_room", "has_room", "is_lack", "limit", "opened"]
-
 SPARE = 32
 """Number of descriptors reserved for accepted connections and files of the program."""
 _TARGET_LIMIT = 8192

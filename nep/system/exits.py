@@ -9,8 +9,6 @@ from __future__ import annotations
 import atexit
 from collections.abc import Callable
 
-__all__ = ["after_nodes", "not_after_nodes"]
-
 _calls: list[Callable[[], object]] = []
 
 

@@ -20,8 +20,6 @@ from collections.abc import Callable
 from typing import Protocol
 from weakref import WeakSet
 
-__all__ = ["Inherited", "give_up", "in_child", "watch"]
-
 
 class Inherited(Protocol):
     """Object that must not be used in a forked child process."""

@@ -11,8 +11,6 @@ import os
 import sys
 from typing import Protocol
 
-__all__ = ["hold_code"]
-
 LOADER = "pyimod02_importers"
 """Name of PyInstaller's import module."""
 

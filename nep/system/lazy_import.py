@@ -10,8 +10,6 @@ from __future__ import annotations
 
 import importlib
 
-__all__ = ["lazy_module"]
-
 
 class LazyModule:
     """Proxy that imports a module when an attribute is first accessed. Thread-safe."""

@@ -6,8 +6,6 @@ import logging
 from contextlib import suppress
 from types import TracebackType
 
-__all__ = ["SurvivedErrors", "is_logged"]
-
 _LOGGED_COUNTS = frozenset(10**n for n in range(20))
 
 

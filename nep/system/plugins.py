@@ -16,7 +16,6 @@ if TYPE_CHECKING:
 else:
     metadata = lazy_module("importlib.metadata")
 
-__all__ = ["Named", "discover", "discover_own"]
 
 _logger = logging.getLogger("nep.system.plugins")
 

@@ -9,8 +9,6 @@ from pathlib import Path
 
 from nep.i18n import _
 
-__all__ = ["replace_file"]
-
 _MAX_ATTEMPTS = 20
 _PAUSE_S = 0.05
 _OPEN_FILE_ERRORS = frozenset({5, 32, 33})

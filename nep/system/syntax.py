@@ -10,8 +10,6 @@ import ast
 import os
 import threading
 
-__all__ = ["parse_expression", "parse_module"]
-
 _lock = threading.Lock()
 if hasattr(os, "register_at_fork"):
     # Another thread may be parsing when the process forks.

@@ -20,7 +20,6 @@ from nep.text import escaped
 if TYPE_CHECKING:
     from typing_extensions import Self
 
-__all__ = ["LineFormatter", "Terminal", "log_to"]
 
 MAX_CHARACTERS = 256 * 1024
 """Maximum size of queued text in characters."""

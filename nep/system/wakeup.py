@@ -13,8 +13,6 @@ from nep.i18n import _
 from nep.system.descriptors import is_lack, limit, opened
 from nep.system.forks import watch
 
-__all__ = ["Waker"]
-
 _HAS_EVENTS = sys.platform == "linux" and hasattr(os, "eventfd")
 
 

@@ -7,8 +7,6 @@ import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
 
-__all__ = ["without_interrupts"]
-
 
 @contextmanager
 def without_interrupts() -> Iterator[None]:

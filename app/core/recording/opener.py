@@ -15,8 +15,6 @@ from nep.recordings.file_reader import CACHE_BYTES, FileReader
 from nep.recordings.formats.limits import ReadBudget
 from nep.recordings.reader import Recording
 
-__all__ = ["LocalOpener", "RecordingOpener", "process_opener"]
-
 
 class RecordingOpener(Protocol):
     """Opens recordings (see `nep.recordings.apart.remote.ReaderProcess`)."""

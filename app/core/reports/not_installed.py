@@ -16,16 +16,6 @@ from dataclasses import dataclass
 from app.core.alerts import Alerts
 from nep.i18n import _, listed, ngettext
 
-__all__ = [
-    "ALERT",
-    "EXTRA_MODULES",
-    "LIBRARIES",
-    "MissingLibraries",
-    "missing_libraries",
-    "tell_missing",
-    "why_not_imported",
-]
-
 ALERT = "system-libraries"
 LIBRARIES: Mapping[str, str] = {
     "libEGL.so.1": "libegl1",

@@ -15,8 +15,6 @@ from nep.backends.zeromq.loss import PublisherTracker
 from nep.messages.history import HISTORY_BYTES
 from nep.protocol.wire import Header
 
-__all__ = ["EarlyMessages"]
-
 T = TypeVar("T")
 _MAX_QUEUED_S = 15.0
 """Maximum time in seconds that a message is queued. A greeting takes ten seconds at most."""

@@ -17,8 +17,6 @@ if TYPE_CHECKING:
 else:
     shapes, typed = lazy_module("nep.messages.shapes"), lazy_module("nep.messages.typed")
 
-__all__ = ["ParameterForm", "form_of"]
-
 
 class ParameterForm:
     """Conversion between instances of a class and plain values."""

@@ -12,8 +12,6 @@ from nep.i18n import _
 from nep.patterns.parameters.parameter import NodeParameter, declared, short_repr
 from nep.text import bounded_str, escaped
 
-__all__ = ["MSG_TYPE", "OnChange", "ParameterHost", "Parameters", "place_of"]
-
 MSG_TYPE = "nep/patterns/parameters"
 """Message type of the latched topic that publishes a node's parameters."""
 _MAX_PARAMETERS = 1_000

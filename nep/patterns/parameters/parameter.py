@@ -15,8 +15,6 @@ from nep.patterns.parameters.form import ParameterForm, form_of
 from nep.protocol.wire import check_topic
 from nep.text import escaped, shortened
 
-__all__ = ["KINDS", "NodeParameter", "declared", "short_repr"]
-
 KINDS: Mapping[str, type] = {
     "bool": bool,
     "int": int,

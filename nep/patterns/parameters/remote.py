@@ -15,8 +15,6 @@ from nep.text import bounded_str, escaped
 if TYPE_CHECKING:
     from typing_extensions import Self
 
-__all__ = ["RemoteParameters", "node_with_parameters"]
-
 
 class RemoteParameters:
     """Client of another node's parameters. Usable as a context manager. Opened by `Node.parameters_of`.

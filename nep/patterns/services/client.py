@@ -28,7 +28,6 @@ from nep.system.arguments import seconds
 if TYPE_CHECKING:
     from typing_extensions import Self
 
-__all__ = ["Client", "Limit"]
 
 Limit = float | Literal["default"] | None
 """Time limit of a call in seconds; None for no limit, "default" for the client's time limit."""

@@ -20,8 +20,6 @@ from nep.patterns.services.typed import CallTypes
 from nep.protocol.service_wire import check_service, check_survey
 from nep.system.arguments import at_least, plain_function, seconds, text
 
-__all__ = ["ServiceRegistry"]
-
 S = TypeVar("S", bound=Server)
 
 

@@ -22,7 +22,6 @@ from nep.system.log_rarely import is_logged
 if TYPE_CHECKING:
     from typing_extensions import Self
 
-__all__ = ["Callback", "Server"]
 
 _logger = logging.getLogger("nep.patterns.services")
 

@@ -13,8 +13,6 @@ from nep.patterns.services.survey import Respondent, Surveyor
 from nep.patterns.services.typed import call_types
 from nep.system.arguments import seconds
 
-__all__ = ["ServiceNode"]
-
 
 class ServiceNode(ABC):
     """Methods of a node for services and surveys."""

@@ -23,7 +23,6 @@ from nep.system.log_rarely import is_logged
 if TYPE_CHECKING:
     from typing_extensions import Self
 
-__all__ = ["Respondent", "Surveyor"]
 
 _logger = logging.getLogger("nep.patterns.services")
 

@@ -19,7 +19,6 @@ if TYPE_CHECKING:
 else:
     shapes, typed = lazy_module("nep.messages.shapes"), lazy_module("nep.messages.typed")
 
-__all__ = ["UNTYPED", "CallTypes", "PayloadType", "call_types"]
 
 _MAX_SHOWN_LENGTH = 60
 

@@ -15,8 +15,6 @@ from nep.programs.alarms.history import AlarmDeed, AlarmHistory, AlarmRecord
 from nep.programs.alarms.rule import AlarmAction, AlarmRule
 from nep.programs.alarms.sentences import what_words
 
-__all__ = ["Alarms", "Carrier", "Done"]
-
 RETRY_S = 30.0
 MAX_TRIES = 20
 _MAX_DEEDS = 1_000

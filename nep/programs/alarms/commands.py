@@ -14,8 +14,6 @@ from nep.patterns.services.client import Client
 from nep.programs.alarms.alarms import Done
 from nep.programs.alarms.rule import AlarmAction
 
-__all__ = ["CALL_S", "AlarmCommands"]
-
 CALL_S = 5.0
 """Time limit of a service call in seconds."""
 _MAX_CACHED = 50

@@ -21,8 +21,6 @@ from nep.programs.alarms.track import AlarmTrack, Turn
 from nep.protocol.graph_view import GraphView
 from nep.protocol.topic_pattern import matches
 
-__all__ = ["AlarmEvaluator", "AlarmEvent", "AlarmPhase", "AlarmState"]
-
 LARGE_BYTES = 256 * 1024
 """Size above which a message is decoded only if it is the newest of its batch."""
 MAX_EVENTS = 1_000

@@ -9,8 +9,6 @@ from typing import NamedTuple
 
 from nep.text import shortened
 
-__all__ = ["MAX_RECORDS", "AlarmDeed", "AlarmHistory", "AlarmRecord", "record_from", "record_plain"]
-
 MAX_RECORDS = 500
 _MAX_DEEDS = 20
 _MAX_CHARACTERS = 300

@@ -6,8 +6,6 @@ from collections import deque
 
 from nep.protocol.graph_view import TopicInfo
 
-__all__ = ["TopicLosses"]
-
 _SAMPLE_PERIOD_S = 0.9
 _MAX_SAMPLES = 700
 """Maximum number of samples, which cover ten minutes."""

@@ -15,24 +15,6 @@ from nep.protocol.service_wire import check_service
 from nep.protocol.topic_pattern import is_pattern
 from nep.protocol.wire import check_node_name, check_topic
 
-__all__ = [
-    "ACTION_KINDS",
-    "KINDS",
-    "NEEDS_LIMIT",
-    "NODE_KINDS",
-    "NUMBER_KINDS",
-    "TOPIC_KINDS",
-    "VALUE_KINDS",
-    "AlarmAction",
-    "AlarmCondition",
-    "AlarmRule",
-    "RuleProblem",
-    "Scalar",
-    "float_of",
-    "new_id",
-    "problem_of",
-]
-
 Scalar = float | int | str | bool | None
 """Type of values that a field can be compared with."""
 

@@ -38,16 +38,6 @@ from nep.programs.alarms.rule import (
 )
 from nep.text import escaped, quotable
 
-__all__ = [
-    "EXAMPLE",
-    "MAX_ALARMS",
-    "AlarmFile",
-    "NewerAlarmsError",
-    "alarms_text",
-    "read_alarms",
-    "read_text",
-]
-
 FORMAT = 1
 MAX_ALARMS = 200
 _MAX_BYTES = 4_000_000

@@ -9,18 +9,6 @@ from nep.i18n import _, lazy, listed, number
 from nep.programs.alarms.rule import KEEP_S, AlarmAction, AlarmCondition, AlarmRule, Scalar, float_of
 from nep.text import quotable, shortened
 
-__all__ = [
-    "action_words",
-    "condition_words",
-    "limit_words",
-    "rule_words",
-    "seen_words",
-    "subject_words",
-    "time_words",
-    "value_words",
-    "what_words",
-]
-
 _MAX_SHOWN_CHARACTERS = 40
 _DO_NOTHING = lazy("add it to the alarm list")
 

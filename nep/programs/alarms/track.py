@@ -14,8 +14,6 @@ from typing import Literal, NamedTuple
 from nep.messages.fields import MISSING, Path, parse_path, pick
 from nep.programs.alarms.rule import EVENT_KINDS, MAX_CHARACTERS, AlarmRule, Scalar, float_of
 
-__all__ = ["AlarmTrack", "Turn", "scalar_of"]
-
 EVENT_SHOWN_S = 5.0
 """Minimum time that an alarm caused by a momentary event stays on, in seconds."""
 

@@ -10,8 +10,6 @@ from __future__ import annotations
 from nep.messages.message import Message
 from nep.programs.blackboard.entries import AgeBy
 
-__all__ = ["AHEAD_S", "BEHIND_S", "beginning_of"]
-
 AHEAD_S = 0.1
 """Maximum time that a stamp may be in the future, in seconds; beyond, the publisher's clock is wrong."""
 BEHIND_S = 10.0

@@ -31,7 +31,6 @@ from nep.system.arguments import at_least, function, period, plain_function, sec
 if TYPE_CHECKING:
     from typing_extensions import Self
 
-__all__ = ["MAX_BYTES", "MAX_KEYS", "Blackboard", "BlackboardChange", "BlackboardEntry", "OnChange"]
 
 MAX_KEYS = 100_000
 MAX_BYTES = 256 * 2**20

@@ -17,8 +17,6 @@ from nep.i18n import _
 from nep.programs.blackboard.keys import Key, key_matches, key_text, literal_levels
 from nep.programs.blackboard.values import is_same, size_of
 
-__all__ = ["AgeBy", "Cause", "Entries", "EntryChange", "StoredEntry"]
-
 AgeBy = Literal["stamp", "arrival"]
 """Start of an age: the publisher's time stamp or the arrival."""
 Cause = Literal["new", "changed", "replaced", "removed", "expired", "dropped"]

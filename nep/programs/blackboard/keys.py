@@ -12,8 +12,6 @@ from nep.errors import BadKeyError
 from nep.i18n import _
 from nep.protocol.topic_pattern import levels_match
 
-__all__ = ["MAX_LEVELS", "Key", "key_matches", "key_of_topic", "key_text", "literal_levels", "parse_key"]
-
 Key = tuple[str, ...]
 MAX_LEVELS = 32
 _MAX_CHARACTERS = 1_000

@@ -15,8 +15,6 @@ from nep.errors import DecodeError
 from nep.messages.codecs import JSON
 from nep.messages.message import NOTHING
 
-__all__ = ["Perception", "perception_in"]
-
 _QUOTES = "'\""
 
 

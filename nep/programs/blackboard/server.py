@@ -30,7 +30,6 @@ from nep.text import bounded_str
 if TYPE_CHECKING:
     from typing_extensions import Self
 
-__all__ = ["DEFAULT_NAME", "MAX_ENTRIES", "BlackboardServer", "service_of"]
 
 DEFAULT_NAME = "blackboard"
 MAX_ENTRIES = 10_000

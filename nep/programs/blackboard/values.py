@@ -8,8 +8,6 @@ from collections.abc import Iterator, Mapping
 
 from nep.programs.blackboard.keys import MAX_LEVELS, Key
 
-__all__ = ["copied", "is_same", "leaves", "size_of"]
-
 _MAX_DEPTH = 100
 _PLAIN = frozenset({int, float, bool, type(None)})
 _NUMBER_BYTES = 40

@@ -20,7 +20,6 @@ from nep.system.log_rarely import is_logged
 if TYPE_CHECKING:
     from typing_extensions import Self
 
-__all__ = ["BlackboardWatch", "MessageReading", "PerceivedValue", "is_change_message"]
 
 _logger = logging.getLogger("nep.programs.blackboard")
 _HOLE = re.compile(r"\{([^{}]+)\}")

@@ -32,7 +32,6 @@ from nep.protocol.graph_view import GraphView
 if TYPE_CHECKING:
     from typing_extensions import Self
 
-__all__ = ["Bridge", "check_installed"]
 
 MAX_ROUTES = 500
 """Maximum number of routes that patterns create, in both directions."""

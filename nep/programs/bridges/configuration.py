@@ -17,24 +17,6 @@ from nep.i18n import _
 from nep.protocol.wire import check_node_name, check_topic
 from nep.text import quotable
 
-__all__ = [
-    "DIRECTIONS",
-    "NODE_PREFIX",
-    "SIDES",
-    "BridgeConfiguration",
-    "BridgeTopic",
-    "Direction",
-    "SideConfiguration",
-    "SideName",
-    "TopicEnd",
-    "check_apart",
-    "checked_name",
-    "checked_topic_names",
-    "direction_named",
-    "join_line",
-    "side_of",
-]
-
 Direction = Literal["a->b", "b->a", "both"]
 SideName = Literal["a", "b"]
 

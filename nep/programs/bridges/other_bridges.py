@@ -15,8 +15,6 @@ from typing import NamedTuple
 
 from nep.programs.bridges.configuration import SIDES, SideName
 
-__all__ = ["HEARTBEAT_S", "OtherBridge", "OtherBridges", "Way"]
-
 HEARTBEAT_S = 5.0
 """Maximum interval between two status messages of a bridge in seconds."""
 _EXPIRY_S = 3 * HEARTBEAT_S

@@ -8,8 +8,6 @@ import threading
 import time
 from collections.abc import Callable
 
-__all__ = ["Limit", "Pacer"]
-
 _MAX_CATCH_UP = 0.1
 
 

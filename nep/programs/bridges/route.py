@@ -23,8 +23,6 @@ from nep.programs.robots.guard import MotionGuard
 from nep.protocol.graph_view import GraphView
 from nep.text import escaped, shortened
 
-__all__ = ["Route", "RouteCounts", "RouteEnd"]
-
 MAX_BACKLOG_MESSAGES = 10_000
 """Maximum number of messages buffered for the other side, with at most 64 MB in total.
 

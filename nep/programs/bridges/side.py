@@ -21,8 +21,6 @@ from nep.programs.bridges.route import Route
 from nep.programs.robots.guard import MotionGuard
 from nep.protocol.graph_view import BRIDGES_TOPIC, GraphView
 
-__all__ = ["BridgeSide"]
-
 _STATUS_TYPE = "nep/bridge"
 _logger = logging.getLogger("nep")
 _GRAPH_POLL_S, _EARLY_POLL_S = 1.0, 0.05

@@ -32,7 +32,6 @@ if sys.version_info >= (3, 11):
 else:
     import tomli as tomllib
 
-__all__ = ["EXAMPLE", "read_configuration", "read_text"]
 
 EXAMPLE = """\
 # Configuration of a bridge, which forwards topics between two networks. Start: nep bridge FILE.toml

@@ -11,8 +11,6 @@ from nep.messages.encoded import Encoded
 from nep.messages.message import Message
 from nep.protocol.graph_view import GraphView, TopicInfo
 
-__all__ = ["Form", "default_type", "type_for", "type_in"]
-
 _DEFAULT_TYPE = "json"
 _NO_MAPS = frozenset({"string", "bytes", "image"})
 """Codecs whose payloads have no fields, so that a back end's own types can't represent them."""

@@ -13,8 +13,6 @@ from collections.abc import Mapping
 from hashlib import blake2b
 from typing import NamedTuple
 
-__all__ = ["TRAIL_KEY", "LoopGuard", "Trail", "read_trail"]
-
 TRAIL_KEY = "bridge"
 MAX_HOPS = 16
 """Maximum number of bridges that forward a message; longer chains are loops."""

@@ -19,8 +19,6 @@ from nep.i18n import _
 from nep.masters.process import NO_CONSOLE
 from nep.programs.conformance.verdict import printable
 
-__all__ = ["Adapter", "AdapterError", "AdapterProcess", "AdapterStreams"]
-
 _MAX_LINE_BYTES = 64 * 2**20
 
 

@@ -19,8 +19,6 @@ from nep.programs.conformance.scripted_master import RecordedRequest, ScriptedMa
 from nep.programs.conformance.verdict import broken
 from nep.protocol.requests import AddPublisher, AddSubscriber, Leave, PublisherCame
 
-__all__ = ["Bench", "Start"]
-
 Start = Callable[[str], AdapterStreams]
 """Function that starts an adapter with the given address of the master."""
 _POLL_MS = 2

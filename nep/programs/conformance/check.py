@@ -12,8 +12,6 @@ from nep.programs.conformance.adapter import AdapterError
 from nep.programs.conformance.bench import Bench, Start
 from nep.programs.conformance.rule import RULES, Rule
 
-__all__ = ["Outcome", "check", "chosen_rules"]
-
 _MODULES = (
     "registration",
     "handshake",

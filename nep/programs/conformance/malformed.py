@@ -9,8 +9,6 @@ import msgpack  # type: ignore[import-untyped]
 
 from nep.protocol.wire import BATCH, EXTENSION, LATCHED, Header, topic_part
 
-__all__ = ["malformed_parts"]
-
 _PUBLISHER = 7  # not listed by the master, which distinguishes delivered malformed messages from valid ones
 
 

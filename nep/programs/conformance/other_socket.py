@@ -8,8 +8,6 @@ import sys
 
 from nep.programs.conformance.ports import retry_bind
 
-__all__ = ["OtherSocket"]
-
 _GREETING = b"\xff" + bytes(8) + b"\x7f\x03\x00NULL".ljust(23, b"\0") + bytes(32)
 
 

@@ -28,8 +28,6 @@ from nep.protocol.wire import (
     topic_part,
 )
 
-__all__ = ["Notice", "ScriptedPublisher", "ScriptedSubscriber", "new_node"]
-
 
 def new_node(name: str) -> NodeRecord:
     """Create the record of a new node of the tester."""

@@ -12,8 +12,6 @@ from typing import Any
 
 import zmq
 
-__all__ = ["bind_again", "closed_port", "retry_bind"]
-
 _WAIT_S = 5.0
 
 

@@ -7,8 +7,6 @@ from dataclasses import dataclass
 
 from nep.programs.conformance.bench import Bench
 
-__all__ = ["RULES", "Rule", "rule"]
-
 Judge = Callable[[Bench], None]
 
 

@@ -29,8 +29,6 @@ from nep.protocol.requests import (
     Request,
 )
 
-__all__ = ["RecordedRequest", "ScriptedMaster"]
-
 PEER = "peer"
 """Route of the nodes that the tester registers."""
 

@@ -9,8 +9,6 @@ from contextlib import contextmanager
 from nep.errors import NepError
 from nep.i18n import _
 
-__all__ = ["BrokenRuleError", "at_most", "broken", "expect", "printable"]
-
 _MAX_SHOWN = 200
 
 

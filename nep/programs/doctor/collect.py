@@ -45,7 +45,6 @@ if TYPE_CHECKING:
 else:
     metadata, psutil = lazy_module("importlib.metadata"), lazy_module("psutil")
 
-__all__ = ["PORTS", "collect_facts", "collect_in_steps", "loopback_problem", "start_obstacle"]
 
 PORTS: Mapping[int, str] = {
     7000: lazy("used by programs of nep up to 0.5.4.5, nep-js and C#"),

@@ -12,8 +12,6 @@ from nep.programs.doctor.finding import Finding
 from nep.programs.doctor.listen import collect_topic
 from nep.programs.doctor.topics import topic_findings
 
-__all__ = ["Tell", "diagnose"]
-
 Tell = Callable[[tuple[Finding, ...], int, int], object]
 """Progress callback: (findings so far, worst first; number of completed checks; number of all checks)."""
 

@@ -13,8 +13,6 @@ from nep.programs.doctor.finding import Finding, Severity
 from nep.programs.doctor.network import clocks, loopback, master_alerts, masters, originals
 from nep.programs.doctor.original_ports import ports
 
-__all__ = ["PARTS", "findings", "in_order", "report", "to_plain", "worst"]
-
 MIN_FILES = 1024
 FILES_WARNING_RATIO = 0.8
 _FILES_PER_TOPIC = 20

@@ -9,20 +9,6 @@ from typing import Literal
 from nep.programs.doctor.installs import Install
 from nep.protocol.graph_view import Alert, GraphView
 
-__all__ = [
-    "ClockFact",
-    "Facts",
-    "FileFact",
-    "FolderFact",
-    "PackageFact",
-    "PortFact",
-    "ProcessFact",
-    "ProgramFact",
-    "PublisherFact",
-    "Reach",
-    "TopicFacts",
-]
-
 Reach = Literal["", "elsewhere", "refused", "timeout", "unknown"]
 """Reason why an address can't be reached; "" if it can, or was not tried.
 

@@ -7,8 +7,6 @@ from typing import Literal
 
 from nep.i18n import _, ngettext, number
 
-__all__ = ["Finding", "Severity", "ago", "with_process"]
-
 Severity = Literal["error", "warning", "info", "ok"]
 
 

@@ -19,7 +19,6 @@ if TYPE_CHECKING:
 else:
     metadata, psutil = lazy_module("importlib.metadata"), lazy_module("psutil")
 
-__all__ = ["Install", "environment_of", "install_in", "install_of"]
 
 _SITE_PACKAGES = ("lib/python*/site-packages", "Lib/site-packages")
 

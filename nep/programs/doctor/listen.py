@@ -18,8 +18,6 @@ from nep.protocol.graph_view import GraphView, PublisherInfo, TopicInfo
 from nep.protocol.wire import check_topic
 from nep.system.addresses import master_address, nearest
 
-__all__ = ["collect_topic", "reach_of"]
-
 _GRAPH_TIMEOUT_S = 1.0
 _LISTEN_S = 1.5
 _CONNECT_TIMEOUT_S = 0.7

@@ -14,8 +14,6 @@ from pathlib import Path
 
 from nep.programs.doctor.facts import PackageFact
 
-__all__ = ["node_packages", "path_python_package"]
-
 _SITES = ("lib/{}/site-packages", "lib/{}/dist-packages", "local/lib/{}/dist-packages", "Lib/site-packages")
 _ORIGINAL_BELOW = (0, 6)
 

@@ -9,8 +9,6 @@ from nep.programs.doctor.facts import Facts, ProcessFact
 from nep.programs.doctor.finding import Finding, ago, with_process
 from nep.system.addresses import host_of, is_loopback
 
-__all__ = ["clocks", "loopback", "master_alerts", "masters", "originals"]
-
 SLOW_S = 0.5
 NOT_SERVED = ("0.5.4.6", "0.5.4.7")
 _NATIVE = {"native", "gateway"}

@@ -8,8 +8,6 @@ from nep.i18n import _, listed, ngettext
 from nep.programs.doctor.facts import Facts, PortFact, ProcessFact
 from nep.programs.doctor.finding import Finding, with_process
 
-__all__ = ["ports"]
-
 KILL_PORT = 12345
 AIRPLAY_PORT = 7000
 _AIRPLAY = ("ControlCe", "AirPlay", "rapportd")

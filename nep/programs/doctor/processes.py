@@ -17,7 +17,6 @@ if TYPE_CHECKING:
 else:
     psutil = lazy_module("psutil")
 
-__all__ = ["describe", "is_free", "is_master_command", "listening", "masters", "open_files"]
 
 _LOOPBACK = frozenset({"127.0.0.1", "0.0.0.0", "::", "::ffff:127.0.0.1"})  # noqa: S104  nothing is bound
 _CODE_OPTIONS = frozenset({"-c", "-e", "--eval", "-p", "--print"})

@@ -12,8 +12,6 @@ from nep.programs.doctor.finding import Finding, ago
 from nep.programs.doctor.network import NOT_SERVED, not_served
 from nep.system.addresses import is_loopback
 
-__all__ = ["meant_topic", "topic_findings"]
-
 QUIET_S = 2.0
 """Time without messages in seconds after which a publisher with a low rate counts as silent."""
 _MAX_NAMED = 5

@@ -29,8 +29,6 @@ from nep.programs.robots.moving import (
 from nep.protocol.graph_view import GraphView
 from nep.text import escaped, shortened
 
-__all__ = ["MotionGuard", "refusal_words"]
-
 MAX_DESCRIPTIONS = 200
 MAX_DESCRIPTION_BYTES = 1_000_000
 _MAX_CLAIMANTS = 8

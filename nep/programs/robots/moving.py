@@ -15,19 +15,6 @@ from nep.protocol.graph_view import GraphView
 from nep.protocol.topic_pattern import is_pattern, matches
 from nep.protocol.wire import check_topic
 
-__all__ = [
-    "COMMAND_TYPE",
-    "DESCRIPTION_TYPE",
-    "RIZE_COMMANDS",
-    "MovingTopics",
-    "RobotControls",
-    "controls_in",
-    "described_name",
-    "description_topics",
-    "moving_topics",
-    "original_robots",
-]
-
 DESCRIPTION_TYPE = "robot/description"
 COMMAND_TYPE = "robot/command"
 ANSWER_TYPE = "robot/answer"

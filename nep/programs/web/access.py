@@ -21,8 +21,6 @@ from nep.i18n import _
 from nep.programs.web.messages.operations import Auth
 from nep.text import quotable
 
-__all__ = ["Access", "AuthCheck", "checked_origin", "is_own_host", "new_token", "query_of"]
-
 _CLOCK_TOLERANCE_S = 5
 """Maximum difference between the clocks of server and client in seconds, as in rosauth."""
 _MAX_REMEMBERED = 1_000

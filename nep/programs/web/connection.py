@@ -25,7 +25,6 @@ if TYPE_CHECKING:
 else:
     ws_exceptions = lazy_module("websockets.exceptions")
 
-__all__ = ["PageConnection"]
 
 _logger = logging.getLogger("nep.programs.web")
 _POLICY_VIOLATION = 1008

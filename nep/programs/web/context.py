@@ -17,8 +17,6 @@ from nep.programs.web.outgoing import EncodingOptions, operation_frames
 from nep.programs.web.send_queue import SendQueue
 from nep.programs.web.visitors import Device
 
-__all__ = ["ConnectedPage", "PageContext", "PageTopic", "Protocol", "Refusal", "RefusalKind", "WebCounts"]
-
 Protocol = Literal["rosbridge", "foxglove"]
 RefusalKind = Literal["origin", "token", "robot", "limit", "kept out", "other"]
 _ROBOT_REFUSAL_INTERVAL_S = 10.0

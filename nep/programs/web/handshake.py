@@ -8,8 +8,6 @@ if TYPE_CHECKING:
     from websockets.asyncio.server import ServerConnection
     from websockets.http11 import Request
 
-__all__ = ["address_of", "host_of", "is_handshake", "origin_of", "own_origin"]
-
 
 def is_handshake(request: Request) -> bool:
     """Return True if an HTTP request is a WebSocket handshake."""

@@ -11,7 +11,6 @@ if TYPE_CHECKING:
     from websockets.asyncio.server import ServerConnection
     from websockets.http11 import Request
 
-__all__ = ["KeptOut"]
 
 _MAX_PAGES = 100
 

@@ -1,26 +1,5 @@
 """Resource limits for one page of `nep web`. All are checked before memory is allocated."""
 
-__all__ = [
-    "AUTH_TIMEOUT_S",
-    "CALL_TIMEOUT_S",
-    "MAX_CALLS",
-    "MAX_CALL_TIMEOUT_S",
-    "MAX_CONTROL_BYTES",
-    "MAX_FRAGMENTED",
-    "MAX_FRAGMENTS",
-    "MAX_MESSAGE_BYTES",
-    "MAX_NAME_LENGTH",
-    "MAX_NESTED_OPERATIONS",
-    "MAX_PAGES",
-    "MAX_QUEUED_BYTES",
-    "MAX_QUEUED_MESSAGES",
-    "MAX_SERVICES",
-    "MAX_SUBSCRIPTION_IDS",
-    "MAX_TOPICS",
-    "MAX_VALUES",
-    "MIN_FRAGMENT_SIZE",
-]
-
 MAX_PAGES = 100
 MAX_MESSAGE_BYTES = 8 * 2**20
 """Maximum size of an incoming WebSocket message, and of an operation reassembled from fragments."""

@@ -27,7 +27,6 @@ if TYPE_CHECKING:
 else:
     cbor2 = lazy_module("cbor2")
 
-__all__ = ["EncodingOptions", "Frame", "json_bytes", "operation_frames", "publish_frames"]
 
 _NS = 1_000_000_000
 _TYPED_ARRAYS = {

@@ -4,8 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-__all__ = ["RateMeter"]
-
 _SLOT_S = 0.5
 _SLOTS = 4
 _WINDOW_S = _SLOT_S * _SLOTS

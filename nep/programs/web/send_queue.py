@@ -20,8 +20,6 @@ from nep.programs.web.messages.operations import COMPRESSIONS, OperationId, Subs
 from nep.programs.web.outgoing import EncodingOptions, Frame
 from nep.programs.web.rates import RateMeter
 
-__all__ = ["Feed", "Queued", "SendQueue"]
-
 _MAX_QUEUED_IMAGES = 4
 """Maximum queue length for images if the page doesn't set a limit; longer queues would only add delay."""
 _MAX_LATCHED_BYTES = MAX_QUEUED_BYTES // 4

@@ -41,7 +41,6 @@ if TYPE_CHECKING:
     from websockets.http11 import Request, Response
     from websockets.typing import Subprotocol
 
-__all__ = ["DEFAULT_PORT", "WebServer", "WebSettings"]
 
 DEFAULT_PORT = 9090
 """Default port of rosbridge."""

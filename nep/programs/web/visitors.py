@@ -8,8 +8,6 @@ from urllib.parse import parse_qs, unquote, urlsplit
 
 from nep.text import escaped
 
-__all__ = ["MAX_SHOWN_LENGTH", "Device", "client_name", "device_kind", "page_title"]
-
 Device = Literal["", "phone", "tablet"]
 MAX_SHOWN_LENGTH = 60
 _MAX_READ_LENGTH = 2_000

@@ -13,16 +13,6 @@ from nep.recordings.formats.channels import ChannelDefinition
 from nep.recordings.formats.index import AttachedFile, Damage
 from nep.recordings.formats.records import RawMessage, message_head
 
-__all__ = [
-    "damage_of",
-    "facts_of",
-    "packed_messages",
-    "plain_damage",
-    "plain_facts",
-    "read_frame",
-    "write_frame",
-]
-
 _LENGTH = struct.Struct("<I")
 _MAX_FRAME_BYTES = 2**31 - 1
 

@@ -23,8 +23,6 @@ from nep.recordings.file_reader import FileReader
 from nep.recordings.formats.limits import ReadBudget
 from nep.recordings.formats.records import RawMessage
 
-__all__ = ["RecordingService", "main"]
-
 _MAX_CURSORS = 32
 _BATCH_BYTES = 1_000_000
 _MAX_BATCH = 4_096

@@ -26,7 +26,6 @@ from nep.recordings.reader import Recording
 if TYPE_CHECKING:
     from typing_extensions import Self
 
-__all__ = ["ReaderProcess"]
 
 _TIMEOUT_S = 60.0
 _CLOSE_S = 5.0

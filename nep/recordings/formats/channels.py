@@ -33,19 +33,6 @@ from nep.recordings.formats.protobuf import (
 from nep.recordings.formats.records import RawMessage
 from nep.recordings.formats.schemas import schema_of
 
-__all__ = [
-    "OWN_TOPICS",
-    "PREFIX",
-    "ChannelDecoder",
-    "ChannelDefinition",
-    "Encoding",
-    "LiveChannels",
-    "Role",
-    "definition_of",
-    "encoding_of",
-    "own_channel",
-]
-
 PREFIX = "nep."
 """Prefix of metadata keys that nep uses."""
 _U32, _U64 = 2**32 - 1, 2**64 - 1

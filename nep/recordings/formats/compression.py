@@ -23,7 +23,6 @@ else:  # optional for programs that don't record
     lz4_frame = lazy_module("lz4.frame")
     zstandard = lazy_module("zstandard")
 
-__all__ = ["check_packages", "compressed", "decompressed", "decompressed_part"]
 
 _ZSTD_LEVEL = 1
 """Compression level with the best throughput.

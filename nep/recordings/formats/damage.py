@@ -7,8 +7,6 @@ from collections.abc import Sequence
 from nep.i18n import _, ngettext, number
 from nep.recordings.formats.index import Damage
 
-__all__ = ["damage_words"]
-
 _MAX_NAMED = 3
 
 

@@ -12,8 +12,6 @@ from nep.errors import RecordingError
 from nep.i18n import _
 from nep.recordings.formats.mcap_file import FileWriter
 
-__all__ = ["USUAL_LIMITS", "Destination", "OneFile", "WriterLimits", "disk_error"]
-
 
 @dataclass(frozen=True)
 class WriterLimits:

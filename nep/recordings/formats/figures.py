@@ -11,8 +11,6 @@ from dataclasses import dataclass, field
 
 import orjson
 
-__all__ = ["MAX_LOST", "MAX_PUBLISHERS", "MAX_TOPICS", "TopicCounter", "TopicFigures", "read_figures"]
-
 MAX_TOPICS = 10_000
 """Maximum number of topics that are counted separately; all others share one counter."""
 MAX_PUBLISHERS = 1_000

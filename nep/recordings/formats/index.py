@@ -44,17 +44,6 @@ from nep.recordings.formats.walk import Place, walk
 if TYPE_CHECKING:
     from mcap.records import Channel, Schema
 
-__all__ = [
-    "MAX_RECORD_BYTES",
-    "AttachedFile",
-    "Damage",
-    "Definitions",
-    "FileIndex",
-    "RecordCounter",
-    "read_chunk",
-    "read_entries",
-    "read_index",
-]
 
 _FOOTER_BYTES = HEAD_BYTES + 20 + len(MAGIC)
 MAX_RECORD_BYTES = 64_000_000

@@ -13,8 +13,6 @@ from pathlib import Path
 from nep.errors import RecordingTooLargeError
 from nep.i18n import _
 
-__all__ = ["MAX_PLAIN_CHUNK_BYTES", "RECORD_COST_BYTES", "ReadBudget", "max_chunk_bytes", "open_budget"]
-
 MAX_PLAIN_CHUNK_BYTES = 64 * 2**20
 """Decompressed size of a chunk that is always accepted."""
 _MAX_RATIO = 2

@@ -38,7 +38,6 @@ if TYPE_CHECKING:
 else:  # optional for programs that don't record
     mcap_records = lazy_module("mcap.records")
 
-__all__ = ["CHUNK_BYTES", "MAX_CHANNELS", "ChannelTable", "FileWriter"]
 
 CHUNK_BYTES = 1_000_000
 MAX_CHANNELS = 65_535

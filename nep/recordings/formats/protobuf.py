@@ -19,8 +19,6 @@ import struct
 from collections.abc import Iterator, Mapping
 from functools import cache
 
-__all__ = ["EXTRA", "SCHEMAS", "bytes_field", "descriptor_set", "fields", "fixed_field", "timestamp_field"]
-
 EXTRA = 1000
 """Number of the field with properties of nep."""
 _VARINT, _FIXED64, _BYTES, _FIXED32 = 0, 1, 2, 5

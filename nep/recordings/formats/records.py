@@ -27,33 +27,6 @@ else:  # optional for programs that don't record
     mcap_records = lazy_module("mcap.records")
     mcap_stream = lazy_module("mcap.data_stream")
 
-__all__ = [
-    "CHUNK_HEAD_BYTES",
-    "HEAD_BYTES",
-    "MAGIC",
-    "MAX_CHUNK_BYTES",
-    "MESSAGE_HEAD",
-    "MESSAGE_REST_BYTES",
-    "MESSAGE_START",
-    "RECORD_HEAD",
-    "ChunkHead",
-    "ChunkInfo",
-    "IndexEntry",
-    "Opcode",
-    "RawMessage",
-    "chunk_head",
-    "message_count",
-    "message_head",
-    "messages_in",
-    "pack_chunk",
-    "pack_chunk_info",
-    "pack_message_index",
-    "pack_offsets",
-    "packed",
-    "read_chunk_info",
-    "read_message_index",
-    "read_record",
-]
 
 MAGIC = b"\x89MCAP0\r\n"
 RECORD_HEAD = struct.Struct("<BQ")  # opcode, length of the content

@@ -18,8 +18,6 @@ import orjson
 
 from nep import geometry, sensor
 
-__all__ = ["ANY_OBJECT", "json_schema", "schema_of"]
-
 ANY_OBJECT = b'{"type":"object"}'
 _SCALARS: Mapping[object, str] = {str: "string", bool: "boolean", int: "integer", float: "number"}
 _MAX_DEPTH = 10

@@ -8,8 +8,6 @@ from typing import BinaryIO, NamedTuple
 from nep.recordings.formats.limits import RECORD_COST_BYTES, ReadBudget
 from nep.recordings.formats.records import HEAD_BYTES, MAGIC, RECORD_HEAD, Opcode
 
-__all__ = ["Place", "walk"]
-
 _SMALL_WINDOW, _LARGE_WINDOW = 4_096, 1_048_576
 _SPEND_EVERY = 1_000
 

@@ -14,17 +14,6 @@ import nep
 from nep.backends.ros2.environment import configuration
 from tests.nep.programs import GREETINGS_S, Program, eventually, running
 
-__all__ = [
-    "Bytes",
-    "Make",
-    "a_domain_for_each_test",
-    "all_are_patient",
-    "killed_soon",
-    "knows",
-    "making",
-    "nep_program",
-]
-
 Make = Callable[[str], nep.Node]
 _domains = count(1)
 

@@ -24,8 +24,6 @@ from nep.programs.web.outgoing import Frame, json_bytes
 from nep.programs.web.rosbridge.page_topics import read_messages, subscribed_topic
 from nep.programs.web.send_queue import Feed, Queued
 
-__all__ = ["ChannelFormat", "Channels"]
-
 _ADVERTISED_TOGETHER = 100
 """Maximum number of channels advertised in one message, because each includes its schema."""
 
@@ -34,15 +32,24 @@ class ChannelSchema(Protocol):
     """Channel and its schema, as defined by `nep.recordings.formats.channels`."""
 
     @property
-    def topic(self) -> str: ...
+    def topic(self) -> str:
+        """Topic of the channel."""
+
     @property
-    def message_encoding(self) -> str: ...
+    def message_encoding(self) -> str:
+        """Encoding of the messages, such as `json`."""
+
     @property
-    def schema_name(self) -> str: ...
+    def schema_name(self) -> str:
+        """Name of the message type."""
+
     @property
-    def schema_encoding(self) -> str: ...
+    def schema_encoding(self) -> str:
+        """Encoding of the schema, such as `jsonschema`; "" without a schema."""
+
     @property
-    def schema_data(self) -> bytes: ...
+    def schema_data(self) -> bytes:
+        """The schema in this encoding."""
 
 
 class ChannelFormat(Protocol):

@@ -10,8 +10,6 @@ from nep.programs.web.messages.payloads import ros_type_of
 from nep.programs.web.rosbridge.rosapi import is_shown
 from nep.protocol.graph_view import GraphView
 
-__all__ = ["GraphUpdates"]
-
 _MAX_SERVICES = 1_000
 _SCHEMA = {"encoding": ENCODING, "schemaEncoding": "jsonschema", "schema": '{"type":"object"}'}
 _Names = Mapping[str, tuple[str, ...]]

@@ -18,21 +18,6 @@ from nep.i18n import _
 from nep.messages.nesting import json_is_too_deep
 from nep.programs.web.outgoing import Frame
 
-__all__ = [
-    "CAPABILITIES",
-    "ENCODING",
-    "MAX_ID",
-    "SUBPROTOCOLS",
-    "ClientMessage",
-    "ServiceRequest",
-    "control_frame",
-    "is_offered",
-    "items",
-    "message_frame",
-    "parse",
-    "response_frame",
-]
-
 SUBPROTOCOLS = ("foxglove.sdk.v1", "foxglove.websocket.v1")
 CAPABILITIES = ("clientPublish", "services", "connectionGraph")
 ENCODING = "json"

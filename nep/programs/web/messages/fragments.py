@@ -6,8 +6,6 @@ from nep.i18n import _
 from nep.programs.web.limits import MAX_FRAGMENTED, MAX_MESSAGE_BYTES
 from nep.programs.web.messages.operations import Fragment, OperationError, OperationId, Png
 
-__all__ = ["FragmentBuffer", "cut"]
-
 
 class FragmentBuffer:
     """Buffer for the incomplete operations of one page. When it is full, a new one replaces the oldest."""

@@ -28,34 +28,6 @@ from nep.programs.web.limits import (
 from nep.protocol.wire import check_topic
 from nep.text import bounded_str, escaped, quotable
 
-__all__ = [
-    "COMPRESSIONS",
-    "LEVELS",
-    "Advertise",
-    "AdvertiseService",
-    "Auth",
-    "CallService",
-    "Compression",
-    "Fragment",
-    "Level",
-    "Operation",
-    "OperationError",
-    "OperationId",
-    "PageStatus",
-    "Png",
-    "Publish",
-    "ServiceResponse",
-    "SetLevel",
-    "Subscribe",
-    "Unadvertise",
-    "UnadvertiseService",
-    "Unsubscribe",
-    "operation_of",
-    "parse",
-    "parse_json",
-    "shown",
-]
-
 OperationId = str | int | None
 Compression = Literal["none", "png", "cbor", "cbor-raw"]
 Level = Literal["info", "warning", "error", "none"]

@@ -38,8 +38,6 @@ from nep.programs.web.messages.ros_definitions import (
 )
 from nep.text import bounded_str, escaped
 
-__all__ = ["PayloadError", "from_ros", "is_compatible", "nep_type_of", "ros_bytes", "ros_type_of", "to_ros"]
-
 _STRING = "std_msgs/String"
 _BYTES = "std_msgs/UInt8MultiArray"
 _FILE = "sensor_msgs/CompressedImage"

@@ -13,8 +13,6 @@ from nep.messages.image_files import examine
 from nep.programs.web.limits import MAX_MESSAGE_BYTES
 from nep.programs.web.messages.operations import OperationError
 
-__all__ = ["text_as_png", "text_in_png"]
-
 _MAX_WIDTH = 4_096
 
 

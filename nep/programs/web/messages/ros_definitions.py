@@ -11,8 +11,6 @@ from functools import cache
 
 from nep.backends.ros.definition import Definition, FieldKind, parse
 
-__all__ = ["JSON_TYPE", "MSGPACK_TYPE", "bare_type", "definition_of", "full_text", "type_definitions"]
-
 JSON_TYPE = "nep/Json"
 """Type of topics with arbitrary JSON messages. In ROS serialization, the JSON text is a string."""
 MSGPACK_TYPE = "nep/Msgpack"

@@ -32,7 +32,6 @@ if TYPE_CHECKING:
 else:
     ws_exceptions = lazy_module("websockets.exceptions")
 
-__all__ = ["Page", "authenticate"]
 
 _logger = logging.getLogger("nep.programs.web")
 

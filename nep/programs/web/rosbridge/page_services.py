@@ -26,9 +26,6 @@ from nep.programs.web.outgoing import EncodingOptions, operation_frames
 from nep.programs.web.rosbridge.rosapi import RosApi, is_rosapi
 from nep.text import bounded_str, quotable
 
-__all__ = ["PageServices"]
-
-
 Respond = Callable[[CallService, object, bool], None]
 """Sends a reply, or the reason of a failure, to the page; raises `NepError` if it can't be encoded."""
 

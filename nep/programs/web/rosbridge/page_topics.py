@@ -27,8 +27,6 @@ from nep.programs.web.rates import RateMeter
 from nep.programs.web.send_queue import Feed, SendQueue
 from nep.text import quotable
 
-__all__ = ["PageTopics", "read_messages", "subscribed_topic"]
-
 _GRAPH_TIMEOUT_S = 2.0
 _SETTLE_S = 0.5
 """Maximum time in seconds to wait for the descriptions of robots before a page may publish."""

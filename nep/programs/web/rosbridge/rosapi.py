@@ -20,8 +20,6 @@ from nep.programs.web.messages.ros_definitions import JSON_TYPE, bare_type, full
 from nep.protocol.graph_view import GraphView, NodeInfo
 from nep.text import bounded_str, quotable
 
-__all__ = ["PREFIX", "RosApi", "is_rosapi", "is_shown"]
-
 PREFIX = "/rosapi/"
 _HIDDEN = "/nep/"
 _GRAPH_TIMEOUT_S = 2.0

@@ -22,8 +22,6 @@ from nep.errors import NepError
 from nep.i18n import _, language
 from nep.programs.web.access import Access, checked_origin, query_of
 
-__all__ = ["PageRequest", "PageResponse", "answer", "starter_page"]
-
 _METHODS = frozenset({"GET", "HEAD"})
 _HOLE = re.compile(r"\{\{(\w+)\}\}")
 _INLINE = re.compile(r"<(script|style)>(.*?)</\1>", re.DOTALL)
