@@ -279,16 +279,11 @@ def calls(day: Day, out_s: float) -> Measured:
     eventually(lambda: bool(set(client.ask("look")["ends"]) - {"answered"}), WAIT_S)
     _wait(max(0.0, out_s - 1.0))
     day.hosts.cable(client.host, is_in=True)
-    since = now()
-    eventually(lambda: client.ask("look")["back_at"] > since, WAIT_S)
-    back_s = client.ask("look")["back_at"] - since
+    back_s = _answered_again_s(client)
     server.host.change_address("10.88.0.202")
-    since = now()
-    eventually(lambda: client.ask("look")["back_at"] > since, WAIT_S)
-    moved_s = client.ask("look")["back_at"] - since
+    moved_s = _answered_again_s(client)
     client.host.change_address("10.88.0.203")
-    since = now()
-    eventually(lambda: client.ask("look")["back_at"] > since, WAIT_S)
+    _answered_again_s(client)
     seen = client.ask("pause")
     assert sum(seen["ends"].values()) == seen["calls"], seen
     assert seen["wrong"] == 0
@@ -296,6 +291,13 @@ def calls(day: Day, out_s: float) -> Measured:
     assert done["twice"] == 0
     assert seen["ends"]["answered"] <= done["done"] <= seen["calls"], (done, seen)
     return {"back_s": back_s, "moved_s": moved_s, "failed": seen["calls"] - seen["ends"]["answered"]}
+
+
+def _answered_again_s(client: Part) -> float:
+    """Wait until a call that starts from now on is answered; return after how many seconds it started."""
+    since = now()
+    eventually(lambda: client.ask("look")["answered_from"] > since, WAIT_S)
+    return float(client.ask("look")["answered_from"]) - since
 
 
 SIDE_BY_SIDE = (

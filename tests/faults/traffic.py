@@ -195,32 +195,42 @@ def server() -> None:
 
 
 def client() -> None:
-    """Calls again and again. Commands: go, pause, look."""
+    """Calls repeatedly. Commands: go, pause, look.
+
+    `answered_from` is when the newest answered call started. The time of its answer would not do: a
+    call can wait for a new connection and be answered, and then no call fails after a change of address.
+    """
     options = json.loads(sys.argv[1])
     node = nep.node(options["node"])
     asking = node.new_client(options["topic"], timeout_s=options.get("timeout_s", 1.0))
     ends: Counter[str] = Counter()
     calls = wrong = 0
-    back_at = 0.0
+    answered_from = 0.0
 
     def call() -> None:
-        nonlocal calls, wrong, back_at
+        nonlocal calls, wrong, answered_from
         calls += 1
+        start = time.monotonic()
         try:
             wrong += asking.call({"number": f"{options['node']}/{calls}"})["number"] != (
                 f"{options['node']}/{calls}"
             )
         except NepError as error:
             ends[type(error).__name__] += 1
-            back_at = 0.0
         else:
             ends["answered"] += 1
-            back_at = back_at or time.monotonic()
+            answered_from = start
 
     worker = _Worker(call, 0.01)
 
     def look() -> Answer:
-        return {"calls": calls, "wrong": wrong, "ends": ends, "back_at": back_at, "error": worker.error}
+        return {
+            "calls": calls,
+            "wrong": wrong,
+            "ends": ends,
+            "answered_from": answered_from,
+            "error": worker.error,
+        }
 
     def pause() -> Answer:
         worker.pause()
