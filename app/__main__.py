@@ -67,13 +67,13 @@ def window_parser() -> argparse.ArgumentParser:
         "--self-drive",
         metavar="DIR",
         type=Path,
-        help=_("run the main job without a person; screenshots go to DIR"),
+        help=_("perform the main task unattended; save screenshots to DIR"),
     )
     parser.add_argument(
         "--selftest",
         metavar="DIR",
         type=Path,
-        help=_("test whether all of Studio works; write a report to DIR"),
+        help=_("test all parts of Studio; write a report to DIR"),
     )
     parser.add_argument(
         "--no-web", dest="web", action="store_false", help=_("with --selftest: skip the block editor")
@@ -97,7 +97,7 @@ def run_parser() -> argparse.ArgumentParser:
         type=float,
         metavar="S",
         default=10.0,
-        help=_("how long to wait for its robots, in seconds"),
+        help=_("seconds to wait for the behaviour's robots"),
     )
     parser.add_argument("--master", metavar="HOST:PORT", help=_("address of the master"))
     parser.add_argument(
@@ -108,7 +108,7 @@ def run_parser() -> argparse.ArgumentParser:
     parser.add_argument(
         "--keep-position",
         action="store_true",
-        help=_("start where the virtual robots are instead of at their start position"),
+        help=_("keep the current positions of the virtual robots instead of resetting them to the start"),
     )
     return parser
 
@@ -152,7 +152,7 @@ def _main(given: Sequence[str]) -> int:
     if options.selftest is not None:
         return end_process(self_test(options.selftest, web=options.web))
     if not options.web:
-        parser.error(_("--no-web needs --selftest"))
+        parser.error(_("--no-web requires --selftest"))
     # saves a tenth of the start time; the window runs the collector itself (`app.ui.startup.interpreter`)
     gc.disable()
     # Shiboken reads the source of every module imported after Qt, so modules without Qt are imported first.

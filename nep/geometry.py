@@ -117,7 +117,9 @@ class Quaternion:
         length = math.hypot(self.x, self.y, self.z, self.w)
         if not 0.0 < length < math.inf:
             raise ValueError(
-                _("'{given}' is not a rotation; its length must be above 0 and finite").format(given=self)
+                _("'{given}' is not a rotation; its length must be finite and greater than 0").format(
+                    given=self
+                )
             )
         x, y, z, w = (each / length for each in (self.x, self.y, self.z, self.w))
         up = 2.0 * (w * y - z * x)

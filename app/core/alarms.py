@@ -352,7 +352,7 @@ class SessionAlarms:
 
         def job(node: Node) -> None:
             if self._clock() - asked > MAX_AGE_S:
-                done(False, _("there was no master"))
+                done(False, _("no master was running"))
             else:
                 self._commands.carry(node, action, done)
 

@@ -127,7 +127,7 @@ class Console:
         return ConsoleRecord(
             given.stamp_ns / 1e9 if given.stamp_ns else self._clock(),
             _LEVELS.get(given.level, given.level),
-            given.node or given.name or _("someone"),
+            given.node or given.name or _("unknown sender"),
             _shortened(given.text),
             logger="" if given.name == given.node else given.name,
             place=place,

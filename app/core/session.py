@@ -304,9 +304,9 @@ class Session:
             live.nodes.age(now)
             live.networks.age(now, now_ns)
         if self.replay is not None:
-            with self.guarded(lazy("follow the recording")):
+            with self.guarded(lazy("update the replay")):
                 self._tick_replay(self.replay, now)
-        with self.guarded(lazy("follow the robots")):
+        with self.guarded(lazy("monitor the robots")):
             self._follow_robots()
         with self.guarded(lazy("monitor the alarms")):
             self.alarms.tick()
@@ -314,14 +314,14 @@ class Session:
             self.acting.tick()
         with self.guarded(lazy("play the robots' voices")):
             self.voices.follow()
-        with self.guarded(lazy("tell the program about its robots")):
+        with self.guarded(lazy("update the robots of the program")):
             self.runs.follow_robots()
         with self.guarded(lazy("stop robots again")):
             for name in self.fleet.take_settled():
                 self.runs.stop_again(name)
-        with self.guarded(lazy("follow started programs")):
+        with self.guarded(lazy("monitor started programs")):
             self.launcher.follow()
-        with self.guarded(lazy("show the run")):
+        with self.guarded(lazy("update the run")):
             self.runs.tick()
             self.recordings.events.follow_run(self.runs.state)
         if now >= self._next_check:

@@ -71,7 +71,7 @@ class DiffDrive:
     battery = battery_sensor()
     camera = picture(title="camera", width=320, height=240, rate_hz=15, hfov_deg=56.3)
     bump = event(
-        "when %robot bumps on the %side",
+        "when %robot bumps into something on the %side",
         title="bumped",
         icon="octagon-alert",
         fields={"side": Literal["left", "right", "front", "back"]},
@@ -116,24 +116,24 @@ class DiffDrive:
         speed: Annotated[float, Range(-0.5, 0.5, 0.05, "m/s", "slider")] = 0.2,
         turn: Annotated[float, Range(-90, 90, 5, "deg/s", "slider")] = 0.0,
     ) -> None:
-        """Keep moving until the next drive or stop; it stops by itself when its program falls silent."""
+        """Keep moving until the next drive or stop. The robot stops if its program no longer responds."""
         self._go(call, speed, turn)
 
     @drives("move %distance m", "footprints", "moves %distance m", unit="m", moved=True)
     def move(self, call: Call, distance: Distance = 0.5) -> Mapping[str, object]:
-        """Move straight, backwards when the distance is negative."""
+        """Move straight ahead, or backwards if the distance is negative."""
         left = abs(distance)
         made = self._roll(call, distance, lambda moved: {"moved": moved, "to_go": _left(left, moved)})
         return {"moved": round(made, 3)}
 
     @drives("turn %angle °", "rotate-ccw", "turns %angle °", unit="deg")
     def turn(self, call: Call, angle: Annotated[float, Range(-360, 360, 5, "deg", "angle")] = 90.0) -> None:
-        """Turn on the spot, to the left when positive."""
+        """Turn on the spot; positive angles turn left."""
         self._spin(call, angle, lambda turned: {"to_go": _left(abs(angle), turned)})
 
     @drives("go to x %x m y %y m", "map-pin", "goes to %x, %y m", unit="m", title="go to")
     def go_to(self, call: Call, x: Distance = 0.0, y: Distance = 0.0) -> None:
-        """Turn to a place and move there straight; it does not drive round what is in the way."""
+        """Turn to a position and move there in a straight line. The robot doesn't avoid obstacles."""
         here_x, here_y, facing = self.wheels.pose()
         away = math.hypot(x - here_x, y - here_y)
         if away < FAR_ENOUGH_M:
@@ -152,7 +152,7 @@ class DiffDrive:
         cancellable=False,
     )
     def light(self, call: Call, colour: Colour = "#35c26b") -> None:  # noqa: ARG002 - it needs no call
-        """Give its light a colour."""
+        """Set the colour of the light."""
         self.wheels.light(colour)
 
     @safe_stop(watchdog_s=0.5, within_s=0.1)

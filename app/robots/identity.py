@@ -95,7 +95,7 @@ def wrong_topic(robot: Robot, topic: str) -> str | None:
     home = topic_of(robot.name, "description")
     if topic == home and robot.topics.description == home:
         return None
-    return _("{topic} announces {robot}, which belongs to {home} only; it is ignored").format(
+    return _("{topic} announces {robot}, which may only be announced on {home}; it is ignored").format(
         topic=topic, robot=robot.name, home=home
     )
 
@@ -135,7 +135,8 @@ def said(error: object) -> str:
 def said_of_stop(name: str, error: object) -> str:
     """Return the error of a failed stop in the robot's words: "Arm may still move: the brake is stuck"."""
     words = "".join(
-        sign if sign.isprintable() else " " for sign in bounded_str(error or _("its stop failed"), ERROR_MOST)
+        sign if sign.isprintable() else " "
+        for sign in bounded_str(error or _("the stop command failed"), ERROR_MOST)
     )
     words = " ".join(words[:WORDS_MOST].split()).rstrip(".")
     return words if may_move(name, words) else _(MAY_MOVE).format(robot=name, why=words)

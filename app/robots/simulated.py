@@ -78,7 +78,7 @@ class VirtualPepper(Acting):
         volume: Volume = 60,
         language: Language = "en",
     ) -> Mapping[str, object]:
-        """Say a text; the words stand in a bubble for as long as they take."""
+        """Say a text. A speech bubble shows it while the robot speaks."""
         with self._simulation.changed:
             body = self._simulation.body
             body.volume, body.language = volume, language
@@ -103,7 +103,7 @@ class VirtualPepper(Acting):
         timeout_s=15,
     )
     def play_sound(self, call: Call, sound: SoundName = "beep", volume: Volume = 60) -> None:
-        """Play a sound, to its end."""
+        """Play a sound until it ends."""
         self._play(call, sound, SOUNDS[sound], volume)
 
     @action(
@@ -121,7 +121,7 @@ class VirtualPepper(Acting):
         seconds: Annotated[float, Range(0.1, 10, 0.1, "s")] = 0.5,
         volume: Volume = 60,
     ) -> None:
-        """Play one tone; 262 Hz is the middle C, twice as much is the C above it."""
+        """Play a tone. 262 Hz is middle C; twice the frequency is one octave higher."""
         self._play(call, f"{frequency:g} Hz", ((frequency, seconds),), volume)
 
     def _play(self, call: Call, title: str, notes: Notes, volume: int) -> None:
@@ -171,7 +171,7 @@ class VirtualPepper(Acting):
         distance: Annotated[float, Range(-2, 2, 0.05, "m")] = 0.5,
         speed: Annotated[float, Range(0.05, 0.35, 0.05, "m/s")] = 0.3,
     ) -> None:
-        """Walk straight, backwards when the distance is negative."""
+        """Walk straight ahead, or backwards if the distance is negative."""
         motion = self._roll(call, lambda body: body.walk(distance, speed))
         if motion.blocked:
             raise Failed(
@@ -182,7 +182,7 @@ class VirtualPepper(Acting):
 
     @moves("look at %target", "eye", "looks at %target", "head", timeout_s=10, title="look at")
     def look_at(self, call: Call, target: Target = "face") -> None:
-        """Turn the head to a side, or to the face or the ball that is in the picture."""
+        """Turn the head in a direction, or to the face or ball in the picture."""
         with self._simulation.changed:
             yaw, pitch = self._direction_of(target)
         self._turn_head(call, yaw, pitch)
@@ -206,14 +206,14 @@ class VirtualPepper(Acting):
 
     @moves("wave %hand hand", "hand", "waves its %hand hand", "arms", timeout_s=20, rize="wave")
     def wave(self, call: Call, hand: Side = "right") -> None:
-        """Greet with one hand."""
+        """Wave one hand."""
         with self._simulation.changed:
             wave = self._simulation.body.wave(hand)
         self._until(call, lambda: wave.done, wave.halt)
 
     @moves("stand straight", "person-standing", "stands straight", "arms", "head", timeout_s=10)
     def stand(self, call: Call) -> None:
-        """Let the arms hang and look ahead."""
+        """Lower the arms and look straight ahead."""
         with self._simulation.changed:
             self._simulation.body.stand()
         self._until(call, lambda: self._simulation.body.joints_still, self._simulation.body.hold_joints)
@@ -237,7 +237,7 @@ class VirtualPepper(Acting):
         emotion: Emotion = "happy",
         seconds: Annotated[float, Range(0.5, 60, 0.5, "s")] = 2.0,
     ) -> None:
-        """Make a face for a while."""
+        """Show an emotion for some time."""
         with self._simulation.changed:
             self._simulation.body.emotion = emotion
         try:
@@ -262,7 +262,7 @@ class VirtualPepper(Acting):
         where: Literal["eyes", "shoulders", "both"] = "eyes",
         colour: Colour = "#35b0fa",
     ) -> None:
-        """Give the lights a colour."""
+        """Set the colour of the lights."""
         with self._simulation.changed:
             if where in {"eyes", "both"}:
                 self._simulation.body.eyes = colour

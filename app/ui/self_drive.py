@@ -200,10 +200,10 @@ class SelfDrive(QObject):
     def _miss(self, step: Step, why: str) -> None:
         self._grab(self._failed_picture)
         if why:
-            words = _("not seen: {what}: {why}").format(what=step.what, why=why)
+            words = _("step failed: {what}: {why}").format(what=step.what, why=why)
         else:
             seconds = number(step.within_s, "g")
-            words = _("not seen within {seconds} s: {what}").format(seconds=seconds, what=step.what)
+            words = _("step not completed within {seconds} s: {what}").format(seconds=seconds, what=step.what)
         self._end(False, words)
 
     def _grab(self, name: str) -> None:

@@ -82,19 +82,19 @@ class WindowSteps:
             self._step("window", _("the window"), lambda: None, lambda: self._painted),
             self._step("master", _("the master"), lambda: None, self._has_master, self._master_wrong),
             self._step("robot", _("the virtual robot"), self._begin, self._has_robot, self._robot_wrong),
-            self._step("behaviour", _("the greeting, as a program"), lambda: None, self._has_program),
+            self._step("behaviour", _("the program of the greeting"), lambda: None, self._has_program),
         ]
         if self._web:
             made.append(
-                self._step("editor", _("its blocks, in the block editor"), lambda: None, self._has_blocks)
+                self._step("editor", _("its blocks in the block editor"), lambda: None, self._has_blocks)
             )
         return [
             *made,
             self._step("run", _("the program runs"), self._run, self._runs, self._run_wrong),
             self._step("moves", _("the robot speaks and moves"), lambda: None, self._moves, self._run_wrong),
-            self._step("stop", _("the robot says that it has stopped"), self._stop, self._has_stopped),
+            self._step("stop", _("the robot confirms that it has stopped"), self._stop, self._has_stopped),
             Step(
-                _("a picture of the window"),
+                _("a screenshot of the window"),
                 lambda: None,
                 lambda: True,
                 bounds.STEP_S["picture"],
@@ -257,7 +257,7 @@ class Told:
             return
         shown = colours(QImage(str(self._test.place.path(PICTURE))))
         if shown < MIN_COLOURS:
-            self._test.fail(_("the window's picture has only {count} colours").format(count=shown))
+            self._test.fail(_("the screenshot of the window has only {count} colours").format(count=shown))
         else:
             self._test.record_success(_("{count} colours").format(count=shown))
 
@@ -271,7 +271,7 @@ class Told:
         )
         if not well:
             self._test.fail(words)
-        self._test.begin("close", _("the window closes, and the robot and the program end"))
+        self._test.begin("close", _("the window closes; the robot and the program stop"))
 
 
 def colours(picture: QImage) -> int:

@@ -38,8 +38,7 @@ ADVICE = {
         "Install the packages “speech-dispatcher”, “espeak-ng” and “libpulse0”, then start Studio again."
     ),
     "win32": lazy(
-        "Add a voice in the settings of Windows, under “Time & language” and “Speech”, then start "
-        "Studio again."
+        "Add a voice in Windows Settings, under “Time & language” and “Speech”, then start Studio again."
     ),
     "darwin": lazy(
         "Add a voice in System Settings, under “Accessibility” and “Spoken Content”, then start Studio again."

@@ -413,7 +413,11 @@ def fitting(reply: Reply) -> Reply:
 
 def refusal(service: str, *, is_closed: bool) -> Reply:
     """Return the reply that rejects a call: the server is closed, or its queue is full."""
-    reason = _("'{service}' is closing") if is_closed else _("'{service}' has too many pending calls")
+    reason = (
+        _("'{service}' is closing")
+        if is_closed
+        else _("'{service}' has too many pending calls; try again later")
+    )
     return failure(CallKind.REFUSED, "", reason.format(service=service))
 
 

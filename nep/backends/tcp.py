@@ -48,7 +48,7 @@ class TcpTransport(ZeromqTransport):
 
 def _over_tcp(configuration: Configuration) -> Direct:
     if not isinstance(configuration, Direct):
-        reason = _("plain TCP has no master; give both sides the address with 'node.direct(ip, port)'")
+        reason = _("plain TCP has no master; set the address on both sides with 'node.direct(ip, port)'")
         raise NepError(reason)
     return replace(configuration, wire="tcp")
 

@@ -91,7 +91,7 @@ class TypedService:
         kind, number, data = answer["kind"], answer["codec"], answer["data"]
         found = next((each for each in _KINDS if each == kind), None)
         if found is None or not isinstance(number, int) or not isinstance(data, bytes):
-            raise WireError(_("it is not a reply of a service"), len(body))
+            raise WireError(_("it is not a service reply"), len(body))
         return Reply(found, data, number)
 
     # ---- for servers
@@ -122,5 +122,5 @@ class TypedService:
             return self.answer.encode({"kind": kind, "codec": reply.codec, "data": data})
         codec = codec_numbered(reply.codec)
         if codec is None or reply.kind != CallKind.ANSWER:
-            raise DecodeError(self.name, len(reply.data), _("it is not a reply of a service"))
+            raise DecodeError(self.name, len(reply.data), _("it is not a service reply"))
         return self.answer.encode(codec.decode(reply.data, {}))

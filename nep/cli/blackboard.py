@@ -47,7 +47,9 @@ _COLUMNS = (
 def _checked_lifetime(lifetime_s: float | None) -> float | None:
     if lifetime_s is not None and not lifetime_s > 0.0:  # rejects NaN, too
         raise typer.BadParameter(
-            _("{given:g} is not a valid lifetime; use a number of seconds above 0").format(given=lifetime_s)
+            _("{given:g} is not a valid lifetime; use a number of seconds greater than 0").format(
+                given=lifetime_s
+            )
         )
     return lifetime_s
 
@@ -97,7 +99,7 @@ def run(
         typer.Option(
             "--lives",
             metavar=_("SECONDS"),
-            help=_("Delete a value that isn't updated for this long (default: never)."),
+            help=_("Delete values that have not been updated for this long (default: never)."),
             show_default=False,
             callback=_checked_lifetime,
         ),
@@ -141,7 +143,7 @@ def show(
         typer.Option(
             "--timeout",
             metavar=_("SECONDS"),
-            help=_("How long to wait for the blackboard's reply (default: {seconds:g}).").format(
+            help=_("Maximum time to wait for the blackboard's reply (default: {seconds:g}).").format(
                 seconds=_TIMEOUT_S
             ),
             show_default=False,

@@ -47,7 +47,7 @@ _HEADS = (
     lazy("received"),
     lazy("sent"),
     lazy("lost"),
-    lazy("thinned"),
+    lazy("throttled"),
     lazy("failed"),
     lazy("dropped"),
     lazy("waiting"),
@@ -65,7 +65,7 @@ WhatArgument = Annotated[
 DirectionOption = Annotated[
     str,
     typer.Option(
-        "--direction", metavar=_("WAY"), help=_("Direction for one topic: 'a->b', 'b->a' or 'both'.")
+        "--direction", metavar=_("DIRECTION"), help=_("Direction for one topic: 'a->b', 'b->a' or 'both'.")
     ),
 ]
 RateOption = Annotated[
@@ -94,7 +94,7 @@ def bridge(
     allow_moving: AllowMovingOption = None,
     as_json: JsonOption = False,
 ) -> None:
-    """Forward topics between two back ends until Ctrl+C, as a file describes or for one topic.
+    """Forward topics between two back ends until Ctrl+C, as configured in a file or for one topic.
 
     Messages are forwarded unchanged if both back ends use the same encoding, else they are converted.
     Forwarded messages are not sent back. Once a second a table shows what was forwarded, lost and dropped
@@ -136,14 +136,16 @@ def _configuration(what: Sequence[str], direction: str, rate_hz: float | None) -
         return join_line(*what, name=str(os.getpid()), direction=way, max_rate_hz=rate_hz or 0.0)
     if len(what) != 1:
         raise NepError(
-            _("give a file or two ends, such as 'zeromq:/chatter ros:/chatter'; --example prints a file")
+            _("specify a file or two ends, such as 'zeromq:/chatter ros:/chatter'; --example prints a file")
         )
     if direction != "both" or rate_hz is not None:
         raise NepError(_("--direction and --rate can't be used with a file; set them in the file"))
     path = Path(what[0])
     if ":" in what[0] and not path.exists():
         raise NepError(
-            _("'{word}' is only one end; add the other one, such as 'ros:/chatter'").format(word=what[0])
+            _("'{word}' is only one end of the bridge; add the other one, such as 'ros:/chatter'").format(
+                word=what[0]
+            )
         )
     return read_configuration(path)
 

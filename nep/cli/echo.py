@@ -108,7 +108,7 @@ def echo(
         topics, fields = topics_and_fields(topic, more or (), graph)
         if as_csv and not fields:
             raise typer.BadParameter(
-                _("name the fields: nep topic echo {topic} pose.x pose.y --csv").format(topic=topic)
+                _("specify the fields: nep topic echo {topic} pose.x pose.y --csv").format(topic=topic)
             )
         picked = Fields(fields)
         names_topic = len(topics) > 1 or (is_pattern(topic) and topic not in graph.topics)
@@ -158,7 +158,7 @@ def topics_and_fields(topic: str, more: Sequence[str], graph: GraphView) -> tupl
             fields.append(word)
     both = [word for word in more if word in graph.topics and not word.startswith("/")]
     for word in both:
-        print_status(_("'{word}' is a topic; write .{word} for a field of that name").format(word=word))
+        print_status(_("'{word}' is a topic; use .{word} for a field of that name").format(word=word))
     return list(dict.fromkeys(topics)), fields
 
 

@@ -66,10 +66,10 @@ def hz(
     timeout_s: TimeoutOption = None,
     backend: BackendOption = None,
 ) -> None:
-    """Print the rate of topics and the gaps between their messages, once a second until Ctrl+C.
+    """Print the rate of topics and the intervals between their messages, once a second until Ctrl+C.
 
-    Gaps are measured with the publishers' time stamps; programs of the original NEP send none, so arrival
-    times are used. Latched messages from before the start are not counted.
+    Intervals are measured with the publishers' time stamps; programs of the original NEP send none, so
+    arrival times are used. Latched messages from before the start are not counted.
     """
     heads = (lazy("rate"), lazy("shortest"), lazy("longest"), lazy("std dev"), lazy("messages"), lazy("lost"))
     _Report(topics, window_s, heads, _frequency_cells).run(count, timeout_s, master, backend, as_json=as_json)
@@ -109,7 +109,7 @@ def delay(
 
     Between two computers the latency is corrected by the difference of their clocks, which the master
     measures within two seconds; the uncertainty follows after ±. Programs of the original NEP send no time
-    stamps. Latched messages count with their full age.
+    stamps. The latency of a latched message is its full age.
     """
     _DelayReport(topics, window_s).run(count, timeout_s, master, backend, as_json=as_json)
 
@@ -276,8 +276,8 @@ class _DelayReport(_Report):
         self._uncompared[topic] = self._uncompared.get(topic, 0) + 1
         if self._uncompared[topic] == _CLOCK_WARNING_REPORTS:
             words = _(
-                "'{topic}': the clocks of the two computers are not compared; the latency includes "
-                "their difference"
+                "'{topic}': the clock difference between the two computers is unknown and is included in "
+                "the latency"
             )
             print_status(words.format(topic=topic))
 

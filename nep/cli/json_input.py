@@ -72,9 +72,11 @@ def _invalid_json_message(fault: JsonFault, shown: str, first_line: int, *, othe
 def _not_json_message(text: str, *, other_types: bool) -> str:
     example = text if len(text) <= _MAX_SHOWN_CHARACTERS else _("some text")
     quoted = _shell_quoted(json.dumps(example, ensure_ascii=bool(control_in(example))))
-    message = _("'{text}' is not JSON; put a text in quotes, such as {quoted}")
+    message = _("'{text}' is not valid JSON; put strings in quotes, such as {quoted}")
     if other_types:
-        message = _("'{text}' is not JSON; put a text in quotes, such as {quoted}, or use --type string")
+        message = _(
+            "'{text}' is not valid JSON; put strings in quotes, such as {quoted}, or use --type string"
+        )
     return message.format(text=_shown(text), quoted=quoted)
 
 

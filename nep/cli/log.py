@@ -72,7 +72,7 @@ def log(
 ) -> None:
     """Print log records: the last errors of running nodes, then new records until Ctrl+C.
 
-    Robot drivers, behaviours and the master log here; your own program does with node.log.
+    Robot drivers, behaviours and the master write log records; your own program can use node.log.
     """
     if level.lower() not in {*LEVELS, "warn"}:
         raise typer.BadParameter(

@@ -35,8 +35,8 @@ _ListenOption = Annotated[
     typer.Option(
         metavar=_("ADDRESS"),
         help=_(
-            "Also accept other computers at this address of this computer; 0.0.0.0 means all. "
-            "There is no password: everyone in that network can read and send everything."
+            "Also accept other computers at this address of this computer; 0.0.0.0 means all. There is "
+            "no password: anyone on that network can read and send all messages."
         ),
         show_default=False,
     ),
@@ -45,7 +45,7 @@ _OwnerOption = Annotated[
     int | None,
     typer.Option(
         metavar="PID",
-        help=_("Exit when this process has ended and no node is registered."),
+        help=_("Exit when this process has exited and no node is registered."),
         show_default=False,
     ),
 ]
@@ -67,7 +67,9 @@ def master(
     gateway: Annotated[
         bool,
         typer.Option(
-            "--gateway/--no-gateway", envvar="NEP_GATEWAY", help=_("Let programs of the original NEP join.")
+            "--gateway/--no-gateway",
+            envvar="NEP_GATEWAY",
+            help=_("Allow programs of the original NEP to join."),
         ),
     ] = True,
 ) -> None:
@@ -152,5 +154,5 @@ def _show_remote_addresses(address: str, hosts: Sequence[str], terminal: Termina
         )
     if hosts:
         out.print(
-            _("  everyone in that network can read and send everything: there is no password"), style="yellow"
+            _("  anyone on that network can read and send all messages: there is no password"), style="yellow"
         )

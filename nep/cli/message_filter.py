@@ -44,7 +44,7 @@ class MessageFilter:
                 warnings.simplefilter("ignore")  # Python's SyntaxWarnings about odd comparisons
                 tree = parse_expression(text.strip())
         except (SyntaxError, ValueError, RecursionError, MemoryError) as error:
-            message = _("'{text}' is not a filter; write it like '{example}'")
+            message = _("'{text}' is not a valid filter; use a condition such as '{example}'")
             raise NepError(message.format(text=quotable(text), example=_EXAMPLE)) from error
         try:
             self._term = _condition(tree.body)

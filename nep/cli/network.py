@@ -29,7 +29,8 @@ BackendOption = Annotated[
         "--backend",
         metavar=_("NAME"),
         help=_(
-            "Use this back end instead of the master: 'zenoh', 'ros2', 'ros'. --master is then its address."
+            "Use this back end instead of the master: 'zenoh', 'ros2', 'ros'. --master then specifies "
+            "its address."
         ),
         show_default=False,
         callback=_checked_backend,

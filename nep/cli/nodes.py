@@ -51,8 +51,8 @@ _WIRES = {
     "native": lazy("native"),
     "A": "NEP ≤ 0.5.4.5",
     "B": "NEP 0.5.4.8",
-    "0.5.4.6": lazy("0.5.4.6, not served"),
-    "0.5.4.7": lazy("0.5.4.7, not served"),
+    "0.5.4.6": lazy("0.5.4.6 (not supported)"),
+    "0.5.4.7": lazy("0.5.4.7 (not supported)"),
 }
 
 

@@ -92,7 +92,7 @@ def set_value(
         str,
         typer.Argument(
             metavar=_("VALUE"),
-            help=_("Value as JSON, such as 0.5, true or [1, 2]; anything else is taken as text."),
+            help=_("Value as JSON, such as 0.5, true or [1, 2]; anything else is treated as text."),
             show_default=False,
         ),
     ],
@@ -206,7 +206,9 @@ def _states(
             check_at = time.monotonic() + _PRESENCE_CHECK_S
             with suppress(MasterUnreachable):  # connections survive while the master is down
                 if node_id not in own.graph().nodes:
-                    raise NepError(_("the node has left; watch it again after it is restarted"))
+                    raise NepError(
+                        _("the node has left the network; run the command again after the node restarts")
+                    )
 
 
 def _values(message: Message) -> Mapping[str, object] | None:

@@ -90,7 +90,7 @@ def play(
             words = damage.damage_words(recording.damage, recording.start_ns)
             raise NepError(f"{reason}; {words}" if words else reason)
         if len(chosen) > _MAX_TOPICS:
-            template = _("'{file}' has {count} matching topics; name at most {most}")
+            template = _("'{file}' has {count} matching topics; choose at most {most}")
             raise NepError(template.format(file=file, count=len(chosen), most=_MAX_TOPICS))
         names = _remapped_names(chosen, remap or ())
         armed = frozenset(named) if arm else frozenset[str]()
@@ -122,7 +122,7 @@ def _named_topics(recording: reader.Recording, words: Sequence[str], *, publish_
     if not words and not publish_all:
         known = listed([f"'{quotable(each)}'" for each in list(recording.topics)[:20]], "and")
         raise typer.BadParameter(
-            _("name the topics to publish, or --all; the recording has {topics}").format(topics=known)
+            _("specify the topics to publish, or use --all; the recording has {topics}").format(topics=known)
         )
     return chosen_topics(recording, words)
 

@@ -128,7 +128,9 @@ def publish(
     There is no confirmation, even if the topic moves a robot.
     """
     if rate_hz is not None and not 0 < rate_hz <= 10_000:
-        raise typer.BadParameter(_("the rate must be above 0 and at most 10000 Hz"), param_hint="--rate")
+        raise typer.BadParameter(
+            _("the rate must be greater than 0 and at most 10000 Hz"), param_hint="--rate"
+        )
     with node_for("pub", master, backend) as node:
         known = node.graph().topics.get(topic)
         kind = msg_type or (known.msg_type if known else "json")
@@ -151,7 +153,7 @@ def publish(
 def _warn_of_type(topic: str, kind: str, known: TopicInfo | None) -> None:
     if known is not None and known.publishers and known.msg_type != kind:
         print_status(
-            _("'{topic}' is published with the type '{msg_type}'; yours is '{kind}'").format(
+            _("'{topic}' is published with the type '{msg_type}', not '{kind}'").format(
                 topic=topic, msg_type=known.msg_type, kind=kind
             )
         )
@@ -190,7 +192,7 @@ def value_of(text: str, msg_type: str, first_line: int = 1) -> object:
     if msg_type == "bytes":
         return _encode_typed(text)
     if msg_type in _BYTE_TYPES:
-        raise EncodeError(msg_type, "str", _("name a JPEG or PNG file: @picture.jpg"))
+        raise EncodeError(msg_type, "str", _("specify a JPEG or PNG file, such as @picture.jpg"))
     allow_nan = codec_for(msg_type).name == "msgpack"
     return parse_json(text, file=file, first_line=first_line, allow_nan=allow_nan, other_types=True)
 

@@ -93,7 +93,9 @@ def record(
     """
     if duration_s is not None and not 0.0 < duration_s < 1e9:
         raise typer.BadParameter(
-            _("{given:g} is not a valid duration; use seconds, 0 or more").format(given=duration_s),
+            _("{given:g} is not a valid duration; use a number of seconds, 0 or greater").format(
+                given=duration_s
+            ),
             param_hint="--duration",
         )
     max_bytes = _max_bytes(max_size, split=split)
@@ -212,8 +214,8 @@ def _show_summary(path: Path, status: writer.RecordingStatus) -> None:
         missing = (each.lost or 0) + each.unkept
         if missing:
             template = ngettext(
-                "'{topic}' lacks {count} message: {lost} lost, {unkept} write errors",
-                "'{topic}' lacks {count} messages: {lost} lost, {unkept} write errors",
+                "'{topic}': {count} message is missing ({lost} lost, {unkept} write errors)",
+                "'{topic}': {count} messages are missing ({lost} lost, {unkept} write errors)",
                 missing,
             )
             print_status(template.format(count=missing, topic=topic, lost=each.lost or 0, unkept=each.unkept))

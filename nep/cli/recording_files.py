@@ -36,7 +36,7 @@ FromOption = Annotated[
     typer.Option(
         "--from",
         metavar=_("SECONDS|CLOCK"),
-        help=_("Begin this long after the start of the recording, or at this time: 15:04:05."),
+        help=_("Start this long after the beginning of the recording, or at this time: 15:04:05."),
         show_default=False,
     ),
 ]
@@ -46,7 +46,7 @@ ToOption = Annotated[
         "--to",
         metavar=_("SECONDS|CLOCK"),
         help=_(
-            "End this long after the start of the recording, or at this time: 15:04:05.5, "
+            "Stop this long after the beginning of the recording, or at this time: 15:04:05.5, "
             "2026-11-17T14:04:05Z."
         ),
         show_default=False,
@@ -149,7 +149,9 @@ def time_ns(text: str, start_ns: int, end_ns: int) -> int:
         return _clock_ns(words, start_ns, end_ns)
     if not 0.0 <= seconds < 1e9:
         raise typer.BadParameter(
-            _("{given:g} is not a valid duration; use seconds, 0 or more").format(given=seconds)
+            _("{given:g} is not a valid duration; use a number of seconds, 0 or greater").format(
+                given=seconds
+            )
         )
     return start_ns + int(seconds * 1e9)
 

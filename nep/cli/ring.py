@@ -65,7 +65,11 @@ class _Saver:
     def keep(self, seconds: float | None = None, note: str = "") -> dict[str, object]:
         wanted = self._seconds if seconds is None else seconds
         if not 0.0 < wanted < 1e9:
-            raise NepError(_("{given:g} is not a valid duration; use seconds above 0").format(given=wanted))
+            raise NepError(
+                _("{given:g} is not a valid duration; use a number of seconds greater than 0").format(
+                    given=wanted
+                )
+            )
         with self._lock:
             kept = self._ring.keep(self._free_path(), min(wanted, self._seconds), note)
         result: dict[str, object] = {**asdict(kept), "path": str(kept.path.resolve())}
@@ -144,7 +148,8 @@ def ring(
                 _save_on_signal(commands)
                 if not as_json:
                     template = _(
-                        "buffering the last {seconds:g} s; 'nep recording keep' saves them, Ctrl+C stops"
+                        "buffering the last {seconds:g} s; run 'nep recording keep' to save them, "
+                        "press Ctrl+C to stop"
                     )
                     print_status(template.format(seconds=seconds))
                 _run_commands(commands, keeper, kept)

@@ -158,7 +158,7 @@ def call(
         typer.Option(
             "--timeout",
             metavar=_("SECONDS"),
-            help=_("How long to wait for a server and its reply (default: {seconds:g}).").format(
+            help=_("Maximum time to wait for a server and its reply (default: {seconds:g}).").format(
                 seconds=_TIMEOUT_S
             ),
             show_default=False,

@@ -109,8 +109,8 @@ def top(
 ) -> None:
     """Show a live table of all topics and nodes, updated every second until Ctrl+C.
 
-    It subscribes to nothing: the figures are those that publishers and subscribers report to the master. Into
-    a file or pipe the tables are printed one after the other. If the master goes down, it is waited for.
+    The values are those that publishers and subscribers report to the master; no topic is subscribed to.
+    In a file or pipe the tables follow one another. If the master goes down, the command waits for it.
     """
     graph = view(master)  # fail at once: the address may be wrong
     shown = _GraphPrinter(pattern, order)

@@ -74,7 +74,7 @@ def watch(
         write(EXAMPLE)
         return
     if file is None:
-        raise NepError(_("give an alarm file; --example prints one"))
+        raise NepError(_("specify an alarm file; --example prints one"))
     rules = read_alarms(Path(file)).rules
     if check:
         for rule in rules:

@@ -71,7 +71,7 @@ FoxgloveOption = Annotated[
     bool,
     typer.Option(
         "--foxglove",
-        help=_("Serve Foxglove and Lichtblick by Foxglove's WebSocket protocol, too."),
+        help=_("Also serve Foxglove and Lichtblick, over Foxglove's WebSocket protocol."),
     ),
 ]
 
@@ -85,10 +85,10 @@ def web(
     foxglove: FoxgloveOption = False,
     master: MasterOption = None,
 ) -> None:
-    """Serve web pages and programs with roslib, roslibpy or Foxglove. Ctrl+C ends it.
+    """Serve web pages and programs with roslib, roslibpy or Foxglove until Ctrl+C.
 
     This is a WebSocket server for the rosbridge v2 protocol. Each connected page is a node. Only this
-    computer can connect unless you add --listen. Messages that move a robot are refused unless you add
+    computer can connect unless you add --listen. Messages that move a robot are blocked unless you add
     --allow-moving. See docs/web.md for examples.
     """
     hosts = [checked_host(each) for each in listen or ()]
@@ -115,7 +115,7 @@ def web(
                 pass  # short waits: on Windows Ctrl+C does not interrupt a wait
             if server.problem is not None:
                 raise NepError(
-                    _("the web server ended because of an error: {reason}").format(reason=server.problem)
+                    _("the web server stopped because of an error: {reason}").format(reason=server.problem)
                 )
         finally:
             server.close()
@@ -128,7 +128,7 @@ def _start(server: WebServer) -> None:
     except AddressInUseError as error:
         raise NepError(
             _(
-                "port {port} is in use, perhaps by rosbridge or another 'nep web'; end that program or "
+                "port {port} is in use, perhaps by rosbridge or another 'nep web'; stop that program or "
                 "choose another port with --port"
             ).format(port=server.settings.port)
         ) from error
@@ -183,14 +183,14 @@ def _say_running(server: WebServer, terminal: Terminal, *, token_file: Path | No
         out.print(words.format(file=token_file), style="dim")
     if not server.settings.access.origins:
         out.print(
-            _("  pages from web servers of other computers need --origin"),
+            _("  pages from web servers on other computers require --origin"),
             style="dim",
         )
     address = master_address(server.settings.master)
     if not is_running(address, _MASTER_TIMEOUT_S):
         words = _("no master at '{address}'; start one with 'nep master'")
         print_status(words.format(address=address), terminal)
-    out.print(_("  Ctrl+C ends it"), style="dim")
+    out.print(_("  press Ctrl+C to stop"), style="dim")
 
 
 def _network_hosts(listen: Collection[str]) -> list[str]:
@@ -203,7 +203,7 @@ def _say_ended(server: WebServer, terminal: Terminal) -> None:
         return
     words = ngettext("{count} connection", "{count} connections", counts.opened).format(count=counts.opened)
     words += _(
-        ", {turned_away} refused; {operations} operations, {rejected} rejected; {sent} messages sent, "
-        "{dropped} dropped"
+        ", {turned_away} rejected; {operations} operations, {rejected} rejected; {sent} messages "
+        "sent, {dropped} dropped"
     ).format(**counts.as_map())
     print_status(words, terminal)

@@ -29,7 +29,7 @@ def check_hosts(hosts: Iterable[str], addresses: Iterable[OwnAddress]) -> tuple[
             address = ipaddress.IPv4Address(host)
         except ValueError:
             raise NepError(
-                _("'{host}' is not an IPv4 address; write it as '192.168.1.20'").format(host=host)
+                _("'{host}' is not an IPv4 address; use an address such as '192.168.1.20'").format(host=host)
             ) from None
         if host != ANY and host not in known and not address.is_loopback:
             others = ", ".join(sorted(known)) or _(

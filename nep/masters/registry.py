@@ -557,9 +557,9 @@ def _check_registration(record: PublisherRecord | SubscriberRecord) -> None:
             if not is_tcp_endpoint(endpoint) and not is_nanomsg_endpoint(endpoint):
                 shown_endpoint = escaped(shortened(endpoint, 80))
                 raise WireError(
-                    _(
-                        "'{said}' is not an endpoint of a publisher; it must be written as 'tcp://HOST:PORT'"
-                    ).format(said=shown_endpoint),
+                    _("'{said}' is not a publisher endpoint; it must have the form 'tcp://HOST:PORT'").format(
+                        said=shown_endpoint
+                    ),
                     code="endpoint",
                 )
 

@@ -251,7 +251,7 @@ def _validated(payload: object) -> NDArray[Any]:
         )
     is_picture = payload.ndim == 2 or (payload.ndim == 3 and 1 <= payload.shape[2] <= 4)
     if not is_picture or 0 in payload.shape:
-        reason = _("{shape} is not the shape of an image; use (height, width, 3)").format(shape=payload.shape)
+        reason = _("{shape} is not a valid image shape; use (height, width, 3)").format(shape=payload.shape)
         raise EncodeError("image", kind, reason)
     frame: NDArray[Any] = payload
     try:
@@ -342,7 +342,7 @@ def raw_array(data: memoryview, layout: RawLayout, shape: object) -> NDArray[Any
     sides = shape[:2] if isinstance(shape, list | tuple) else ()
     if len(sides) < 2 or not all(type(side) is int for side in sides):
         raise DecodeError(
-            "image", data.nbytes, _("'{shape}' is not the shape of an image").format(shape=str(shape)[:60])
+            "image", data.nbytes, _("'{shape}' is not a valid image shape").format(shape=str(shape)[:60])
         )
     height, width = sides
     pixel_bytes = layout.channels * numbers.itemsize

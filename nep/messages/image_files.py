@@ -180,7 +180,9 @@ class _Jpeg(_Reader):
     def _marker(self, at: int) -> tuple[int, int]:
         if self.number(at, 1) != 0xFF:
             reason = (
-                _("it is truncated") if at >= self.size else _("a segment is not where the previous one ends")
+                _("it is truncated")
+                if at >= self.size
+                else _("a segment does not follow directly after the previous one")
             )
             raise self.broken(reason)
         found = _FILL_BYTES.match(self.data, at)

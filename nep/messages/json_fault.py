@@ -129,7 +129,7 @@ def _explain(text: str, error: json.JSONDecodeError) -> JsonFault:
         return _open_string(text, position)
     if message.startswith("Invalid \\"):
         fix = JsonFix(position, position, "\\") if text[position : position + 1] == "\\" else None
-        return _at(text, position, _("a text contains a single \\; use \\\\"), fix)
+        return _at(text, position, _("a string contains a single \\; use \\\\"), fix)
     if message.startswith("Extra data"):
         return _at(text, position, _("there is extra text after the first value"))
     if message.startswith("Illegal trailing comma"):
@@ -209,11 +209,11 @@ def _open_string(text: str, position: int) -> JsonFault:
     sign = text[position : position + 1]
     if sign == "\t":
         fix = JsonFix(position, position + 1, "\\t")
-        return _at(text, position, _("a text contains a tab character; use \\t"), fix)
+        return _at(text, position, _("a string contains a tab character; use \\t"), fix)
     if sign and sign not in {'"', "\n", "\r"}:
-        return _at(text, position, _("a text contains an invisible character; delete it"))
+        return _at(text, position, _("a string contains an invisible character; delete it"))
     start = text.rfind("\n", 0, position) + 1
     end = text.find("\n", position)
     line = text[start : end if end >= 0 else len(text)].rstrip()
     close = start + len(line[:-1].rstrip() if line.endswith(",") else line)
-    return _at(text, position, _("a text has no closing quote"), JsonFix(close, close, '"'))
+    return _at(text, position, _("a string has no closing quote"), JsonFix(close, close, '"'))

@@ -79,12 +79,14 @@ class ValueShape:
 
 def wrong_type(value: object, expected: str) -> ShapeMismatch:
     """Return the error for a value of a wrong type."""
-    return ShapeMismatch(_("is a '{kind}'; give {wanted}").format(kind=type(value).__name__, wanted=expected))
+    return ShapeMismatch(
+        _("is a '{kind}'; expected {wanted}").format(kind=type(value).__name__, wanted=expected)
+    )
 
 
 def missing_value(shape: ValueShape) -> ShapeMismatch:
     """Return the error for a missing value."""
-    return ShapeMismatch(_("is missing; give {wanted}").format(wanted=shape.expected))
+    return ShapeMismatch(_("is missing; expected {wanted}").format(wanted=shape.expected))
 
 
 def short_repr(value: object) -> str:
@@ -119,7 +121,9 @@ def _float() -> ValueShape:
             try:
                 return float(plain)
             except OverflowError:
-                raise ShapeMismatch(_("is too large; give {wanted}").format(wanted=shape.expected)) from None
+                raise ShapeMismatch(
+                    _("is too large; expected {wanted}").format(wanted=shape.expected)
+                ) from None
         raise wrong_type(value, shape.expected)
 
     shape.read, shape.write = read, write
@@ -139,7 +143,9 @@ def _int() -> ValueShape:
         if not isinstance(plain, int) or isinstance(plain, bool):
             raise wrong_type(value, shape.expected)
         if not _MIN_INT <= plain <= _MAX_INT:
-            raise ShapeMismatch(_("does not fit into 64 bits; give {wanted}").format(wanted=shape.expected))
+            raise ShapeMismatch(
+                _("does not fit into 64 bits; expected {wanted}").format(wanted=shape.expected)
+            )
         return int(plain)
 
     shape.read, shape.write = read, write
@@ -169,7 +175,7 @@ def _check_letters(value: str) -> None:
     try:
         value.encode("utf-8")
     except UnicodeEncodeError:
-        raise ShapeMismatch(_("contains an unpaired surrogate; give valid Unicode text")) from None
+        raise ShapeMismatch(_("contains an unpaired surrogate; use valid Unicode text")) from None
 
 
 def _bool() -> ValueShape:
@@ -222,7 +228,7 @@ def _datetime_shape(kind: type[datetime | date | time]) -> ValueShape:
             return kind.fromisoformat(whole)
         except ValueError:
             raise ShapeMismatch(
-                _("is {value}; give text such as {example}").format(
+                _("is {value}; expected a string such as {example}").format(
                     value=short_repr(value), example=_EXAMPLES[kind]
                 )
             ) from None
@@ -281,7 +287,7 @@ def literal_shape(values: Sequence[object]) -> ValueShape | None:
             if _is_same(value, each):
                 return each
         raise ShapeMismatch(
-            _("is {value}; give {wanted}").format(value=short_repr(value), wanted=shape.expected)
+            _("is {value}; expected {wanted}").format(value=short_repr(value), wanted=shape.expected)
         )
 
     shape.read = shape.write = both
@@ -306,7 +312,7 @@ def enum_shape(kind: type[Enum]) -> ValueShape | None:
             except ValueError:
                 pass
         wanted = shape.expected if is_flag else listed([repr(each.value) for each in members], "or")
-        raise ShapeMismatch(_("is {value}; give {wanted}").format(value=short_repr(value), wanted=wanted))
+        raise ShapeMismatch(_("is {value}; expected {wanted}").format(value=short_repr(value), wanted=wanted))
 
     def write(value: object) -> object:
         if not isinstance(value, kind):
@@ -405,7 +411,7 @@ def tuple_shape(items: Sequence[ValueShape]) -> ValueShape:
         values = _items(value, shape.expected)
         if len(values) != len(ways):
             raise ShapeMismatch(
-                _("has {count} values; give {wanted}").format(count=len(values), wanted=shape.expected)
+                _("has {count} values; expected {wanted}").format(count=len(values), wanted=shape.expected)
             )
         converted: list[Any] = []
         for way, part in zip(ways, values, strict=True):

@@ -84,8 +84,8 @@ def message_type(declared: type) -> MessageType:
     if not is_map and not is_dataclass(declared):
         raise WrongTypeError(
             _(
-                "msg_type is the class '{name}', which is neither a dataclass nor a TypedDict; put "
-                "'@dataclass' before it"
+                "msg_type is the class '{name}', which is neither a dataclass nor a TypedDict; decorate it "
+                "with '@dataclass'"
             ).format(name=_name_of(declared))
         )
     name = text("MSG_TYPE", getattr(declared, "MSG_TYPE", declared.__name__))
@@ -274,7 +274,8 @@ def _require_distinct(shape: ValueShape | None, hint: object, where: str) -> Val
     if shape is None:
         raise ValueError(
             _(
-                "{where} is a '{type}', two types that look the same in JSON; use one of them, or two fields"
+                "{where} is a '{type}', whose types can't be distinguished in JSON; use one of them, or "
+                "two fields"
             ).format(where=where, type=_name_of(hint))
         )
     return shape
@@ -349,7 +350,7 @@ def _fill_dataclass(shape: ValueShape, declared: type, known: dict[object, Value
                 other_name = each.metadata.get(OTHER_NAME, each.name)
                 entries.append(_Entry(each.name, other_name, field_shape, is_required))
         elif is_required:
-            raise ValueError(_("{where} is not sent; give it a default").format(where=where))
+            raise ValueError(_("{where} is not sent; add a default value").format(where=where))
     _check_constructor(declared, {each.name for each in entries})
 
     def read(value: object) -> object:
@@ -376,8 +377,8 @@ def _check_constructor(declared: type, names: Collection[str]) -> None:
         if not is_open and (each.name not in names or each.kind is each.POSITIONAL_ONLY):
             raise ValueError(
                 _(
-                    "{where} is required by the constructor but is not a field that is sent; give it a "
-                    "default"
+                    "{where} is required by the constructor but is not a field of the message; "
+                    "add a default value"
                 ).format(where=f"{declared.__name__}.{each.name}")
             )
 

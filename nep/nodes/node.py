@@ -639,7 +639,7 @@ def spin(*nodes: Node, timeout_s: float | None = None) -> None:
         ClosedError: This is a forked child process.
     """
     if not nodes or not all(isinstance(each, Node) for each in nodes):
-        raise WrongTypeError(_("spin takes one or more nodes"))
+        raise WrongTypeError(_("'spin' requires at least one node"))
     works = dict.fromkeys(each._work for each in nodes)  # noqa: SLF001 - private to this module
     spin_all(tuple(works), seconds("timeout_s", timeout_s))
 

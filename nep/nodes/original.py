@@ -43,7 +43,7 @@ def original_hint(name: str) -> str:
     replacement = _REPLACEMENTS.get(name)
     if replacement is None:
         return ""
-    template = _("'{name}' of the original module is '{instead}' here; see docs/original-nep.md")
+    template = _("'{name}' of the original module is called '{instead}' here; see docs/original-nep.md")
     return template.format(name=name, instead=replacement)
 
 

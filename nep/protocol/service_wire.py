@@ -118,7 +118,7 @@ class _Native:
     def read_answer(self, parts: Sequence[bytes | memoryview]) -> ReadAnswer:
         kind, codec, _limit, number, data = _read(parts)
         if kind not in {CallKind.ANSWER, CallKind.ERROR, CallKind.REFUSED}:
-            raise WireError(_("it is not a reply of a service"), code="call-kind")
+            raise WireError(_("it is not a service reply"), code="call-kind")
         return ReadAnswer(number, Reply(CallKind(kind), data, codec))
 
 
@@ -209,7 +209,7 @@ def check_service(name: str) -> str:
     """Validate a service name and return it. Raises `BadTopicError`."""
     check_topic(name)
     if name.startswith(PREFIX):
-        raise BadTopicError(name, _("leave out '{prefix}'; nep adds it").format(prefix=PREFIX))
+        raise BadTopicError(name, _("omit '{prefix}'; nep adds it").format(prefix=PREFIX))
     if name.startswith(SURVEY):
         raise BadTopicError(
             name, _("names that start with '{prefix}' are reserved for surveys").format(prefix=SURVEY)

@@ -110,7 +110,7 @@ class Bookmarks:
     def _index_of(self, bookmark: Bookmark) -> int:
         if bookmark not in self._saved:
             raise ValueError(
-                _("this bookmark was removed, or made during the recording, and can't be changed")
+                _("this bookmark can't be changed: it was removed, or added during the recording")
             )
         return self._saved.index(bookmark)
 

@@ -200,7 +200,7 @@ class Playback:
     def speed(self, speed: float) -> None:
         if not SPEED_MIN <= speed <= SPEED_MAX:
             raise ValueError(
-                _("{speed:g} is not a valid speed; give {least:g} to {most:g}").format(
+                _("{speed:g} is not a valid speed; use {least:g} to {most:g}").format(
                     speed=speed, least=SPEED_MIN, most=SPEED_MAX
                 )
             )
@@ -215,9 +215,7 @@ class Playback:
             start_ns = max(start_ns, self._recording.start_ns)
             end_ns = min(end_ns, self._recording.end_ns)
             if start_ns >= end_ns:
-                raise ValueError(
-                    _("the start is not before the end of the part, or lies outside the recording")
-                )
+                raise ValueError(_("the start of the part must be before its end and within the recording"))
             self._loop = (start_ns, end_ns)
             if not start_ns <= self._position_ns <= end_ns:
                 self.seek(start_ns)

@@ -235,7 +235,7 @@ class FlightRecorder:
             ValueError: `seconds` or `size_bytes` is not positive.
         """
         if not 0.0 < seconds < _MAX_SECONDS or size_bytes < 1:
-            raise ValueError(_("the duration and the size of the flight recorder must be above 0"))
+            raise ValueError(_("the duration and the size of the flight recorder must be greater than 0"))
         path = Path(folder)
         self._clock = LogClock() if clock is None else clock
         try:
@@ -280,7 +280,7 @@ class FlightRecorder:
             ValueError: `seconds` is not positive.
         """
         if not 0.0 < seconds < _MAX_SECONDS:
-            raise ValueError(_("the duration must be above 0 and finite"))
+            raise ValueError(_("the duration must be finite and greater than 0"))
         target = Path(path)
         if not self._writer.flush():
             raise RecordingError(str(target), self._writer.problem or _("the disk does not respond"))
@@ -320,7 +320,9 @@ class FlightRecorder:
             writer.close()
             _remove(target)
             if isinstance(error, ValueError):
-                raise RecordingError(str(target), _("the saved seconds are damaged on the disk")) from error
+                raise RecordingError(
+                    str(target), _("the messages buffered on the disk are damaged")
+                ) from error
             raise
         count = sum(each.received - each.unkept for each in totals.values())
         return KeptRecording(target, count, (writer.end_ns - (writer.start_ns or writer.end_ns)) / 1e9)

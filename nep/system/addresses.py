@@ -62,7 +62,7 @@ def master_address(address: str | None = None) -> str:
         chosen, host, port = f"{chosen}:{_DEFAULT_PORT}", chosen, str(_DEFAULT_PORT)
     if not _HOST.fullmatch(host) or not _is_valid_host(host) or not _is_port(port):
         raise NepError(
-            _("'{chosen}' is not an address of a master; write it as '{example}'").format(
+            _("'{chosen}' is not a valid address of a master; use an address such as '{example}'").format(
                 chosen=quotable(chosen), example=DEFAULT_MASTER
             )
         )
@@ -89,9 +89,10 @@ def checked_host(host: object) -> str:
         )
     if not isinstance(host, str) or not _HOST.fullmatch(host) or not _is_valid_host(host):
         raise NepError(
-            _("'{host}' is not an address of a computer; use one such as '127.0.0.1', or a name").format(
-                host=quotable(str(host))
-            )
+            _(
+                "'{host}' is not a valid computer address; use an IP address such as '127.0.0.1', or the "
+                "computer's name"
+            ).format(host=quotable(str(host)))
         )
     return host
 

@@ -24,9 +24,9 @@ _MAX_SECONDS = sys.float_info.max
 def text(name: str, value: object) -> str:
     """Validate the name of a message type and return it. Raises `ValueError`."""
     if not isinstance(value, str):
-        raise WrongTypeError(_("{name} is a '{kind}'; give a 'str'").format(name=name, kind=_kind(value)))
+        raise WrongTypeError(_("{name} must be a 'str', not '{kind}'").format(name=name, kind=_kind(value)))
     if not value:
-        raise ValueError(_("{name} is empty; give a name such as 'json'").format(name=name))
+        raise ValueError(_("{name} is empty; use a name such as 'json'").format(name=name))
     if len(value) > _MAX_LENGTH or control_in(value):
         shown = escaped(shortened(value, 40))
         raise ValueError(
@@ -41,7 +41,7 @@ def flag(name: str, value: object) -> bool:
     """Validate a bool and return it. Raises `ValueError`."""
     if not isinstance(value, bool):
         raise WrongTypeError(
-            _("{name} is {value}; give True or False").format(name=name, value=_shown(value))
+            _("{name} must be True or False, not {value}").format(name=name, value=_shown(value))
         )
     return value
 
@@ -61,13 +61,13 @@ def at_least(name: str, value: object, least: int) -> int:
     """Validate an int of at least `least` and return it. Raises `ValueError`."""
     if not isinstance(value, int) or isinstance(value, bool):
         raise WrongTypeError(
-            _("{name} is {value}; give a whole number of at least {least}").format(
+            _("{name} must be a whole number of at least {least}, not {value}").format(
                 name=name, value=_shown(value), least=least
             )
         )
     if value < least:
         raise ValueError(
-            _("{name} is {value}; give a whole number of at least {least}").format(
+            _("{name} must be a whole number of at least {least}, not {value}").format(
                 name=name, value=_shown(value), least=least
             )
         )
@@ -78,13 +78,13 @@ def within(name: str, value: object, least: int, most: int) -> int:
     """Validate an int from `least` to `most` and return it. Raises `ValueError`."""
     if not isinstance(value, int) or isinstance(value, bool):
         raise WrongTypeError(
-            _("{name} is {value}; give a whole number from {least} to {most}").format(
+            _("{name} must be a whole number from {least} to {most}, not {value}").format(
                 name=name, value=_shown(value), least=least, most=most
             )
         )
     if not least <= value <= most:
         raise ValueError(
-            _("{name} is {value}; give a whole number from {least} to {most}").format(
+            _("{name} must be a whole number from {least} to {most}, not {value}").format(
                 name=name, value=_shown(value), least=least, most=most
             )
         )
@@ -97,11 +97,15 @@ def seconds(name: str, value: object) -> float | None:
         return None
     if not isinstance(value, int | float) or isinstance(value, bool):
         raise WrongTypeError(
-            _("{name} is {value}; give seconds, 0 or more, or None").format(name=name, value=_shown(value))
+            _("{name} must be a number of seconds (0 or greater) or None, not {value}").format(
+                name=name, value=_shown(value)
+            )
         )
     if not value >= 0.0:  # also NaN
         raise ValueError(
-            _("{name} is {value}; give seconds, 0 or more, or None").format(name=name, value=_shown(value))
+            _("{name} must be a number of seconds (0 or greater) or None, not {value}").format(
+                name=name, value=_shown(value)
+            )
         )
     return None if value > _MAX_SECONDS else value
 
@@ -110,11 +114,15 @@ def period(name: str, value: object) -> float:
     """Validate a positive, finite period in seconds and return it. Raises `ValueError`."""
     if not isinstance(value, int | float) or isinstance(value, bool):
         raise WrongTypeError(
-            _("{name} is {value}; give seconds, more than 0").format(name=name, value=_shown(value))
+            _("{name} must be a number of seconds greater than 0, not {value}").format(
+                name=name, value=_shown(value)
+            )
         )
     if not 0.0 < value <= _MAX_SECONDS:  # also NaN
         raise ValueError(
-            _("{name} is {value}; give seconds, more than 0").format(name=name, value=_shown(value))
+            _("{name} must be a number of seconds greater than 0, not {value}").format(
+                name=name, value=_shown(value)
+            )
         )
     return value
 
@@ -122,14 +130,18 @@ def period(name: str, value: object) -> float:
 def limit(name: str, value: object) -> float:
     """Validate a non-negative time limit in seconds and return it. None is rejected. Raises `ValueError`."""
     if value is None:
-        raise WrongTypeError(_("{name} is None; give seconds, 0 or more").format(name=name))
+        raise WrongTypeError(
+            _("{name} must be a number of seconds (0 or greater), not None").format(name=name)
+        )
     return math.inf if seconds(name, value) is None else cast("float", value)
 
 
 def function(name: str, value: F) -> F:
     """Validate a callable and return it. Raises `ValueError`."""
     if not callable(value):
-        raise WrongTypeError(_("{name} is a '{kind}'; give a function").format(name=name, kind=_kind(value)))
+        raise WrongTypeError(
+            _("{name} must be a function, not '{kind}'").format(name=name, kind=_kind(value))
+        )
     return value
 
 
@@ -137,7 +149,7 @@ def plain_function(name: str, value: F) -> F:
     """Validate a callable that is not a coroutine function, and return it. Raises `ValueError`."""
     if is_coroutine_function(function(name, value)):
         raise ValueError(
-            _("{name} is a coroutine function, which is not awaited here; give a plain function").format(
+            _("{name} is a coroutine function, which is not awaited here; use a regular function").format(
                 name=name
             )
         )

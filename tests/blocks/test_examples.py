@@ -26,7 +26,7 @@ def test_start_page_examples_are_complete():
         ("Reaction to touch", "Laughs when its head is touched"),
         ("Tour guide", "Walks to three stations and speaks"),
         ("A quiz", "Asks questions; touch its head to answer “yes”"),
-        ("A dance", "Sways and blinks, by functions"),
+        ("A dance", "Sways and blinks, using functions"),
         ("A careful walk", "Walks while nothing is in its way"),
         ("The finder", "Looks for the ball and for a face"),
         ("Weather station", "Sends messages and reacts to them"),
@@ -212,7 +212,7 @@ def test_finder_example_reports_what_it_sees():
     play, link = run(6, link)
     play.end()
     assert play.runtime.error is None
-    assert said(link) == ["I look for the ball.", "There is the ball.", "Hello! Did you lose a ball?"]
+    assert said(link) == ["I am looking for the ball.", "There is the ball.", "Hello! Did you lose a ball?"]
     assert actions(link).count("look_at") == 2
 
 

@@ -91,7 +91,9 @@ const robot = new Robot({
     pose: { type: "object", fields: { x: speed }, text: "pose" },
   },
   events: {
-    bumped: { text: "when %robot bumps on the %side", icon: "zap", fields: { side }, choose: ["side"] },
+    bumped: {
+      text: "when %robot bumps into something on the %side", icon: "zap", fields: { side }, choose: ["side"],
+    },
   },
   stop: { run() {} },
 });

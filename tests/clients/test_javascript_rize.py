@@ -82,7 +82,7 @@ const robot = new Robot({
   },
   events: {
     bumped: {
-      text: "when %robot bumps on the %side", icon: "zap",
+      text: "when %robot bumps into something on the %side", icon: "zap",
       fields: { side: { type: "string", choices: ["left", "right"] } }, choose: ["side"],
       rize: ({ side }) => ["bumpers", { [side]: 1 }],
     },

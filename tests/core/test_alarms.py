@@ -211,5 +211,5 @@ def test_alarm_message_expires_if_no_master_is_found_in_time(tmp_path: Path) -> 
     session.alarms._command(None, AlarmAction("send", "/cmd", 1), lambda *said: told.append(said))  # type: ignore[arg-type]
     now[0] += MAX_AGE_S + 1
     jobs[0](None)
-    assert told == [(False, "there was no master")]
+    assert told == [(False, "no master was running")]
     session.close()

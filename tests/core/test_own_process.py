@@ -75,10 +75,10 @@ def test_check_of_the_program_file_preserves_the_alert_of_a_behaviour(
 ) -> None:
     session = Session(Settings(tmp_path / "home"), journal_folder=tmp_path / "j", start_processes=False)
     try:
-        session.alerts.put("program", "error", "The behaviour ended unexpectedly.")
+        session.alerts.put("program", "error", "The behaviour stopped unexpectedly.")
         session._check(0.0)
         assert [each.title for each in session.alerts.active if each.id == "program"] == [
-            "The behaviour ended unexpectedly."
+            "The behaviour stopped unexpectedly."
         ]
     finally:
         session.close()

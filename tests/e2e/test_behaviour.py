@@ -82,7 +82,7 @@ def test_crashed_robot_is_reported_missing_and_reconnects(with_robot: Callable[[
     studio = with_robot(started(forever(turn(30))))
     (robot,) = studio.children("app.robots.simulated")
     robot.kill()
-    studio.says("The virtual robot Pepper ended.")
+    studio.says("The virtual robot Pepper stopped unexpectedly.")
     until(lambda: "not connected" in str(studio.page("document.body.textContent")), "the toolbox says so")
     studio.says("Pepper is not connected, so ")
     studio.click("Start a virtual Pepper")

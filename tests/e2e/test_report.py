@@ -106,7 +106,7 @@ def test_crashes_of_a_robot_and_the_editor_are_reported_at_the_next_start(
     studio.says("Pepper is connected", within_s=END_S)
     (robot,) = studio.children("app.robots.simulated")
     robot.send_signal(signal.SIGSEGV)
-    studio.says("The virtual robot Pepper ended.", within_s=END_S)
+    studio.says("The virtual robot Pepper stopped unexpectedly.", within_s=END_S)
     until(lambda: [name for name in kept(studio) if "robot" in name], "it is reported")
     renderers = until(lambda: renderers_of(studio), "the editor's page has its process")
     renderers[0].send_signal(signal.SIGSEGV)

@@ -13,7 +13,7 @@ from tests.e2e.studio import Studio
 from tests.e2e.waiting import until
 
 pytestmark = pytest.mark.timeout(240)
-LATER = "Your changes apply at the next Run"
+LATER = "Your changes take effect at the next run"
 CHILD = "app.blocks.runtime.child"
 
 

@@ -131,11 +131,11 @@ def test_failed_step_is_reported_at_once_with_its_reason(screen: Screen, tmp_pat
     tried = Tried(screen, tmp_path / "out", "--no-web", begin=("-c", NO_ROBOT))
     with tried.program as program:
         assert program.wait(100) == 1, program.lines
-        assert any("The virtual robot Pepper ended." in line for line in program.lines)
+        assert any("The virtual robot Pepper stopped unexpectedly." in line for line in program.lines)
     report, robot = tried.report, tried.steps()["robot"]
     assert not report["ok"]
     assert report["why"] == robot["said"]
-    assert "the virtual robot: The virtual robot Pepper ended." in report["why"]
+    assert "the virtual robot: The virtual robot Pepper stopped unexpectedly." in report["why"]
     assert "app.robots.nobody" in report["why"]
     assert not robot["ok"]
     assert robot["ms"] - robot["began_ms"] < robot["bound_s"] * 1000  # nobody waited for the rest of the time

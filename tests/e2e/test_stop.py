@@ -221,4 +221,4 @@ def test_killed_program_leaves_no_robot_moving(turning: Studio) -> None:
     (program,) = turning.children("app.blocks.runtime.child")
     program.kill()
     stands_still(turning)
-    turning.says("The behaviour ended unexpectedly.")
+    turning.says("The behaviour stopped unexpectedly.")

@@ -71,7 +71,7 @@ class Turtle:
 
     battery = sensor(Annotated[int, Range(0, 100, unit="%")], title="battery", text="battery", icon="battery")
     bumped = event(
-        "when %robot bumps on the %side",
+        "when %robot bumps into something on the %side",
         title="bumped",
         icon="zap",
         fields={"side": Literal["left", "right"]},

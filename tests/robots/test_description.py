@@ -128,7 +128,7 @@ def broken(change) -> tuple[str, ...]:
         (lambda d: d["actions"]["turn"]["input"]["properties"]["angle"].update(minimum="low"),
          "actions.turn.input.properties.angle.minimum must be a number"),
         (lambda d: d["actions"]["turn"]["input"]["properties"]["angle"].update(minimum=400),
-         "actions.turn.input.angle: minimum 400 is above maximum 360"),
+         "actions.turn.input.angle: minimum 400 is greater than maximum 360"),
         (lambda d: d["actions"]["turn"]["input"]["properties"]["angle"].update(default=400),
          "actions.turn.input.angle: the default must be between -360 and 360 °"),
         (lambda d: d["actions"]["turn"]["rb:block"]["text"].update(en="turn %wings"),
@@ -143,7 +143,8 @@ def broken(change) -> tuple[str, ...]:
          "actions.turn.input uses $ref, which is not supported; write the definition in place"),
         (lambda d: d.update({"rb:profile": 2}), "rb:profile must be 1"),
         (lambda d: d["events"].update(state={}),
-         "'state' is used for two things of one robot; their topics would be the same"),
+         ("'state' is reserved or used twice; each sensor and event needs a name of its own, "
+          "because the name becomes a topic")),
     ],
 )  # fmt: skip
 def test_invalid_description_is_reported_with_a_message(change, sentence):
@@ -317,7 +318,7 @@ def test_huge_description_is_rejected_before_decoding():
     described = td_for(model("pepper"), "Pepper")
     described["description"] = "x" * 1_000_000
     message = message_of(json.dumps(described).encode())
-    with pytest.raises(DescriptionError, match="it has 1\\.0 MB; the limit is 1 MB"):
+    with pytest.raises(DescriptionError, match="it is 1\\.0 MB in size; the limit is 1 MB"):
         announced(message)
     assert message.decoded is UNDECODED
 

@@ -63,4 +63,4 @@ def test_unmet_tour_condition_is_reported(
     driver = drive(qtbot, window, commands, tmp_path, steps)
     assert not driver.well
     assert (tmp_path / "failed.png").is_file()
-    assert capsys.readouterr().err == "not seen within 0.2 s: a robot\n"
+    assert capsys.readouterr().err == "step not completed within 0.2 s: a robot\n"

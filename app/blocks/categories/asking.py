@@ -22,8 +22,9 @@ CATEGORY = Category(
             style="values",
             icon="message-circle-question-mark",
             tooltip="Shows a question in Studio and waits until somebody answers it.",
-            help="“answer” is what was typed. Enter answers, Esc answers nothing. Let a robot say the "
-            "question first, if it shall be heard. The other scripts go on; what they ask comes afterwards.",
+            help="The typed text is stored in “answer”. Press Enter to answer; Esc leaves the answer "
+            "empty. The question isn't spoken: use “say” of a robot for that. The other scripts continue; "
+            "their questions are asked afterwards.",
             python="ask(%QUESTION)",
             arguments=(ValueInput("QUESTION", None, "What is your name?"),),
             words="input, prompt, question, type, person, read, keyboard, user, form",
@@ -34,10 +35,11 @@ CATEGORY = Category(
             shape="statement",
             style="values",
             icon="list-checks",
-            tooltip="Shows a question in Studio with one large button for each choice, and waits for one.",
-            help="“answer” is what was chosen. The arrows and Enter choose, and so do the keys 1 to 9; Esc "
-            "answers nothing. The two buttons add and take away a choice; any other list fits in there, too. "
-            "A question has room for 12 choices.",
+            tooltip="Shows a question in Studio with a large button for each choice, and waits for an "
+            "answer.",
+            help="The choice is stored in “answer”. Choose with the arrow keys and Enter, or with the "
+            "keys 1 to 9; Esc leaves the answer empty. The two buttons add and remove a choice; you can also "
+            "insert another list. A question can have up to 12 choices.",
             python="ask_with_choices(%QUESTION, %CHOICES)",
             arguments=(
                 ValueInput("QUESTION", None, "Do you want to play?"),
@@ -51,8 +53,9 @@ CATEGORY = Category(
             shape="value",
             style="values",
             icon="message-circle-reply",
-            tooltip="What was answered to the last question: what was typed or chosen.",
-            help="What is typed as a number can be counted with. Before the first question it is empty.",
+            tooltip="The answer to the last question, as typed or chosen.",
+            help="If a number was typed, you can calculate with it. Before the first question, the "
+            "answer is empty.",
             python="answer()",
             fails=False,
             words="input, reply, response, typed, user",

@@ -29,10 +29,10 @@ CATEGORY = Category(
             "functions_define",
             "to %NAME %INPUTS %BODY",
             icon="square-function",
-            tooltip="Makes a block of your own: its name, its inputs, and what it does.",
-            help="Its block is in this category then. The buttons add an input and take the last one away; "
-            "rename function and inputs by clicking on their names: the blocks that use it follow. "
-            "A function may use itself, up to 200 times deep.",
+            tooltip="Creates your own block: its name, its inputs and what it does.",
+            help="The new block appears in this category. The buttons add an input and remove the last "
+            "one. To rename the function or an input, click its name; the blocks that use it are updated. "
+            "A function can call itself, up to 200 levels deep.",
             python="",
             arguments=(_NAME, _INPUTS, _BODY),
             mutator="function",
@@ -40,10 +40,10 @@ CATEGORY = Category(
         ),
         _definition(
             "functions_define_result",
-            "to %NAME %INPUTS %BODY give back %RESULT",
+            "to %NAME %INPUTS %BODY return %RESULT",
             icon="square-function",
-            tooltip="Makes a value block of your own, which works out a result.",
-            help="For example “double” with the input “number” gives back number × 2.",  # noqa: RUF001
+            tooltip="Creates your own value block, which calculates a result.",
+            help="For example, “double” with the input “number” returns number × 2.",  # noqa: RUF001
             python="",
             arguments=(TextField("NAME", "my result"), _INPUTS, _BODY, ValueInput("RESULT")),
             mutator="function",
@@ -51,10 +51,10 @@ CATEGORY = Category(
         ),
         _statement(
             "functions_return_if",
-            "if %CONDITION give back %VALUE",
+            "if %CONDITION return %VALUE",
             icon="corner-down-left",
-            tooltip="Ends the function with this result if this is so.",
-            help="Only inside a function that gives back a result.",
+            tooltip="Ends the function with this result if the condition is true.",
+            help="Works only inside a function that returns a result.",
             python="if %CONDITION:\n    return %VALUE",
             arguments=(ValueInput("CONDITION", "Boolean"), ValueInput("VALUE")),
             needs_function="result",
@@ -64,8 +64,9 @@ CATEGORY = Category(
             "functions_leave_if",
             "if %CONDITION leave the function",
             icon="corner-down-left",
-            tooltip="Ends the function if this is so; the script goes on where it was used.",
-            help="Only inside a function without a result.",
+            tooltip="Ends the function if the condition is true; the script continues after the block "
+            "that called it.",
+            help="Works only inside a function without a result.",
             python="if %CONDITION:\n    return",
             arguments=(ValueInput("CONDITION", "Boolean"),),
             needs_function="plain",
@@ -86,7 +87,7 @@ CATEGORY = Category(
             "functions_result",
             "%INPUTS",
             icon="square-function",
-            tooltip="Runs your function and is what it gives back.",
+            tooltip="Runs your function and returns its result.",
             python="",
             arguments=(_INPUTS,),
             mutator="call",
@@ -97,7 +98,7 @@ CATEGORY = Category(
             "functions_input",
             "%INPUT",
             icon="",
-            tooltip="What was put into this gap of the function.",
+            tooltip="The value of this input of the function.",
             python="%INPUT",
             arguments=(InputField("INPUT"),),
             fails=False,

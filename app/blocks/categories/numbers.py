@@ -66,7 +66,7 @@ _BASIC = (
         shape="value",
         style="values",
         icon="",
-        tooltip="Works out a number from two numbers.",
+        tooltip="Calculates with two numbers.",
         python=_ARITHMETIC,
         arguments=(*_TWO, ChoiceField("SIGN", _SIGNS)),
         variant="SIGN",
@@ -82,7 +82,7 @@ _BASIC = (
         shape="value",
         style="values",
         icon="dices",
-        tooltip="A number by chance; a whole one when both limits are whole.",
+        tooltip="A random number; a whole number if both limits are whole.",
         python="random_number(%LOW, %HIGH)",
         arguments=(ValueInput("LOW", "Number", 1), ValueInput("HIGH", "Number", 6)),
         check="Number",
@@ -94,7 +94,7 @@ _BASIC = (
         shape="value",
         style="values",
         icon="",
-        tooltip="Makes a whole number; halves go up.",
+        tooltip="Rounds to a whole number; “round” rounds halves up.",
         python={
             "round": "rounded(%NUMBER)",
             "up": "rounded_up(%NUMBER)",
@@ -115,9 +115,9 @@ _MORE = (
         "numbers_function",
         "%FUNCTION of %NUMBER",
         icon="square-radical",
-        tooltip="Works out one number from another.",
-        help="sin, cos and tan take an angle in degrees; asin, acos and atan give one. “log” is the "
-        "logarithm to the base 10, “ln” the one to the base e. The absolute value of −5 is 5; "  # noqa: RUF001
+        tooltip="Calculates a mathematical function of a number.",
+        help="sin, cos and tan take an angle in degrees; asin, acos and atan return one. “log” is the "
+        "base-10 logarithm, “ln” the natural logarithm. The absolute value of −5 is 5; "  # noqa: RUF001
         "the sign is 1, 0 or −1.",  # noqa: RUF001
         python={value: python for _words, value, python in _FUNCTIONS},
         arguments=(
@@ -132,8 +132,8 @@ _MORE = (
         "numbers_round_to",
         "round %NUMBER to %PLACES decimal places",
         icon="decimals-arrow-left",
-        tooltip="Rounds to so many digits behind the decimal point; halves go up.",
-        help="With 0 places it is a whole number. With −1 places it is rounded to tens.",  # noqa: RUF001
+        tooltip="Rounds to a number of decimal places; halves are rounded up.",
+        help="With 0 places, the result is a whole number; with −1, it is rounded to tens.",  # noqa: RUF001
         python="rounded_to(%NUMBER, %PLACES)",
         arguments=(ValueInput("NUMBER", "Number", 3.14159), ValueInput("PLACES", "Number", 2)),
         words="digits, decimals, precision, places",
@@ -156,8 +156,9 @@ _MORE = (
         "numbers_limit",
         "limit %NUMBER to between %LOW and %HIGH",
         icon="between-vertical-start",
-        tooltip="The number, but never below the first limit and never above the second.",
-        help="Useful for a speed or an angle: whatever comes in, the robot gets a number that it can do.",
+        tooltip="Keeps a number between two limits, both included.",
+        help="Useful for a speed or an angle: the number that the robot receives is never outside its "
+        "limits.",
         python="limited(%NUMBER, %LOW, %HIGH)",
         arguments=(
             ValueInput("NUMBER", "Number", 120),
@@ -170,9 +171,8 @@ _MORE = (
         "numbers_map",
         "map %NUMBER from %LOW – %HIGH to %NEW_LOW – %NEW_HIGH",  # noqa: RUF001 (from … to …)
         icon="scaling",
-        tooltip="Turns a number of one range into the number at the same place of another range.",
-        help="A number outside the first range comes out outside the second; put “limit” around it if that "
-        "must not be.",
+        tooltip="Scales a number from one range to another.",
+        help="A number outside the first range is also outside the second; use “limit” to prevent that.",
         python="mapped(%NUMBER, %LOW, %HIGH, %NEW_LOW, %NEW_HIGH)",
         arguments=(
             ValueInput("NUMBER", "Number", 50),
@@ -187,8 +187,8 @@ _MORE = (
         "numbers_constant",
         "%CONSTANT",
         icon="pi",
-        tooltip="A number that mathematics has a name for.",
-        help="π is the distance around a circle divided by the distance across it.",
+        tooltip="A mathematical constant.",
+        help="π is the circumference of a circle divided by its diameter.",
         python={"pi": "3.141592653589793", "e": "2.718281828459045", "golden": "1.618033988749895"},
         arguments=(
             ChoiceField("CONSTANT", (("π (3.1416)", "pi"), ("e (2.7183)", "e"), ("φ (1.618)", "golden"))),
@@ -201,7 +201,7 @@ _MORE = (
         "numbers_is",
         "%NUMBER is %KIND",
         icon="binary",
-        tooltip="Whether a number is even, odd, whole, positive or negative.",
+        tooltip="Checks if a number is even, odd, whole, positive or negative.",
         help="0 is even, and neither positive nor negative.",
         python={
             "even": "is_even(%NUMBER)",
@@ -230,7 +230,7 @@ _MORE = (
         "numbers_divisible",
         "%NUMBER is divisible by %BY",
         icon="divide",
-        tooltip="Whether nothing is left over when the first number is divided by the second.",
+        tooltip="True if the division leaves no remainder.",
         python="is_divisible(%NUMBER, %BY)",
         arguments=(ValueInput("NUMBER", "Number", 12), ValueInput("BY", "Number", 3)),
         words="multiple, remainder, modulo, divided",

@@ -21,7 +21,7 @@ CATEGORY = Category(
             shape="statement",
             style="variables",
             icon="variable",
-            tooltip="Gives the variable this value; all scripts see it.",
+            tooltip="Sets the variable to this value. All scripts share the variable.",
             python="%VAR = %VALUE",
             arguments=(VariableField("VAR"), ValueInput("VALUE", None, 0)),
             words="variable, assign, store, save, put!, remember, initialize, let, make, equals, =",

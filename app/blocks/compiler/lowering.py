@@ -127,7 +127,7 @@ class Lowering:
         if placed.type == RESULT:
             result = tuple(argument for argument in kept if argument.name == "RESULT")
             self._catalogue.blocks[f"{END}:{placed.id}"] = replace(
-                block, shape="statement", text="give back %RESULT", python="return %RESULT", arguments=result
+                block, shape="statement", text="return %RESULT", python="return %RESULT", arguments=result
             )
         return self._with_type(
             placed, replace(block, type=f"{block.type}:{placed.id}", text=text, arguments=kept)

@@ -59,7 +59,8 @@ class ProblemCollector:
         subject = pgettext("block", "when started")
         self._add(
             "warning", None, None, subject,
-            _("These blocks have no start. Put “{start}” above them.").format(start=subject),
+            _("No event block starts these blocks, so they don't run. Put “{start}” above "
+              "them.").format(start=subject),
             fix=_("Add “when started”"), fix_action=f"add:{_STARTER}",
         )  # fmt: skip
 
@@ -307,7 +308,9 @@ class ProblemCollector:
         real = [name for name in robots if not self._catalogue.connected[name].virtual]
         if real:
             who, name = listed(real), self.label(placed, block)
-            said = _("{block} on {topic} moves {robots}. Studio asks before it does, and Stop stops it.")
+            said = _(
+                "{block} on {topic} moves {robots}. Studio asks for permission first; Stop ends the movement."
+            )
             self._add("info", placed, block, name, said.format(block=name, topic=topic, robots=who))
 
     def _wait_forever_sentence(self, placed: Placed, block: Block) -> str:

@@ -46,10 +46,10 @@ def explain(error: Exception, label: str, block: str | None) -> BehaviourError:
     if isinstance(error, TypeError):
         if "NoneType" in str(error):
             return BehaviourError(
-                _("{name} needs a value, but it has none yet.").format(name=name), block, unknown=True
+                _("{name} needs a value that isn't known yet.").format(name=name), block, unknown=True
             )
         return BehaviourError(
-            _("{name} can't do this with {kinds}.").format(name=name, kinds=_kinds(str(error))), block
+            _("{name} doesn't work with {kinds}.").format(name=name, kinds=_kinds(str(error))), block
         )
     return BehaviourError(_("{name} failed: {error}.").format(name=name, error=error), block)
 

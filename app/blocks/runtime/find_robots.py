@@ -163,8 +163,8 @@ def _result(there: Mapping[str, Robot], asked: Mapping[str, _Topic]) -> FoundRob
     claims = [f"{each.wrong}." for each in asked.values() if each.wrong]
     claims += [
         _(
-            "{count} programs announce themselves as {robot}. {first} was first and is used; {others} "
-            "is ignored."
+            "{count} programs announce themselves as {robot}. {first} was first and is used; ignored: "
+            "{others}."
         ).format(
             count=len(each.twins) + 1,
             robot=each.robot.name,

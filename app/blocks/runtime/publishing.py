@@ -43,7 +43,7 @@ class PublishGuard:
             who = listed(names)
             raise BehaviourError(
                 _(
-                    "Publishing on {topic} would move {who}, which has not been allowed. Stop the behaviour "
-                    "and run it again."
+                    "Can't publish on {topic}: this would move {who} without permission. Stop the behaviour "
+                    "and run it again to allow it."
                 ).format(topic=topic, who=who)
             )

@@ -51,7 +51,9 @@ class Questions:
         Raises BehaviourError outside of Studio.
         """
         if self._asked is None:
-            raise BehaviourError(_("No one can answer: the behaviour runs outside Studio."))
+            raise BehaviourError(
+                _("Can't ask the question: the behaviour runs outside Studio. Run it in Studio.")
+            )
         self.answer = as_value(self._answer_to(text(words)))
 
     def ask_with_choices(self, words: object, choices: object) -> None:
@@ -61,7 +63,9 @@ class Questions:
         and for a list that is empty or too long.
         """
         if self._asked is None:
-            raise BehaviourError(_("No one can answer: the behaviour runs outside Studio."))
+            raise BehaviourError(
+                _("Can't ask the question: the behaviour runs outside Studio. Run it in Studio.")
+            )
         offered = offers(choices)
         chosen = self._answer_to(text(words), tuple(offered))
         value = offered.get(chosen, "")
@@ -95,7 +99,7 @@ def offers(choices: object) -> dict[str, object]:
     """Return the items of a list by their texts on the buttons, without empty and duplicate texts."""
     if not isinstance(choices, list):
         raise BehaviourError(
-            _("A question with choices needs a list of them, not {value}.").format(value=kind(choices))
+            _("A question with choices needs a list of choices, not {value}.").format(value=kind(choices))
         )
     found: dict[str, object] = {}
     for item in choices:

@@ -422,7 +422,7 @@ def _with_full_stop(words: str) -> str:
 def _check_hint(robot: Robot) -> str:
     if robot.virtual:
         return _("Start the virtual robot again.")
-    return _("Check that it is switched on and on the same Wi-Fi.")
+    return _("Check that it is switched on and connected to the same Wi-Fi.")
 
 
 def rest_of(action: Action, input: Mapping[str, object], call: RobotCall) -> dict[str, object] | None:

@@ -101,7 +101,7 @@ def number(value: object, what: str) -> int | float:
     """Return the value as a finite number. Raises BehaviourError with a message that starts with ``what``."""
     if value is None:
         raise BehaviourError(
-            _("{what} needs a value, but it has none yet.").format(what=_(what)), unknown=True
+            _("{what} needs a value that isn't known yet.").format(what=_(what)), unknown=True
         )
     if not isinstance(value, (int, float)):
         raise BehaviourError(_("{what} needs a number, not {value}.").format(what=_(what), value=kind(value)))

@@ -131,4 +131,4 @@ def write_file(path: Path, behaviour: BehaviourFile) -> None:
 
 def what_behaviours_are() -> str:
     """Return a hint about the file extension of behaviours, for a file that isn't one."""
-    return _("behaviours are files ending in {suffix}").format(suffix=SUFFIX)
+    return _("the file name of a behaviour ends in {suffix}").format(suffix=SUFFIX)

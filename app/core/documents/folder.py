@@ -54,7 +54,7 @@ def name_refusal(name: str) -> str:
     """Return why a name is invalid for a file or folder; "" if it is valid."""
     bad = REFUSED.search(name)
     if bad:
-        return _("A name can't have “{sign}” in it.").format(sign=bad[0])
+        return _("A name can't contain “{sign}”.").format(sign=bad[0])
     if name.startswith("."):
         return _("A name that begins with a full stop hides the file.")
     if RESERVED.fullmatch(name) or name.endswith((".", " ")):

@@ -36,9 +36,9 @@ def why_not(name: str, path: Path | None) -> str:
     for letter in wanted:
         if letter in NOT_IN_NAMES or not letter.isprintable():
             shown = letter if letter.isprintable() else " "
-            return _("A file's name can't have {sign} in it.").format(sign=f"“{shown}”")
+            return _("A file name can't contain {sign}.").format(sign=f"“{shown}”")
     if wanted.endswith(".") or wanted.startswith("."):
-        return _("A file's name can't begin or end with a full stop.")
+        return _("A file name can't begin or end with a full stop.")
     if wanted.partition(".")[0].lower() in DEVICES:
         return _("Windows reserves the name “{name}”.").format(name=wanted)
     if len(wanted.encode("utf-8", "surrogatepass")) > MAX_BYTES:

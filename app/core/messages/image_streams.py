@@ -299,7 +299,7 @@ class Images:
             except Exception as problem:  # noqa: BLE001  one message must not end the decoding thread
                 picture, error = (
                     None,
-                    _("“{topic}” sends a picture that can't be shown: {problem}").format(
+                    _("“{topic}” sends an image that can't be shown: {problem}").format(
                         topic=message.topic, problem=problem
                     ),
                 )

@@ -277,7 +277,7 @@ def _structure(data: memoryview) -> tuple[Places, NDArray[np.uint8]]:
         kinds.append(part[found])
         in_text = int(inside[-1])
     if in_text or not places:
-        raise ValueError(_("a text in it has no end"))
+        raise ValueError(_("it contains an unterminated string"))
     return np.concatenate(places), np.concatenate(kinds)
 
 

@@ -88,11 +88,11 @@ def decode(
     except NepError as error:
         return None, str(error)
     except (cv2.error, MemoryError) as error:
-        return None, _("“{topic}” sends a picture that can't be shown: {problem}").format(
+        return None, _("“{topic}” sends an image that can't be shown: {problem}").format(
             topic=message.topic, problem=_short_message(error)
         )
     if found is None:
-        return None, _("“{topic}” has pictures of {shape} {dtype}; they can't be shown").format(
+        return None, _("“{topic}” has images of {shape} {dtype}, which can't be shown").format(
             topic=message.topic, shape=frame.shape, dtype=frame.dtype
         )
     bgra, numbers, scale = found

@@ -54,7 +54,9 @@ def save(message: Message, into: Path | None = None) -> Path:
             path.unlink(missing_ok=True)  # delete an incomplete file
             raise
         return path
-    raise FileExistsError(_("there are already a thousand images named “{stem}”").format(stem=stem))
+    raise FileExistsError(
+        _("the folder already has 999 images named “{stem}”; move or delete some").format(stem=stem)
+    )
 
 
 def file_stem(message: Message) -> str:

@@ -327,7 +327,7 @@ class WebPages:
         if self._server is not None and self._server.wait(0):
             self._server, self.state, self.protocols = None, "off", frozenset()
             self.kept_out.clear()
-            self.sentence = _("The web server ended because of an error. The log has the details.")
+            self.sentence = _("The web server stopped because of an error. See the log for details.")
         self.refresh()
 
     def close(self) -> None:

@@ -155,7 +155,7 @@ def _refused(web: WebPages) -> Iterator[WebNotice]:
 def _kept_out(web: WebPages, refusal: Refusal) -> Iterator[WebNotice]:
     for page in web.kept_out.values():
         if refusal.who in {page.origin, page.address}:
-            sentence = _("{page} tried to connect again at {time} and was refused.").format(
+            sentence = _("{page} tried to connect again at {time} and was rejected.").format(
                 page=page_name(page), time=_clock_words(refusal.time_s)
             )
             yield WebNotice(("kept out", str(page.id)), "error", sentence, "let in", str(page.id))
@@ -165,22 +165,22 @@ def _notice_of(refusal: Refusal) -> WebNotice:
     key = (refusal.kind, refusal.who, refusal.robot)
     who, clock = refusal.who, _clock_words(refusal.time_s)
     if refusal.kind == "robot" and refusal.robot:
-        sentence = _("A page asked to move {robot} and was refused.").format(robot=refusal.robot)
+        sentence = _("A page tried to move {robot} and was blocked.").format(robot=refusal.robot)
         return WebNotice(("robot", refusal.robot), "error", sentence, "choose robots", refusal.robot)
     if refusal.kind == "origin" or refusal.origin:
-        sentence = _("{origin} was refused at {time}. Its origin isn't allowed.")
+        sentence = _("{origin} was rejected at {time}. Its origin isn't allowed.")
         step: NextStep = "allow origin" if refusal.origin else ""
         return WebNotice(key, "error", sentence.format(origin=who, time=clock), step, refusal.origin)
     if refusal.kind == "token":
-        sentence = _("{address} was refused at {time}: wrong token.")
+        sentence = _("{address} was rejected at {time}: wrong token.")
         return WebNotice(key, "error", sentence.format(address=who, time=clock))
-    sentence = _("{address} was refused at {time}: {reason}.")
+    sentence = _("{address} was rejected at {time}: {reason}.")
     return WebNotice(key, "error", sentence.format(address=who, time=clock, reason=refusal.reason))
 
 
 def _slow(web: WebPages) -> Iterator[WebNotice]:
     for slow in web.slow:
-        sentence = _("{page} reads slower than {topic} sends. {share} dropped.").format(
+        sentence = _("{page} can't keep up with {topic}. {share} of the messages were dropped.").format(
             page=page_name(slow.page), topic=slow.topic, share=share_words(slow.share)
         )
         yield WebNotice(("slow", slow.page.name, slow.topic), "warn", sentence)

@@ -89,9 +89,9 @@ KINDS = (
     NetworkKind(
         "zenoh",
         "Zenoh",
-        lazy("Address of its nodes"),
+        lazy("Address of a node or router"),
         "local",
-        lazy("“local” is this computer; a router is written as tcp/192.168.1.5:7447."),
+        lazy("“local” is this computer; the address of a router looks like tcp/192.168.1.5:7447."),
         tells_figures=True,
         codec=lambda info: info.codec,
         reads=lambda info: info.msg_type,

@@ -173,7 +173,7 @@ class RecorderProcess:
             with suppress(queue.Full):
                 self._orders.put_nowait(None)  # ends the thread that waits for commands
             writer.join(END_TIMEOUT_S)
-        return "" if code == 0 else _tail(log) or _("it ended with exit code {code}").format(code=code)
+        return "" if code == 0 else _tail(log) or _("it exited with code {code}").format(code=code)
 
     def _write(self, process: subprocess.Popen[bytes]) -> None:
         if process.stdin is None:
@@ -435,7 +435,7 @@ class RecorderClient:
                 "recorder:low",
                 "warn",
                 _("The disk is nearly full."),
-                _("The recorder will stop on its own before then; everything received is saved."),
+                _("The recorder stops before the disk is full; everything received until then is saved."),
                 count=0,
             )
         else:

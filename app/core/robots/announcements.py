@@ -116,7 +116,7 @@ class Announcements:
                     _("{count} programs announce themselves as {robot}.").format(
                         count=len(known.twins) + 1, robot=name
                     ),
-                    _("{first} was first and is used; {others} is ignored. Close one of them.").format(
+                    _("{first} was first and is used; {others} is ignored. Close all but one.").format(
                         first=known.owner.words,
                         others=listed([twin.words for twin in known.twins[:MAX_CLAIMANTS]]),
                     ),
@@ -261,10 +261,11 @@ class Announcements:
             sentence = f"{error.sentence[:1].upper()}{error.sentence[1:]}."
             whose = known.owner.words if known.owner is not None else topic
             words = (
-                _("{program} announces it; its driver needs to be fixed.")
+                _("{program} sent this invalid description; fix its driver.")
                 if known.robot is None
                 else _(
-                    "{program} announces it; its driver needs to be fixed. The previous description is used."
+                    "{program} sent this invalid description; fix its driver. "
+                    "The previous description is used."
                 )
             )
             known.wrong, known.is_unreadable = Claim(sentence, words.format(program=whose)), True

@@ -52,7 +52,7 @@ class CommandPublishers:
                 publisher.close()
 
         if old:
-            self._submit(_("leave the old topics of {robot}").format(robot=link.name), close_them)
+            self._submit(_("close the old publishers of {robot}").format(robot=link.name), close_them)
 
     def end(self, link: RobotLink) -> None:
         """Close the publishers for a robot that is discarded, including those that are being opened."""

@@ -478,7 +478,7 @@ class Fleet:
             return
         link.rejected, link.errors = ReportedCount(), ReportedCount()
         self._notes.append(
-            _("{robot} was restarted as {now}; it was {before}").format(
+            _("{robot} was restarted as {now} (previously {before})").format(
                 robot=link.name, now=identity.words, before=before.words
             )
         )
@@ -488,7 +488,9 @@ class Fleet:
     def _leave_topics(self, link: RobotLink) -> None:
         # The description names other topics: invocations on the old ones fail.
         self._heartbeat.stop(link.name)
-        self._tries.end_all(link, "failed", _("{robot} has changed; try again").format(robot=link.name))
+        self._tries.end_all(
+            link, "failed", _("The description of {robot} has changed; try again").format(robot=link.name)
+        )
         if link.watch is not None:
             link.watch.close()
             link.watch = None

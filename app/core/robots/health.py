@@ -26,7 +26,7 @@ INSTALLATION = "installation"
 ROBOT_ALERTS = ("robot", "moving", "camera", "rejected", "errors")
 """Prefixes of the ids of alerts about one robot. A colon and the name of the robot follow."""
 
-REAL = lazy("Check that it is switched on and on the same Wi-Fi.")
+REAL = lazy("Check that it is switched on and connected to the same Wi-Fi.")
 VIRTUAL = lazy("Start the virtual robot again.")
 
 
@@ -107,7 +107,7 @@ class Health:
                     f"robot:{link.name}",
                     "error",
                     _("{robot} is not responding.").format(robot=link.name),
-                    _("The behaviour uses it. {next_step}").format(
+                    _("The behaviour uses this robot. {next_step}").format(
                         next_step=_(VIRTUAL if link.virtual else REAL)
                     ),
                     button=_("Stop"),
@@ -225,7 +225,7 @@ class Health:
             bad.count,
         )
         detail = (
-            _("{why} See the raw bytes in the Inspector. {count} more came too fast to be decoded.")
+            _("{why} See the raw bytes in the Inspector. {count} more arrived too fast to be decoded.")
             if bad.unchecked
             else _("{why} See the raw bytes in the Inspector.")
         )
@@ -322,7 +322,7 @@ class Health:
                     "The driver of {robot} caught {count} exceptions.",
                     errors.value,
                 ),
-                _("The traceback is in its log."),
+                _("See the driver's log for the traceback."),
             ),
         }
         for kind, (count, title, detail) in said.items():

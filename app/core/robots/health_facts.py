@@ -92,7 +92,7 @@ def _connection(link: RobotLink, now: float, age_words: AgeWords) -> HealthFact:
         return HealthFact(CONNECTION, "warn", words.format(age=age_words(now - link.gone_s)))
     if link.mute:
         return HealthFact(CONNECTION, "error", _unresponsive_words(link, age))
-    words = _("last response {age} ago").format(age=age) if age else _("connected; no question sent yet")
+    words = _("last response {age} ago").format(age=age) if age else _("connected; no request sent yet")
     return HealthFact(CONNECTION, "ok", words)
 
 
@@ -200,13 +200,15 @@ def _sensors(link: RobotLink, topics: Topics, age_words: AgeWords) -> Iterable[H
         yield HealthFact(SENSORS, "off", words.format(count=len(felt)))
     elif sent < len(felt):
         yield HealthFact(
-            SENSORS, "ok", _("{sent} of {count} have sent something").format(sent=sent, count=len(felt))
+            SENSORS, "ok", _("{sent} of {count} have sent data").format(sent=sent, count=len(felt))
         )
     else:
         yield HealthFact(
             SENSORS,
             "ok",
-            ngettext("{count} sensor sends", "all {count} send", len(felt)).format(count=len(felt)),
+            ngettext("{count} sensor is sending", "all {count} are sending", len(felt)).format(
+                count=len(felt)
+            ),
         )
 
 
@@ -231,7 +233,7 @@ def _count(title: str, count: ReportedCount, now: float) -> Iterable[HealthFact]
 def _left_alone(link: RobotLink) -> HealthFact:
     after = link.robot.safe_stop.watchdog_s
     if after is None:
-        return HealthFact(LEFT_ALONE, "off", _("keeps moving: stay near its switch"))
+        return HealthFact(LEFT_ALONE, "off", _("keeps moving; stay near its power switch"))
     return HealthFact(LEFT_ALONE, "ok", _("stops by itself after {seconds} s").format(seconds=number(after)))
 
 
@@ -239,7 +241,7 @@ def _heartbeat_fact(link: RobotLink) -> Iterable[HealthFact]:
     every = link.robot.beat_s
     if every is not None:
         yield HealthFact(
-            SIGN_OF_LIFE, "ok", _("every {seconds} s while it works").format(seconds=number(every))
+            SIGN_OF_LIFE, "ok", _("every {seconds} s during actions").format(seconds=number(every))
         )
     elif link.robot.dialect == "native":
-        yield HealthFact(SIGN_OF_LIFE, "off", _("none while it works"))
+        yield HealthFact(SIGN_OF_LIFE, "off", _("none during actions"))

@@ -262,7 +262,7 @@ class Launcher:
                 self._post_event(
                     LaunchFailed(
                         name,
-                        _("The virtual robot {robot} ended.").format(robot=name),
+                        _("The virtual robot {robot} stopped unexpectedly.").format(robot=name),
                         output.strip()[-TAIL_LETTERS:] or _end_without_output(code),
                     )
                 )
@@ -289,7 +289,7 @@ def _end_without_output(code: int) -> str:
     # A negative exit code is the number of a signal.
     if code < 0:
         return _("Another program on this computer stopped it.")
-    return _("It gave no reason (exit code {code}).").format(code=code)
+    return _("No reason was reported (exit code {code}).").format(code=code)
 
 
 def _tail(log: IO[bytes]) -> str:

@@ -113,7 +113,7 @@ class Tries:
         silence = max(MIN_SILENCE_S, BEATS_MISSED * robot.beat_s) if robot.beat_s else None
         if silence is not None and now - link.heard_s > silence:
             error = _(
-                "{robot} stopped responding. Check that it is switched on; press Stop to make it stand still."
+                "{robot} stopped responding. Check that it is switched on, or press Stop to stop it."
             ).format(robot=link.name)
             self._mark_unresponsive(link, made, error)
             return

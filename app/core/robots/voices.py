@@ -193,7 +193,7 @@ class RobotVoices:
     def _queue(self, said: Utterance) -> None:
         if len(self._waiting) >= MAX_WAITING:
             lost = self._waiting.popleft()
-            words = _("“{words}” was only shown: others were speaking").format(words=lost.words)
+            words = _("“{words}” was shown but not spoken: others were speaking").format(words=lost.words)
             self._tell("info", lost.robot, words)
         self._waiting.append(said)
 

@@ -523,7 +523,7 @@ class Runs:
         self._stop(tuple(dict.fromkeys((*self._used, *event.silent))))
         self._run = replace(self._run, finished=finished)
         if not event.ok and not self._run.errors:
-            self._alerts.put("program", "error", _("The behaviour ended unexpectedly."), event.text)
+            self._alerts.put("program", "error", _("The behaviour stopped unexpectedly."), event.text)
 
     def _stop(self, names: tuple[str, ...] | None) -> None:
         self.asking.clear()

@@ -12,7 +12,7 @@ from nep.i18n import _, lazy, listed, ngettext, number
 MAX_NAMED = 4
 WIDEST_NAMES = 24
 """Maximum length of robot names on the button; longer ones are shown only next to it."""
-APPLIES_LATER = lazy("Your changes apply at the next Run")
+APPLIES_LATER = lazy("Your changes take effect at the next run")
 NOTHING = lazy("Drag “when started” from Events and put blocks below it")
 RUN, GO_ON, RESTART = lazy("Run"), lazy("Resume"), lazy("Restart")
 STOP, STOPPING, STOP_AGAIN = lazy("Stop"), lazy("Stopping"), lazy("Stop again")
@@ -151,7 +151,7 @@ def _tried(view: RunView, run: RunState) -> RunView:
         title = _("Trying “{block}”").format(block=run.trying)
         return replace(view, title=title, compact=title, run_word=RUN, edited=False)
     if view.state == "proven" or _ended_without_robots(run):
-        words = _("“{block}” stopped by a problem") if run.errors else _("“{block}” was stopped")
+        words = _("“{block}” stopped because of an error") if run.errors else _("“{block}” was stopped")
         detail = view.detail
         if run.finished:
             words = _("Tried “{block}”")
@@ -318,7 +318,7 @@ _ENDED = {
 def _proven(run: RunState, _now: float) -> RunView:
     report = run.report if run.report is not None and run.report.robots else None
     words = result_words(report) if report is not None else ""
-    title, detail = _ended_title(run), _("The dashed block is where it stopped") if run.dashed else ""
+    title, detail = _ended_title(run), _("It stopped at the dashed block") if run.dashed else ""
     if run.errors:
         detail = next(iter(run.errors.values()))
     elif run.finished:
@@ -459,7 +459,7 @@ def stop_words(robot: RobotStop, clock: str) -> str:
     if robot.error:
         return _("{wrong}, at {time}").format(wrong=robot.wrong, time=clock)
     if robot.program:
-        return _("“{program}” has not answered, at {time}").format(program=robot.program, time=clock)
+        return _("no reply from “{program}”, at {time}").format(program=robot.program, time=clock)
     return _("not confirmed, at {time}").format(time=clock)
 
 

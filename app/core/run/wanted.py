@@ -83,5 +83,5 @@ def _absent(program: Program, stack: Stack) -> dict[str, str]:
     fixes = (each.fix_action or "" for each in program.problems if each.block_id == stack.id)
     robot = next((fix.removeprefix(CONNECT) for fix in fixes if fix.startswith(CONNECT)), "")
     if not robot:
-        return {stack.id: _("Its robot is not connected, so it can't be tried.")}
-    return {stack.id: _("{robot} is not connected, so it can't be tried.").format(robot=robot)}
+        return {stack.id: _("The robot is not connected, so these blocks can't be tried.")}
+    return {stack.id: _("{robot} is not connected, so these blocks can't be tried.").format(robot=robot)}

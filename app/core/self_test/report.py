@@ -138,7 +138,7 @@ class Report:
         step, why = self.step, self._why
         if not why and not self._over:
             name = step.name if step is not None else (self._steps[-1].name if self._steps else "")
-            why = _("Studio ended during the self-test; its last step was “{step}”.").format(step=name)
+            why = _("Studio exited during the self-test; its last step was “{step}”.").format(step=name)
         content = {
             "format": FORMAT,
             "format_version": FORMAT_VERSION,

@@ -75,7 +75,7 @@ class SelfTest:
             )
         else:
             if code != 0:
-                self.fail(_("Studio ended with exit code {code}").format(code=code))
+                self.fail(_("Studio exited with exit code {code}").format(code=code))
         if not self.report.why:
             self.record_success()  # it has closed
         self._end_processes()

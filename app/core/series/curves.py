@@ -132,7 +132,7 @@ class Curves:
         there = {each.text for each in self.all}
         new = [each for each in sources if str(each) not in there]
         if not sources:
-            raise CurveError(_("{text} is empty now").format(text=text))
+            raise CurveError(_("{text} has no elements now").format(text=text))
         if len(self.all) + len(new) > MAX_CURVES:
             raise CurveError(_("a plot has at most {count} curves").format(count=MAX_CURVES))
         curves = []

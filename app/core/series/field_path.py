@@ -76,7 +76,11 @@ class FieldPath:
             found = _STEP.match(text, at)
             bare = found is not None and found["name"] is not None and bool(steps) and text[at] != "."
             if found is None or bare or len(steps) >= MAX_STEPS or len(text) > MAX_LENGTH:
-                raise CurveError(_("'{path}' is not a field path").format(path=text[:80]))
+                raise CurveError(
+                    _("'{path}' is not a valid field path; use a path such as pose.x or joints[3]").format(
+                        path=text[:80]
+                    )
+                )
             steps.append(_step_of(found))
             at = found.end()
         if not steps:
@@ -139,7 +143,11 @@ def _step_of(found: re.Match[str]) -> Step:
     try:
         key = json.loads(found["key"])
     except ValueError:
-        raise CurveError(_("'{path}' is not a field path").format(path=found["key"][:80])) from None
+        raise CurveError(
+            _("'{path}' is not a valid field path; use a path such as pose.x or joints[3]").format(
+                path=found["key"][:80]
+            )
+        ) from None
     return str(key)
 
 

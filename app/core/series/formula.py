@@ -149,7 +149,7 @@ class _Parser:
         try:
             tree = parse_expression(python)
         except (SyntaxError, ValueError, MemoryError, RecursionError):
-            raise CurveError(_("'{text}' can't be parsed").format(text=self._text[:80])) from None
+            raise CurveError(_("'{text}' is not a valid formula").format(text=self._text[:80])) from None
         if sum(1 for _node in ast.walk(tree)) > MAX_NODES:
             raise CurveError(_("this is too complex for one curve; use several curves"))
         source = self._source(tree.body)
@@ -174,7 +174,7 @@ class _Parser:
                 place, wants_value = duration.end(), False
                 continue
             if letter == "_" and wants_value:
-                raise CurveError(_("'{text}' can't be parsed").format(text=self._text[:80]))
+                raise CurveError(_("'{text}' is not a valid formula").format(text=self._text[:80]))
             out.append("**" if letter == "^" else letter)
             if not letter.isspace():
                 wants_value = letter in "(,+-*/%^"
@@ -193,7 +193,7 @@ class _Parser:
             raise CurveError(_("the field after {topic} is missing").format(topic=topic))
         found = FieldSource(topic, FieldPath.parse(path[0].removeprefix(".")))
         if found.path.has_every:
-            raise CurveError(_("[*] means several curves; use one of them in a formula"))
+            raise CurveError(_("a formula can't use [*]; choose one element, such as [0]"))
         self._fields.append(found)
         return place + path.end()
 
@@ -211,7 +211,9 @@ class _Parser:
         wanted = 2 if kind == "mean" else 1
         if len(node.args) != wanted or node.keywords:
             example = "mean(/odom.speed, 2 s)" if kind == "mean" else f"{kind}(/odom.speed)"
-            raise CurveError(_("{name} is written as {example}").format(name=kind, example=example))
+            raise CurveError(
+                _("wrong arguments for {name}; use {example}").format(name=kind, example=example)
+            )
         of = self._source(node.args[0])
         if of is None:
             raise CurveError(_("the formula has no field, so its value never changes"))
@@ -221,7 +223,7 @@ class _Parser:
             if isinstance(window, ast.Constant) and type(window.value) in {int, float}:
                 window_s = float(window.value)  # type: ignore[arg-type]
             if not 0 < window_s <= MAX_WINDOW_S:
-                raise CurveError(_("a mean needs a duration above 0 and up to 600 s"))
+                raise CurveError(_("the duration of a mean must be greater than 0 and at most 600 s"))
         return WindowSource(next(each for each in WINDOWED if each == kind), of, window_s)
 
     def _calculation(self, node: ast.expr, inputs: list[Source]) -> Calculation:
@@ -244,7 +246,7 @@ class _Parser:
             return self._call(node, node.func.id, inputs)
         if isinstance(node, (ast.Name, ast.Call)):
             return self._input(node, inputs)
-        raise CurveError(_("'{text}' can't be calculated").format(text=self._as_typed(node)[:80]))
+        raise CurveError(_("'{text}' can't be evaluated").format(text=self._as_typed(node)[:80]))
 
     def _call(self, node: ast.Call, name: str, inputs: list[Source]) -> Calculation:
         wanted, function = FUNCTIONS[name]
@@ -283,7 +285,7 @@ def _constant(value: object) -> Floats:
     try:
         return np.float64(value)  # type: ignore[arg-type, return-value]
     except OverflowError:
-        raise CurveError(_("'{text}' can't be calculated").format(text=str(value)[:40])) from None
+        raise CurveError(_("'{text}' can't be evaluated").format(text=str(value)[:40])) from None
 
 
 def unknown_topic(name: str, topics: Sequence[str]) -> CurveError:

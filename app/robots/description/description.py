@@ -53,7 +53,7 @@ def announced(message: Message) -> Robot:
     """
     size = len(message.data)
     if size > MAX_BYTES:
-        said = _("it has {size} MB; the limit is {limit} MB").format(
+        said = _("it is {size} MB in size; the limit is {limit} MB").format(
             size=number(size / 1000000.0, ".1f"), limit=number(MAX_BYTES / 1000000.0, ".0f")
         )
         raise DescriptionError(message.topic, (said,))

@@ -390,7 +390,7 @@ def _wrong_text(parameter: Parameter, value: object, place: str) -> str | None:
         words = (
             _("{place} must not be empty")
             if parameter.min_length == 1
-            else _("{place} needs {count} characters")
+            else _("{place} must be at least {count} characters long")
         )
         return words.format(place=place, count=parameter.min_length)
     if parameter.max_length is not None and len(value) > parameter.max_length:

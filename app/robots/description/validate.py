@@ -112,7 +112,7 @@ def _not_json(value: object, seen: Iterator[int], path: str = "", depth: int = 0
         )
         return next((found for found in found_items if found is not None), None)
     if isinstance(value, (int, float)) and not -_MAX_NUMBER <= value <= _MAX_NUMBER:
-        return _("{place} is not a usable number").format(place=path)
+        return _("{place} is not a finite number, or is too large").format(place=path)
     if value is None or isinstance(value, (str, bool, int, float)):
         return None
     return _("{place} is not JSON: {kind}").format(place=path, kind=type(value).__name__)
@@ -145,7 +145,7 @@ _EMPTY = lazy("{place} must not be empty")
 _LONG = lazy("{place} has more than {limit} entries")
 _RULES = {
     "minimum": lazy("{place} must be at least {limit}"),
-    "exclusiveMinimum": lazy("{place} must be above {limit}"),
+    "exclusiveMinimum": lazy("{place} must be greater than {limit}"),
     "maximum": lazy("{place} must be at most {limit}"),
     "minLength": _EMPTY,
     "maxLength": lazy("{place} is longer than {limit} characters"),
@@ -153,7 +153,7 @@ _RULES = {
     "minProperties": _EMPTY,
     "maxItems": _LONG,
     "maxProperties": _LONG,
-    "anyOf": lazy("{place} has the wrong form"),
+    "anyOf": lazy("{place} doesn't match any allowed format"),
 }
 NOT_UNDERSTOOD = lazy("{place} is not valid")
 WHOLE = lazy("the description")
@@ -199,9 +199,10 @@ def _contradictions(model: Mapping[str, object]) -> Iterator[str]:
         yield _("'{stop}' is the safe stop, so its input must not have required fields").format(stop=stop)
     resources_named = set(names(model.get("rb:resources")))
     for name in (set(properties) | _RESERVED) & set(part(model, "events")) | set(properties) & _RESERVED:
-        yield _("'{name}' is used for two things of one robot; their topics would be the same").format(
-            name=name
-        )
+        yield _(
+            "'{name}' is reserved or used twice; each sensor and event needs a name of its own, "
+            "because the name becomes a topic"
+        ).format(name=name)
     for name, action in actions.items():
         yield from _of_action(name, as_part(action), resources_named, properties)
     for name, sensor in properties.items():
@@ -252,7 +253,9 @@ def _of_fields(place: str, fields: Mapping[str, object]) -> Iterator[str]:
 def _of_data(place: str, data: Mapping[str, object]) -> Iterator[str]:
     low, high = data.get("minimum"), data.get("maximum")
     if isinstance(low, (int, float)) and isinstance(high, (int, float)) and low > high:
-        yield _("{place}: minimum {low} is above maximum {high}").format(place=place, low=low, high=high)
+        yield _("{place}: minimum {low} is greater than maximum {high}").format(
+            place=place, low=low, high=high
+        )
     elif data.get("default") is not None:
         default = _("{place}: the default").format(place=place)
         wrong = wrong_value(parameter_of(place, data), data["default"], default)

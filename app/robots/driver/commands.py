@@ -231,9 +231,9 @@ class CommandHandler:
     def _cancel(self, wanted: str, name: str, publisher: int | None) -> None:
         error = self._tasks.cancel(lambda task: task.id == wanted and task.publisher == publisher)
         if error is not None and wanted in self._open_ids and error == NOTHING_RUNS:
-            error = _("only the program that started “{action}” can cancel it; anyone can stop").format(
-                action=name or wanted
-            )
+            error = _(
+                "only the program that started “{action}” can cancel it; any program can stop the robot"
+            ).format(action=name or wanted)
         if error is not None:
             error = _(error) if error == NOTHING_RUNS else error
             self._answering(wanted, "cancel", name)(Answer("failed", error=error))

@@ -391,7 +391,7 @@ class Kind:
 
     def _members(self) -> list[tuple[str, object]]:
         if not isinstance(self.body, type):
-            raise DescriptionError(self.model, (_("a robot is declared as a class"),))
+            raise DescriptionError(self.model, (_("a robot must be declared as a class"),))
         found: dict[str, object] = {}
         for owner in reversed(self.body.__mro__):
             found.update(vars(owner))

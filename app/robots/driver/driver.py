@@ -64,11 +64,7 @@ class Driver:
         if len(json.dumps(self.description)) > MAX_BYTES:
             raise DescriptionError(
                 name,
-                (
-                    _("it is larger than {limit} MB, the limit").format(
-                        limit=number(MAX_BYTES / 1000000.0, ".0f")
-                    ),
-                ),
+                (_("it exceeds the limit of {limit} MB").format(limit=number(MAX_BYTES / 1000000.0, ".0f")),),
             )
         self._node = node
         self.clock = clock or MonotonicClock()
@@ -322,7 +318,7 @@ class EventLoop:
             call.on_cancel(partial(self._call_soon, waited.cancel))
         if not waited.ended.wait(within_s) and within_s is not None:
             self._call_soon(waited.cancel)
-            raise TimeoutError(_("it has not ended after {seconds} s").format(seconds=number(within_s)))
+            raise TimeoutError(_("timed out after {seconds} s").format(seconds=number(within_s)))
         if waited.error is not None:
             raise waited.error
         return waited.result
@@ -345,8 +341,8 @@ class EventLoop:
                 if asyncio.iscoroutine(work):
                     work.close()
                 if self._closed:
-                    raise RuntimeError(_("a coroutine can't run here: the robot has ended"))
-                raise RuntimeError(_("use await: this code runs in the event loop itself"))
+                    raise RuntimeError(_("can't run the coroutine: the robot's driver is closed"))
+                raise RuntimeError(_("can't block in the event loop; use await"))
             if self._loop is None:
                 self._loop = asyncio.new_event_loop()
                 name = f"{self._name} asyncio"

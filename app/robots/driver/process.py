@@ -43,8 +43,10 @@ def main(kind: Kind, arguments: Sequence[str] | None = None) -> int:
             described, 2 for
         invalid arguments.
     """
-    parser = argparse.ArgumentParser(description=_("Drive a robot: {title}.").format(title=kind.title))
-    parser.add_argument("--name", default=kind.title, help=_("robot name; its topics begin with it"))
+    parser = argparse.ArgumentParser(
+        description=_("Run the driver of a robot: {title}.").format(title=kind.title)
+    )
+    parser.add_argument("--name", default=kind.title, help=_("robot name, used as the prefix of its topics"))
     parser.add_argument("--master", default=None, help=_("master address (default: $NEP_MASTER)"))
     parser.add_argument("--owner-pid", type=int, default=None, help=_("exit when this process has ended"))
     chosen = parser.parse_args(arguments)
@@ -97,9 +99,9 @@ def run(
                 _print(sentence, output)
 
         words = (
-            _("{robot}: a robot, model virtual {model}; its topics are {topics}")
+            _("{robot}: virtual robot, model {model}; topics: {topics}")
             if kind.virtual
-            else _("{robot}: a robot, model {model}; its topics are {topics}")
+            else _("{robot}: robot, model {model}; topics: {topics}")
         )
         say(words.format(robot=name, model=kind.model, topics=topic_of(name, "...")))
         try:
@@ -125,9 +127,9 @@ def _wait_for_master(
         if is_over():
             return False
     words = (
-        _("{robot}: found the master at {address}; the robot is ready, Ctrl+C ends it")
+        _("{robot}: found the master at {address}; the robot is ready, press Ctrl+C to stop it")
         if has_waited
-        else _("{robot}: the master is at {address}; the robot is ready, Ctrl+C ends it")
+        else _("{robot}: the master is at {address}; the robot is ready, press Ctrl+C to stop it")
     )
     say(words.format(robot=name, address=address))
     return True

@@ -104,7 +104,7 @@ class MessageQueue:
 
     def too_large(self, message: Message) -> str:
         """Return the error message for a message that is too large."""
-        return _("the message has {size} kB; the limit is {limit} kB").format(
+        return _("the message is {size} kB in size; the limit is {limit} kB").format(
             size=number(message.size_bytes / 1000, ".0f"), limit=number(self.max_message_bytes / 1000, ".0f")
         )
 

@@ -135,15 +135,15 @@ def _plain(annotation: object, inside: tuple[object, ...]) -> Schema:
         )
     if annotation in inside:
         raise TypeError(
-            _("a robot's value can't contain itself: {annotation}").format(annotation=shown(annotation))
+            _("recursive types are not supported: {annotation}").format(annotation=shown(annotation))
         )
     fields = fields_of(annotation)
     if fields is not None:
         return _object(fields, (*inside, annotation))
     raise TypeError(
         _(
-            "a robot's value can't be {annotation}; use float, int, bool, str, list[...], "
-            "tuple[...], dict[str, ...], Literal, Optional, an Enum, a dataclass or a TypedDict"
+            "unsupported type {annotation}; use float, int, bool, str, list[...], tuple[...], "
+            "dict[str, ...], Literal, Optional, an Enum, a dataclass or a TypedDict"
         ).format(annotation=shown(annotation))
     )
 
@@ -152,7 +152,7 @@ def _element_schema(annotation: object, inside: tuple[object, ...]) -> Schema:
     # Elements of a list or map: None is not allowed.
     if without_none(bare(annotation)[0])[1]:
         raise TypeError(
-            _("a robot's list can't hold None: {annotation}; leave the value out").format(
+            _("items of a list or dict can't be None: {annotation}; leave them out").format(
                 annotation=shown(annotation)
             )
         )
@@ -163,7 +163,7 @@ def _choice(annotation: object, choices: tuple[tuple[object, object, str | None]
     values = [value for value, _, _ in choices]
     if not all(isinstance(value, (str, int, float)) and not isinstance(value, bool) for value in values):
         raise TypeError(
-            _("a robot's choice is between texts or numbers, not {annotation}; use bool").format(
+            _("choices must be texts or numbers, not {annotation}; for true or false, use bool").format(
                 annotation=shown(annotation)
             )
         )
@@ -220,7 +220,9 @@ def _check_unit(unit: object) -> None:
         return
     if not isinstance(unit, str):
         raise TypeError(
-            _("a unit is a text like 'm', not {unit}; write Range(0, 1, unit='m')").format(unit=repr(unit))
+            _("a unit must be a text such as 'm', not {unit}; use Range(0, 1, unit='m')").format(
+                unit=repr(unit)
+            )
         )
     sign = _UNIT_SPELLINGS.get(unit.lower())
     if sign is not None:
@@ -246,9 +248,10 @@ def input_types(function: Callable[..., object]) -> dict[str, object]:
             continue
         if parameter.kind is parameter.VAR_POSITIONAL or parameter.kind is parameter.VAR_KEYWORD:
             raise TypeError(
-                _("'{name}' can't take a variable number of values; name each one, or use a list").format(
-                    name=name
-                )
+                _(
+                    "'{name}' can't take a variable number of arguments; declare each parameter, or use a "
+                    "list"
+                ).format(name=name)
             )
         if parameter.kind is parameter.POSITIONAL_ONLY:
             raise TypeError(_("'{name}' can't be positional-only; remove the '/'").format(name=name))

@@ -45,9 +45,7 @@ def without_none(annotation: object) -> tuple[object, bool]:
         return float, is_optional
     if len(kinds) != 1:
         raise TypeError(
-            _("a robot's value can't be one of several types: {annotation}").format(
-                annotation=shown(annotation)
-            )
+            _("a union of several types is not supported: {annotation}").format(annotation=shown(annotation))
         )
     return kinds[0], is_optional
 
@@ -178,7 +176,9 @@ def told_fields(
     if not isinstance(value, Mapping):
         wanted = listed(list(kinds)) or _("named values")
         raise RobotValueError(
-            lazy("{place} must have {names}, not be {value}"), names=wanted, value=_shown_value(value)
+            lazy("{place} must be an object with {names}, not {value}"),
+            names=wanted,
+            value=_shown_value(value),
         )
     made: dict[str, object] = {}
     for name, each in value.items():

@@ -89,7 +89,7 @@ class StopThread:
                 self._thread.start()
 
     def _run(self, run: int) -> None:
-        error: str | None = _(MAY_MOVE).format(robot=self._name, why=_("its stop failed"))
+        error: str | None = _(MAY_MOVE).format(robot=self._name, why=_("the stop command failed"))
         try:
             error = self._call_stop()
         finally:
@@ -104,7 +104,7 @@ class StopThread:
             why = bounded_str(failed, ERROR_MOST)
         except BaseException as failed:  # noqa: BLE001 - also SystemExit: a stop must always be answered
             _log.warning("%s: its stop broke off", self._name, exc_info=True)
-            why = _("its stop failed: {error}").format(error=bounded_str(failed, ERROR_MOST))
+            why = _("the stop command failed: {error}").format(error=bounded_str(failed, ERROR_MOST))
         else:
             return None
         return _(MAY_MOVE).format(robot=self._name, why=why)

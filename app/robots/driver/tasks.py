@@ -35,7 +35,7 @@ _GRACE_S = 1.0
 _MAX_QUEUED = 50
 _MAX_RUNNING = 50
 """Maximum number of running actions. Actions without resources run in parallel, each in its own thread."""
-THE_STOP = lazy("the stop itself")
+THE_STOP = lazy("the stop function")
 NOTHING_RUNS = lazy("no running task has this id")
 _MAX_PENDING_STOPS = 2_000
 _JOIN_TIMEOUT_S = 2.0
@@ -207,7 +207,7 @@ class Tasks:
             self._note_unasked_stop(answer)
             stopped.set()
 
-        self.stop(take, _("the driver is ending"))
+        self.stop(take, _("the driver is shutting down"))
         stopped.wait(self._patience_s + _GRACE_S)
         self._stop_thread.close()
         self._dispatcher.close()
@@ -379,7 +379,7 @@ class Tasks:
         if self._watchdog.bites(self._clock.now(), acting):
             self.stop(
                 self._note_unasked_stop,
-                _("its program has been silent for {seconds} s").format(
+                _("its program hasn't responded for {seconds} s").format(
                     seconds=number(self._watchdog.patience_s or 0.0)
                 ),
             )

@@ -77,7 +77,7 @@ class Senses:
         rize=lambda data: ("word", {str(data["word"]): 1}),
     )
     bumped = event(
-        "when %robot bumps with its %side",
+        "when %robot bumps into something with its %side",
         title="bumped",
         icon="octagon-alert",
         fields={"side": Literal["front", "back"]},

@@ -257,7 +257,7 @@ class PanelWidget(QWidget):
 
     def why(self, topic: str = "") -> EmptyAction:
         """Return the action that opens the connection doctor for a topic; "" stands for any topic."""
-        return EmptyAction(_("Why do I see nothing?"), lambda: self.context.why(self, topic), "stethoscope")
+        return EmptyAction(_("Why is nothing shown?"), lambda: self.context.why(self, topic), "stethoscope")
 
     def save_state(self) -> dict[str, object]:
         """Return the panel's state for the saved layout, as JSON values."""

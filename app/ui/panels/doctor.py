@@ -178,7 +178,7 @@ class DoctorPanel(PanelWidget):
 
     def _panel_waits(self, panel: PanelWidget, topic: str) -> Hindrance:
         live, names = self.session.live, {"panel": panel.title(), "topic": topic_words(topic)}
-        ask = (_("Why do I see nothing?"), lambda: self.context.why(panel, topic))
+        ask = (_("Why is nothing shown?"), lambda: self.context.why(panel, topic))
         known = live.topics.get(topic)
         if split_key(topic)[0] or (known is not None and known.publisher_nodes):
             return Hindrance(
@@ -220,7 +220,7 @@ class DoctorPanel(PanelWidget):
         self._offered = facts
         names = [topic.key for topic in (*live.topics, *live.networks.topics)]
         self.missed.clear()
-        self.missed.addItem(_("nothing specific"), "")
+        self.missed.addItem(_("no specific topic"), "")
         for name in sorted({*names[:MAX_TOPICS], missed} - {""}):
             self.missed.addItem(topic_words(name), name)
         self.missed.set_value(missed)

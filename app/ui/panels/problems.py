@@ -181,7 +181,9 @@ class ProblemsPanel(PanelWidget):
         for place, row in enumerate(self.rows):
             self._column.insertWidget(place, row)
         more = max(0, len(found) - MAX_ROWS)
-        said = ngettext("{count} more after these are fixed", "{count} more after these are fixed", more)
+        said = ngettext(
+            "{count} more, shown once these are fixed", "{count} more, shown once these are fixed", more
+        )
         self.others.setText(said.format(count=more))
         paint.show_when(self.others, more > 0)
         self.pages.setCurrentIndex(1 if found else 0)

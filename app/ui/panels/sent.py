@@ -267,7 +267,7 @@ def _columns() -> tuple[Column[SentRecord], ...]:
         Column("name", lazy("Sent to"), 112, to, tip=lambda each: each.name),
         Column("what", lazy("Result"), 110, what, stretch=True, tip=tip),
         Column("count", lazy("Count"), 60, count, figures=True, yields=1),
-        Column("asker", lazy("Called in"), 90, asked, yields=2),
+        Column("asker", lazy("Sent from"), 90, asked, yields=2),
     )  # fmt: skip
 
 

@@ -174,7 +174,7 @@ class DoctorLine(QWidget):
     def __init__(self, theme: Theme, ask: Callable[[], object]) -> None:
         super().__init__()
         words = ElidedLabel("small", "textSecondary")
-        words.setText(_("Expected to see something?"))
+        words.setText(_("Is something missing?"))
         self.button = LinkButton(theme, _("Open the connection doctor"))
         self.button.setSizePolicy(QSizePolicy.Policy.Maximum, QSizePolicy.Policy.Fixed)
         self.button.clicked.connect(ask)

@@ -447,7 +447,7 @@ class MainWindow(QMainWindow):
             self.tool_bar.show_view(view)
             self.use_robot.setVisible(not self.session.fleet.links)
         if self._ticks % FACTS_EVERY == 0:
-            with self.session.guarded(lazy("show figures")):
+            with self.session.guarded(lazy("update the status bar")):
                 self._show_facts()
         with self.session.guarded(lazy("show alerts")):
             self._show_alerts()
@@ -560,7 +560,7 @@ class MainWindow(QMainWindow):
             return True
         self.show_layout("behaviour")
         self.session.documents.show(unkept[0])
-        self.toast.show_toast(_("Studio can't close: unsaved work would be lost"))
+        self.toast.show_toast(_("Studio can't close: save this behaviour first, or its changes are lost"))
         return False
 
     def _keep(self) -> None:

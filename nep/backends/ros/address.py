@@ -31,7 +31,7 @@ def address_of(given: str | None) -> str:
         host, port = None, 0
     if not host or not port:
         raise NepError(
-            _("'{chosen}' is not an address of a ROS master; write it as '{example}'").format(
+            _("'{chosen}' is not a valid address of a ROS master; use an address such as '{example}'").format(
                 chosen=quotable(text), example=f"127.0.0.1:{_PORT}"
             )
         )

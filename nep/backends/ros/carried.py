@@ -160,7 +160,7 @@ def _check_file(encoded: Encoded, kind: str) -> str:
     encoding = (encoded.extension or {}).get("encoding")
     if encoding not in {"jpeg", "png"}:
         raise EncodeError(
-            "image", kind, _("'{name}' carries JPEG and PNG; use the type '{raw}'").format(
+            "image", kind, _("'{name}' supports only JPEG and PNG; use the type '{raw}'").format(
                 name=_COMPRESSED, raw=_RAW
             )
         )  # fmt: skip
@@ -181,7 +181,7 @@ def to_ros(ros_type: str, codec: str, encoded: Encoded) -> bytes:
     if codec == "image" and ros_type == _COMPRESSED and _magic(data):
         known = picture_info(data)
         if known is None:
-            raise EncodeError("image", type(data).__name__, _("they are not a readable image"))
+            raise EncodeError("image", type(data).__name__, _("not a readable image"))
         return to_ros(ros_type, codec, Encoded(data, known))
     if codec in {"ros", "image"}:
         return bytes(data)
@@ -201,7 +201,9 @@ def _raw_body(data: bytes | memoryview, extension: Mapping[str, object]) -> byte
     layout, shape = raw_layout(extension.get("encoding")), extension.get("shape")
     if layout is None or not isinstance(shape, list | tuple):
         raise WireError(
-            _("'{name}' carries raw pixels; publish an array, or use the type 'image'").format(name=_RAW)
+            _("'{name}' supports only raw pixels; publish an array, or use the type 'image'").format(
+                name=_RAW
+            )
         )
     frame = raw_array(memoryview(data), layout, shape)
     encoding = str(extension["encoding"])
@@ -274,7 +276,7 @@ def version_error(ros_type: str) -> NepError:
     """Return the error for a type whose definition differs between this program and the publisher."""
     return NepError(
         _(
-            "its '{ros_type}' has other fields than the definition on this computer; use the same "
+            "its '{ros_type}' has different fields from the definition on this computer; use the same "
             "version on both sides"
         ).format(ros_type=escaped(shortened(ros_type, 100)))
     )

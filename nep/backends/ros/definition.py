@@ -439,7 +439,9 @@ def _write_length(count: int, length: int | None, path: str, out: bytearray) -> 
             raise _FieldError(path, _("is too long"))
         out += _LENGTH.pack(count)
     elif count != length:
-        raise _FieldError(path, _("has {count} elements; give {length}").format(count=count, length=length))
+        raise _FieldError(
+            path, _("has {count} elements; expected {length}").format(count=count, length=length)
+        )
 
 
 def _nested(name: str, fields: tuple[DefinitionField, ...]) -> FieldKind:
@@ -498,11 +500,11 @@ def _to_integer(value: object) -> int | None:
 
 def _not_a_map(fields: tuple[DefinitionField, ...]) -> str:
     names = ", ".join(f"'{each.name}'" for each in fields[:6])
-    return _("publish a 'dict' with its fields {names}").format(names=names or "{}")
+    return _("publish a 'dict' with the fields {names}").format(names=names or "{}")
 
 
 def _type_error(path: str, value: object, name: str) -> _FieldError:
-    return _FieldError(path, _("is {value}; give a '{name}'").format(value=_describe(value), name=name))
+    return _FieldError(path, _("is {value}; expected a '{name}'").format(value=_describe(value), name=name))
 
 
 def _unknown_field(path: str, key: object, names: tuple[str, ...]) -> _FieldError:

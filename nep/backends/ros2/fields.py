@@ -105,7 +105,7 @@ def to_message(types: Types, name: str, payload: object, path: str = "") -> Any:
     if not isinstance(payload, Mapping):
         raise (
             RosFieldError(
-                path, _("is a '{kind}'; give a map of the fields").format(kind=type(payload).__name__)
+                path, _("is a '{kind}'; expected a map of the fields").format(kind=type(payload).__name__)
             )
             if path
             else RosFieldError("", _("publish a map of the fields of '{name}'").format(name=name))
@@ -161,13 +161,13 @@ def _scalar(field: RosField, value: object, path: str) -> str | bool | int | flo
     value = _unwrap_scalar(value)
     if field.kind == "bool":
         if not isinstance(value, bool):
-            raise RosFieldError(path, _("is a '{kind}'; give True or False").format(kind=_kind(value)))
+            raise RosFieldError(path, _("is a '{kind}'; expected True or False").format(kind=_kind(value)))
         return value
     if field.kind in _FLOATS:
         return _float(field, value, path)
     low, high = _RANGES[field.kind]
     if not isinstance(value, int) or isinstance(value, bool):
-        raise RosFieldError(path, _("is a '{kind}'; give a whole number").format(kind=_kind(value)))
+        raise RosFieldError(path, _("is a '{kind}'; expected a whole number").format(kind=_kind(value)))
     if not low <= value <= high:
         raise RosFieldError(
             path,
@@ -180,7 +180,7 @@ def _scalar(field: RosField, value: object, path: str) -> str | bool | int | flo
 
 def _float(field: RosField, value: object, path: str) -> float:
     if not isinstance(value, int | float) or isinstance(value, bool):
-        raise RosFieldError(path, _("is a '{kind}'; give a number").format(kind=_kind(value)))
+        raise RosFieldError(path, _("is a '{kind}'; expected a number").format(kind=_kind(value)))
     try:
         number = float(value)
     except OverflowError:
@@ -195,7 +195,7 @@ def _float(field: RosField, value: object, path: str) -> float:
 
 def _text(field: RosField, value: object, path: str) -> str:
     if not isinstance(value, str):
-        raise RosFieldError(path, _("is a '{kind}'; give a 'str'").format(kind=_kind(value)))
+        raise RosFieldError(path, _("is a '{kind}'; expected a 'str'").format(kind=_kind(value)))
     if "\0" in value:
         raise RosFieldError(path, _("contains a null character, which is not allowed in ROS strings"))
     try:
@@ -214,7 +214,7 @@ def _items(types: Types, field: RosField, value: object, path: str) -> Any:  # n
     if isinstance(value, str) or not (
         isinstance(value, Sequence | bytes | bytearray | memoryview) or hasattr(value, "__array__")
     ):
-        raise RosFieldError(path, _("is a '{kind}'; give a list").format(kind=_kind(value)))
+        raise RosFieldError(path, _("is a '{kind}'; expected a list").format(kind=_kind(value)))
     dimensions = getattr(value, "ndim", 1)
     if dimensions != 1:
         raise RosFieldError(
@@ -233,7 +233,7 @@ def _items(types: Types, field: RosField, value: object, path: str) -> Any:  # n
         items = _array(field, value, path)
     if field.length is not None and field.length >= 0 and len(items) != field.length:
         raise RosFieldError(
-            path, _("has {count} items; give {length}").format(count=len(items), length=field.length)
+            path, _("has {count} items; expected {length}").format(count=len(items), length=field.length)
         )
     if field.size and len(items) > field.size:
         raise RosFieldError(
@@ -248,7 +248,7 @@ def _array(field: RosField, value: Any, path: str) -> Any:  # noqa: ANN401 - an 
     wanted = np.dtype(_NUMBERS[field.kind])
     if isinstance(value, bytes | bytearray | memoryview):
         if field.kind not in _OCTETS:
-            raise RosFieldError(path, _("is a '{kind}'; give a list").format(kind=_kind(value)))
+            raise RosFieldError(path, _("is a '{kind}'; expected a list").format(kind=_kind(value)))
         return np.frombuffer(bytes(value), np.uint8)
     try:
         found = np.asarray(value)

@@ -55,8 +55,8 @@ class Ros2Transport:
         if not isinstance(configuration, Hybrid):
             raise NepError(
                 _(
-                    "'ros2' has no direct connections: its nodes find each other in a domain; omit the "
-                    "configuration, or choose the domain with master='5'"
+                    "'ros2' does not support direct connections: its nodes find each other in a domain; omit "
+                    "the configuration, or choose the domain with master='5'"
                 )
             )
         with self._lock:
@@ -67,7 +67,7 @@ class Ros2Transport:
         if participant.number != int(configuration.master):
             raise NepError(
                 _(
-                    "'{name}' is in the domain {domain} of ROS 2; create another node for {other} with "
+                    "'{name}' is in ROS 2 domain {domain}; create another node for domain {other} with "
                     "master='{other}'"
                 ).format(name=self.node.name, domain=participant.number, other=configuration.master)
             )

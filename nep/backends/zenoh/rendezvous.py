@@ -125,7 +125,7 @@ def _own_folder(folder: Path) -> Path:
     except OSError as error:
         raise NepError(
             _(
-                "can't use '{folder}' to connect nodes: {error}; set XDG_RUNTIME_DIR to a folder of yours"
+                "can't use '{folder}' to connect nodes: {error}; set XDG_RUNTIME_DIR to a folder that you own"
             ).format(folder=folder, error=error.strerror or error)
         ) from error
     is_ours = sys.platform == "win32" or found.st_uid == os.getuid()
@@ -133,7 +133,7 @@ def _own_folder(folder: Path) -> Path:
         raise NepError(
             _(
                 "can't use '{folder}' to connect nodes: it belongs to another user; set XDG_RUNTIME_DIR to "
-                "a folder of yours"
+                "a folder that you own"
             ).format(folder=folder)
         )
     return folder

@@ -48,7 +48,7 @@ class ParameterForm:
             raise ValueError(_("it has too many levels")) from None
         where = find_nan(plain)
         if where is not None:
-            raise ValueError(_("{where} is not finite; give a finite number").format(where=where or _("it")))
+            raise ValueError(_("{where} must be a finite number").format(where=where or _("it")))
         return plain
 
     def instance(self, plain: object) -> object:

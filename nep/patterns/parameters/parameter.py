@@ -90,16 +90,16 @@ class NodeParameter:
         if isinstance(value, int | float) and not isinstance(value, bool) and self.kind in {"int", "float"}:
             return self._number(value)
         if type(value) is not KINDS[self.kind]:
-            raise self._error(value, _("give a '{kind}'").format(kind=self.kind))
+            raise self._error(value, _("it must be of type '{kind}'").format(kind=self.kind))
         return self._json_copy(value)
 
     def _number(self, value: float) -> float:
         if not _is_finite(value):
-            raise self._error(value, _("give a finite number"))
+            raise self._error(value, _("it must be a finite number"))
         if self.kind == "float":
             return float(value)
         if int(value) != value or abs(value) > _MAX_INT:
-            raise self._error(value, _("give a whole number"))
+            raise self._error(value, _("it must be a whole number"))
         return int(value)
 
     def _json_copy(self, value: object) -> object:

@@ -245,7 +245,7 @@ class ServiceRegistry:
 def codec_checked(codec: Codec) -> Codec:
     """Return the codec if calls can use it; raise `NepError` otherwise."""
     if codec.name == "image":
-        raise NepError(_("a call can't carry an image; publish it on a topic"))
+        raise NepError(_("a call can't contain an image; publish it on a topic"))
     if codec_numbered(codec.number) is not codec:  # a back end's codec without a number
         raise NepError(_("'{name}' can't be used for calls; use 'json' or 'msgpack'").format(name=codec.name))
     return codec

@@ -74,7 +74,7 @@ def call_types(**given: object) -> CallTypes:
     for name, each in given.items():
         if each is not None and not isinstance(each, type):
             raise WrongTypeError(
-                _("{name} is {given}, not a class; give a dataclass or a TypedDict").format(
+                _("{name} must be a dataclass or a TypedDict, not {given}").format(
                     name=name, given=escaped(shortened(repr(each), _MAX_SHOWN_LENGTH))
                 )
             )

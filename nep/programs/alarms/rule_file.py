@@ -121,7 +121,7 @@ def read_text(data: bytes, path: str, *, lenient: bool = False) -> AlarmFile:
     """
     path = escaped(path)
     if len(data) > _MAX_BYTES:
-        template = _("'{path}' is larger than {most} bytes, so it is not an alarm file; choose another file")
+        template = _("'{path}' is too large for an alarm file (limit: {most} bytes); choose another file")
         raise NepError(template.format(path=path, most=_MAX_BYTES))
     try:
         text = data.decode("utf-8-sig")
@@ -213,7 +213,7 @@ class _Reader:
                 if rule.id in ids:
                     self._fail(
                         "id",
-                        _("another alarm already has this id; give each alarm its own id, or none"),
+                        _("another alarm already has this id; use a different id for each alarm, or omit it"),
                         index,
                     )
             except _InvalidAlarm as wrong:
@@ -297,7 +297,7 @@ class _Reader:
         if not isinstance(name, str) or not isinstance(path, str):
             self._fail(subject if not isinstance(name, str) else "value", _("it must be a string"), index)
         if path and kind not in VALUE_KINDS:
-            self._fail("value", _("'{kind}' does not use a value; remove the value").format(kind=kind), index)
+            self._fail("value", _("'{kind}' does not take a value; remove it").format(kind=kind), index)
         if kind in NEEDS_LIMIT and "than" not in when:
             self._fail("is", _('the limit is missing; write "than": ...'), index)
         return AlarmCondition(

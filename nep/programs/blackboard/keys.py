@@ -32,9 +32,9 @@ def parse_key(key: str | Sequence[str]) -> Key:
     elif isinstance(key, tuple) and all(isinstance(each, str) for each in key):
         names = key
     else:
-        raise BadKeyError(str(type(key).__name__), _("give a string such as 'human.1.position'"))
+        raise BadKeyError(str(type(key).__name__), _("use a string such as 'human.1.position'"))
     if not names or names == ("",):
-        raise BadKeyError("", _("it is empty; give a name such as 'human.1.position'"))
+        raise BadKeyError("", _("it is empty; use a name such as 'human.1.position'"))
     if len(names) > MAX_LEVELS:
         raise BadKeyError(key_text(names), _("use at most {most} names").format(most=MAX_LEVELS))
     if sum(map(len, names)) > _MAX_CHARACTERS:
@@ -55,7 +55,7 @@ def _names(text: str) -> Key:
     while True:
         match = _NAME.match(text, at)
         if match is None:  # unreachable: the pattern matches the empty text
-            raise BadKeyError(text, _("give a string such as 'human.1.position'"))
+            raise BadKeyError(text, _("use a string such as 'human.1.position'"))
         found.append(_ESCAPE.sub(r"\1", match[1]))
         if not text[match.end(1) :]:
             return tuple(found)

@@ -98,7 +98,7 @@ class BlackboardServer:
         else:
             given = fields.get("values")
             if not isinstance(given, Mapping) or not given:
-                raise NepError(_("the values are missing; give 'key' and 'value', or a map 'values'"))
+                raise NepError(_("the values are missing; specify 'key' and 'value', or a map 'values'"))
             values = given
         for key, value in values.items():
             self._board.put(key if isinstance(key, str) else bounded_str(key), value, lives_s=lives_s)
@@ -135,7 +135,7 @@ def _request(request: object) -> Mapping[object, object]:
 def _text(fields: Mapping[object, object], field: str, default: str | None = None) -> str:
     value = fields.get(field, default)
     if not isinstance(value, str):
-        raise BadKeyError(bounded_str(value), _("give a string such as 'human.1.position'"))
+        raise BadKeyError(bounded_str(value), _("use a string such as 'human.1.position'"))
     return value
 
 

@@ -53,7 +53,7 @@ class MessageReading:
         self._has_holes = any(_HOLE.search(name) for name in self._key or ())
         self._each = parse_key(each) if each else ()
         if isinstance(fields, str):
-            raise WrongTypeError(_("fields is a string; give a list of names"))
+            raise WrongTypeError(_("'fields' must be a list of names, not a string"))
         pairs = fields.items() if isinstance(fields, Mapping) else [(name, name) for name in fields or ()]
         self._fields = None if fields is None else [(parse_key(one), parse_key(two)) for one, two in pairs]
 

@@ -193,7 +193,7 @@ def direction_named(name: str) -> Direction:
     """Validate a direction and return it. Raises `NepError`."""
     if name not in DIRECTIONS:
         raise NepError(
-            _("'{name}' is not a direction; {did_you_mean}").format(
+            _("unknown direction '{name}'; {did_you_mean}").format(
                 name=quotable(name), did_you_mean=did_you_mean(name, tuple(DIRECTIONS))
             )
         )
@@ -222,9 +222,9 @@ def check_apart(a: SideConfiguration, b: SideConfiguration) -> None:
     """Raise `NepError` if both sides are the same network, because every message would return."""
     if a.network == b.network:
         raise NepError(
-            _("both sides are the network '{network}'; give one of them another back end or master").format(
-                network=a.network
-            )
+            _(
+                "both sides are the network '{network}'; choose another back end or master for one of them"
+            ).format(network=a.network)
         )
 
 

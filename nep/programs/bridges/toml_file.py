@@ -98,7 +98,7 @@ def read_configuration(path: Path) -> BridgeConfiguration:
         ) from error
     if len(data) > _MAX_BYTES:
         raise NepError(
-            _("'{path}' is larger than {most} bytes, so it is not a bridge file; choose another file").format(
+            _("'{path}' is too large for a bridge file (limit: {most} bytes); choose another file").format(
                 path=shown, most=_MAX_BYTES
             )
         )
@@ -248,7 +248,7 @@ class _Reader:
             self._fail(
                 "max_rate_hz",
                 "topics",
-                _("it is not a number from 0.000001 to 1000000; use a number such as 10, or leave it out"),
+                _("it must be a number from 0.000001 to 1000000, such as 10; or omit it"),
                 number,
             )
         return float(value)

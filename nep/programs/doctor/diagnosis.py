@@ -186,7 +186,10 @@ def _programs(facts: Facts) -> Iterator[Finding]:
                     "The program of “{name}” has {opened} of at most {limit} files open. At the limit, it "
                     "can't create publishers or subscribers, and other programs can't connect to it."
                 ).format(name=program.name, opened=program.opened, limit=program.limit),
-                _("Close what the program no longer needs, or start it from a terminal with a higher limit."),
+                _(
+                    "Close nodes and files that the program no longer needs, or start it from a terminal "
+                    "with a higher limit."
+                ),
                 command="ulimit -n 8192",
             )
 

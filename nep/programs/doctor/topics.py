@@ -159,7 +159,7 @@ def _silence(facts: TopicFacts, each: PublisherFact) -> Iterator[Finding]:
         fix = words.format(count=number(each.sent or 0, ".0f"), at=at)
     remedy = next(iter(each.remedies), "")
     if remedy:
-        fix += " " + _("It has the service “{service}”.").format(service=remedy)
+        fix += " " + _("Call its service “{service}” to restart it.").format(service=remedy)
     yield Finding(
         f"topic:silent:{each.node}",
         "error",

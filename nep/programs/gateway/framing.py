@@ -175,7 +175,7 @@ def _from_base64(data: bytes) -> bytes:
     try:
         return base64.b64decode(data, validate=True)
     except binascii.Error as error:
-        raise FrameError(_("An image is not base64")) from error
+        raise FrameError(_("An image is not base64-encoded")) from error
 
 
 def _is_json_in_json(frame: bytes) -> bool:

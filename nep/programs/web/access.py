@@ -63,7 +63,7 @@ def checked_origin(origin: str) -> str:
     is_origin = parts.scheme in _DEFAULT_PORTS and bool(parts.hostname) and parts.path in {"", "/"}
     if not is_origin or parts.query or parts.fragment or parts.username:
         raise NepError(
-            _("'{origin}' is not the origin of a page; write it as 'http://192.168.1.5:8000'").format(
+            _("'{origin}' is not a valid origin; use an origin such as 'http://192.168.1.5:8000'").format(
                 origin=quotable(origin)
             )
         )

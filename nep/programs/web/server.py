@@ -445,7 +445,9 @@ class WebServer:
             return _Rejection(HTTPStatus.UNAUTHORIZED, "token", _("the token is wrong"))
         if self._locked >= _MAX_LOCKED:
             return _Rejection(
-                HTTPStatus.UNAUTHORIZED, "token", _("give the token, as in ws://HOST:PORT/?token=TOKEN")
+                HTTPStatus.UNAUTHORIZED,
+                "token",
+                _("a token is required; connect to ws://HOST:PORT/?token=TOKEN"),
             )
         return None
 
@@ -532,7 +534,7 @@ class WebServer:
                 return True
         finally:
             self._locked -= 1
-        said = _("give the token, as in ws://HOST:PORT/?token=TOKEN")
+        said = _("a token is required; connect to ws://HOST:PORT/?token=TOKEN")
         self._turn_away(connection, "token", said)
         await connection.close(_POLICY_VIOLATION, "the token is missing or wrong")
         return False

@@ -231,7 +231,7 @@ def test_block_with_invalid_field_value_is_skipped(it, end):
 def test_blocks_without_event_block_are_reported():
     saved = workspace(say("Hi"))
     assert sentences(saved) == [
-        ("warning", "These blocks have no start. Put “when started” above them."),
+        ("warning", "No event block starts these blocks, so they don't run. Put “when started” above them."),
         ("info", "say doesn't run. Put it below “when started”."),
     ]
     assert sentences(workspace()) == []

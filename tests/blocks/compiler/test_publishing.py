@@ -67,7 +67,7 @@ def test_publish_on_computed_robot_topic_is_rejected_at_run_time(master: Master)
             network.publish("/Pepper/command", {})  # a person was asked
             network.publish("/Rover/command", {"op": "alive"})  # it was not there yet
             network.guard.know(guarded([PEPPER, rover.described]))
-            with pytest.raises(BehaviourError, match="Publishing on /Rover/command would move Rover"):
+            with pytest.raises(BehaviourError, match="publish on /Rover/command: this would move Rover"):
                 network.publish("/Rover/command", {"id": "1", "op": "invoke", "action": "turn", "input": {}})
             with pytest.raises(BehaviourError, match="would move Rover, which has not been allowed"):
                 network.publish(rize.COMMANDS, {})

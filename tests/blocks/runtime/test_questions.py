@@ -120,7 +120,9 @@ def test_question_without_anyone_to_answer_is_an_error():
     run = play(workspace(started(ask("Name?") | {"id": "q"})))
     assert run.runtime.error is not None
     assert run.runtime.error.block == "q"
-    assert run.runtime.error.sentence == "No one can answer: the behaviour runs outside Studio."
+    assert run.runtime.error.sentence == (
+        "Can't ask the question: the behaviour runs outside Studio. Run it in Studio."
+    )
 
 
 @pytest.mark.parametrize(
@@ -236,7 +238,7 @@ def test_text_and_choice_questions_wait_for_each_other():
             list_of(*(number(each) for each in range(MAX_CHOICES + 1))),
             "A question can have at most 12 choices; this list has 13.",
         ),
-        (get("pets"), "A question with choices needs a list of them, not a number."),
+        (get("pets"), "A question with choices needs a list of choices, not a number."),
     ],
 )
 def test_invalid_choices_are_an_error_on_the_block(choices, sentence):
@@ -251,4 +253,6 @@ def test_invalid_choices_are_an_error_on_the_block(choices, sentence):
 def test_choice_question_without_anyone_to_answer_is_an_error():
     run = play(workspace(started(choose(list_of(text("a"))))))
     assert run.runtime.error is not None
-    assert run.runtime.error.sentence == "No one can answer: the behaviour runs outside Studio."
+    assert run.runtime.error.sentence == (
+        "Can't ask the question: the behaviour runs outside Studio. Run it in Studio."
+    )

@@ -322,7 +322,7 @@ def test_wait_until_treats_unknown_value_as_false(running):
         (block("values_arithmetic", "v", A=number(1), SIGN="/", B=number(0)), "“÷” can't divide by 0."),
         (
             block("values_compare", "v", A=text("a"), RELATION="<", B=number(0)),
-            "“is below” can't do this with a number and a text.",
+            "“is below” doesn't work with a number and a text.",
         ),
         (
             block(
@@ -332,7 +332,7 @@ def test_wait_until_treats_unknown_value_as_false(running):
                 RELATION="<",
                 B=number(0),
             ),
-            "“is below” needs a value, but it has none yet.",
+            "“is below” needs a value that isn't known yet.",
         ),
         (
             block("values_arithmetic", "v", A=text("a"), SIGN="+", B=text("b")),

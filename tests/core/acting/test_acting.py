@@ -58,7 +58,7 @@ def test_messages_and_calls_are_sent_and_stop_disarms(session: Session) -> None:
         assert acting.outbox.all_repeated == ()
         while heard.receive(0.0) is not None:
             pass
-        assert acting.repeat(sent.number) == "Not armed for /cmd_vel: sending is off."
+        assert acting.repeat(sent.number) == "Sending to /cmd_vel is not armed. Arm it first."
         assert not acting.arming.is_on
         assert heard.receive(0.1) is None
         tick_until(session, lambda: any(" sent" in each.words for each in acting.sent.records))
@@ -121,7 +121,7 @@ def test_send_results_are_described() -> None:
         (SendResult(order, "sent"), "no subscribers"),
         (SendResult(order, "began"), "started"),
         (SendResult(order, "ended", count=412, skipped=3), "412 sent, 3 late messages skipped"),
-        (SendResult(order, "failed", "not sent: there was no master"), "not sent: there was no master"),
+        (SendResult(order, "failed", "not sent: no master was running"), "not sent: no master was running"),
         (SendResult(order, "failed", "it is closed", count=2), "2 sent, it is closed"),
         (SendResult(order, "ended"), "0 sent"),
     ):

@@ -87,7 +87,7 @@ def test_message_delayed_by_missing_master_is_not_sent_when_expired_or_disarmed(
     bench.now += MAX_AGE_S + 1
     second(bench.node)
     said = [each.sentence for each in bench.outbox.pop_results()]
-    assert said == ["not sent: no longer armed", "not sent: there was no master"]
+    assert said == ["not sent: no longer armed", "not sent: no master was running"]
     assert heard.receive(0.0) is None
 
 

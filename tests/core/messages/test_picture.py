@@ -100,7 +100,7 @@ def test_grey_and_depth_pictures_have_pixel_values() -> None:
             message(b"123", shape=[4, 6], encoding="mono8"),
             "does not match an image of 6 x 4 pixels with 1 bytes each",
         ),
-        (message(b"123", shape="wide", encoding="bgr8"), "'wide' is not the shape of an image"),
+        (message(b"123", shape="wide", encoding="bgr8"), "'wide' is not a valid image shape"),
         (message(b"\x89PNG\r\n\x1a\n" + b"\0" * 40), "the PNG image is damaged"),
     ],
 )

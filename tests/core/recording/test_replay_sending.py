@@ -306,7 +306,7 @@ def test_replayed_topic_is_received_under_its_new_name_until_stop(
         session.tick()
         assert sending.outbox.going == ()
     said = [each.text for each in session.console.records]
-    assert "/test/a: /a of the recording, sent as it is played" in said
+    assert "/test/a: /a of the recording, sent during playback" in said
     assert f"/test/a: /a of the recording, {sent_words(going[0])}" in said
     assert f"/camera: {sent_words(going[1])}" in said
 

@@ -57,7 +57,7 @@ def test_unchecked_messages_are_mentioned_in_the_alert(case: Case) -> None:
     alert = case.alert()
     assert alert is not None
     assert alert.count == 101
-    assert "400 more came too fast to be decoded" in alert.detail
+    assert "400 more arrived too fast to be decoded" in alert.detail
 
 
 def test_alert_is_resolved_by_a_second_of_valid_messages_and_count_restarts(case: Case) -> None:

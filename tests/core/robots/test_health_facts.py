@@ -62,7 +62,7 @@ def test_facts_of_a_healthy_robot(case: Case) -> None:
         ("Camera", "ok", "sends 15 images per second"),
         ("Sensors", "ok", f"all {len(PEPPER.sensors) - 1} send"),
         ("Safety stop", "ok", "stops by itself after 1 s"),
-        ("Last response", "ok", f"every {PEPPER.beat_s:g} s while it works"),
+        ("Last response", "ok", f"every {PEPPER.beat_s:g} s during actions"),
     ]
     assert not any(fact.to_look_at for fact in case.facts())
 
@@ -71,7 +71,7 @@ def test_unknown_facts_are_not_warnings(case: Case) -> None:
     case.link.answered_s = case.link.last_stop = None
     case.link.values.clear()
     case.topics.clear()
-    assert case.says("Connection") == ("ok", "connected; no question sent yet")
+    assert case.says("Connection") == ("ok", "connected; no request sent yet")
     assert case.says("Battery") == ("off", "not reported yet")
     assert case.says("Stop") == ("off", "not used yet")
     assert case.says("Camera") == ("off", "no image yet")
@@ -185,9 +185,9 @@ def test_sensors_without_messages_are_not_counted_as_sending(case: Case) -> None
         case.topics[topic] = Topic(topic)
     assert case.says("Sensors") == ("off", f"none of {len(felt)} has sent anything yet")
     case.topics[felt[0]].age_s = 0.2
-    assert case.says("Sensors") == ("ok", f"1 of {len(felt)} have sent something")
+    assert case.says("Sensors") == ("ok", f"1 of {len(felt)} have sent data")
     case.link.robot = replace(PEPPER, sensors=PEPPER.sensors[:1])
-    assert case.says("Sensors") == ("ok", "1 sensor sends")
+    assert case.says("Sensors") == ("ok", "1 sensor is sending")
     case.topics[felt[0]].age_s = None
     assert case.says("Sensors") == ("off", "has sent nothing yet")
 

@@ -264,7 +264,7 @@ def test_robot_whose_stop_is_always_late_is_asked_only_once_more(session: Sessio
     session.runs.stop()
     for stops in (1, 2, 2, 2):  # it is late, says so, and ends at last
         tick_until(session, lambda: session.runs.view().state == "unanswered", LONG_S)
-        lives(pepper, "the stop itself")
+        lives(pepper, "the stop function")
         tick_until(session, lambda: link.goes_on, LONG_S)
         assert (
             len({each["id"] for each in pepper.heard("stop")}) == stops
@@ -281,7 +281,7 @@ def test_robot_whose_stop_is_always_late_is_asked_only_once_more(session: Sessio
 def test_robot_lost_after_reporting_possible_motion_stays_an_error(session: Session, master: Master) -> None:
     with nep.node("arm", master=master.address) as node, Driver(ARM, "Arm", node) as arm:
         link = the_link(session)
-        told = {"op": "alive", "id": "", "action": "", "state": "running", "not_ended": ["the stop itself"]}
+        told = {"op": "alive", "id": "", "action": "", "state": "running", "not_ended": ["the stop function"]}
         arm._publish(arm.robot.topics.answer, {**told, "error": SAID})
         tick_until(session, lambda: link.state == "not stopped")
     tick_until(session, lambda: not link.connected)

@@ -246,8 +246,8 @@ SAID = {
     "The finder": ["Hello! Did you lose a ball?"],
     "Reaction to touch": ["Touch my head or my hands.", "Ha ha! That tickles."],
     "A quiz": ["Is the sky blue?", "Is ice cold?", "Right answers: "],
-    "A dance": ["Let us dance.", "Thank you."],
-    "A careful walk": ["I go on while there is room."],
+    "A dance": ["Let's dance.", "Thank you."],
+    "A careful walk": ["I keep walking while the way is clear."],
     "Weather station": ["I am a weather station.", "It is cold, ", "It is warm, "],
 }
 """What the robot says in each example. tests/test_readme.py runs the greeting."""

@@ -77,7 +77,7 @@ def test_stop_after_unproven_stop_never_shows_ready() -> None:
 
 def test_proven_stop_shows_its_duration() -> None:
     view = view_of(after(PEPPER, TURTLE, elapsed_s=14.0, dashed=True), [], 0)
-    assert (view.title, view.detail) == ("Stopped after 14 s", "The dashed block is where it stopped")
+    assert (view.title, view.detail) == ("Stopped after 14 s", "It stopped at the dashed block")
     assert (view.result, view.result_status) == ("all 2 robots stopped (41 ms)", "ok")
     assert view.can_run
     assert view_of(after(PEPPER), [], 0).result == "Pepper stopped (41 ms)"

@@ -64,7 +64,7 @@ def test_report_is_valid_at_any_moment(tmp_path: Path) -> None:
     report.begin("window", "the window", 5.0)
     half = told(tmp_path)
     assert not half["ok"]
-    assert half["why"] == "Studio ended during the self-test; its last step was “window”."
+    assert half["why"] == "Studio exited during the self-test; its last step was “window”."
     assert half["steps"][0]["ms"] is None
     report.record_success("it was painted")
     report.mark("first_paint")

@@ -95,7 +95,7 @@ def test_window_functions_can_be_nested() -> None:
         ("__import__('os')", "can't be parsed"),
         ("_0", "can't be parsed"),
         ("().__class__", "can't be"),
-        ("[x for x in (1,)]", "can't be calculated"),
+        ("[x for x in (1,)]", "can't be evaluated"),
         ("(lambda: 1)()", "does not exist"),
         ("/odom.x if 1 else 2", "can't be calculated"),
         ("/odom.x == 1", "can't be calculated"),

@@ -19,7 +19,7 @@ class Hands:
 
     def __call__(self, event, action, done) -> None:
         self.done.append((event.kind, action.kind))
-        done(self.well, "answered" if self.well else "no answer")
+        done(self.well, "answered" if self.well else "not responding")
 
 
 def near(scene: Scene) -> None:

@@ -68,7 +68,10 @@ def test_example_file_is_valid() -> None:
         ({"when": {"node": "n", "is": "silent"}}, "'silent' needs a topic"),
         ({"when": {"topic": "/t", "is": "below", "value": "x"}}, 'write "than"'),
         ({"when": {"topic": "/t", "is": "below", "value": "x", "than": "1"}}, "must be a number"),
-        ({"when": {"topic": "/t", "is": "below", "value": "x[", "than": 1}}, "'x[' is not a field path"),
+        (
+            {"when": {"topic": "/t", "is": "below", "value": "x[", "than": 1}},
+            "'x[' is not a valid field path; use a path such as pose.x or joints[3]",
+        ),
         ({"when": {"topic": "/t", "is": "above", "value": "", "than": 1}}, "needs a name"),
         ({"when": {"topic": "/a b", "is": "silent"}}, "'topic'"),
         ({"when": {"topic": "/*/b", "is": "silent"}}, "wildcards"),
@@ -141,7 +144,7 @@ def test_duplicate_alarm_id_is_rejected() -> None:
 
 def test_history_round_trips_and_damaged_records_are_skipped() -> None:
     history = AlarmHistory([AlarmRecord("a", "x is 1", 12.5, 3.0, count=2, was_snoozed=True)])
-    history.records[0].add(AlarmDeed("call", "no answer"))
+    history.records[0].add(AlarmDeed("call", "not responding"))
     history.records[0].add(AlarmDeed("call", "answered"))
     again = read_text(alarms_text([], history), "f").history
     assert again is not None

@@ -441,7 +441,7 @@ def test_invalid_fields_are_named(make: Make, caplog: pytest.LogCaptureFixture) 
     pub = node.new_pub("t", "geometry_msgs/Twist")
     sub = make("b").new_sub("t", "geometry_msgs/Twist")
     pub.publish({"linear": {"x": 1}, "angular": {"z": "fast"}})
-    assert "'angular.z' is a 'str'; give a number" in caplog.text
+    assert "'angular.z' is a 'str'; expected a number" in caplog.text
     assert "it is at" not in caplog.text
     with pytest.raises(nep.EncodeError, match="publish a map of the fields of 'geometry_msgs/msg/Twist'"):
         pub.publish([1])

@@ -104,7 +104,7 @@ def test_invalid_request_or_reply_is_reported_with_its_field(make: Make) -> None
         add.call({"a": 2**63})
     with pytest.raises(nep.EncodeError, match=r"'c' .*fields: 'a', 'b'"):
         add.call({"c": 1})
-    with pytest.raises(nep.ServiceError, match="'sum' is a 'str'; give a whole number"):
+    with pytest.raises(nep.ServiceError, match="'sum' is a 'str'; expected a whole number"):
         add.call({"a": 1})
 
 

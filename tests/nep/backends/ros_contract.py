@@ -363,4 +363,4 @@ def test_dataclasses_named_like_ros_types_are_sent_as_those_types(make: Make) ->
     stamped.publish(pose)
     assert poses.listen(timeout_s=30.0) == (True, pose)
     pub.publish(Twist("fast"))
-    assert pub.problem.endswith("linear is a 'str'; give a 'Vector3'")
+    assert pub.problem.endswith("linear is a 'str'; expected a 'Vector3'")

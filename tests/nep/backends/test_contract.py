@@ -188,7 +188,7 @@ def test_rejected_payload_does_not_replace_the_latched_message(make: Make) -> No
         ("image", "text", "cannot encode a 'str' as 'image'; publish a 'uint8' array"),
         ("image", np.zeros((4, 4, 3), np.complex64), "'complex64'"),
         ("image", np.zeros((4, 0, 3), np.uint8), "(4, 0, 3)"),
-        ("json", nep.Encoded("text"), "cannot encode a 'str' as 'json'; publish its 'bytes'"),  # type: ignore[arg-type]
+        ("json", nep.Encoded("text"), "cannot encode a 'str' as 'json'; its data must be 'bytes'"),  # type: ignore[arg-type]
         ("json", nep.Encoded(b"1", [1]), "cannot encode a 'list' as 'json'; an extension must be a map"),  # type: ignore[arg-type]
     ],
 )

@@ -166,7 +166,7 @@ def test_history_reaches_sinks_and_keep_latest_subscribers(make: Make) -> None:
 def test_invalid_history_lengths_are_rejected(make: Make) -> None:
     node = make("a")
     for wrong in (-1, 1001, 2**64, True, 1.5, "3", None, float("nan")):
-        with pytest.raises(ValueError, match=r"history is .*; give a whole number from 0 to 1000"):
+        with pytest.raises(ValueError, match=r"history must be a whole number from 0 to 1000, not .*"):
             node.new_pub("topic", history=wrong)  # type: ignore[arg-type]
     assert node.new_pub("topic", history=0).count == 0
 

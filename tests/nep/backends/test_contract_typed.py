@@ -141,14 +141,16 @@ def test_message_of_a_mismatching_type_is_skipped_and_reported(
     pub.publish({})
     pub.publish({"pose": {"position": None}})
     assert sub.listen(timeout_s=30.0) == (True, PoseStamped())
-    assert "pose.position.x is a 'str'; give a 'float'" in caplog.text
+    assert "pose.position.x is a 'str'; expected a 'float'" in caplog.text
     message = sub.receive(30.0)
     assert message is not None
-    with pytest.raises(nep.DecodeError, match=r"pose\.position is a 'NoneType'; give a map of the fields"):
+    with pytest.raises(
+        nep.DecodeError, match="pose\\.position is a 'NoneType'; expected a map of the fields"
+    ):
         _ = message.payload
     pub.publish(3)
     assert sub.listen(timeout_s=0.5) == (False, None)
-    told = "it is a 'int'; give a map of the fields of 'PoseStamped'"
+    told = "it is a 'int'; expected a map of the fields of 'PoseStamped'"
     eventually(lambda: any(told in each.sentence for each in a.graph().alerts))
     pub.publish({})
     assert sub.listen(timeout_s=30.0) == (True, PoseStamped())
@@ -176,7 +178,7 @@ def test_invalid_field_is_rejected_with_its_path(make: Make) -> None:
     sub, pub = b.new_sub("t", Pose), a.new_pub("t", Pose)
     pub.publish(Pose(orientation=Quaternion(w="one")))
     assert (pub.refused, pub.problem) == (
-        1, "cannot encode a 'Pose' as 'geometry_msgs/Pose'; orientation.w is a 'str'; give a 'float'"
+        1, "cannot encode a 'Pose' as 'geometry_msgs/Pose'; orientation.w is a 'str'; expected a 'float'"
     )  # fmt: skip
     eventually(lambda: any("orientation.w is a 'str'" in each.sentence for each in a.graph().alerts))
     pub.publish(Pose())

@@ -98,10 +98,10 @@ def test_nep_calls_a_ros_server(ros: str) -> None:
             assert client.line() == "{'success': False, 'message': 'switched'}"
             assert client.line() == "{'success': True, 'message': 'switched'}"
             assert "EncodeError" in (said := client.line())
-            assert "field 'data' is 5; give a 'bool'" in said
+            assert "field 'data' is 5; expected a 'bool'" in said
             assert "field 'dat' does not exist; did you mean 'data'?" in client.line()
             assert client.line() == "{'success': True, 'message': 'switched'}"
-            assert "publish a 'dict' with its fields 'data'" in client.line()
+            assert "publish a 'dict' with the fields 'data'" in client.line()
             assert client.line() == (
                 "ServiceError the server of '/fails' failed: ServiceException: error processing request: "
                 "no power"

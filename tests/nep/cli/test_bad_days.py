@@ -146,7 +146,7 @@ def test_doctor_reports_an_unwritable_state_folder(tmp_path):
 def test_invalid_master_address_is_reported():
     done = run("node", "list", NEP_MASTER="no address at all")
     assert done.returncode == 1
-    assert done.stderr.startswith("nep: 'no address at all:7780' is not an address of a master; write it as")
+    assert done.stderr.startswith("nep: 'no address at all:7780' is not a valid address of a master")
 
 
 def test_address_in_use_error_for_any_port_names_the_host():

@@ -148,7 +148,7 @@ def test_mismatching_message_type_is_warned_about(running_master, type_in):
         node.new_pub("/odom")
         done = type_in("topic", "pub", "/odom", "text", "--type", "string")
         assert done.returncode == 0
-        assert "'/odom' is published with the type 'json'; yours is 'string'" in done.stderr
+        assert "'/odom' is published with the type 'json', not 'string'" in done.stderr
     assert "did you mean 'string'?" in type_in("topic", "pub", "new", "1", "--type", "strng").stderr
 
 

@@ -80,7 +80,7 @@ class Services:
             self.until(is_answered, timeout_s)
             handshakes.close()
             if not socket.poll(0):
-                return {"error": "no answer"}
+                return {"error": "not responding"}
             reply = service_wire.NATIVE.read_answer(socket.recv_multipart()).reply
         return self.result(reply)
 

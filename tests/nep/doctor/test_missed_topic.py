@@ -43,7 +43,7 @@ def test_silent_publisher_is_reported_with_its_duration_and_alternatives():
     assert one.fix.startswith(f"Its last message was number 18204, at {at}.")
     (one,) = found(**publisher(remedies=("restart_camera",))).values()
     assert one.instead == "restart_camera"
-    assert one.fix.endswith("It has the service “restart_camera”.")
+    assert one.fix.endswith("Call its service “restart_camera” to restart it.")
     (one,) = found(**publisher(sent=0, last_s=None)).values()
     assert one.sentence == "“camera_driver” is connected but has sent nothing on /robot/camera yet."
     (one,) = found(**publisher(sent=None, generation="B")).values()  # nobody numbers what it sends

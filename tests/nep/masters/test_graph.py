@@ -321,7 +321,7 @@ def test_invalid_field_is_named() -> None:
     body = pack({"do": "renew", "call": 1, "what": {"node_id": "a", "epoch": "x", "revision": 1}})
     refused = encoding.decode_request(body).request
     assert isinstance(refused, WireError)
-    assert (refused.code, refused.reason) == ("field-type", "'Renew.epoch' is a 'str', not 'int'")
+    assert (refused.code, refused.reason) == ("field-type", "'Renew.epoch' must be 'int', not 'str'")
     body = pack({"do": "leave", "call": 1, "what": {}})
     missing = encoding.decode_request(body).request
     assert isinstance(missing, WireError)

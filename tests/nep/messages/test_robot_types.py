@@ -136,7 +136,9 @@ def test_known_euler_rotations_and_invalid_quaternions() -> None:
     assert (turned.x, turned.y, turned.z, turned.w) == pytest.approx((half, 0.0, 0.0, half))
     assert Quaternion(0, 0, 3, 3).to_euler() == pytest.approx((0.0, 0.0, math.pi / 2))
     for bad in (Quaternion(0, 0, 0, 0), Quaternion(w=math.nan), Quaternion(x=math.inf)):
-        with pytest.raises(ValueError, match="is not a rotation; its length must be above 0 and finite"):
+        with pytest.raises(
+            ValueError, match="is not a rotation; its length must be greater than 0 and finite"
+        ):
             bad.to_euler()
 
 

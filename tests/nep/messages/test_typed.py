@@ -251,7 +251,7 @@ def test_datetime_formats_of_other_languages_are_decoded() -> None:
     assert read(Seen, {"at": "2026-01-31T12:00:00.500Z"}).at.utcoffset() == timedelta(0)
     moment = datetime(2026, 1, 31, tzinfo=timezone.utc)
     assert read(Seen, {"at": moment}, "msgpack").at == moment
-    assert refused(Seen, {"at": "noon"}).startswith("at is 'noon'; give text such as '2026")
+    assert refused(Seen, {"at": "noon"}).startswith("at is 'noon'; expected a string such as '2026")
 
 
 def test_recursive_type_round_trips_and_rejects_cycles() -> None:
@@ -286,22 +286,22 @@ def test_private_fields_are_not_encoded_and_init_false_fields_are_not_decoded() 
 @pytest.mark.parametrize(
     ("declared", "plain", "reason"),
     [
-        (PoseStamped, {"pose": {"position": {"x": "1"}}}, "pose.position.x is a 'str'; give a 'float'"),
+        (PoseStamped, {"pose": {"position": {"x": "1"}}}, "pose.position.x is a 'str'; expected a 'float'"),
         (PoseStamped, {"pose": {"position": [1]}},
-         "pose.position is a 'list'; give a map of the fields of 'Point'"),
-        (Pose, [], "it is a 'list'; give a map of the fields of 'Pose'"),
-        (Pose, None, "it is a 'NoneType'; give a map of the fields of 'Pose'"),
-        (Vector3, {"x": True}, "x is a 'bool'; give a 'float'"),
-        (Part, {"number": 1.0}, "number is a 'float'; give a 'int'"),
-        (Part, {"number": True}, "number is a 'bool'; give a 'int'"),
-        (Part, {"word": None}, "word is a 'NoneType'; give a 'str'"),
+         "pose.position is a 'list'; expected a map of the fields of 'Point'"),
+        (Pose, [], "it is a 'list'; expected a map of the fields of 'Pose'"),
+        (Pose, None, "it is a 'NoneType'; expected a map of the fields of 'Pose'"),
+        (Vector3, {"x": True}, "x is a 'bool'; expected a 'float'"),
+        (Part, {"number": 1.0}, "number is a 'float'; expected a 'int'"),
+        (Part, {"number": True}, "number is a 'bool'; expected a 'int'"),
+        (Part, {"word": None}, "word must be a 'str', not 'NoneType'"),
         (Tree, {"children": [{}, {"children": [{}, 3]}]},
-         "children[1].children[1] is a 'int'; give a map of the fields of 'Tree'"),
-        (nep.sensor.JointState, {"name": ["a", 1]}, "name[1] is a 'int'; give a 'str'"),
-        (nep.sensor.JointState, {"name": "ab"}, "name is a 'str'; give a 'list'"),
-        (nep.sensor.JointState, {"position": [1, 2.0, False]}, "position[2] is a 'bool'; give a 'float'"),
-        (Strict, {"a": 1}, "b is missing; give a 'str'"),
-        (Strict, {"b": "", "a": None}, "a is a 'NoneType'; give a 'int'"),
+         "children[1].children[1] is a 'int'; expected a map of the fields of 'Tree'"),
+        (nep.sensor.JointState, {"name": ["a", 1]}, "name[1] must be a 'str', not 'int'"),
+        (nep.sensor.JointState, {"name": "ab"}, "name is a 'str'; expected a 'list'"),
+        (nep.sensor.JointState, {"position": [1, 2.0, False]}, "position[2] is a 'bool'; expected a 'float'"),
+        (Strict, {"a": 1}, "b is missing; expected a 'str'"),
+        (Strict, {"b": "", "a": None}, "a is a 'NoneType'; expected a 'int'"),
     ],
 )  # fmt: skip
 def test_mismatched_payload_is_rejected_with_its_path(declared: type, plain: object, reason: str) -> None:
@@ -312,21 +312,21 @@ def test_mismatched_payload_is_rejected_with_its_path(declared: type, plain: obj
     ("name", "value", "reason"),
     [
         ("pair", [1], "pair has 1 values; give 2 values"),
-        ("pair", [1, 2], "pair[1] is a 'int'; give a 'str'"),
-        ("by_name", {"k": {"number": ""}}, "by_name.k.number is a 'str'; give a 'int'"),
-        ("maybe", {"number": ""}, "maybe.number is a 'str'; give a 'int'"),
-        ("maybe", 3, "maybe is a 'int'; give a 'Part' or None"),
-        ("either", 1.5, "either is a 'float'; give a 'int' or a 'str'"),
+        ("pair", [1, 2], "pair[1] must be a 'str', not 'int'"),
+        ("by_name", {"k": {"number": ""}}, "by_name.k.number is a 'str'; expected a 'int'"),
+        ("maybe", {"number": ""}, "maybe.number is a 'str'; expected a 'int'"),
+        ("maybe", 3, "maybe is a 'int'; expected a 'Part' or None"),
+        ("either", 1.5, "either is a 'float'; expected a 'int' or a 'str'"),
         ("word", "c", "word is 'c'; give 'a', 'b', 1 or None"),
         ("word", True, "word is True; give 'a', 'b', 1 or None"),
         ("word", 1.0, "word is 1.0; give 'a', 'b', 1 or None"),
         ("colour", "blue", "colour is 'blue'; give 'red' or 1"),
         ("colour", True, "colour is True; give 'red' or 1"),
         ("colour", [], "colour is []; give 'red' or 1"),
-        ("rights", -1.5, "rights is -1.5; give a 'Rights'"),
+        ("rights", -1.5, "rights is -1.5; expected a 'Rights'"),
         ("day", "2026-02-30", "day is '2026-02-30'; give text such as '2026-01-31'"),
         ("nothing", 0, "nothing is a 'int'; give None"),
-        ("strict", {}, "strict.b is missing; give a 'str'"),
+        ("strict", {}, "strict.b is missing; expected a 'str'"),
     ],
 )
 def test_mismatched_or_missing_field_is_rejected_by_name(name: str, value: object, reason: str) -> None:
@@ -334,7 +334,7 @@ def test_mismatched_or_missing_field_is_rejected_by_name(name: str, value: objec
     assert isinstance(read(Everything, good), Everything)
     assert refused(Everything, {**good, name: value}) == reason
     del good[name]
-    assert refused(Everything, good).startswith(f"{name} is missing; give ")
+    assert refused(Everything, good).startswith(f"{name} is missing; expected ")
 
 
 def _good() -> dict[str, Any]:
@@ -355,20 +355,24 @@ def test_error_in_post_init_is_reported_as_decode_error_with_its_path() -> None:
 @pytest.mark.parametrize(
     ("payload", "reason", "place"),
     [
-        (PoseStamped(pose=Pose(Point("1"))), "pose.position.x is a 'str'; give a 'float'", "pose.position.x"),
-        (PoseStamped(header=Header(Time(1.5))), "header.stamp.sec is a 'float'; give a 'int'",
+        (
+            PoseStamped(pose=Pose(Point("1"))),
+            "pose.position.x is a 'str'; expected a 'float'",
+            "pose.position.x",
+        ),
+        (PoseStamped(header=Header(Time(1.5))), "header.stamp.sec is a 'float'; expected a 'int'",
          "header.stamp.sec"),
-        (Pose(position=Vector3()), "position is a 'Vector3'; give a 'Point'", "position"),
-        (Pose(position={"x": 1}), "position is a 'dict'; give a 'Point'", "position"),
-        (Part(1 << 64), "number does not fit into 64 bits; give a 'int'", "number"),
+        (Pose(position=Vector3()), "position is a 'Vector3'; expected a 'Point'", "position"),
+        (Pose(position={"x": 1}), "position is a 'dict'; expected a 'Point'", "position"),
+        (Part(1 << 64), "number does not fit into 64 bits; expected a 'int'", "number"),
         (Part(-(1 << 63) - 1), "number does not fit into 64 bits; give a 'int'", "number"),
-        (Part(word="\ud800"), "word contains an unpaired surrogate; give valid Unicode text", "word"),
-        (Vector3(10**400), "x is too large; give a 'float'", "x"),
-        (Vector3(y=True), "y is a 'bool'; give a 'float'", "y"),
-        (Vector3(y=None), "y is a 'NoneType'; give a 'float'", "y"),
-        (Vector3(y=np.zeros(2)), "y is a 'ndarray'; give a 'float'", "y"),
-        (nep.sensor.JointState(name=["a", b"b"]), "name[1] is a 'bytes'; give a 'str'", "name[1]"),
-        (nep.sensor.JointState(position={1.0}), "position is a 'set'; give a 'list'", "position"),
+        (Part(word="\ud800"), "word contains an unpaired surrogate; use valid Unicode text", "word"),
+        (Vector3(10**400), "x is too large; expected a 'float'", "x"),
+        (Vector3(y=True), "y is a 'bool'; expected a 'float'", "y"),
+        (Vector3(y=None), "y is a 'NoneType'; expected a 'float'", "y"),
+        (Vector3(y=np.zeros(2)), "y is a 'ndarray'; expected a 'float'", "y"),
+        (nep.sensor.JointState(name=["a", b"b"]), "name[1] must be a 'str', not 'bytes'", "name[1]"),
+        (nep.sensor.JointState(position={1.0}), "position is a 'set'; expected a 'list'", "position"),
     ],
 )  # fmt: skip
 def test_unencodable_typed_value_is_reported_with_its_path(payload: object, reason: str, place: str) -> None:
@@ -379,8 +383,8 @@ def test_dict_published_on_a_typed_topic_is_validated() -> None:
     encode = typed_codec(message_type(Strict), JSON).encode
     assert json.loads(bytes(encode({"b": "x", "a": 3}).data)) == {"b": "x", "a": 3}
     assert unsent({"b": "x", "aa": 1}, Strict) == ("aa is not a field of 'Strict'; did you mean 'a'?", "aa")
-    assert unsent({"a": 1}, Strict) == ("b is missing; give a 'str'", "b")
-    assert unsent({"b": 1}, Strict) == ("b is a 'int'; give a 'str'", "b")
+    assert unsent({"a": 1}, Strict) == ("b is missing; expected a 'str'", "b")
+    assert unsent({"b": 1}, Strict) == ("b must be a 'str', not 'int'", "b")
     assert unsent([], Strict) == ("publish a 'Strict'", "")
     assert unsent({1: 1}, Strict)[1] == "1"
 
@@ -393,7 +397,7 @@ def test_union_field_preserves_the_type_of_its_value(value: object) -> None:
 
 def test_mismatched_union_value_is_reported_with_all_alternatives() -> None:
     assert refused(Number, {"value": ["a"]}) == (
-        "value is a 'list'; give a 'int', a 'str', a 'list', a 'Part', a 'bool', a 'float' or None"
+        "value is a 'list'; expected a 'int', a 'str', a 'list', a 'Part', a 'bool', a 'float' or None"
     )
 
 

@@ -150,7 +150,7 @@ class Plain:
         (TwoTexts, "TwoTexts.inner is a "),
         (TwoLists, "TwoLists.inner is a 'list[int] | tuple[str, int]', two types that look the same in JSON"),
         (Unknown, "the type hints of 'Unknown' can't be resolved: name 'NowhereToBeFound' is not defined"),
-        (Private, "Private._inner is not sent; give it a default"),
+        (Private, "Private._inner is not sent; add a default value"),
         (
             Image,
             (
@@ -167,7 +167,7 @@ class Plain:
             "OwnConstructor.another is required by the constructor but is not a field that is sent",
         ),
         (Empty, "MSG_TYPE is empty"),
-        (Numbered, "MSG_TYPE is a 'int'; give a 'str'"),
+        (Numbered, "MSG_TYPE must be a 'str', not 'int'"),
         (Plain, "msg_type is the class 'Plain', which is neither a dataclass nor a TypedDict"),
         (int, "msg_type is the class 'int'"),
         (dict, "msg_type is the class 'dict'"),

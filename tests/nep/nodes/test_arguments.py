@@ -29,13 +29,13 @@ def node(request: pytest.FixtureRequest, master: Master) -> Iterator[nep.Node]:
     [
         ({"keep": "last"}, "keep is 'last'; use 'all' or 'latest'"),
         ({"keep": None}, "keep is None; use 'all' or 'latest'"),
-        ({"max_messages": -5}, "max_messages is -5; give a whole number of at least 1"),
-        ({"max_messages": 0}, "max_messages is 0; give a whole number of at least 1"),
-        ({"max_messages": 2.5}, "max_messages is 2.5; give a whole number of at least 1"),
-        ({"max_messages": True}, "max_messages is True; give a whole number of at least 1"),
-        ({"sink": "print"}, "sink is a 'str'; give a function"),
-        ({"msg_type": 5}, "msg_type is a 'int'; give a 'str'"),
-        ({"msg_type": ""}, "msg_type is empty; give a name such as 'json'"),
+        ({"max_messages": -5}, "max_messages must be a whole number of at least 1, not -5"),
+        ({"max_messages": 0}, "max_messages must be a whole number of at least 1, not 0"),
+        ({"max_messages": 2.5}, "max_messages must be a whole number of at least 1, not 2.5"),
+        ({"max_messages": True}, "max_messages must be a whole number of at least 1, not True"),
+        ({"sink": "print"}, "sink must be a function, not 'str'"),
+        ({"msg_type": 5}, "msg_type must be a 'str', not 'int'"),
+        ({"msg_type": ""}, "msg_type is empty; use a name such as 'json'"),
         (
             {"msg_type": "json\x00"},
             "msg_type is 'json\\\\x00'; use at most 200 characters, without control characters",
@@ -60,9 +60,9 @@ def test_subscriber_with_invalid_arguments_is_rejected(
 @pytest.mark.parametrize(
     ("given", "sentence"),
     [
-        ({"latched": 1}, "latched is 1; give True or False"),
-        ({"latched": "no"}, "latched is 'no'; give True or False"),
-        ({"msg_type": None}, "msg_type is a 'NoneType'; give a 'str'"),
+        ({"latched": 1}, "latched must be True or False, not 1"),
+        ({"latched": "no"}, "latched must be True or False, not 'no'"),
+        ({"msg_type": None}, "msg_type must be a 'str', not 'NoneType'"),
         ({"topic": 5}, "a topic name must be a 'str'"),
         ({"qos": "sensor"}, r"the back end '(memory|zeromq)' .*\bqos"),
     ],
@@ -81,7 +81,7 @@ def test_strict_must_be_a_bool() -> None:
 
 
 def test_callback_must_be_callable(node: nep.Node) -> None:
-    with pytest.raises(ValueError, match="callback is a 'str'; give a function"):
+    with pytest.raises(ValueError, match="callback must be a function, not 'str'"):
         node.new_callback("t", "json", "print")  # type: ignore[arg-type]
     assert not node.graph().topics
 
@@ -90,9 +90,9 @@ def test_callback_must_be_callable(node: nep.Node) -> None:
     ("given", "sentence"),
     [
         ({"keep": "last"}, "keep is 'last'; use 'all' or 'latest'"),
-        ({"max_messages": 0}, "max_messages is 0; give a whole number of at least 1"),
-        ({"max_messages": True}, "max_messages is True; give a whole number of at least 1"),
-        ({"with_message": 1}, "with_message is 1; give True or False"),
+        ({"max_messages": 0}, "max_messages must be a whole number of at least 1, not 0"),
+        ({"max_messages": True}, "max_messages must be a whole number of at least 1, not True"),
+        ({"with_message": 1}, "with_message must be True or False, not 1"),
         ({"topic": 5}, "a topic name must be a 'str'"),
         ({"qos": "sensor"}, r"the back end '(memory|zeromq)' .*\bqos"),
     ],
@@ -107,16 +107,16 @@ def test_callback_with_invalid_arguments_is_rejected(
 
 @pytest.mark.parametrize("period_s", [0, 0.0, -1.0, math.nan, math.inf, None, "1", True])
 def test_timer_with_invalid_period_or_callback_is_rejected(node: nep.Node, period_s: Any) -> None:
-    with pytest.raises(ValueError, match=r"period_s is .*; give seconds, more than 0"):
+    with pytest.raises(ValueError, match=r"period_s must be a number of seconds greater than 0, not .*"):
         node.new_timer(period_s, print)
-    with pytest.raises(ValueError, match="callback is a 'str'; give a function"):
+    with pytest.raises(ValueError, match="callback must be a function, not 'str'"):
         node.new_timer(1.0, "print")  # type: ignore[arg-type]
 
 
 @pytest.mark.parametrize("time_s", [-1.0, -0.001, math.nan, -math.inf])
 def test_invalid_timeouts_are_rejected(node: nep.Node, time_s: float) -> None:
     sub, pub = node.new_sub("t"), node.new_pub("t")
-    sentence = "_s is .*; give seconds, 0 or more, or None"
+    sentence = "_s must be a number of seconds (0 or greater) or None, not .*"
     for call in (sub.receive, node.spin, node.graph, pub.close, node.close):
         with pytest.raises(ValueError, match=sentence):
             call(time_s)  # type: ignore[operator]
@@ -130,7 +130,9 @@ def test_invalid_timeouts_are_rejected(node: nep.Node, time_s: float) -> None:
         with pytest.raises(ValueError, match=r"timeout_s is '2'; give seconds"):
             called("2")  # type: ignore[arg-type]
     for close in (pub.close, node.close):
-        with pytest.raises(ValueError, match=r"timeout_s is None; give seconds, 0 or more"):
+        with pytest.raises(
+            ValueError, match=r"timeout_s must be a number of seconds \(0 or greater\), not None"
+        ):
             close(None)  # type: ignore[arg-type]
     pub.publish(1)
     assert sub.listen(timeout_s=math.inf) == (True, 1)

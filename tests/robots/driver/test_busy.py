@@ -152,5 +152,5 @@ def test_silent_program_with_a_running_action_stops_the_robot(turtle) -> None:
     eventually(lambda: body.moving)
     clock.advance(1.1)
     ended = ears.final("1")
-    assert (ended["state"], ended["error"]) == ("canceled", "its program has been silent for 1 s")
+    assert (ended["state"], ended["error"]) == ("canceled", "its program hasn't responded for 1 s")
     eventually(lambda: body.stops >= 1)

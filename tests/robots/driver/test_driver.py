@@ -241,7 +241,9 @@ def test_function_that_exits_the_program_is_reported_and_the_robot_can_be_stoppe
     assert (answer["state"], str(answer["error"]).startswith("fail failed: ")) == ("failed", True)
     body.stop_fails = how
     ears.command(id="s", op="stop")
-    assert str(ears.final("s", "stop")["error"]).startswith("Turtle may still move: its stop failed: ")
+    assert str(ears.final("s", "stop")["error"]).startswith(
+        "Turtle may still move: the stop command failed: "
+    )
     body.stop_fails = None
     ears.command(id="t", op="stop")
     assert ears.final("t", "stop")["state"] == "succeeded"
@@ -252,7 +254,7 @@ def test_hanging_stop_is_reported_to_each_caller_and_commands_are_rejected(turtl
     body.may_stop.clear()
     ears.command(id="s", op="stop")
     eventually(lambda: clock.advance(0.1) or ears.states("s"))
-    said = "Turtle may still move: the stop itself is still running"
+    said = "Turtle may still move: the stop function is still running"
     assert ears.final("s", "stop")["error"] == said
     ears.invoke("1", "light")
     assert ears.final("1")["error"] == f"light: {said}"
@@ -313,7 +315,7 @@ def test_silent_program_stops_the_robot(turtle):
         ears.final(f"d{number}")
     assert body.stops == 0
     clock.advance(1.1)
-    assert ears.final("1")["error"] == "its program has been silent for 1 s"
+    assert ears.final("1")["error"] == "its program hasn't responded for 1 s"
     eventually(lambda: body.stops >= 1)
     assert not body.moving
 
@@ -331,7 +333,7 @@ def test_failed_watchdog_stop_is_reported_until_a_stop_succeeds(turtle, caplog):
     ears.invoke("1", "move", program="p")
     eventually(lambda: body.moving)
     clock.advance(1.1)
-    still = (["the stop itself"], "Turtle may still move: the brake does not answer")
+    still = (["the stop function"], "Turtle may still move: the brake does not answer")
     eventually(lambda: told_of_itself(ears) == still)
     assert [record.getMessage() for record in caplog.records] == [still[1]]
     count = len(ears.heard["answer"])
@@ -353,7 +355,7 @@ def test_hanging_watchdog_stop_is_reported(turtle):
     ears.invoke("1", "move", program="p")
     eventually(lambda: body.moving)
     clock.advance(1.1)
-    still = (["the stop itself"], "Turtle may still move: the stop itself is still running")
+    still = (["the stop function"], "Turtle may still move: the stop function is still running")
     eventually(lambda: clock.advance(0.1) or told_of_itself(ears) == still)
     body.may_stop.set()
     eventually(lambda: told_of_itself(ears) == ([], None))
@@ -366,7 +368,7 @@ def test_stop_that_hangs_and_then_fails_is_reported(turtle):
     eventually(lambda: clock.advance(0.1) or ears.states("s"))
     body.stop_fails = Failed("the brake is stuck")
     body.may_stop.set()
-    still = (["the stop itself"], "Turtle may still move: the brake is stuck")
+    still = (["the stop function"], "Turtle may still move: the brake is stuck")
     eventually(lambda: told_of_itself(ears) == still)
 
 
@@ -386,7 +388,7 @@ def test_forged_heartbeat_does_not_keep_the_robot_moving(turtle, node):
         attacker.publish({"op": "alive", "id": f"a{number}", "from": "p"})
         attacker.publish({"op": "invoke", "id": f"i{number}", "action": "fail", "input": {}, "from": "p"})
         ears.final(f"i{number}")  # the forged sign before it was taken
-    assert ears.final("1")["error"] == "its program has been silent for 1 s"
+    assert ears.final("1")["error"] == "its program hasn't responded for 1 s"
     eventually(lambda: body.stops >= 1)
     assert not body.moving
 
@@ -412,7 +414,10 @@ def test_only_the_caller_can_cancel_and_everyone_can_stop(turtle, node):
     eventually(lambda: body.moving)
     attacker.publish({"op": "cancel", "id": "1", "action": "move", "from": "p"})
     refused = ears.final("1", "cancel")
-    assert refused["error"] == "only the program that started “move” can cancel it; anyone can stop"
+    assert (
+        refused["error"]
+        == "only the program that started “move” can cancel it; any program can stop the robot"
+    )
     assert body.moving
     attacker.publish({"op": "stop", "id": "s"})
     assert ears.final("s", "stop")["state"] == "succeeded"
@@ -459,7 +464,7 @@ def test_close_stops_the_robot_and_answers_all_actions(node, clock):
         eventually(lambda: body.moving)
         driver.close()
         driver.close()
-        assert ears.final("1")["error"] == "the driver is ending"
+        assert ears.final("1")["error"] == "the driver is shutting down"
         assert (body.moving, body.stops >= 1, body.is_closed) == (False, True, True)
         eventually(lambda: not other.graph().topics["/Turtle/answer"].publishers)
 

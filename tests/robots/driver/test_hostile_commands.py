@@ -82,7 +82,7 @@ def test_deep_rize_message_does_not_disable_the_robots_it_names(node, clock):
 def test_command_of_more_than_64_kb_is_rejected_with_a_message(turtle, caplog):
     body, ears, _clock = turtle
     ears.invoke("1", "say", text="a" * MAX_COMMAND_BYTES)
-    assert ears.final("1")["error"] == "the message has 64 kB; the limit is 64 kB"
+    assert ears.final("1")["error"] == "the message is 64 kB in size; the limit is 64 kB"
     ears.rize({"node": "action", "robots": "Turtle", "primitives": [], "pad": "x" * MAX_COMMAND_BYTES})
     assert stops(ears, "s")
     assert len([record for record in caplog.records if "rejected" in record.getMessage()]) == 1

@@ -235,7 +235,7 @@ def test_values_round_trip_between_json_and_python(kind, json, python):
         (dict[str, int], {"a": "b"}, "“a” must be a whole number, not 'b'"),
         (Pose, {"y": 1}, "x is missing"),
         (Pose, Pose("far"), "x must be a number, not 'far'"),  # type: ignore[arg-type]
-        (Pose, 7, "the value must have x, y and name, not be 7"),
+        (Pose, 7, "the value must be an object with x, y and name, not 7"),
         (object, object(), "the value must be a JSON value, not object"),
     ],
 )
@@ -396,7 +396,7 @@ def test_return_value_of_a_function_is_the_output(arm, asked, returned, output):
         ("measure", "wide", "the value must be a number, not 'wide'"),
         ("measure", None, "the value must be a number, not None"),
         ("measure", float("nan"), "the value must be a finite number, not nan"),
-        ("look", 7, "the value must have x, y and name, not be 7"),
+        ("look", 7, "the value must be an object with x, y and name, not 7"),
         ("count", "many", "count must be a whole number, not 'many'"),
         ("anything", {"a": float("inf")}, "the value must be a finite number, not inf"),
         ("anything", {"a": ["\ud800"]}, "the value must be valid Unicode text"),

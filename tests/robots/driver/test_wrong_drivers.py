@@ -70,7 +70,7 @@ def test_valid_driver_is_accepted(tmp_path):
         ('"""Turn."""', "yield",
          "table.py, line 8: turn: actions can't be generators (yield); report progress with"),
         ('-> None:\n        """Turn."""', "-> complex: return 1j",
-         "table.py, line 8: turn: a robot's value can't be complex; use float"),
+         "table.py, line 8: turn: unsupported type complex; use float"),
         ('{"side": str}', '{"side": complex}', "table.py, line 5: a robot's value can't be complex"),
         ('unit="deg"', 'unit="°"', "table.py, line 4: unknown unit '°'; write 'deg'"),
         ("turn %far", "turn %wide",

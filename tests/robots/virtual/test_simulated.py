@@ -128,7 +128,7 @@ def test_stop_is_answered_while_moving(pepper):
 
 def test_robot_stops_when_its_program_falls_silent(pepper):
     pepper.invoke("1", "turn", program="p", angle=360, speed=20)
-    assert pepper.final("1")["error"] == "its program has been silent for 1 s"
+    assert pepper.final("1")["error"] == "its program hasn't responded for 1 s"
     eventually(lambda: not pepper.newest("state")["moving"])
 
 

@@ -105,7 +105,7 @@ def test_robot_process_that_exits_reports_its_last_output_once(
     assert started_here.made[0].poll() == 3
     for _ in range(2):
         launcher.check()
-    assert told == [LaunchFailed("Pepper", "The virtual robot Pepper ended.", "no room left")]
+    assert told == [LaunchFailed("Pepper", "The virtual robot Pepper stopped unexpectedly.", "no room left")]
     assert launcher.ended == {"Pepper"}
     launcher.start_virtual_robot("Pepper")
     assert (launcher.virtual_robots, launcher.ended) == (("Pepper",), frozenset())
@@ -119,7 +119,7 @@ def test_process_killed_from_outside_is_reported_as_such(launcher: Launcher, sta
     launcher.check()
     (failed,) = told
     ended = "Another program on this computer stopped it."
-    assert failed.detail == (ended if os.name == "posix" else "It gave no reason (exit code 1).")
+    assert failed.detail == (ended if os.name == "posix" else "No reason was reported (exit code 1).")
 
 
 def test_restarted_process_is_a_new_process(launcher: Launcher, started_here, told) -> None:

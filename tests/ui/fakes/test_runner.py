@@ -180,7 +180,7 @@ def test_program_runs_pauses_steps_resumes_and_stops(run: Run) -> None:
     tick_until(run.session, lambda: runs.view().state == "ready")
     assert shown(run) == READY
     assert runs.view().title.startswith("Stopped after ")
-    assert runs.view().detail == "The dashed block is where it stopped"
+    assert runs.view().detail == "It stopped at the dashed block"
     assert (runs.running_blocks, runs.stopped_blocks) == ((), ("c",))
 
 
@@ -265,7 +265,7 @@ def test_edits_during_a_run_are_reported_as_pending_until_undone(run: Run) -> No
         tick_until(run.session, lambda: document.newest() is document.program())
         runs.tick()
         view = runs.view()
-        assert view.edited == (view.detail == "Your changes apply at the next Run")
+        assert view.edited == (view.detail == "Your changes take effect at the next run")
         return view.edited
 
     document.edited(endless())
@@ -432,7 +432,7 @@ def test_killed_program_process_is_reported(run: Run) -> None:
     run.is_killed()
     tick_until(run.session, lambda: runs.view().state == "ready")
     (alert,) = run.session.alerts.active
-    assert (alert.id, alert.title) == ("program", "The behaviour ended unexpectedly.")
+    assert (alert.id, alert.title) == ("program", "The behaviour stopped unexpectedly.")
     assert alert.detail.startswith("The program's process was killed")
     assert runs.view().title.startswith("Stopped after ")
 

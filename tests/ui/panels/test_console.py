@@ -121,13 +121,13 @@ def logged(window, level="info", text="hello", node="Pepper", name="app.robots.d
 
 
 def test_log_records_of_programs_are_listed_among_the_lines(panel, window) -> None:
-    logged(window, "warning", "its stop failed", file="tasks.py", line=272)
+    logged(window, "warning", "the stop command failed", file="tasks.py", line=272)
     logged(window, "debug", "a detail")
     panel.refresh()
-    assert lines(panel)[0] == "warn Pepper [app.robots.driver.tasks] its stop failed"
+    assert lines(panel)[0] == "warn Pepper [app.robots.driver.tasks] the stop command failed"
     record = panel.model.index(0, 0).data(Qt.ItemDataRole.UserRole)
     said, level, place = tip_of(record).split("\n")
-    assert (said, place) == ("its stop failed", "app.robots.driver.tasks  tasks.py:272")
+    assert (said, place) == ("the stop command failed", "app.robots.driver.tasks  tasks.py:272")
     assert level.endswith(" warn  Pepper")
     panel.set_level("debug")
     assert lines(panel)[0].startswith("debug Pepper")
@@ -135,7 +135,7 @@ def test_log_records_of_programs_are_listed_among_the_lines(panel, window) -> No
 
 @pytest.mark.parametrize(("percent", "width"), [(100, 446), (200, 446), (200, 700), (200, 1200)])
 def test_large_text_leaves_room_for_the_message(panel, window, percent: int, width: int) -> None:
-    logged(window, "warning", "its stop failed")
+    logged(window, "warning", "the stop command failed")
     panel.refresh()
     record = panel.model.index(0, 0).data(Qt.ItemDataRole.UserRole)
     window.theme.set_text_percent(percent)

@@ -105,7 +105,7 @@ def test_waiting_panels_are_listed_with_the_suggested_topic(qtbot, panel, window
     told = {row.accessibleName(): row.button for row in panel.rows}
     assert len(told) == before + 3
     (why,) = [told[each] for each in told if "/zzzz/qqqqqqqqqq, which has no publisher." in each]
-    assert why.accessibleName() == "Why do I see nothing?"
+    assert why.accessibleName() == "Why is nothing shown?"
     press(why)
     assert window.asked_why == [(far, "/zzzz/qqqqqqqqqq")]
     assert [each for each in told if f"is waiting for {published}; no message has arrived." in each]

@@ -86,7 +86,7 @@ def test_panel_names_what_to_arm_and_one_click_publishes_one_message(qtbot, wind
     assert points.isVisible()
     assert panel.actions_of["point"].isChecked()
     assert points.target == Target("topic", POINTS)
-    assert points.strip.words.text() == "Clicks send nothing until armed"
+    assert points.strip.words.text() == "Clicks are not sent until you arm sending"
     assert unsaid(panel) == []
     QTest.mouseClick(panel.view, LEFT, Qt.KeyboardModifier.NoModifier, at(panel, 16, 8))
     press(points.close_button)

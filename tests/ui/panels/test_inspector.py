@@ -330,7 +330,7 @@ def test_large_message_is_never_decoded_in_the_gui_thread(qtbot, panel, window, 
     )
     panel.show_topic("/speech/words")
     panel.refresh()
-    press(button(panel.body.large, "Decode the newest"))
+    press(button(panel.body.large, "Decode the newest message message"))
     qtbot.waitUntil(lambda: (panel.refresh(), panel.body.page == TREE)[1])
     assert threads["looked into"]
     assert threads["decoded"]
@@ -348,8 +348,8 @@ def test_other_large_messages_are_decoded_only_on_request(qtbot, panel, window) 
     panel.show_topic("/speech/words")
     panel.refresh()
     assert panel.body.page == LARGE
-    assert panel.body.large._title.text() == "Message of 1.2 MB"
-    press(button(panel.body.large, "Decode the newest"))
+    assert panel.body.large._title.text() == "Large message (1.2 MB)"
+    press(button(panel.body.large, "Decode the newest message message"))
     assert panel.frozen  # the next large one would hide it again
     topic.newest = Message("/speech/words", b"y" * 1_200_000, "string", "string", seq=2)
     qtbot.waitUntil(lambda: (ticks(window, panel), panel.body.page == TREE)[1])

@@ -142,7 +142,7 @@ def test_messages_of_watched_topics_on_another_network_are_counted_locally(
     theirs = cells(panel, "ros /blackboard")
     assert 25 < float(str(theirs["rate"])) < 35
     assert (str(theirs["bandwidth"]).partition(" ")[2], theirs["loss"]) == ("B/s", "")
-    assert "Measured here while it is open" in tips(panel, "ros /blackboard")["rate"]
+    assert "doesn't report this; Studio measures it" in tips(panel, "ros /blackboard")["rate"]
     watch.close()
 
 
@@ -210,7 +210,7 @@ def test_inspector_shows_messages_of_another_network(qtbot, window: Window, look
     assert panel._facts_of[1] == "8 B   ROS 1 does not report sequence numbers or latency"
     ros.tell(MasterLost("", REASON))
     ticks(window, panel, 2)
-    assert panel.live.accessibleName() == "no answer"
+    assert panel.live.accessibleName() == "not responding"
     for _ in range(80):  # who is connected goes on, without a master
         for sink in ros.sinks:
             sink("ros /blackboard", [message("/blackboard", b'{"x": 8}')])
@@ -230,7 +230,7 @@ def test_inspector_shows_why_a_topic_cannot_be_decoded(qtbot, window: Window, lo
     ros.tell(WatchFailed("/blackboard", "no type 'my/Own' is known here; install its package"))
     ticks(window, panel, 2)
     said = [each.text() for each in panel.body.empty.findChildren(QLabel) if each.text()]
-    assert said[0] == "Can't be decoded here"
+    assert said[0] == "Can't decode the messages"
     assert said[1] == "/blackboard on ROS 2: no type 'my/Own' is known here; install its package."
     panel.dispose()
 

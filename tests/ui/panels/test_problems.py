@@ -146,11 +146,11 @@ def test_hundreds_of_problems_are_counted_and_only_the_first_are_listed(panel, w
     document.edits = 30
     panel.refresh()
     assert (len(panel.rows), panel.chip.text) == (60, "500")
-    assert panel.others.text() == "440 more after these are fixed"
+    assert panel.others.text() == "440 more, shown once these are fixed"
     document.found, document.edits = document.found[400:], 31
     panel.refresh()
     assert panel.rows[0].problem.subject == "b400"
-    assert panel.others.text() == "40 more after these are fixed"
+    assert panel.others.text() == "40 more, shown once these are fixed"
     document.found, document.edits = document.found[:1], 32
     panel.refresh()
     assert not panel.others.isVisibleTo(panel)

@@ -61,7 +61,7 @@ def test_syntax_error_is_located_and_fixed_by_a_button(window, panel) -> None:
     assert states(panel) == ["line 3", "not armed"]
     press(form.fix)
     assert form.edit.wrong_line == 0
-    assert form.sentence.text() == "Fill in “yaw” first. It can't be sent yet."
+    assert form.sentence.text() == "Fill in “yaw” first. The message can't be sent yet."
     QTest.keyClicks(form.values.fields["yaw"], "-12.5")
     ticks(window, panel)
     assert not form.sentence.isVisible()
@@ -186,7 +186,7 @@ def test_last_message_is_the_template(window, panel) -> None:
     panel.begin("/blackboard")
     assert panel.message is not None
     assert (panel.message.topic, panel.message.msg_type) == ("/blackboard", "json")
-    assert panel.form.template.text() == "Waiting for a message"
+    assert panel.form.template.text() == "Waiting for per message"
     window.session.send("/blackboard", {"mood": "happy", "n": [1, 2]})
     ticks(window, panel)
     kept = panel.message
@@ -204,7 +204,7 @@ def test_without_a_publisher_the_message_type_is_the_template(window, panel) -> 
     panel.form.kind.clear()
     QTest.keyClicks(panel.form.kind, "geometry_msgs/Point")
     press(panel.form.template)
-    assert window.toasts[-1] == "No publisher now: these are the fields of its type"
+    assert window.toasts[-1] == "No publisher on this topic: using the fields of the message type"
     assert panel.message is not None
     assert panel.message.payload() == {"x": 0.0, "y": 0.0, "z": 0.0}
 

@@ -168,9 +168,9 @@ def test_real_robot_has_a_link_to_its_actions_instead_of_a_drawing(qtbot, qapp) 
 @pytest.mark.parametrize(
     ("kept", "words"),
     [
-        (lambda sensor: True, "Its camera and sensors show its state."),
-        (lambda sensor: sensor.is_image, "Its camera shows its state."),
-        (lambda sensor: not sensor.is_image, "Its sensors show its state."),
+        (lambda sensor: True, "Use its camera and sensors to see its state."),
+        (lambda sensor: sensor.is_image, "Use its camera to see its state."),
+        (lambda sensor: not sensor.is_image, "Use its sensors to see its state."),
         (lambda sensor: False, "This robot reports no state, but you can try its actions."),
     ],
 )

@@ -65,7 +65,7 @@ def test_rejected_input_is_reported_below_its_row(panel, window) -> None:
         ("succeeded", None, "done in 1.4 s", "ok", ""),
         ("canceled", None, "stopped after 1.4 s", "off", ""),
         ("failed", "the way is blocked", "failed", "error", "The way is blocked."),
-        ("failed", None, "failed", "error", "The robot gave no reason."),
+        ("failed", None, "failed", "error", "The robot reported no reason."),
     ],
 )
 def test_result_of_an_action_is_shown(panel, window, state, error, chip, status, sentence) -> None:

@@ -224,7 +224,7 @@ def test_adding_beyond_the_limit_of_a_kind_is_rejected_with_a_toast(panel, windo
     for _turn in range(9):
         press(panel.add)
         choose(panel, "Add a ball")
-    assert window.toasts == ["No more room. Remove something first"] * 2
+    assert window.toasts == ["The room is full. Remove something first"] * 2
 
 
 # ---- a larger room ----------------------------------------------------------------------------------------

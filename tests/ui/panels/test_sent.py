@@ -48,7 +48,7 @@ def sign(panel: SentPanel, row: int) -> str:
 def test_sent_messages_are_listed_copied_and_resent_while_armed(qtbot, window) -> None:
     session, panel = window.session, made(qtbot, window)
     acting = session.acting
-    press(button(panel, "Publish a message"))
+    press(button(panel, "Publish per message"))
     assert window.commands == ["publish.new"]
     heard = session.source.listen("/words", "json")
     assert acting.send(WORD) == ""
@@ -93,7 +93,7 @@ def test_sent_messages_are_listed_copied_and_resent_while_armed(qtbot, window) -
     assert (again.text(), again.isEnabled()) == ("Send again (not armed)", False)
     panel.table.choose(key)
     panel.repeat()
-    assert window.toasts[-1] == "Not armed for /words: sending is off."
+    assert window.toasts[-1] == "Sending to /words is not armed. Arm it first."
     assert heard.receive(0.0) is None
     panel.filter.setText("image words")
     assert rows(panel) == []

@@ -268,7 +268,7 @@ def test_filter_for_a_missing_topic_links_to_the_connection_doctor_too(panel, wi
     panel.filter.setText("no topic")
     assert [each.accessibleName() for each in panel.empty.findChildren(Button)] == ["Clear the filter"]
     panel.filter.setText("/robot/deph")
-    press(button(panel, "Why do I see nothing?"))
+    press(button(panel, "Why is nothing shown?"))
     assert window.asked_why == [(panel, "/robot/deph")]
     (hidden,) = panel.hindrances()
     assert hidden.sentence == "Topics only shows entries with “/robot/deph”."

@@ -117,8 +117,8 @@ def test_suggested_name_skips_numbers_in_use(folder: Path) -> None:
 @pytest.mark.parametrize(
     ("name", "wrong"),
     [
-        ("a/b", "A name can't have “/” in it."),
-        ("what?", "A name can't have “?” in it."),
+        ("a/b", "A name can't contain “/”."),
+        ("what?", "A name can't contain “?”."),
         (".x", "A name that begins with a full stop hides the file."),
         ("con", "Some computers don't support this file name. Choose another one."),
         ("ends.", "Some computers don't support this file name. Choose another one."),
@@ -134,7 +134,7 @@ def test_invalid_names_are_rejected_with_a_reason(name: str, wrong: str) -> None
 def test_file_with_an_invalid_name_cannot_be_saved(sheet: FileSheet, folder: Path, taken: list[Path]) -> None:
     sheet.ask_save(folder / "x.nepb", taken.append)
     typed(sheet, "what?")
-    assert sheet.said.text() == "A name can't have “?” in it."
+    assert sheet.said.text() == "A name can't contain “?”."
     assert not sheet.done.isEnabled()
     QTest.keyClick(sheet.name, Qt.Key.Key_Return)
     assert taken == []

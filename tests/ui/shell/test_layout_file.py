@@ -52,18 +52,18 @@ def test_layout_name_is_reduced_to_one_short_line(name, shown):
 @pytest.mark.parametrize(
     ("data", "sentence"),
     [
-        (b"", "it is damaged or not a layout of Studio"),
-        (b"\xff\xfe", "it is damaged or not a layout of Studio"),
-        (b"[" * 100_000, "it is damaged or not a layout of Studio"),
-        (b"[]", "it is not a layout of Studio"),
-        (b'{"format": "another"}', "it is not a layout of Studio"),
+        (b"", "it is damaged or not a Studio layout"),
+        (b"\xff\xfe", "it is damaged or not a Studio layout"),
+        (b"[" * 100_000, "it is damaged or not a Studio layout"),
+        (b"[]", "it is not a Studio layout"),
+        (b'{"format": "another"}', "it is not a Studio layout"),
         (changed(arrangement={**SAVED, "docks": "AAAA"}), "it is damaged"),
         (changed(sum=None), "it is damaged"),
-        (changed(version=2), "it was made by a newer Studio; update this one"),
+        (changed(version=2), "it was saved by a newer version of Studio; update Studio to open it"),
         (changed(version=0), "it is damaged"),
         (changed(version="1"), "it is damaged"),
-        (changed(base="start"), "it is for a layout that this Studio doesn't have"),
-        (changed(base=["developer"]), "it is for a layout that this Studio doesn't have"),
+        (changed(base="start"), "it belongs to a layout that this version of Studio doesn't have"),
+        (changed(base=["developer"]), "it belongs to a layout that this version of Studio doesn't have"),
         (changed(arrangement=[]), "it is damaged"),
         (changed(arrangement={"open": 3, "docks": ""}), "it is damaged"),
         (changed(arrangement={"open": [], "docks": 3}), "it is damaged"),
@@ -100,7 +100,7 @@ def test_layout_is_exported_imported_and_import_can_be_undone(
     file.write_bytes(layout_bytes("Arm", "developer", saved))
     for name in ("Arm", "Arm 2"):
         commands.files.open_all([file])  # a drop, or the command line
-        assert window.toast.text == f"Opened the layout “{name}”. Missing panels were left out: teleport"
+        assert window.toast.text == f"Opened the layout “{name}”. Unknown panels were skipped: teleport"
         assert set(window.bench.open_names()) == {"topics", "console"}
     file.write_bytes(layout_bytes("Arm", "developer", {**saved, "docks": ""}))  # Qt has nothing to put back
     commands.files.open_all([file])
@@ -109,7 +109,7 @@ def test_layout_is_exported_imported_and_import_can_be_undone(
     assert [each.name for each in window.saved_layouts.all()] == ["Arm", "Arm 2"]
     file.write_bytes(b"nothing of the kind")
     commands.files.open_all([file])
-    assert window.toast.text == "Can't open Mine.nep-layout: it is damaged or not a layout of Studio"
+    assert window.toast.text == "Can't open Mine.nep-layout: it is damaged or not a Studio layout"
     commands.files.open_all([tmp_path / "gone.nep-layout"])
     assert window.toast.text == "Can't open gone.nep-layout: no such file or directory"
     answers.path = tmp_path / "a file" / "x.nep-layout"

@@ -184,7 +184,7 @@ def test_topic_patterns_are_tokens_added_and_removed_by_keyboard(window, recorde
 def test_recording_stops_after_the_chosen_limit_and_its_size_is_estimated(window, recorder):
     window.commands.run("recording.sheet")
     sheet = sheet_of(window)
-    assert sheet.ends_words.text() == "when you stop it"
+    assert sheet.ends_words.text() == "no limit"
     for field, text in ((sheet.ends_min, "30"), (sheet.ends_gb, "8")):
         field.setText(text)
         field.editingFinished.emit()

@@ -37,7 +37,7 @@ VIEWS = {
         stop_word="Stopping", result="1 of 2 robots stopped",
     ),
     "proven": RunView(
-        "proven", "Stopped after 14 s", "The dashed block is where it stopped", "Stopped after 14 s",
+        "proven", "Stopped after 14 s", "It stopped at the dashed block", "Stopped after 14 s",
         can_run=True, can_step=True, result="all 2 robots stopped (41 ms)", result_status="ok",
     ),
     "unanswered": RunView(

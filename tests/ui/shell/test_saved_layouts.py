@@ -77,7 +77,7 @@ def test_invalid_layout_names_are_reported(shown: MainWindow, commands: Commands
     assert "40 characters" in sheet.wrong.text()
     sheet.field.setText("  ")
     QTest.keyClick(sheet.field, Qt.Key.Key_Return)
-    assert sheet.wrong.text() == "A layout needs a name."
+    assert sheet.wrong.text() == "Enter a name for the layout."
     QTest.keyClick(sheet.field, Qt.Key.Key_Escape)
     assert not sheet.isVisible()
     assert shown.saved_layouts.all() == ()
@@ -196,7 +196,7 @@ def test_unwritable_layout_is_reported_as_not_saved(shown: MainWindow, commands:
     commands.behaviours.forget_recent()
     assert shown.toast.text == "Can't save this change: the recent files will return at the next start"
     commands.run("robots.ask")
-    assert shown.toast.text == "Studio will ask again before a real robot moves, until you close it"
+    assert shown.toast.text == "Until you close Studio, it will ask again before a real robot moves"
     path.rmdir()
     keep_as(shown, commands, "Three")
     assert shown.toast.text == "Saved layout “Three”"

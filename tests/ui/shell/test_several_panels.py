@@ -138,7 +138,7 @@ def test_single_instance_panel_does_not_offer_another(bench) -> None:
 def test_number_of_panels_of_a_kind_is_limited(bench, window) -> None:
     opened = [bench.open_another("image") for _ in range(MAX_OF_A_KIND)]
     assert len([dock for dock in opened if dock is not None]) == MAX_OF_A_KIND - 1
-    assert window.toast.text == f"{MAX_OF_A_KIND} are already open, the maximum"
+    assert window.toast.text == f"The maximum of {MAX_OF_A_KIND} panels of this kind is already open"
 
 
 def test_panels_are_restored_with_their_topics_after_restart(qtbot, bench, window) -> None:

@@ -317,7 +317,7 @@ def test_shortcuts_are_removed_and_reset(sheet: ShortcutSheet, commands: Command
     assert keys.of("file.save") == ("Ctrl+S",)
     choose(sheet, "Stop the program and all robots")
     sheet._take_away()
-    assert sheet.said.text() == "Stop now has only F12."
+    assert sheet.said.text() == "Stop has only the shortcut F12 now."
     assert keys.of("run.stop") == ("F12",)
     sheet._take_away()
     assert sheet.said.text() == "F12 can't be removed: it always triggers Stop."

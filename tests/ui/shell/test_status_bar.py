@@ -38,9 +38,9 @@ def test_health_item_matches_the_health_panel(session: fakes.Session) -> None:
     session.alerts.resolve("message:/faces")
     link = session.fleet.links[0]
     link.values["battery"] = 7
-    assert facts(session).health() == ("triangle-alert", "Pepper: 1 to check", "warn")
+    assert facts(session).health() == ("triangle-alert", "Pepper: needs attention (1)", "warn")
     link.last_stop, link.last_stop_status = "not confirmed, at 8:41", "error"
-    assert facts(session).health() == ("circle-x", "Pepper: 2 to check", "error")
+    assert facts(session).health() == ("circle-x", "Pepper: needs attention (2)", "error")
 
 
 def test_robot_that_has_not_reported_is_connected_and_not_healthy(session: fakes.Session) -> None:
@@ -56,7 +56,7 @@ def test_disconnected_robot_counts_as_to_check(session: fakes.Session) -> None:
     session.alerts.resolve("message:/faces")
     link = session.fleet.links[0]
     link.connected = False
-    assert facts(session).health() == ("triangle-alert", "Pepper: 1 to check", "warn")
+    assert facts(session).health() == ("triangle-alert", "Pepper: needs attention (1)", "warn")
 
 
 def test_health_item_shows_no_robot_when_none_is_connected() -> None:

@@ -93,7 +93,7 @@ def test_existing_name_is_reported_while_typing(shown: MainWindow, commands: Com
     typed(sheet, "x" * 61)
     assert "60 characters" in sheet.wrong.text()
     QTest.keyClick(typed(sheet, "").field, Qt.Key.Key_Return)
-    assert sheet.wrong.text() == "A variable needs a name."
+    assert sheet.wrong.text() == "Enter a name for the variable."
     assert editor(shown).edited == []
 
 

@@ -42,7 +42,7 @@ VIEWS = (
     RunView(
         "proven",
         "Stopped after 14 s",
-        "The dashed block is where it stopped",
+        "It stopped at the dashed block",
         "",
         can_run=True,
         can_step=True,

@@ -18,7 +18,7 @@ const WORDS: Readonly<Record<string, string>> = {
   KEYBOARD_NAV_UNCONSTRAINED_MOVE_HINT: lazy('Hold %1 and press the arrow keys to move it freely, then press %2 to place it.'),
   KEYBOARD_NAV_COPIED_HINT: lazy('Copied. Press %1 to paste.'),
   KEYBOARD_NAV_CUT_HINT: lazy('Cut. Press %1 to paste.'),
-  KEYBOARD_NAV_BLOCK_NAVIGATION_HINT: lazy('%1 enters the block.'),
+  KEYBOARD_NAV_BLOCK_NAVIGATION_HINT: lazy('Press %1 to enter the block.'),
   KEYBOARD_NAV_FLYOUT_LABEL_HINT: lazy('Use the arrow keys to choose a block and %1 to go to the next heading.'),
   KEYBOARD_NAV_WORKSPACE_NAVIGATION_HINT: lazy('Use the arrow keys to move between blocks.'),
   HELP_PROMPT: lazy('Press %1 for keyboard shortcuts.'),

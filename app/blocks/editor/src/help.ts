@@ -101,7 +101,7 @@ export class HelpCard {
 function keptHelp(block: Blockly.BlockSvg): BlockHelp {
   return {title: t('Unknown block'), name: '', does: String(block.getTooltip()),
     more: t('It may belong to a robot that was never connected here, or to a newer version of Studio. It stays in the file unchanged.'),
-    gaps: [], example: t('For example: connect the robot that this block belongs to.'), words: '', english: '', choices: []};
+    gaps: [], example: t('If the block belongs to a robot, connect that robot.'), words: '', english: '', choices: []};
 }
 
 function element(tag: string, name: string, words = ''): HTMLElement {

@@ -205,7 +205,9 @@ def _as_list(of: object) -> Sequence[object]:
 def _mutable_list(of: object) -> list[object]:
     items = _as_list(of)
     if not isinstance(items, list):
-        raise BehaviourError(_("This list can't be changed."))
+        raise BehaviourError(
+            _("This list can't be changed. Set a variable to a copy of it and change the copy.")
+        )
     return items
 
 

@@ -268,7 +268,7 @@ class ReplaySending:
         if opened is None or not self.routes:
             return _("Choose a topic first.")
         if not self.is_known:
-            return _("Still finding out which topics move robots. Try again in a moment.")
+            return _("Still checking which topics move robots. Try again in a moment.")
         why_not = self._acting.arm(for_replay=True)
         if why_not:
             return why_not
@@ -307,7 +307,7 @@ class ReplaySending:
         topic = opened.recording.topics[route.recorded]
         self._acting.tell_moved(route.target, "replay")
         self.outbox.begin(route, turn, topic.msg_type, is_latched=route.recorded in self._latched)
-        self._log(route, _("sent as it is played"))
+        self._log(route, _("sent during playback"))
         self._changed()
 
     def end(self) -> None:

@@ -29,7 +29,7 @@ class MayNotMoveError(AppError):
     def __init__(self, names: Sequence[str]) -> None:
         self.names = tuple(names)
         super().__init__(
-            _("{robots} may not move yet; answer the question above first").format(robots=listed(list(names)))
+            _("{robots} can't move yet; answer the question above first").format(robots=listed(list(names)))
         )
 
 

@@ -28,13 +28,13 @@ _SENTENCES = {
     "form": lazy("{robot} received a command from a form and has not responded since"),
     "behaviour": lazy("{robot} received a command from a behaviour and has not responded since"),
     "shelf": lazy("{robot} received a command from a saved message and has not responded since"),
-    "key": lazy("{robot} received a command from a key and has not responded since"),
+    "key": lazy("{robot} received a command from the keyboard and has not responded since"),
     "alarm": lazy("{robot} received a command from an alarm and has not responded since"),
     "replay": lazy("{robot} received a command from a replayed recording and has not responded since"),
     "bridge": lazy("{robot} received a command from a bridge and has not responded since"),
     "image": lazy("{robot} received a command from a click on an image and has not responded since"),
     "program": lazy("{robot} received a command from a Python program and has not responded since"),
-    "action": lazy("{robot} could not end an action and has not responded since"),
+    "action": lazy("{robot} could not stop an action and has not responded since"),
     "stop": lazy("{robot} has not confirmed Stop"),
 }
 """Reason for each kind of sender; `_OTHER` is used for unknown kinds."""

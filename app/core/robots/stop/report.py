@@ -60,7 +60,7 @@ class RobotStop:
     def sentence(self) -> str:
         """Result as a sentence: "Pepper stopped (41 ms)"."""
         if self.answered and self.waited_ms:
-            words = _("{robot} stopped ({elapsed} ms; it was not connected for {waited} ms of them)")
+            words = _("{robot} stopped ({elapsed} ms, including {waited} ms without a connection)")
             return words.format(
                 robot=self.who, elapsed=f"{self.elapsed_ms or 0:.0f}", waited=f"{self.waited_ms:.0f}"
             )

@@ -159,7 +159,7 @@ class SessionActing:
             self.revision += 1
             return ""
         if not self.arming.allow(target, is_confirmed=is_sure):
-            return _("Not armed, or too many names. Remove one first.")
+            return _("Sending is not armed, or too many names are armed. Arm sending, or remove a name.")
         self.revision += 1
         if then is not None:
             then()
@@ -296,7 +296,7 @@ class SessionActing:
         if record is None or record.again is None:
             return _("This can't be sent again.")
         if not self.arming.allows(record.target):
-            return _("Not armed for {name}: sending is off.").format(name=record.name)
+            return _("Sending to {name} is not armed. Arm it first.").format(name=record.name)
         return record.again()
 
     def end(self, message_id: str) -> None:
@@ -405,7 +405,7 @@ class SessionActing:
         except OSError as error:
             self._written = -1  # retried at the next check
             detail = _("They are kept until Studio closes: {reason}.").format(reason=error.strerror or error)
-            title = _("The saved messages can't be saved.")
+            title = _("Changes to saved messages can't be saved.")
             self._session.alerts.put("messages:kept", "warn", title, detail, count=0)
 
     def close(self) -> None:

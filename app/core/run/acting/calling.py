@@ -139,7 +139,7 @@ class ServiceCalls:
 
     def give_up(self) -> None:
         """Stop waiting for the reply; the server may still execute the call."""
-        self._cancel("canceled", _("canceled; the server may still carry it out"))
+        self._cancel("canceled", _("cancelled; the server may still execute the call"))
 
     def tick(self) -> list[CallRecord]:
         """Apply finished calls; return those that ended since the last tick, including cancelled ones."""
@@ -167,7 +167,7 @@ class ServiceCalls:
 
     def close(self) -> None:
         """Cancel the call in flight; the node closes the clients."""
-        self._cancel("canceled", _("canceled; the server may still carry it out"))
+        self._cancel("canceled", _("cancelled; the server may still execute the call"))
         self._clients.clear()
 
     # ---- private

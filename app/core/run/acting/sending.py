@@ -238,7 +238,7 @@ class Outbox:
         def run(node: Node) -> None:
             try:
                 if self._clock() - asked_s > MAX_AGE_S:
-                    raise NepError(_("not sent: there was no master"))
+                    raise NepError(_("not sent: no master was running"))
                 job(node)
             except NepError as error:
                 self._add_result(SendResult(order, "failed", str(error)))

@@ -55,7 +55,7 @@ def state_words(rule: AlarmRule, state: AlarmState, now_s: float) -> tuple[str, 
         words = _("{state}, {seen}").format(state=lasts, seen=seen) if is_told else lasts
         return words, severity_of(rule.condition), None
     if state.phase == "pending":
-        return seen or _("true for a moment"), "warn", None
+        return seen or _("pending"), "warn", None
     return seen or _("OK"), "ok", None
 
 
@@ -80,9 +80,9 @@ def note_words(rule: AlarmRule, state: AlarmState, alarms: SessionAlarms, now: d
     if today:
         parts.append(ngettext("once today", "{count} times today", today).format(count=today))
     elif last is not None:
-        parts.append(_("last on {when}").format(when=_uncapital(when_words(moment(last.at_s), now))))
+        parts.append(_("last active {when}").format(when=_uncapital(when_words(moment(last.at_s), now))))
     else:
-        parts.append(_("never on"))
+        parts.append(_("never active"))
     return ", ".join(parts)
 
 
@@ -123,7 +123,7 @@ def history_columns(
         Column("alarm", lazy("Alarm"), 180, alarm, stretch=True, tip=lambda record: record.words),
         Column("times", lazy("Count"), 56, lambda record: Cell(str(record.count) if record.count > 1 else ""),
                key=lambda record: record.count, figures=True, yields=2),
-        Column("lasted", lazy("Lasted"), 84, lasted, key=lambda record: record.lasted_s, figures=True),
+        Column("lasted", lazy("Duration"), 84, lasted, key=lambda record: record.lasted_s, figures=True),
         Column("did", lazy("Actions"), 210, lambda record: Cell(deeds_words(record), role="textSecondary"),
                tip=deeds_words, yields=1),
     )  # fmt: skip

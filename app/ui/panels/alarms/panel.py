@@ -452,7 +452,7 @@ class AlarmsPanel(PanelWidget):
         menu = Menu(self.theme, self)
         menu.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
         if rule.is_snoozed(self.now_s()):
-            menu.addAction(self.theme.icon("bell"), _("End the snooze"), partial(self._snooze, rule.id, 0.0))
+            menu.addAction(self.theme.icon("bell"), _("Stop snoozing"), partial(self._snooze, rule.id, 0.0))
         else:
             for words, seconds in (
                 (_("Snooze for 10 min"), SNOOZE_S),
@@ -463,7 +463,7 @@ class AlarmsPanel(PanelWidget):
         menu.addSeparator()
         group = QActionGroup(menu)
         for calm_s in CALM_CHOICES_S:
-            said = _("Active until all was well for {time}").format(time=time_words(calm_s))
+            said = _("Stay active until the condition is false for {time}").format(time=time_words(calm_s))
             action = menu.addAction(said)
             action.setCheckable(True)
             action.setChecked(rule.calm_s == calm_s)

@@ -51,16 +51,16 @@ KIND_WORDS: Mapping[str, str] = {
 MENU_WORDS: Sequence[Sequence[tuple[str, str]]] = (
     (
         ("silent", lazy("A topic is silent")),
-        ("rate_below", lazy("A topic has fewer messages")),
-        ("rate_above", lazy("A topic has more messages")),
+        ("rate_below", lazy("A topic has too few messages")),
+        ("rate_above", lazy("A topic has too many messages")),
         ("loses", lazy("A topic loses messages")),
         ("appears", lazy("A topic appears")),
     ),
     (
-        ("below", lazy("A value is below")),
-        ("above", lazy("A value is above")),
-        ("equals", lazy("A value is")),
-        ("is_not", lazy("A value is not")),
+        ("below", lazy("A value is below a limit")),
+        ("above", lazy("A value is above a limit")),
+        ("equals", lazy("A value equals a given value")),
+        ("is_not", lazy("A value differs from a given value")),
         ("changes", lazy("A value changes")),
     ),
     (("leaves", lazy("A node leaves")), ("comes", lazy("A node joins"))),
@@ -75,7 +75,7 @@ SLOT_NAMES: Mapping[str, str] = {
     "add": lazy("Add an action"),
     "action": lazy("Action"),
     "name": lazy("Name"),
-    "payload": lazy("With"),
+    "payload": lazy("Content"),
 }
 NEW_ACTIONS: Sequence[AlarmAction] = (
     AlarmAction("banner"),

@@ -76,7 +76,7 @@ class AlarmRow(QWidget):
         self.switch.setAccessibleName(_("Enable: {condition}").format(condition=said))
         self.switch.setChecked(rule.is_on)
         self.snooze.set_icon("bell" if snoozed else "bell-off")
-        self.snooze.set_name(_("End the snooze") if snoozed else _("Snooze for 10 min"))
+        self.snooze.set_name(_("Stop snoozing") if snoozed else _("Snooze for 10 min"))
         parts = parts_of(rule, icon)
         if parts != self._shown:
             self._shown = parts

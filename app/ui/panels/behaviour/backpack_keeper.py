@@ -86,7 +86,7 @@ class BackpackKeeper:
             ids = [item.id for item in made]
             said = words.format(count=count)
             if left:
-                said = _("{what}. Notes were left out: the backpack holds blocks only.").format(what=said)
+                said = _("{what}. Notes were not added: the backpack can only hold blocks.").format(what=said)
             self._context.toast(said, _("Undo"), lambda: self._try(lambda: self._backpack.remove(ids)))
 
     def _take_out(self, take: Callable[[], list[Packed]], *, emptied: bool) -> None:

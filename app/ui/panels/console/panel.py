@@ -220,7 +220,7 @@ class ConsolePanel(PanelWidget):
         nodes = sorted({record.origin for record in self.session.shown_console.records} | {self.node} - {""})
         if nodes:
             menu.addSeparator()
-            self._offer(menu, _("From everyone"), not self.node, partial(self.set_node, ""))
+            self._offer(menu, _("From all sources"), not self.node, partial(self.set_node, ""))
         for node in nodes[:MAX_NODES]:
             if node:
                 self._offer(menu, node, node == self.node, partial(self.set_node, node))

@@ -32,7 +32,7 @@ class Lesson:
 
 
 STEPS: tuple[Lesson, ...] = (
-    Lesson("robot", lazy("Use the virtual robot"), lazy("It is part of Studio."), button="robots.virtual"),
+    Lesson("robot", lazy("Use the virtual robot"), lazy("It comes with Studio."), button="robots.virtual"),
     Lesson(
         "start",
         lazy("Drag “{start}” onto the page"),

@@ -348,7 +348,7 @@ def _of_topic(topic: Topic, facts: CardFacts) -> CardContent:
         CardFigure(
             _("Bandwidth"),
             bandwidth_words(sent),
-            _("{size} a message").format(size=size_words(size)) if size else "",
+            _("{size} per message").format(size=size_words(size)) if size else "",
         ),
         _lost(topic),
         _latency(topic),
@@ -493,4 +493,4 @@ def clock_words(view: GraphView | None) -> str:
     known = [node.clock_uncertainty_ns for node in view.nodes.values() if node.clock_uncertainty_ns]
     if not known:
         return ""
-    return _("Clock offset known to ±{time} ms").format(time=number(max(known) / 1e6, ".1f"))
+    return _("Clock offset accurate to ±{time} ms").format(time=number(max(known) / 1e6, ".1f"))

@@ -80,7 +80,7 @@ class GraphLegend(QWidget):
         flow = Flow(self, gap=18, row_gap=2)
         flow.setContentsMargins(12, 4, 12, 8)
         for kind, words in (
-            ("topic", _("topic; thicker carries more")),
+            ("topic", _("topic; thicker line: more data")),
             ("service", _("service")),
             ("chosen", _("chosen topic")),
             ("gone", _("gone or quiet")),

@@ -67,7 +67,7 @@ def node_line(node: DrawnNode) -> str:
     if entry is None:
         return _members(node.members, node.quiet)
     if entry.gone_s is not None:
-        return _("gone {seconds} s").format(seconds=int(entry.gone_s))
+        return _("gone for {seconds} s").format(seconds=int(entry.gone_s))
     if node.kind == "page":
         return node.page.where if node.page is not None else _("web page")
     if node.kind == "original":

@@ -60,7 +60,10 @@ class LookBar(QWidget):
         self.own_range = ToggleButton(theme, _("Custom range"), "ruler")
         self.own_range.toggled.connect(self._set_own_range)
         self.low, self.high = (_EndEdit(theme, None, None) for _end in range(2))
-        for field, name in ((self.low, _("First colour at")), (self.high, _("Last colour at"))):
+        for field, name in (
+            (self.low, _("Value of the first colour")),
+            (self.high, _("Value of the last colour")),
+        ):
             field.setAccessibleName(name)
             field.setFixedWidth(92)
             field.number.connect(lambda _value: self._read_range())

@@ -312,7 +312,7 @@ class ImagePanel(PanelWidget):
             action.setChecked(name in self.overlays.chosen)
             action.toggled.connect(lambda on, name=name: self.overlays.choose(name, on))
         if menu.isEmpty():
-            menu.addAction(_("No topic annotates images now")).setEnabled(False)
+            menu.addAction(_("No topic has image annotations")).setEnabled(False)
         menu.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
         drop_below(menu, self.layers)
 

@@ -35,7 +35,7 @@ class PointStrip(ArmedStrip):
         super().__init__(context)
 
     def off_words(self) -> str:
-        return _("Clicks send nothing until armed")
+        return _("Clicks are not sent until you arm sending")
 
     def arm(self) -> str:
         return self._arm()
@@ -87,7 +87,7 @@ class PointBar(QWidget):
         row = QWidget()
         flow = Flow(row, gap=8, row_gap=4)
         flow.setContentsMargins(12, 6, 6, 6)
-        about = label(_("A click publishes its point to"), "small", role="textSecondary")
+        about = label(_("Publish clicked points to"), "small", role="textSecondary")
         about.setToolTip(plain.tip(_(KEYS_WORDS)))
         flow.addWidget(about)
         flow.add_elastic(self.topic, greedy=True)

@@ -155,7 +155,7 @@ class InspectorBody(QWidget):
         words = _("{topic}: {reason}.").format(topic=topic, reason=reason)
         if words != self._waiting:
             self._waiting = words
-            self.empty.set_texts(_("Can't be decoded here"), words)
+            self.empty.set_texts(_("Can't decode the messages"), words)
             self.empty.set_actions([why])
 
     def say_nothing(self, topic: str, choose: Callable[[], object], why: EmptyAction) -> None:
@@ -169,11 +169,11 @@ class InspectorBody(QWidget):
 
     def say_large(self, size_bytes: int, words: str, read: Callable[[], object] | None = None) -> None:
         """Show that the message is large, with a button that calls `read` to decode it."""
-        self.large.set_texts(_("Message of {size}").format(size=size_words(size_bytes)), words)
+        self.large.set_texts(_("Large message ({size})").format(size=size_words(size_bytes)), words)
         if read is None:
             self.large.set_actions([])
         elif self.page != LARGE:
-            action = EmptyAction(_("Decode the newest"), read, "list-tree", primary=True)
+            action = EmptyAction(_("Decode the newest message"), read, "list-tree", primary=True)
             self.large.set_actions([action])
 
     def reveal(self, path: object) -> None:

@@ -283,7 +283,9 @@ class InspectorPanel(PanelWidget):
 
     def _offer_large(self, message: Message) -> None:
         self._shown = message
-        words = _("Messages of {codec} above 1 MB are decoded on request only.").format(codec=message.codec)
+        words = _("{codec} messages larger than 1 MB are decoded only on request.").format(
+            codec=message.codec
+        )
         self.body.say_large(message.size_bytes, words, self._read_large)
         self._page(LARGE)
 
@@ -486,9 +488,9 @@ def chip_words(
         return pgettext("topic", "gone"), "off", ""
     # no messages arrive any more
     if topic.stale and not (topic.counted is not None and topic.counted[0] > 0):
-        return pgettext("topic", "no answer"), "warn", ""
+        return pgettext("topic", "not responding"), "warn", ""
     if topic.gone_s is not None:
-        return _("gone {seconds} s").format(seconds=int(topic.gone_s)), "off", ""
+        return _("gone for {seconds} s").format(seconds=int(topic.gone_s)), "off", ""
     return pgettext("message", "live"), "info", ""
 
 

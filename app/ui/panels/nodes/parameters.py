@@ -213,7 +213,7 @@ class ParametersPart(QWidget):
         if refusal:
             self._set_status(_sentence(refusal), "error")
         elif waits:
-            self._set_status(_("Waiting for the node's answer"))
+            self._set_status(_("Waiting for the node's reply"))
         elif why_not:
             self._set_status(_sentence(why_not))
         else:

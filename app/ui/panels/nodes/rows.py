@@ -32,8 +32,8 @@ LIMITS_OF_NETWORK = lazy(
 )
 ORIGINAL = lazy("original NEP")
 BRIDGE = lazy(
-    "A bridge that forwards topics between this network and others. {topic} has its counts of "
-    "forwarded and lost messages."
+    "A bridge that forwards topics between this network and others. {topic} reports how many "
+    "messages were forwarded and lost."
 )
 VERSIONS = {"A": lazy("original NEP up to 0.5.4.5"), "B": lazy("original NEP 0.5.4.8")}
 
@@ -174,7 +174,7 @@ def _cpu(node: NodeEntry) -> str:
     return (
         cpu_words(node.cpu_ratio)
         if node.gone_s is None
-        else _("gone {seconds} s").format(seconds=int(node.gone_s))
+        else _("gone for {seconds} s").format(seconds=int(node.gone_s))
     )
 
 
@@ -216,7 +216,7 @@ COLUMNS: tuple[Column[NodeRow], ...] = (
         lambda r: r.node.name.casefold(), stretch=True, tip=_name_tip,
     ),
     Column(
-        "generation", lazy("Generation"), 116, generation_cell,
+        "generation", lazy("Kind"), 116, generation_cell,
         lambda r: (r.node.network, r.node.is_bridge, r.node.is_original, r.node.generation),
         tip=_generation_tip,
     ),

@@ -25,7 +25,7 @@ class PlotAdvice(QWidget):
         """Topic without data, or ""."""
         self._words = label("", "small", role="warn", wrap=True)
         self._words.setMinimumWidth(0)
-        self.why = LinkButton(theme, _("Why do I see nothing?"))
+        self.why = LinkButton(theme, _("Why is nothing shown?"))
         self.why.setSizePolicy(QSizePolicy.Policy.Maximum, QSizePolicy.Policy.Fixed)
         self.why.clicked.connect(lambda: ask(self.topic))
         row = QHBoxLayout(self)

@@ -104,7 +104,7 @@ class _Cells:
             begin_s, end_s = sorted(figures.cursors)
             if isinstance(shown.curve.last, bool):
                 lasted = seconds_words(shown.curve.states.lasted_s("true", begin_s, end_s))
-                words = _("{seconds} true").format(seconds=lasted)
+                words = _("true for {seconds}").format(seconds=lasted)
             else:
                 count = shown.curve.states.changes(begin_s, end_s)
                 words = ngettext("{count} change", "{count} changes", count).format(count=count)

@@ -48,7 +48,7 @@ class XYCanvas(pg.GraphicsView):  # type: ignore[misc]  # pyqtgraph is untyped
     def __init__(self, theme: Theme) -> None:
         super().__init__(background=None)
         self.theme = theme
-        self.setAccessibleName(_("Curve against curve"))
+        self.setAccessibleName(_("XY plot"))
         self.setFrameShape(QGraphicsView.Shape.NoFrame)
         self.setViewportUpdateMode(QGraphicsView.ViewportUpdateMode.FullViewportUpdate)
         self.setFocusPolicy(Qt.FocusPolicy.StrongFocus)

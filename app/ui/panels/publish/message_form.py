@@ -242,7 +242,7 @@ class MessageForm(QWidget):
     def say_problem(self, problem: str) -> None:
         """Show the reason why the message can't be sent; "" if it can."""
         fault = self.read.fault
-        words = _("{problem} It can't be sent yet.").format(problem=problem) if problem else ""
+        words = _("{problem} The message can't be sent yet.").format(problem=problem) if problem else ""
         if words != self.sentence.text():
             self.sentence.setText(words)
         self.fault_icon.setVisible(bool(problem))

@@ -235,7 +235,7 @@ class PublishPanel(PanelWidget):
             self._end_peek()
             self.form.put_text(text_of_type(message.msg_type))
             if topic is None or not topic.publishers:
-                self.context.toast(_("No publisher now: these are the fields of its type"))
+                self.context.toast(_("No publisher on this topic: using the fields of the message type"))
             return
         if topic.msg_type != message.msg_type:
             self.form.set_type(topic.msg_type)

@@ -64,7 +64,10 @@ class ValueFields(QWidget):
         field = QLineEdit()
         field.setMinimumWidth(round(self._theme.scaled(FIELD_WIDTH_PX)))
         field.setAccessibleName(_("Value of {name}").format(name=name))
-        hint = _("A number such as 12.5 or 12,5, JSON such as true, or text. Quotes make a number text.")
+        hint = _(
+            "A number such as 12.5 or 12,5, JSON such as true, or text. Put a number in quotes to send "
+            "it as text."
+        )
         field.setToolTip(plain.tip(hint))
         field.setProperty("focusRadius", self._theme.radius("control"))
         EditMenu(self._theme, field)

@@ -78,8 +78,8 @@ class FilmStrip(QWidget):
         self.begin_ns = self.end_ns = 0
         self.by_clock = False
         """True to show times of day, False to show times relative to the start of the recording."""
-        self.begin = StripHandle(theme, self, _("Start of the part"))
-        self.end = StripHandle(theme, self, _("End of the part"))
+        self.begin = StripHandle(theme, self, _("Start of the selected range"))
+        self.end = StripHandle(theme, self, _("End of the selected range"))
         self.begin.moved.connect(lambda by_ns: self.set_part(self.begin_ns + by_ns, self.end_ns))
         self.end.moved.connect(lambda by_ns: self.set_part(self.begin_ns, self.end_ns + by_ns))
         self.begin.dragged.connect(lambda x: self.set_part(self._time(x), self.end_ns))

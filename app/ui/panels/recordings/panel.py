@@ -311,7 +311,7 @@ class RecordingsPanel(TablePanel[RecordingFacts]):
         if stem == path.stem:
             return True
         if not stem:
-            self.context.toast(_("A recording needs a name"))
+            self.context.toast(_("Enter a name for the recording"))
             return False
         new = path.with_name(f"{stem}{path.suffix}")
         if new.exists():

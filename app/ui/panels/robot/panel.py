@@ -185,7 +185,7 @@ class RobotPanel(OneRobotPanel):
         self.pages.setCurrentWidget(self.empty)
         if link.virtual:
             title = _("{robot} is starting").format(robot=link.name)
-            self.empty.set_texts(title, _("The robot is drawn as soon as it reports its position."))
+            self.empty.set_texts(title, _("The robot appears as soon as it reports its position."))
             self.empty.set_actions([])
         else:
             self.empty.set_texts(link.name, _where_to_look(link))
@@ -304,7 +304,7 @@ class RobotPanel(OneRobotPanel):
         x, y = room.nearest_free(state.x + 1.0, state.y + 0.9, radius)
         name = self.session.room.add(kind, x, y)
         if name is None:
-            self.context.toast(_("No more room. Remove something first"))
+            self.context.toast(_("The room is full. Remove something first"))
         else:
             self.view.chosen = name
 
@@ -362,11 +362,11 @@ def _where_to_look(link: RobotLink) -> str:
     # Mentions only parts that the robot has.
     images = [sensor.is_image for sensor in link.robot.sensors]
     if True in images and False in images:
-        return _("Its camera and sensors show its state.")
+        return _("Use its camera and sensors to see its state.")
     if True in images:
-        return _("Its camera shows its state.")
+        return _("Use its camera to see its state.")
     if images:
-        return _("Its sensors show its state.")
+        return _("Use its sensors to see its state.")
     return _("This robot reports no state, but you can try its actions.")
 
 

@@ -77,7 +77,7 @@ class SayBar(QWidget):
         self._theme, self._awaited = theme, awaited
         self._robot: Robot | None = None
         self.field = SayField(theme)
-        self.words = IconButton(theme, "chevron-down", _("Words to say"), size=26)
+        self.words = IconButton(theme, "chevron-down", _("Choose what to say"), size=26)
         self.events = IconButton(theme, "zap", _("Simulate an event"), size=26)
         self.field.said.connect(self.said)
         self.field.asked.connect(self.show_words)
@@ -125,7 +125,7 @@ class SayBar(QWidget):
                 lambda _on=False, word=word: self.field.submit(word)
             )
         if menu.isEmpty():
-            menu.addAction(_("No program is waiting for words")).setEnabled(False)
+            menu.addAction(_("No program is waiting for speech")).setEnabled(False)
         self._pop_up(menu, self.words)
 
     # -- simulated events ---------------------------------------------------------------------------------

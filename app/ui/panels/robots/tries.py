@@ -128,7 +128,7 @@ def end_words(made: Invocation, *, may_move: bool = False) -> tuple[str, str, st
         reason = made.error if made.error and made.error != "stopped" else ""
         said = _("ended after {duration}") if may_move else _("stopped after {duration}")
         return said.format(duration=took), "off", _sentence(reason)
-    return _("failed"), "error", _sentence(made.error or _("The robot gave no reason"))
+    return _("failed"), "error", _sentence(made.error or _("The robot reported no reason"))
 
 
 def _sentence(words: str) -> str:

@@ -48,7 +48,7 @@ def answer_rows(answer: object) -> list[AnswerRow]:
         _rows("", 0, "", answer) if _has_parts(answer) else [AnswerRow("", 0, _("reply"), _words(answer))]
     ):
         if len(found) == MAX_ROWS:
-            found.append(AnswerRow("…", 0, "…", _("there is more; see the JSON")))
+            found.append(AnswerRow("…", 0, "…", _("truncated; see the JSON for the rest")))
             break
         found.append(row)
     return found
@@ -112,7 +112,7 @@ class AnswerView(QWidget):
             theme,
             [("fields", _("Fields"), None), ("json", _("JSON"), None)],
             size="small",
-            name=_("Answer as"),
+            name=_("Reply as"),
         )
         self.way.changed.connect(self._turn)
         self.copy = IconButton(theme, "copy", _("Copy reply"), size=26)
@@ -126,8 +126,8 @@ class AnswerView(QWidget):
         )
         self.table = TableView(theme, self.model)
         self.table.horizontalHeader().hide()
-        self.table.setAccessibleName(_("Answer"))
-        self.text = JsonEdit(theme, _("Answer as JSON"), least_lines=3)
+        self.table.setAccessibleName(_("Reply"))
+        self.text = JsonEdit(theme, _("Reply as JSON"), least_lines=3)
         self.text.edit.setReadOnly(True)
         self.sentence = label("", "body", role="textSecondary", wrap=True)
         self.sentence.setMinimumWidth(0)
@@ -199,7 +199,7 @@ class AnswerView(QWidget):
             return
         self.facts.setText(clock_of(record))
         if record.state == "waiting":
-            self.sentence.setText(_("Waiting for the answer."))
+            self.sentence.setText(_("Waiting for the reply."))
         elif record.state != "answered":
             self.sentence.setText(record.sentence)
         elif not record.is_kept:

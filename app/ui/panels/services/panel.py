@@ -108,7 +108,7 @@ class ServicesPanel(PanelWidget):
                 stretch=True,
                 tip=lambda each: each.request[:2000],
             ),
-            Column("took", lazy("Took"), 120, took_cell, figures=True, tip=lambda each: each.sentence),
+            Column("took", lazy("Duration"), 120, took_cell, figures=True, tip=lambda each: each.sentence),
         )
         self.calls_model: TableModel[CallRecord] = TableModel(columns, lambda each: str(each.number))
         self.calls = TableView(self.theme, self.calls_model)

@@ -202,5 +202,5 @@ def run_words(span: RecordedSpan, start_ns: int) -> str:
 def _told(words: str, span: RecordedSpan, start_ns: int) -> str:
     begin, end = (span_words(each - start_ns, digits=1) for each in (span.start_ns, span.end_ns))
     if not span.is_over:
-        return _("{what}\nfrom {begin} on").format(what=words, begin=begin)
+        return _("{what}\nsince {begin}").format(what=words, begin=begin)
     return _("{what}\n{begin} to {end}").format(what=words, begin=begin, end=end)

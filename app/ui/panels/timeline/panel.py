@@ -295,7 +295,7 @@ class TimelinePanel(PanelWidget):
         path = self._shown.path if self._shown is not None else None
         rows = (
             (_("Open a recording"), "folder-open", "replay.open"),
-            *([(_("Export a part"), "download", f"recording.export:{path}")] if path else []),
+            *([(_("Export a range"), "download", f"recording.export:{path}")] if path else []),
             (_("Back to live"), "radio-tower", "replay.live"),
         )
         for words, icon, command in rows:

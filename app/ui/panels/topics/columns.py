@@ -97,7 +97,7 @@ def _bandwidth_tip(topic: Topic) -> str:
 def age_cell(topic: Topic) -> Cell:
     """Return the cell with the age of the newest message, or the time since the topic disappeared."""
     if topic.gone_s is not None:
-        return Cell(_("gone {seconds} s").format(seconds=int(topic.gone_s)), role="textDisabled")
+        return Cell(_("gone for {seconds} s").format(seconds=int(topic.gone_s)), role="textDisabled")
     return Cell(age_words(topic.age_s), role=_ink(topic, "text"))
 
 
@@ -161,8 +161,10 @@ def _not_told(topic: Topic) -> str:
     if kind is None:
         return ""
     if topic.counted is not None:
-        return _("Measured here while it is open: {network} doesn't report it").format(network=kind.words)
-    return _("{network} doesn't report it. Topics you open are measured here").format(network=kind.words)
+        return _("{network} doesn't report this; Studio measures it while the topic is open").format(
+            network=kind.words
+        )
+    return _("{network} doesn't report this. Studio measures the topics you open").format(network=kind.words)
 
 
 def _rate_tip(topic: Topic) -> str:
@@ -258,12 +260,12 @@ def _folder_loss_tip(folder: TopicFolder) -> str:
     lost = folder.figures.lost
     if lost is None:
         return _("No subscriber reports losses")
-    said = ngettext("{count} message lost below {folder}", "{count} messages lost below {folder}", lost)
+    said = ngettext("{count} message lost in {folder}", "{count} messages lost in {folder}", lost)
     return said.format(count=grouped(lost), folder=folder.path)
 
 
 def _sum_tip(folder: TopicFolder) -> str:
-    return _("Total below {folder}").format(folder=folder.path)
+    return _("Total in {folder}").format(folder=folder.path)
 
 
 FolderColumn = tuple[
@@ -282,7 +284,7 @@ FOLDERS: dict[str, FolderColumn] = {
     "age": (
         lambda f: Cell(age_words(f.figures.age_s)),
         lambda f: f.figures.age_s,
-        lambda f: _("Newest message below {folder}").format(folder=f.path),
+        lambda f: _("Newest message in {folder}").format(folder=f.path),
     ),
     "loss": (_folder_loss, lambda _f: None, _folder_loss_tip),
 }  # fmt: skip

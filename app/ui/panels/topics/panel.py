@@ -32,8 +32,8 @@ if TYPE_CHECKING:
 
 FOOT = lazy("Rates are reported by the publishers; Studio subscribes only to the topics you open")
 FOOT_OF_NETWORKS = lazy(
-    "Rates are reported by the publishers. {networks} report neither rates nor losses; topics "
-    "you open there are measured here"
+    "Rates are reported by the publishers. {networks} report neither rates nor losses; Studio "
+    "measures the topics you open there"
 )
 RECORDED_FOOT = lazy("Recorded values; ages are relative to the playhead")
 WORDS = TableWords(
@@ -179,7 +179,7 @@ class TopicsPanel(NetworkTable[TreeRow]):
 
     def say_empty(self) -> None:
         if self.session.master.kind == "searching":
-            said = _("At {address}.").format(address=self.session.master.address)
+            said = _("Address: {address}").format(address=self.session.master.address)
             self.empty.set_texts(_("Searching for a master"), said, "radio-tower")
             self.empty.set_actions([])
         else:

@@ -25,7 +25,9 @@ from app.ui.widgets import IconButton
 from nep.i18n import _, lazy
 
 STOP_KEY = "F12"
-NEEDS_MODIFIER = lazy("A single letter can't be a shortcut. Hold Ctrl or Alt with it, or use a function key.")
+NEEDS_MODIFIER = lazy(
+    "A single letter can't be a shortcut. Combine it with Ctrl or Alt, or use a function key."
+)
 FUNCTION_KEYS = range(Qt.Key.Key_F1, Qt.Key.Key_F35 + 1)
 MODIFIERS = (
     Qt.KeyboardModifier.ControlModifier | Qt.KeyboardModifier.AltModifier | Qt.KeyboardModifier.MetaModifier
@@ -42,7 +44,7 @@ class Fixed:
 
 
 FIXED: tuple[Fixed, ...] = (
-    Fixed(lazy("Everywhere"), lazy("Close the palette or another open surface, or leave a field"), "Esc"),
+    Fixed(lazy("Everywhere"), lazy("Close the palette or a dialog, or leave a field"), "Esc"),
     Fixed(lazy("Everywhere"), lazy("Next control"), "Tab"),
     Fixed(lazy("Everywhere"), lazy("Previous control"), "Shift+Tab"),
     Fixed(lazy("Everywhere"), lazy("Press the selected button"), "Space"),
@@ -57,7 +59,7 @@ FIXED: tuple[Fixed, ...] = (
     Fixed(lazy("Plot"), lazy("Add a curve"), "C"),
     Fixed(lazy("Plot"), lazy("Pause or resume"), "Space"),
     Fixed(lazy("Plot"), lazy("Show or hide A and B"), "M"),
-    Fixed(lazy("Plot"), lazy("Place A or B at the mouse"), "A, B"),
+    Fixed(lazy("Plot"), lazy("Place A or B at the mouse pointer"), "A, B"),
     Fixed(lazy("Plot"), lazy("Move A or B by one value, with Shift by ten"), "Left, Right"),
     Fixed(lazy("Plot"), lazy("Shorter, longer, entire time range"), "+, -, 0"),
     Fixed(lazy("Plot"), lazy("Show or hide the selected curve"), "H"),
@@ -76,9 +78,9 @@ FIXED: tuple[Fixed, ...] = (
     Fixed(lazy("Timeline"), lazy("Shorter, longer, entire time range"), "+, -, 0"),
     Fixed(lazy("Sliders"), lazy("One step"), "Left, Right"),
     Fixed(lazy("Sliders"), lazy("Ten steps"), "PgUp, PgDown"),
-    Fixed(lazy("Sliders"), lazy("Lowest and highest"), "Home, End"),
+    Fixed(lazy("Sliders"), lazy("Minimum and maximum"), "Home, End"),
     Fixed(lazy("Blocks"), lazy("Move between blocks and slots"), "Up, Down, Left, Right"),
-    Fixed(lazy("Blocks"), lazy("Open the block's field, or take the block from the toolbox"), "Enter"),
+    Fixed(lazy("Blocks"), lazy("Edit the block's field, or insert the block from the toolbox"), "Enter"),
     Fixed(lazy("Blocks"), lazy("Run from the block, or show its value"), "Ctrl+Enter"),
     Fixed(lazy("Blocks"), lazy("Open the menu of the block or canvas"), "Shift+F10"),
     Fixed(lazy("Blocks"), lazy("Copy, cut, paste blocks"), "Ctrl+C, Ctrl+X, Ctrl+V"),
@@ -88,7 +90,7 @@ FIXED: tuple[Fixed, ...] = (
     Fixed(lazy("Blocks"), lazy("Delete block"), "Delete, Backspace"),
     Fixed(lazy("Blocks"), lazy("Move the block with the arrow keys; Enter places it"), "Ctrl+M"),
     Fixed(lazy("Blocks"), lazy("Move the block with all blocks below it"), "Ctrl+Shift+M"),
-    Fixed(lazy("Blocks"), lazy("Take the block out of its stack"), "Ctrl+Shift+X"),
+    Fixed(lazy("Blocks"), lazy("Detach the block from its stack"), "Ctrl+Shift+X"),
     Fixed(lazy("Blocks"), lazy("Disable or enable the block"), "Ctrl+E"),
     Fixed(lazy("Blocks"), lazy("Clean up the canvas"), "Ctrl+L"),
     Fixed(lazy("Blocks"), lazy("Go to the toolbox"), "Ctrl+B"),

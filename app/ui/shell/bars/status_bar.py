@@ -70,7 +70,7 @@ class StatusFacts:
         wrong = [fact.status for _link, facts in found for fact in facts if fact.to_look_at]
         if wrong:
             icon, status = _worst(wrong)
-            words = _("{robot}: {count} to check")
+            words = _("{robot}: needs attention ({count})")
             if len(links) > 1:
                 words = ngettext(
                     "{robots} robot: {count} warning", "{robots} robots: {count} warnings", len(links)
@@ -239,7 +239,7 @@ class StatusFacts:
     def window(self) -> Fact:
         """Return the duration of the last refresh of the window."""
         spent = f"{round(self.window_ms):>2}".replace(" ", FIGURE_SPACE)  # equal width for 9 and 10
-        return "", _("Window {spent} ms of {most} ms").format(spent=spent, most=TICK_MS), None
+        return "", _("Refresh {spent} ms of {most} ms").format(spent=spent, most=TICK_MS), None
 
 
 class StatusBar(QWidget):

@@ -88,7 +88,7 @@ class RecordCommands:
         recordings = self._recordings
         if not recordings.wish.is_on:
             self._shell.show_toast(
-                _("The flight recorder is off: there are no last seconds to save"),
+                _("The flight recorder is off: there is nothing to save"),
                 _("Turn it on"),
                 self._switch_on,
             )

@@ -89,7 +89,7 @@ class ReportCommands:
         """
         opened = open_outside(QUrl(page))
         words = (
-            _("This is NEP Studio {version}. Your browser shows the newest version.")
+            _("This is NEP Studio {version}. The newest version is shown in your browser.")
             if opened
             else _("This is NEP Studio {version}. You'll find newer versions at {page}")
         )

@@ -134,7 +134,7 @@ class RobotCommands:
 
         def change() -> None:
             if document.use_robot(swap.missing, robot):
-                words = _("{robot} does what {other} was asked to do")
+                words = _("Replaced {other} with {robot}")
                 words = words.format(robot=swap.other, other=swap.missing)
                 self._shell.show_toast(words, _("Undo"), self._undo)
 
@@ -148,7 +148,7 @@ class RobotCommands:
             self._session.fleet.permission.forget()
         except SettingsError as error:
             self._shell.complain(str(error))
-            words = _("Studio will ask again before a real robot moves, until you close it")
+            words = _("Until you close Studio, it will ask again before a real robot moves")
         self._shell.show_toast(words)
 
     def ask_about_others(self) -> None:

@@ -137,7 +137,7 @@ class VariableCommands:
     def refusal(self, name: str, own: str = "") -> str:
         """Return the reason why a name is invalid, or "". ``own`` is the id of the variable to rename."""
         if not name:
-            return _("A variable needs a name.")
+            return _("Enter a name for the variable.")
         if len(name) > MAX_NAME_LENGTH:
             return _("This name is too long. Use at most {most} characters.").format(most=MAX_NAME_LENGTH)
         used = {each.casefold() for id, each in self._workspace().variables.items() if id != own}

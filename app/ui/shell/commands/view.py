@@ -387,9 +387,7 @@ class ViewCommands:
         words = _("Opened the layout “{name}”").format(name=name)
         if found.unknown:
             left_out = listed(list(found.unknown[:MAX_NAMED]))
-            words = _("{opened}. Missing panels were left out: {panels}").format(
-                opened=words, panels=left_out
-            )
+            words = _("{opened}. Unknown panels were skipped: {panels}").format(opened=words, panels=left_out)
         shell.show_toast(words, _("Undo"), undo)
 
     def freeze(self) -> None:

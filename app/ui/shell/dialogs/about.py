@@ -17,7 +17,7 @@ from nep.version import __version__
 
 TITLE = "NEP Studio"
 LINES = (
-    lazy("See what robots say, and tell them what to do."),
+    lazy("See what robots send, and program what they do."),
     lazy("NEP Studio is free software (MIT licence)."),
     lazy("Inter, JetBrains Mono and M PLUS 1p: SIL Open Font License 1.1. Icons: Lucide, ISC licence."),
 )

@@ -133,7 +133,7 @@ class RecordSheet(Overlay):
 
     def _make_form(self) -> None:
         theme = self.theme
-        self.name = self._field(_("Name"), _("the time if left empty"))
+        self.name = self._field(_("Name"), _("default: date and time"))
         self.note = self._field(_("Note"), _("subject"))
         options = [
             ("all", _("All"), None),
@@ -236,7 +236,7 @@ class RecordSheet(Overlay):
         rows = QVBoxLayout(box)
         rows.setContentsMargins(12, 10, 12, 10)
         rows.setSpacing(8)
-        words = [label(each) for each in (_("keeps the last"), _("in at most"), _("on disk"))]
+        words = [label(each) for each in (_("keeps the last"), _("using up to"), _("on disk"))]
         self.ring_bar.setFixedWidth(round(self.theme.scaled(BAR_WIDE)))
         wish = _flow(self.ring, words[0], self.seconds, words[1], self.size_gb, words[2])
         there = _flow(self.ring_bar, self.ring_words, self.keep)
@@ -463,7 +463,7 @@ class RecordSheet(Overlay):
         # Explains the limits, or what is wrong with them.
         both = bool(self.ends_min.text() and self.ends_gb.text())
         none = not (self.ends_min.text() or self.ends_gb.text())
-        usual = _("whichever comes first") if both else _("when you stop it") if none else ""
+        usual = _("whichever comes first") if both else _("no limit") if none else ""
         self.ends_words.setText(sentence or usual)
         set_role(self.ends_words, "error" if sentence else "textSecondary")
 

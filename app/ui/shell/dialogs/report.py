@@ -38,8 +38,8 @@ LOOK_MS = 50
 ICON = 15
 ZIP = FileKind(lazy("Zip file"), ENDING)
 INTRODUCTION = lazy(
-    "Studio writes a file that describes its state on this computer. Nothing is sent: you give "
-    "the file to the person who helps you."
+    "Studio writes a file that describes its state on this computer. Nothing is sent: you "
+    "decide who gets the file."
 )
 NO_BEHAVIOURS = lazy("Your behaviours")
 NO_BEHAVIOURS_UNLESS = lazy("Your behaviours, unless you include them below")

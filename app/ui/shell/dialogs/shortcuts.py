@@ -240,7 +240,7 @@ class ShortcutSheet(Overlay):
             self._set_status(_("F12 can't be removed: it always triggers Stop."))
             return
         said = _("“{command}” no longer has a shortcut.").format(command=entry.words)
-        self._stop_waiting(_("Stop now has only F12.") if entry.name == STOP else said)
+        self._stop_waiting(_("Stop has only the shortcut F12 now.") if entry.name == STOP else said)
         self._shortcuts.give(entry.name, "")
 
     def _reset(self) -> None:

@@ -68,17 +68,17 @@ def read_layout(data: bytes, stem: str, panels: Collection[str]) -> LayoutFile:
     try:
         told = deep_json.loads(data)
     except (ValueError, RecursionError) as error:
-        raise LayoutFileError(_("it is damaged or not a layout of Studio")) from error
+        raise LayoutFileError(_("it is damaged or not a Studio layout")) from error
     if not isinstance(told, dict) or told.get("format") != FORMAT:
-        raise LayoutFileError(_("it is not a layout of Studio"))
+        raise LayoutFileError(_("it is not a Studio layout"))
     version = told.get("version")
     if type(version) is not int or version < 1:
         raise LayoutFileError(_("it is damaged"))
     if version > VERSION:
-        raise LayoutFileError(_("it was made by a newer Studio; update this one"))
+        raise LayoutFileError(_("it was saved by a newer version of Studio; update Studio to open it"))
     base, saved = told.get("base"), told.get("arrangement")
     if not isinstance(base, str) or base not in {layout.name for layout in LAYOUTS}:
-        raise LayoutFileError(_("it is for a layout that this Studio doesn't have"))
+        raise LayoutFileError(_("it belongs to a layout that this version of Studio doesn't have"))
     opened = saved.get("open") if isinstance(saved, dict) else None
     if not isinstance(saved, dict) or not isinstance(opened, list) or not isinstance(saved.get("docks"), str):
         raise LayoutFileError(_("it is damaged"))

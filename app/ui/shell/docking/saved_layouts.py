@@ -59,7 +59,7 @@ class SavedLayouts:
         """Return the reason why a name is invalid, as a sentence, or ""."""
         name = name.strip()
         if not name:
-            return _("A layout needs a name.")
+            return _("Enter a name for the layout.")
         if len(name) > MAX_LENGTH:
             return _("The name is too long. Use at most {count} characters.").format(count=MAX_LENGTH)
         taken = {_(layout.title).lower() for layout in LAYOUTS} | {own.name.lower() for own in self.all()}

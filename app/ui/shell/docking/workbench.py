@@ -225,7 +225,7 @@ class Workbench(QMainWindow):
         free = (number for number in range(1, MAX_OF_A_KIND + 1) if not self._is_open(key_of(name, number)))
         number = next(free, 0)
         if not number:
-            said = _("{count} are already open, the maximum")
+            said = _("The maximum of {count} panels of this kind is already open")
             self._context.toast(said.format(count=MAX_OF_A_KIND))
             return None
         if number == 1:

@@ -57,11 +57,11 @@ RECENT_SHOWN = 3
 FIRST, OTHER = 408, 318  # relative widths of the first card and the others
 LEARN = (
     lazy("Learn in five minutes"),
-    lazy("Six steps to a robot that speaks and turns. Each is checked as you go."),
+    lazy("Six steps to a robot that speaks and turns. Each is checked off as you go."),
 )
 OFFER = (
     lazy("First steps (five minutes)"),
-    lazy("New here? Six steps to a robot that speaks and turns. Each is checked as you go."),
+    lazy("New here? Six steps to a robot that speaks and turns. Each is checked off as you go."),
 )
 
 
@@ -172,7 +172,7 @@ class StartPage(QWidget):
         self._question = label(_("What would you like to do?"), "display", wrap=True)
         column.addWidget(self._question)
         column.addSpacing(7)
-        lead = _("Put blocks together to build what a robot says and does. No programming needed.")
+        lead = _("Combine blocks to make a robot speak and act. No programming needed.")
         column.addWidget(label(lead, "lead", role="textSecondary", wrap=True))
         column.addSpacing(24)
         column.addWidget(self.open_work)

@@ -104,9 +104,10 @@ def _in_folders(name: str) -> tuple[str, str] | None:
             bounds = [number for number, line in enumerate(lines) if line.strip() == "---"]
             if len(bounds) != 1:
                 raise NepError(
-                    _("'{path}' is not a .srv file; write '---' between the request and the response").format(
-                        path=path
-                    )
+                    _(
+                        "'{path}' is not a valid .srv file; write one line '---' between the request and "
+                        "the response"
+                    ).format(path=path)
                 )
             return "\n".join(lines[: bounds[0]]), "\n".join(lines[bounds[0] + 1 :])
     return None

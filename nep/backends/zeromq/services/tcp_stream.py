@@ -77,7 +77,7 @@ class TcpStream:
             self._clear_input()
             self.is_over = True
             self._abort()
-            reason = _("it declares {size} bytes; it is not a call, or is too large").format(size=size)
+            reason = _("invalid call size: {size} bytes").format(size=size)
             raise WireError(reason, code="call-size")
         if available < _SIZE.size + size:
             self._check_end(available)

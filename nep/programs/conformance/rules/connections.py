@@ -73,7 +73,10 @@ def _reconnect(bench: Bench) -> None:
 
 @rule(
     "other-socket-at-publisher",
-    lazy("A subscriber connects to a publisher whose port a ZeroMQ socket of another program had before."),
+    lazy(
+        "A subscriber connects to a publisher whose port was previously used by a ZeroMQ socket of "
+        "another program."
+    ),
     "a-failed-handshake",
 )
 def _other_socket_at_publisher(bench: Bench) -> None:

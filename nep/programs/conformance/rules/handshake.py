@@ -46,7 +46,10 @@ def _hello_after_topic(bench: Bench) -> None:
 
 @rule(
     "hello-form",
-    lazy("A hello has the subscriber's id in 16 lowercase hexadecimal digits and the level that it reads."),
+    lazy(
+        "A hello contains the subscriber's id as 16 lowercase hexadecimal digits, and the level "
+        "that it supports."
+    ),
     "who-connects",
 )
 def _hello_form(bench: Bench) -> None:
@@ -129,7 +132,7 @@ def _new_pub_bounded(bench: Bench) -> None:
 
 @rule(
     "missing",
-    lazy("Subscribers without a hello in time are reported to the program and to the master."),
+    lazy("Subscribers that don't send a hello in time are reported to the program and to the master."),
     _SECTION,
 )
 def _missing(bench: Bench) -> None:

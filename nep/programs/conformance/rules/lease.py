@@ -141,7 +141,10 @@ def _restart(bench: Bench) -> None:
 
 @rule(
     "other-socket-at-master",
-    lazy("A node joins a master that starts where a ZeroMQ socket of another program rejected it."),
+    lazy(
+        "A node joins a master that starts on an address where a ZeroMQ socket of another program "
+        "rejected the node before."
+    ),
     "a-failed-handshake",
 )
 def _other_socket_at_master(bench: Bench) -> None:
@@ -189,7 +192,7 @@ def _renewed_topics(bench: Bench) -> None:
 
 @rule(
     "unknown-answers",
-    lazy("Probes, unknown pushes, unknown fields and malformed answers are ignored."),
+    lazy("Probes, unknown pushes, unknown fields and malformed replies are ignored."),
     "the-master",
 )
 def _unknown_answers(bench: Bench) -> None:

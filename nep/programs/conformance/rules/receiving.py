@@ -64,7 +64,7 @@ def _reads_batches(bench: Bench) -> None:
     expect("payload", payloads[260], b'{"n":255}')
 
 
-@rule("reads-alone", lazy("A subscriber reads messages that are sent under its hello."), "notices")
+@rule("reads-alone", lazy("A subscriber reads messages whose first part is its hello."), "notices")
 def _reads_alone(bench: Bench) -> None:
     publisher, sub = bench.subscribed_publisher(bench.new_topic())
     for form in ("alone", "parts", "alone"):
@@ -104,7 +104,7 @@ def _other_topics(bench: Bench) -> None:
 
 @rule(
     "read",
-    lazy("A subscriber answers each echo but the first by subscribing to a read filter and removing it."),
+    lazy("A subscriber answers every echo except the first by subscribing to a read filter and removing it."),
     "what-is-under-way",
     "hello2",
 )

@@ -64,7 +64,7 @@ def _service_record(bench: Bench) -> None:
 
 @rule(
     "service-answer",
-    lazy("A server answers each call with the call's number and codec."),
+    lazy("A server replies to each call with the call's number and codec."),
     _SECTION,
     "services",
 )
@@ -83,7 +83,7 @@ def _service_answer(bench: Bench) -> None:
 
 @rule(
     "service-malformed",
-    lazy("A server ignores malformed calls, refuses calls that it can't decode, and keeps serving."),
+    lazy("A server ignores malformed calls, rejects calls that it can't decode, and keeps serving."),
     _SECTION,
     "services",
 )
@@ -138,7 +138,7 @@ def _called(bench: Bench, socket: zmq.Socket[bytes], number: int, reply: Reply) 
 
 @rule(
     "service-call",
-    lazy("A client calls the server that the master lists and returns its answer."),
+    lazy("A client calls the server that the master lists and returns its reply."),
     _SECTION,
     "services",
 )
@@ -152,7 +152,10 @@ def _service_call(bench: Bench) -> None:
 
 @rule(
     "other-socket-at-server",
-    lazy("A call waits for a server whose port a ZeroMQ socket of another program has, and is then sent."),
+    lazy(
+        "If a ZeroMQ socket of another program occupies the server's port, a call waits for the "
+        "server and is then sent."
+    ),
     "a-failed-handshake",
     "services",
 )
@@ -171,7 +174,7 @@ def _other_socket_at_server(bench: Bench) -> None:
 
 @rule(
     "service-error",
-    lazy("A client reports errors and refused calls as such, not as answers."),
+    lazy("A client reports errors and rejected calls as errors, not as replies."),
     _SECTION,
     "services",
 )
@@ -184,7 +187,7 @@ def _service_error(bench: Bench) -> None:
                 value = _called(bench, socket, number, failure(kind, error, "rejected by the tester"))
             except AdapterError:
                 continue
-            raise broken(_("it returned {seen} as the answer").format(seen=printable(value)))
+            raise broken(_("it returned {seen} as the reply").format(seen=printable(value)))
 
 
 @rule(

@@ -349,9 +349,11 @@ class _Fields:
         """Create the error for a missing field, or a field that is not `wanted`."""
         op = quotable(self._fields.get("op"))
         if name not in self._fields:
-            return self.error(_("'{op}' needs '{name}', {wanted}").format(op=op, name=name, wanted=wanted))
+            return self.error(
+                _("'{op}' requires '{name}' ({wanted})").format(op=op, name=name, wanted=wanted)
+            )
         return self.error(
-            _("'{name}' of '{op}' is {given}; give {wanted}").format(
+            _("'{name}' of '{op}' is {given}; expected {wanted}").format(
                 name=name, op=op, given=escaped(bounded_str(self._fields[name], 60)), wanted=wanted
             )
         )

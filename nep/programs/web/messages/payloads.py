@@ -214,7 +214,7 @@ def _image(fields: Mapping[str, object], ros_type: str) -> object:
 
 def _wrong(field: str, value: object, wanted: str) -> PayloadError:
     return PayloadError(
-        _("'{field}' is {given}; give {wanted}").format(
+        _("'{field}' is {given}; expected {wanted}").format(
             field=field, given=escaped(bounded_str(value, 60)), wanted=wanted
         )
     )

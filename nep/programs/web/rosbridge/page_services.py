@@ -100,7 +100,7 @@ class PageServices:
     async def advertise(self, operation: AdvertiseService) -> None:
         """Serve a service on behalf of the page."""
         if is_rosapi(operation.service):
-            raise OperationError(_("a page can't serve services of rosapi"), operation.id)
+            raise OperationError(_("a page can't provide services of rosapi"), operation.id)
         if operation.service in self._servers:
             return
         if len(self._servers) >= MAX_SERVICES:

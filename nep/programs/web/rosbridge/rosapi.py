@@ -57,7 +57,9 @@ class RosApi:
         name = f"/{service.removeprefix('/')}".removeprefix(PREFIX)
         known = _SERVICES.get(name)
         if known is None:
-            raise NepError(_("rosapi has no service '{service}' here").format(service=quotable(service)))
+            raise NepError(
+                _("the rosapi service '{service}' is not supported here").format(service=quotable(service))
+            )
         return known[1](self, args if isinstance(args, Mapping) else {})
 
     @cached_property
@@ -278,7 +280,9 @@ def _parameter(args: Mapping[str, object]) -> tuple[str, str]:
     node, colon, name = given.rpartition(":")
     if not colon or not node:
         raise NepError(
-            _("'{name}' is not a parameter here; write it as 'NODE:PARAMETER'").format(name=quotable(given))
+            _("'{name}' is not a valid parameter name; use the form 'NODE:PARAMETER'").format(
+                name=quotable(given)
+            )
         )
     return node.removeprefix("/"), name
 

@@ -53,7 +53,10 @@ def test_list_items_are_counted_from_1_and_described_in_words() -> None:
             "This needs a list, not a number. Set the variable to an empty list first.",
         ),
         (lambda: lists.item(None, 1), "This list has no value yet."),
-        (lambda: lists.add_item((1, 2), 3), "This list can't be changed."),
+        (
+            lambda: lists.add_item((1, 2), 3),
+            "This list can't be changed. Set a variable to a copy of it and change the copy.",
+        ),
         (
             lambda: lists.add_item([0] * lists.MAX_ITEMS, 1),
             "The list is full: it can have at most 10000 items.",

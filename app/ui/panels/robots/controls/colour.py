@@ -273,7 +273,7 @@ class ColourChoice(QWidget):
         if found is not None:
             self.swatches.set_value(f"#{found[1].lower()}")
             self.strip.show_colour(QColor(self.swatches.value))
-        self._judge("" if found is not None else _("A colour is written like #33aaff."), quiet=not final)
+        self._judge("" if found is not None else _("Enter a colour such as #33aaff."), quiet=not final)
         self.changed.emit()
         if final:
             self.finished.emit()

@@ -171,7 +171,7 @@ class PictureChoice(QWidget):
         if text.startswith("data:"):
             self._image = _image_in(text)
             self.thumbnail.show_image(self._image)
-            self.field.setText(_("image of that time") if self._image is not None else "")
+            self.field.setText(_("earlier image") if self._image is not None else "")
         else:
             self._typed(text)
             self.field.setText(text)

@@ -36,7 +36,7 @@ def read_picture(path: Path) -> tuple[QImage | None, str]:
         reason = (error.strerror or _("unknown")).lower()
         return None, _("“{file}” can't be read: {reason}.").format(file=path.name, reason=reason)
     if len(data) > MAX_FILE_BYTES:
-        said = _("“{file}” is too large. Choose a file below {size} MB.")
+        said = _("“{file}” is too large. Choose a file smaller than {size} MB.")
         return None, said.format(file=path.name, size=MAX_FILE_BYTES // 1_000_000)
     try:
         return image_of(data), ""
@@ -60,7 +60,7 @@ def image_of(data: bytes) -> QImage:
     reader.setDecideFormatFromContent(False)
     image = reader.read()
     if image.isNull():
-        raise DecodeError("image", len(data), _("they are not a readable image"))
+        raise DecodeError("image", len(data), _("not a readable image"))
     return upright(image, file)
 
 

@@ -48,12 +48,12 @@ class OpenTo(QWidget):
             self._row.removeWidget(self._choice)
             self._choice.deleteLater()
         if len(options) <= _MAX_SEGMENTS:
-            segments = Segments(self._theme, options, value, check=True, name=_("Open to"), wraps=True)
+            segments = Segments(self._theme, options, value, check=True, name=_("Available on"), wraps=True)
             segments.changed.connect(self.chosen)
             self._choice = segments
         else:
             combo = ComboBox(
-                self._theme, [(host, words) for host, words, _icon in options], name=_("Open to")
+                self._theme, [(host, words) for host, words, _icon in options], name=_("Available on")
             )
             combo.set_value(value)
             combo.activated.connect(lambda _index: self.chosen.emit(combo.value))
@@ -124,7 +124,7 @@ class AccessForm(QWidget):
         grid.setHorizontalSpacing(10)
         grid.setVerticalSpacing(8)
         grid.setColumnStretch(1, 1)
-        for place, words in enumerate((_("Address"), _("Token"), _("Open to"))):
+        for place, words in enumerate((_("Address"), _("Token"), _("Available on"))):
             grid.addWidget(label(words, "body", role="textSecondary"), place, 0)
         grid.addWidget(self.address, 0, 1)
         grid.addLayout(token, 1, 1)
@@ -170,13 +170,13 @@ class AccessForm(QWidget):
         words = _("Other devices can't reach this address.")
         if host:
             words = _(
-                "Devices in the network of {address} can reach this address. Messages are not encrypted."
+                "Devices on the network of {address} can reach this address. Messages are not encrypted."
             )
         self.reach.setText(words.format(address=host))
         self.works_with.setText(
             _("Port, token, origins and robots are the same as for rosbridge.")
             if is_foxglove
-            else _("Works with roslib, roslibpy and pages of your own.")
+            else _("Works with roslib, roslibpy and your own pages.")
         )
 
     def _show_code(self, *, is_foxglove: bool) -> None:
@@ -186,7 +186,9 @@ class AccessForm(QWidget):
                 _("Copy the link below. In Foxglove or Lichtblick: Open connection, Foxglove WebSocket.")
             )
         elif not web.host:
-            self.qr.show_words(_("Open it to a network to scan a code with a tablet."))
+            self.qr.show_words(
+                _("To scan a code with a tablet, select a network address instead of “This computer”.")
+            )
         elif web.state != "on" or "rosbridge" not in web.protocols:
             self.qr.show_words(_("The code appears here once web pages can connect."))
         else:

@@ -12,9 +12,9 @@ from app.ui.widgets.flow_layout import Flow
 from nep.i18n import _, lazy, ngettext
 
 _BUTTONS = {
-    "allow origin": lazy("Allow it"),
+    "allow origin": lazy("Allow"),
     "choose robots": lazy("Choose robots"),
-    "let in": lazy("Let it connect"),
+    "let in": lazy("Unblock"),
 }
 
 

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 def since_words(listed: ListedPage) -> str:
     """Format the state of a page, such as "since 8:32" or "gone 4 s"."""
     if listed.gone_s is not None:
-        return _("gone {seconds} s").format(seconds=int(listed.gone_s))
+        return _("gone for {seconds} s").format(seconds=int(listed.gone_s))
     then = dt.datetime.fromtimestamp(listed.page.since_s).astimezone()
     return _("since {time}").format(time=clock_words(then))
 

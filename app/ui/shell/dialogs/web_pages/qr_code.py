@@ -53,7 +53,7 @@ class QrCode(QWidget):
         try:
             modules = modules_of(text)
         except ImportError:
-            self.show_words(_("Install segno to see a code here: pip install segno"))
+            self.show_words(_("Install segno to show the QR code: pip install segno"))
             return
         self._text, self._modules, self._words = text, modules, ""
         self.setAccessibleName(

@@ -288,7 +288,7 @@ class WebPagesSheet(Overlay):
         self.model.show_pages([sorted_topics(each) for each in listed])
         words = ngettext("{count} connected", "{count} connected", count).format(count=grouped(count))
         self.count.set(words if count else "", "ok")
-        sums = _("{count}, {bandwidth} in all").format(
+        sums = _("{count}, {bandwidth} in total").format(
             count=grouped(count), bandwidth=bandwidth_words(web.bytes_per_s)
         )
         self.sums.setText(sums if count else "")
@@ -356,7 +356,7 @@ class WebPagesSheet(Overlay):
             return
         self._web.keep_out(page)
         self.refresh()
-        words = _("Disconnected {page}. It is refused when it connects again.")
+        words = _("Disconnected {page}. It is now blocked.")
         self._say(
             words.format(page=page_name(page)),
             _("Undo"),

@@ -175,7 +175,7 @@ class PermissionForm(QWidget):
         self.origins = OriginField(theme, web)
         self.origins_state = label("", "small", wrap=True)
         self.robots = RobotChoice(theme, web, robots)
-        said = _("Pages can read topics and publish their own. Moving a robot needs its name here.")
+        said = _("Pages can read topics and publish their own. Add a robot's name here to let pages move it.")
         self.robots_state = label(said, "small", role="textTertiary", wrap=True)
         self._grid = grid = QGridLayout(self)
         grid.setContentsMargins(0, 0, 0, 0)
@@ -206,8 +206,8 @@ class PermissionForm(QWidget):
         self.origins.show_origins(self._web.origins)
         set_role(self.origins_state, "error" if self.origins.is_wrong else "textTertiary")
         self.origins_state.setText(
-            _("An origin looks like {example}.").format(example=EXAMPLE)
+            _("Enter an origin such as {example}.").format(example=EXAMPLE)
             if self.origins.is_wrong
-            else _("Pages from other origins are refused. Programs need only the token.")
+            else _("Pages from other origins are blocked. Programs need only the token.")
         )
         self.robots.show_state()
